@@ -1,0 +1,1 @@
+"""Policies that play without torch: scripted ones, and shipped learned ones."""

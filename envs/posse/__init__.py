@@ -1,0 +1,60 @@
+"""posse: a team of unicycle robots finds, follows and holds formation on one mobile target."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from posse.batch import Batch, Snapshot
+from posse.metrics import METRICS, Metric
+from posse.observation import Field, ObservationLayout
+from posse.reward import REWARD_TERMS, RewardTerm
+from posse.scenario import Scenario, ScenarioError
+from posse.scenarios import get_scenario, scenario_names
+
+__version__ = "0.1.0"
+
+
+def batch(
+    scenario: str | Scenario = "constant",
+    num_worlds: int = 1,
+    *,
+    seed: int = 0,
+    split: str = "train",
+    first_world: int = 0,
+    autoreset: str = "next_step",
+    num_threads: int | None = None,
+    **overrides: Any,
+) -> Batch:
+    """Return a batch of worlds, the engine under every environment; see :class:`Batch`."""
+    return Batch(
+        get_scenario(scenario, **overrides),
+        num_worlds,
+        seed=seed,
+        split=split,
+        first_world=first_world,
+        autoreset=autoreset,
+        num_threads=num_threads,
+    )
+
+
+def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
+    """Return every field of a scenario's observation, in order: name, size, unit, range, meaning."""
+    return ObservationLayout(get_scenario(scenario, **overrides)).fields
+
+
+__all__ = [
+    "METRICS",
+    "REWARD_TERMS",
+    "Batch",
+    "Field",
+    "Metric",
+    "ObservationLayout",
+    "RewardTerm",
+    "Scenario",
+    "ScenarioError",
+    "Snapshot",
+    "batch",
+    "get_scenario",
+    "observation_fields",
+    "scenario_names",
+]

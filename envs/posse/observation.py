@@ -1,0 +1,541 @@
+"""The observation of one robot: a flat float32 vector, its fields declared by name.
+
+The fields come in five blocks. Each block's declaration stands above the function that writes it,
+so that adding a field touches one place. Directions are cosine and sine; *ego* means the robot's own
+frame, x ahead and y to the left; the *common frame* is the one that the team agreed on at the start.
+A quantity that is not known holds the field's ``unknown`` value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled
+from posse.formation import FORMATIONS
+from posse.scenario import Scenario
+from posse.sensing import ping
+from posse.state import NEVER
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_MINUS_ONE: Final = np.float32(-1.0)
+_LARGE: Final = np.float32(1e18)
+_COUNTED: Final = 12  # up to this team size, places are found by counting
+_SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
+
+
+@dataclass(frozen=True)
+class Field:
+    """One named part of an observation."""
+
+    name: str
+    size: int
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    unknown: float | None = None
+    """The value that stands for "not known", or ``None`` where it is always known."""
+    of_neighbour: bool = False
+    """Whether it is repeated for each place of a team-mate."""
+
+
+def _own_fields(s: Scenario) -> list[Field]:
+    bound = s.position_bound * _SLACK
+    return [
+        Field("heading", 2, "1", -1, 1, "own heading in the common frame, cosine and sine"),
+        Field("position", 2, "m", -bound, bound, "own odometry in the common frame, x and y"),
+        Field("speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "own speed"),
+        Field(
+            "turn_rate", 1, "rad/s",
+            -_most_turn(s), _most_turn(s), "own turn rate, positive to the left",
+        ),
+        Field("touching", 1, "1", 0, 1, "1 while it touches a robot, an obstacle or a wall"),
+        Field("working", 1, "1", 0, 1, "0 once it is broken: its actions are ignored"),
+    ]  # fmt: skip
+
+
+def _most_turn(s: Scenario) -> float:
+    return max(s.tracker_turn_rate, s.target_turn_rate) * _SLACK
+
+
+@compiled
+def _write_own(
+    c: Record, robot: Record, touching: int, working: int, o: FloatArray, k: int
+) -> int:
+    o[k] = robot.heading_cos
+    o[k + 1] = robot.heading_sin
+    o[k + 2] = robot.x
+    o[k + 3] = robot.y
+    o[k + 4] = robot.speed
+    o[k + 5] = robot.turn_rate
+    o[k + 6] = np.float32(touching)
+    o[k + 7] = np.float32(working)
+    return k + 8
+
+
+def _task_fields(s: Scenario) -> list[Field]:
+    n = s.num_trackers
+    return [
+        Field(
+            "formation", len(FORMATIONS), "1", 0, 1,
+            f"the formation asked for: 1 at its place among {', '.join(FORMATIONS)}",
+        ),
+        Field("number", 1, "1", -1, n - 1, "own number, 0 to N - 1", unknown=-1),
+        Field("team_size", 1, "1", n, n, "N, trackers in the team"),
+        Field(
+            "formation_distance", 1, "m",
+            s.formation_distance / _SLACK, s.formation_distance * _SLACK,
+            "wanted distance from the target to the nearest slot",
+        ),
+        Field(
+            "formation_spacing", 1, "m",
+            s.formation_spacing / _SLACK, s.formation_spacing * _SLACK,
+            "wanted distance between neighbouring slots",
+        ),
+        Field("max_speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "own greatest speed"),
+        Field("max_turn_rate", 1, "rad/s", 0, _most_turn(s), "own greatest turn rate"),
+        Field(
+            "acceleration_time", 1, "s",
+            0, s.tracker_speed / s.tracker_acceleration * _SLACK,
+            "from rest to full speed; 0: at once",
+        ),
+        Field(
+            "turn_acceleration_time", 1, "s",
+            0, s.tracker_turn_rate / s.tracker_turn_acceleration * _SLACK,
+            "from no turn to the greatest turn rate; 0: at once",
+        ),
+        Field("time_left", 1, "s", 0, s.duration * _SLACK, "until the episode is truncated"),
+    ]  # fmt: skip
+
+
+@compiled
+def _write_task(
+    c: Record,
+    w: Record,
+    number: int,
+    max_speed: np.float32,
+    max_turn_rate: np.float32,
+    o: FloatArray,
+    k: int,
+) -> int:
+    o[k] = _ZERO
+    o[k + 1] = _ZERO
+    o[k + 2] = _ZERO
+    o[k + c.formation] = _ONE
+    o[k + 3] = np.float32(number)
+    o[k + 4] = np.float32(c.num_trackers)
+    o[k + 5] = c.formation_distance
+    o[k + 6] = c.formation_spacing
+    o[k + 7] = max_speed
+    o[k + 8] = max_turn_rate
+    o[k + 9] = c.acceleration_time
+    o[k + 10] = c.turn_acceleration_time
+    o[k + 11] = np.float32(c.horizon - w.step) * c.dt
+    return k + 12
+
+
+def _target_fields(s: Scenario) -> list[Field]:
+    noise = 1 + 3 * s.range_noise + 3 * s.bearing_noise
+    most = s.range_bound * noise * _SLACK
+    return [
+        Field("target_known", 1, "1", 0, 1, "1 once it has a fix of the target, seen or heard"),
+        Field("target_seen", 1, "1", 0, 1, "1 while its own sensor has the target"),
+        Field(
+            "target_age", 1, "s", -1, s.duration * _SLACK,
+            "age of the fix that the following fields are about", unknown=-1,
+        ),
+        Field("target_range", 1, "m", -1, most, "distance of the fix from here", unknown=-1),
+        Field("target_bearing", 2, "1", -1, 1, "direction of the fix, ego", unknown=0),
+        Field("target_heading", 2, "1", -1, 1, "heading of the target at the fix, ego", unknown=0),
+        Field("target_frame", 2, "1", -1, 1, "slot frame ψ at the fix, ego", unknown=0),
+        Field(
+            "target_velocity", 2, "m/s", -s.tracker_speed * _SLACK, s.tracker_speed * _SLACK,
+            "velocity of the target from successive fixes, ego", unknown=0,
+        ),
+    ]  # fmt: skip
+
+
+@compiled
+def _unit(value: np.float32) -> np.float32:
+    """Return a cosine or sine that rounding may have carried past 1, brought back."""
+    return min(max(value, _MINUS_ONE), _ONE)
+
+
+@compiled
+def _write_direction(
+    hc: np.float32, hs: np.float32, x: np.float32, y: np.float32, o: FloatArray, k: int
+) -> int:
+    """Write a unit vector of the common frame in the frame whose heading is (hc, hs)."""
+    o[k] = _unit(x * hc + y * hs)
+    o[k + 1] = _unit(y * hc - x * hs)
+    return k + 2
+
+
+@compiled
+def _write_place(
+    hc: np.float32, hs: np.float32, dx: np.float32, dy: np.float32, o: FloatArray, k: int
+) -> int:
+    """Write the range and the ego direction of what lies (dx, dy) away in the common frame."""
+    distance = np.float32(math.sqrt(dx * dx + dy * dy))
+    o[k] = distance
+    if distance > _ZERO:
+        return int(_write_direction(hc, hs, dx / distance, dy / distance, o, k + 1))
+    o[k + 1] = _ONE
+    o[k + 2] = _ZERO
+    return k + 3
+
+
+@compiled
+def _write_target(c: Record, w: Record, t: Record, o: FloatArray, k: int) -> int:
+    if t.fix_step < 0:
+        return int(_write_no_target(o, k))
+    hc, hs = t.heading_cos, t.heading_sin
+    o[k] = _ONE
+    o[k + 1] = np.float32(t.sees)
+    o[k + 2] = np.float32(w.step - t.fix_step) * c.dt
+    k = _write_place(hc, hs, t.fix_x - t.x, t.fix_y - t.y, o, k + 3)
+    k = _write_direction(hc, hs, t.fix_cos, t.fix_sin, o, k)
+    k = _write_direction(hc, hs, t.fix_frame_cos, t.fix_frame_sin, o, k)
+    o[k] = t.fix_vx * hc + t.fix_vy * hs
+    o[k + 1] = t.fix_vy * hc - t.fix_vx * hs
+    return k + 2
+
+
+@compiled
+def _write_no_target(o: FloatArray, k: int) -> int:
+    for j in range(k, k + 12):
+        o[j] = _ZERO
+    o[k + 2] = _MINUS_ONE
+    o[k + 3] = _MINUS_ONE
+    return k + 12
+
+
+def _sonar_fields(s: Scenario) -> list[Field]:
+    if s.sonar_beams == 0:
+        return []
+    return [
+        Field(
+            "sonar", s.sonar_beams, "m", 0, s.sonar_range * _SLACK,
+            "distance from its rim to anything, each beam from straight ahead to the left; "
+            "sonar_range where nothing is near",
+        )
+    ]  # fmt: skip
+
+
+def _neighbour_fields(s: Scenario) -> list[Field]:
+    fields = [
+        Field("neighbour_number", 1, "1", -1, s.num_trackers - 1, "its number", -1),
+        Field("neighbour_age", 1, "s", -1, s.forget_after * _SLACK, "age of what was heard", -1),
+        Field(
+            "neighbour_range", 1, "m", -1, s.range_bound * _SLACK,
+            "distance from here to where it was", -1,
+        ),
+        Field("neighbour_bearing", 2, "1", -1, 1, "direction of where it was, ego", 0),
+        Field("neighbour_heading", 2, "1", -1, 1, "its heading, ego", 0),
+        Field("neighbour_speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "its speed", 0),
+        Field(
+            "neighbour_turn_rate", 1, "rad/s",
+            -s.tracker_turn_rate * _SLACK, s.tracker_turn_rate * _SLACK, "its turn rate", 0,
+        ),
+    ]  # fmt: skip
+    if s.message_size:
+        fields.append(
+            Field("neighbour_message", s.message_size, "1", -1, 1, "what its policy added", 0)
+        )
+    return [Field(**{**f.__dict__, "of_neighbour": True}) for f in fields]
+
+
+@compiled
+def _write_neighbour(
+    hc: np.float32,
+    hs: np.float32,
+    x: np.float32,
+    y: np.float32,
+    other: Record,
+    number: int,
+    age: np.float32,
+    o: FloatArray,
+) -> None:
+    """Write a team-mate's part (9 + m,), the message excepted."""
+    o[0] = np.float32(number)
+    o[1] = age
+    k = _write_place(hc, hs, other.x - x, other.y - y, o, 2)
+    k = _write_direction(hc, hs, other.heading_cos, other.heading_sin, o, k)
+    o[k] = other.speed
+    o[k + 1] = other.turn_rate
+
+
+@compiled
+def _write_message(said: FloatArray, o: FloatArray) -> None:
+    for q in range(len(said)):
+        o[9 + q] = said[q]
+
+
+@compiled
+def _keep_nearest(
+    places: int, filled: int, number: int, d2: np.float32, nearest: FloatArray
+) -> int:
+    """Insert a team-mate into the (2, N) list of the nearest, row 0 distances, row 1 numbers."""
+    if filled == places and d2 >= nearest[0, places - 1]:
+        return filled
+    spot = filled if filled < places else places - 1
+    while spot > 0 and nearest[0, spot - 1] > d2:
+        nearest[0, spot] = nearest[0, spot - 1]
+        nearest[1, spot] = nearest[1, spot - 1]
+        spot -= 1
+    nearest[0, spot] = d2
+    nearest[1, spot] = np.float32(number)
+    return min(filled + 1, places)
+
+
+@compiled
+def _write_all_neighbours(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    i: int,
+    x: np.float32,
+    y: np.float32,
+    hc: np.float32,
+    hs: np.float32,
+    message: FloatArray,
+    nearest: FloatArray,
+    o: FloatArray,
+    k: int,
+) -> None:
+    """Write every team-mate, nearest first, where all are heard and each has a place.
+
+    Its place is the number of team-mates that are nearer: counted without branches, which
+    beats sorting for small teams.
+    """
+    n, size = c.num_trackers, 9 + c.message_size
+    for j in range(n):
+        dx, dy = trackers[j].x - x, trackers[j].y - y
+        nearest[0, j] = dx * dx + dy * dy
+    nearest[0, i] = _LARGE
+    for j in range(n):
+        if j != i:
+            d2 = nearest[0, j]
+            place = 0
+            for other in range(n):
+                nearer = nearest[0, other] < d2 or (nearest[0, other] == d2 and other < j)
+                place += 1 if nearer else 0
+            part = o[k + place * size : k + (place + 1) * size]
+            _write_neighbour(hc, hs, x, y, trackers[j], j, _ZERO, part)
+            _write_message(message[j], part)
+
+
+@compiled
+def _write_neighbours(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    i: int,
+    heard: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    nearest: FloatArray,
+    o: FloatArray,
+    k: int,
+) -> None:
+    """Write the team-mates of tracker i, nearest first, from what it last heard of each."""
+    t = trackers[i]
+    x, y, hc, hs = t.x, t.y, t.heading_cos, t.heading_sin
+    places, perfect = c.neighbours, c.perfect_radio != 0
+    if perfect and c.num_trackers <= _COUNTED and w.working == c.num_trackers <= places + 1:
+        _write_all_neighbours(c, w, trackers, i, x, y, hc, hs, message[0], nearest, o, k)
+        return
+    filled = 0
+    deaf = perfect and t.broken_at != NEVER
+    if places > 0:
+        for j in range(c.num_trackers):
+            if j == i or deaf:
+                continue
+            if perfect:
+                # Nothing is lost, so what was last heard of a team-mate is where it is; one that
+                # broke stays where it was when it was last heard.
+                known = w.step - trackers[j].broken_at <= c.forget_steps
+                dx, dy = trackers[j].x - x, trackers[j].y - y
+            else:
+                h = heard[i, j]
+                known = h.step >= 0 and w.step - h.step <= c.forget_steps
+                dx, dy = h.x - x, h.y - y
+            if known:
+                filled = _keep_nearest(places, filled, j, dx * dx + dy * dy, nearest)
+    size = 9 + c.message_size
+    for p in range(places):
+        part = o[k + p * size : k + (p + 1) * size]
+        if p >= filled:
+            part[:] = _ZERO
+            part[0] = _MINUS_ONE
+            part[1] = _MINUS_ONE
+            part[2] = _MINUS_ONE
+            continue
+        j = int(nearest[1, p])
+        if perfect:
+            age = max(_ZERO, np.float32(w.step - trackers[j].broken_at)) * c.dt
+            _write_neighbour(hc, hs, x, y, trackers[j], j, age, part)
+            _write_message(message[0, j], part)
+        else:
+            age = np.float32(w.step - heard[i, j].step) * c.dt
+            _write_neighbour(hc, hs, x, y, heard[i, j], j, age, part)
+            _write_message(heard_message[i, j], part)
+
+
+@compiled
+def observe_tracker(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    i: int,
+    obstacles: Records,
+    heard: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    beams: FloatArray,
+    nearest: FloatArray,
+    o: FloatArray,
+) -> None:
+    """Write what tracker i is given, (F,)."""
+    t = trackers[i]
+    k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
+    k = _write_task(c, w, i, c.tracker_speed, c.tracker_turn_rate, o, k)
+    k = _write_target(c, w, t, o, k)
+    ping(c, w, t, i, trackers, obstacles, beams, o[k : k + c.sonar_beams])
+    k += c.sonar_beams
+    _write_neighbours(
+        c, w, trackers, i, heard, heard_message, message, nearest, o, k
+    )
+
+
+@compiled
+def observe_target(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    beams: FloatArray,
+    nearest: FloatArray,
+    o: FloatArray,
+) -> None:
+    """Write what a target that is an agent is given: it knows where every tracker is, (F,)."""
+    k = _write_own(c, w, w.touching != np.uint64(0), 1, o, 0)
+    k = _write_task(c, w, -1, c.target_speed, c.target_turn_rate, o, k)
+    k = _write_no_target(o, k)
+    ping(c, w, w, -1, trackers, obstacles, beams, o[k : k + c.sonar_beams])
+    k += c.sonar_beams
+    # As many trackers as there are places: those of the lowest numbers, if not all fit.
+    size = 9 + c.message_size
+    for j in range(c.neighbours):
+        part = o[k + j * size : k + (j + 1) * size]
+        part[:] = _ZERO
+        _write_neighbour(
+            w.heading_cos, w.heading_sin, w.x, w.y, trackers[j], j, _ZERO, part
+        )
+
+
+class ObservationLayout:
+    """Where each field lies in the flat observation of a scenario, and what it may hold.
+
+    Attributes:
+        fields: Every :class:`Field`, in order; those of a team-mate once.
+        size: F, length of the flat observation.
+        neighbours: Places for team-mates.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        single = [
+            *_own_fields(scenario),
+            *_task_fields(scenario),
+            *_target_fields(scenario),
+            *_sonar_fields(scenario),
+        ]
+        repeated = _neighbour_fields(scenario)
+        self.fields: tuple[Field, ...] = (*single, *repeated)
+        self.neighbours = scenario.neighbours
+        self._repeated_from = sum(field.size for field in single)
+        self._stride = sum(field.size for field in repeated)
+        self.size = self._repeated_from + self.neighbours * self._stride
+        self.offsets: dict[str, int] = {}
+        offset = 0
+        for field in self.fields:
+            self.offsets[field.name] = offset
+            offset += field.size
+
+    @property
+    def stride(self) -> int:
+        """Length of one team-mate's part."""
+        return self._stride
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest value of every entry, each (F,) float32."""
+
+        def stack(values: list[tuple[Field, float]]) -> list[float]:
+            single = [v for f, v in values if not f.of_neighbour for _ in range(f.size)]
+            repeated = [v for f, v in values if f.of_neighbour for _ in range(f.size)]
+            return single + repeated * self.neighbours
+
+        low = stack([(field, field.low) for field in self.fields])
+        high = stack([(field, field.high) for field in self.fields])
+        return np.array(low, np.float32), np.array(high, np.float32)
+
+    def views(self, observations: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
+        """Return named views of flat observations (..., F), sharing their memory.
+
+        A field of size 1 is (...), one of size k is (..., k); a team-mate's field has one more
+        axis before, (..., places) or (..., places, k).
+
+        Raises:
+            ValueError: The last axis is not F long.
+        """
+        if observations.shape[-1] != self.size:
+            raise ValueError(
+                f"observations of shape {observations.shape} do not fit: the last axis of "
+                f"{self.scenario.name!r} is {self.size} long"
+            )
+        mates = observations[..., self._repeated_from :].reshape(
+            *observations.shape[:-1], self.neighbours, self._stride
+        )
+        views: dict[str, npt.NDArray[Any]] = {}
+        for field in self.fields:
+            start = self.offsets[field.name]
+            source = observations
+            if field.of_neighbour:
+                source, start = mates, start - self._repeated_from
+            part = source[..., start : start + field.size]
+            views[field.name] = part[..., 0] if field.size == 1 else part
+        return views
+
+    def flatten(self, views: Mapping[str, npt.ArrayLike]) -> FloatArray:
+        """Return the flat observations (..., F) of named values; the inverse of :meth:`views`.
+
+        Raises:
+            ValueError: A field is missing, unknown, or of a shape that does not fit.
+        """
+        names = [field.name for field in self.fields]
+        if set(views) != set(names):
+            odd = sorted(set(views) ^ set(names))
+            raise ValueError(f"fields missing or unknown: {', '.join(odd)}")
+        leading = np.shape(views["speed"])
+        flat = np.empty((*leading, self.size), np.float32)
+        for name, part in self.views(flat).items():
+            value = np.asarray(views[name], np.float32)
+            if value.shape != part.shape:
+                raise ValueError(f"{name} has shape {value.shape}, wanted {part.shape}")
+            part[...] = value
+        return flat
+
+    def describe(self) -> list[dict[str, Any]]:
+        """Return every field as a plain dictionary, in order, for files and tables."""
+        return [
+            {**field.__dict__, "offset": self.offsets[field.name]} for field in self.fields
+        ]

@@ -1,0 +1,129 @@
+"""The score, and the sums that the metrics are worked out from.
+
+At each control step, score = occupied slots / working trackers, at most 1. A slot is occupied when
+a working tracker that touches nothing is within tolerance of it; who stands where is free.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled
+from posse.radio import connected
+from posse.state import NEVER
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_LARGE: Final = np.float32(1e12)
+_BIT: Final = np.uint64(1)
+_NO_BITS: Final = np.uint64(0)
+
+
+@compiled
+def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
+    """Return a tracker's position in the slot frame, (ahead, left) of the target, m."""
+    dx, dy = t.x - w.x, t.y - w.y
+    return dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+
+
+@compiled
+def nearest_slot(
+    c: Record, slots: Records, taken: np.uint64, ahead: np.float32, left: np.float32
+) -> tuple[int, np.float32]:
+    """Return the nearest slot that is not in the set ``taken``, and its squared distance."""
+    best, least = -1, _LARGE
+    for s in range(c.num_trackers):
+        if taken & (_BIT << np.uint64(s)) == _NO_BITS:
+            dx, dy = ahead - slots[s].x, left - slots[s].y
+            d2 = dx * dx + dy * dy
+            if d2 < least:
+                best, least = s, d2
+    return best, least
+
+
+@compiled
+def occupy(c: Record, w: Record, trackers: Records, slots: Records) -> None:
+    """Work out who occupies which slot, and how far everyone is from a slot that is free."""
+    taken = _NO_BITS
+    occupied = 0
+    near2 = c.tolerance * c.tolerance
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        t.slot = -1
+        ahead, left = place(c, w, t)
+        best, least = nearest_slot(c, slots, _NO_BITS, ahead, left)
+        # Until all slots taken are known, the distance to the nearest one of all.
+        t.slot_progress = t.slot_distance
+        t.slot_distance = np.float32(math.sqrt(least))
+        if least <= near2 and t.broken_at == NEVER and t.touching == 0:
+            bit = _BIT << np.uint64(best)
+            if taken & bit == _NO_BITS:
+                taken |= bit
+                occupied += 1
+                t.slot = best
+    if taken != _NO_BITS:
+        for i in range(c.num_trackers):
+            t = trackers[i]
+            if t.slot < 0:
+                ahead, left = place(c, w, t)
+                best, least = nearest_slot(c, slots, taken, ahead, left)
+                if best >= 0:
+                    t.slot_distance = np.float32(math.sqrt(least))
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        t.slot_progress -= t.slot_distance
+    w.score = _ZERO
+    if w.working > 0:
+        w.score = min(_ONE, np.float32(occupied) / np.float32(w.working))
+    w.held = w.held + 1 if w.working > 0 and occupied >= w.working else 0
+
+
+@compiled
+def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
+    """Say whether a tracker, straight on from its start at full speed, could be in a slot now."""
+    reach = c.tracker_speed * np.float32(w.step) * c.dt + c.tolerance
+    dx, dy = t.start_x - w.x, t.start_y - w.y
+    most = reach + c.slots_reach
+    if dx * dx + dy * dy > most * most:
+        return False
+    ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+    _, least = nearest_slot(c, slots, _NO_BITS, ahead, left)
+    return bool(least <= reach * reach)
+
+
+@compiled
+def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
+    """Add this step to the sums of the episode."""
+    w.score_sum += w.score
+    bound, error, effort, sight = 0, _ZERO, _ZERO, _ZERO
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            continue
+        if t.could_arrive == 0:
+            t.could_arrive = could_arrive(c, w, t, slots)
+        bound += t.could_arrive
+        error += t.slot_distance
+        v, turn = t.speed / c.tracker_speed, t.turn_rate / c.tracker_turn_rate
+        effort += v * v + turn * turn
+        sight += np.float32(t.sees)
+    w.error_sum += error
+    w.effort_sum += effort
+    w.sight_sum += sight
+    w.tracker_steps += np.float32(w.working)
+    if w.working > 0:
+        w.bound_sum += np.float32(bound) / np.float32(w.working)
+    if w.detected_at < 0 and sight > _ZERO:
+        w.detected_at = w.step
+    if connected(c, w, trackers):
+        w.connected_sum += _ONE
+    if w.held >= c.settle_steps:
+        begun = w.step - w.held + 1
+        if w.settled_at < 0:
+            w.settled_at = begun
+        if w.lost_at >= 0 and w.recovered_at < 0:
+            w.recovered_at = begun

@@ -1,0 +1,319 @@
+"""One world, stepped: the order in which everything happens in a control step.
+
+actions → faults → the target decides → physics (target first, then trackers by number) → the slot
+frame follows → contacts → sensing → radio → score → reward → end → observation.
+
+Only the kernels at the end loop over a batch; everything else is about one world.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled, kernel
+from posse.contact import free_move, meet
+from posse.faults import apply_faults
+from posse.formation import follow_heading
+from posse.kinematics import approach, arc
+from posse.observation import observe_target, observe_tracker
+from posse.radio import hear, send, share_fixes
+from posse.reward import write_reward
+from posse.score import add_up, occupy
+from posse.sensing import look
+from posse.start import draw_start, rest
+from posse.state import NEVER
+from posse.target_motion import AGENT, target_turn_rate
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_HALF: Final = np.float32(0.5)
+
+
+@compiled
+def move(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    robot: Record,
+    number: int,
+    time: np.float32,
+) -> None:
+    """Move a tracker (number -1: the target) on its arc, as far as nothing blocks."""
+    dx, dy, robot.heading_cos, robot.heading_sin = arc(
+        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, time
+    )
+    if robot.near:
+        share = free_move(c, w, trackers, obstacles, number, robot.x, robot.y, dx, dy)
+        if share < _ONE:
+            dx, dy = dx * share, dy * share
+            robot.speed = _ZERO
+    robot.x += dx
+    robot.y += dy
+
+
+@compiled
+def command(c: Record, t: Record, action: FloatArray) -> None:
+    """Bring a tracker's speed and turn rate towards what the action asks for, within its limits."""
+    speed = _HALF * (action[0] + _ONE) * c.tracker_speed
+    t.speed = approach(t.speed, speed, c.speed_change)
+    t.turn_rate = approach(t.turn_rate, action[1] * c.tracker_turn_rate, c.turn_change)
+
+
+@compiled
+def command_target(
+    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray
+) -> None:
+    """Set the target's speed and turn rate for the control step."""
+    w.speed = c.target_speed
+    if c.motion == AGENT:
+        action = actions[c.num_trackers]
+        w.speed = _HALF * (action[0] + _ONE) * c.target_speed
+        w.turn_rate = action[1] * c.target_turn_rate
+    else:
+        w.turn_rate = target_turn_rate(c, w, trackers, obstacles)
+
+
+@compiled
+def motion(
+    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray
+) -> None:
+    """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
+
+    A robot that nothing can touch within the step moves on one arc; one that something is near to
+    moves by physics steps, each of them swept.
+    """
+    command_target(c, w, trackers, obstacles, actions)
+    any_near = w.near != 0 or c.whole_arcs == 0
+    if not any_near:
+        move(c, w, trackers, obstacles, w, -1, c.dt)
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.broken_at == NEVER:
+            if c.whole_arcs and t.near == 0:
+                command(c, t, actions[i])
+                move(c, w, trackers, obstacles, t, i, c.dt)
+            else:
+                any_near = True
+    if any_near:
+        target_in_parts = w.near != 0 or c.whole_arcs == 0
+        for _ in range(c.physics_steps):
+            if target_in_parts:
+                move(c, w, trackers, obstacles, w, -1, c.physics_dt)
+            for i in range(c.num_trackers):
+                t = trackers[i]
+                if t.broken_at == NEVER and (t.near != 0 or c.whole_arcs == 0):
+                    command(c, t, actions[i])
+                    move(c, w, trackers, obstacles, t, i, c.physics_dt)
+    w.frame_cos, w.frame_sin = follow_heading(
+        w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
+    )
+
+
+@compiled
+def sense(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+) -> None:
+    """Let every tracker look for the target, then tell and hear."""
+    for i in range(c.num_trackers):
+        look(c, w, trackers[i], obstacles, i)
+    if c.perfect_radio:
+        share_fixes(c, trackers)
+    else:
+        send(c, w, trackers, broadcast)
+        hear(c, w, trackers, heard, broadcast, heard_message, message)
+
+
+@compiled
+def observe(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    heard: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    beams: FloatArray,
+    nearest: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write the observations of every agent of a world, (rows, F)."""
+    for i in range(c.num_trackers):
+        observe_tracker(
+            c, w, trackers, i, obstacles, heard, heard_message, message, beams, nearest,
+            observations[i],
+        )  # fmt: skip
+    if c.motion == AGENT:
+        observe_target(
+            c, w, trackers, obstacles, beams, nearest, observations[c.num_trackers]
+        )
+
+
+@compiled
+def begin(
+    c: Record,
+    slots: Records,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+) -> None:
+    """Bring a world whose poses are set to the start of an episode, first sensing included."""
+    rest(c, w, trackers)
+    heard["step"][:] = -1
+    heard_message[:] = _ZERO
+    message[:] = _ZERO
+    broadcast["sent"][:] = 0
+    meet(c, w, trackers, obstacles)
+    sense(c, w, trackers, obstacles, heard, broadcast, heard_message, message)
+    occupy(c, w, trackers, slots)
+    w.held, w.score = 0, _ZERO
+
+
+@compiled
+def reward(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    weights: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+) -> None:
+    """Write the reward of every agent (rows,) and its terms (rows, K).
+
+    A target that is an agent gets the negative of the team's score.
+    """
+    for i in range(c.num_trackers):
+        rewards[i] = write_reward(c, w, trackers[i], weights, terms[i])
+    if c.motion == AGENT:
+        rewards[c.num_trackers] = -w.score
+        terms[c.num_trackers, :] = _ZERO
+
+
+@compiled
+def step(
+    c: Record,
+    slots: Records,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    actions: FloatArray,
+) -> None:
+    """Advance one world by one control step."""
+    apply_faults(c, w, trackers)
+    motion(c, w, trackers, obstacles, actions)
+    meet(c, w, trackers, obstacles)
+    w.step += 1
+    slot = w.step % (c.radio_delay + 1)
+    for i in range(c.num_trackers):
+        works = trackers[i].broken_at == NEVER
+        for k in range(c.message_size):
+            message[slot, i, k] = actions[i, 2 + k] if works else _ZERO
+    sense(c, w, trackers, obstacles, heard, broadcast, heard_message, message)
+    occupy(c, w, trackers, slots)
+    add_up(c, w, trackers, slots)
+    if c.terminate_on_contact:
+        for i in range(c.num_trackers):
+            if trackers[i].touching:
+                w.terminated = 1
+    w.over = w.terminated != 0 or w.step >= c.horizon
+
+
+STEP: Final = 0
+START: Final = 1
+START_FROM_POSES: Final = 2
+LOOK: Final = 3
+
+
+@kernel
+def advance(
+    config: Records,
+    slots: Records,
+    beams: FloatArray,
+    weights: FloatArray,
+    world: Records,
+    tracker: Records,
+    obstacle: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    actions: FloatArray,
+    observations: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+    flags: npt.NDArray[np.uint8],
+    orders: npt.NDArray[np.uint8],
+    nearest: FloatArray,
+    first: int,
+    last: int,
+) -> None:
+    """Do what each world is ordered to, for worlds ``first`` to ``last``; the only loop over worlds.
+
+    ================== =============================================================================
+    STEP               a control step; or, where the episode is over, the start of the next one
+    START              an episode drawn from the world's key
+    START_FROM_POSES   an episode from the poses that stand in the arrays
+    LOOK               nothing but the observations
+    ================== =============================================================================
+
+    Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K) and flags (2, E):
+    terminated, truncated.
+    """
+    c = config[0]
+    for e in range(first, last):
+        w, trackers, obstacles = world[e], tracker[e], obstacle[e]
+        order = orders[e]
+        if order == STEP and w.over != 0:
+            w.episode += 1
+            order = START
+        if order == STEP:
+            step(
+                c, slots, w, trackers, obstacles,
+                heard[e], broadcast[e], heard_message[e], message[e], actions[e],
+            )  # fmt: skip
+            reward(c, w, trackers, weights, rewards[e], terms[e])
+        else:
+            if order == START:
+                draw_start(c, w, trackers, obstacles)
+            if order != LOOK:
+                begin(
+                    c, slots, w, trackers, obstacles,
+                    heard[e], broadcast[e], heard_message[e], message[e],
+                )  # fmt: skip
+            rewards[e, :] = _ZERO
+            terms[e, :, :] = _ZERO
+        flags[0, e] = w.terminated
+        flags[1, e] = w.over != 0 and w.terminated == 0
+        observe(
+            c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
+            beams, nearest, observations[e],
+        )  # fmt: skip
+
+
+@kernel
+def bad_action(actions: FloatArray) -> int:
+    """Return the flat position of the first action that is not a number in [-1, 1], or -1."""
+    flat = actions.reshape(-1)
+    for k in range(len(flat)):
+        if not (flat[k] >= -_ONE and flat[k] <= _ONE):
+            return k
+    return -1

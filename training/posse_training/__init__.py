@@ -1,0 +1,1 @@
+"""Learning, evaluation, reports and the command line of posse."""
