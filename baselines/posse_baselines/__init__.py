@@ -1,1 +1,34 @@
 """Policies that play without torch: scripted ones, and shipped learned ones."""
+
+from __future__ import annotations
+
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    Played,
+    Policy,
+    PolicyError,
+    StateReader,
+    begin,
+    play,
+    rollout,
+    split_agents,
+    stack_agents,
+)
+from posse_baselines.registry import load, policy_names
+
+__all__ = [
+    "BasePolicy",
+    "Memory",
+    "Played",
+    "Policy",
+    "PolicyError",
+    "StateReader",
+    "begin",
+    "load",
+    "play",
+    "policy_names",
+    "rollout",
+    "split_agents",
+    "stack_agents",
+]

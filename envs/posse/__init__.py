@@ -7,11 +7,15 @@ from typing import Any
 from posse.batch import Batch, Snapshot
 from posse.metrics import METRICS, Metric
 from posse.observation import Field, ObservationLayout
+from posse.pettingzoo_env import env, parallel_env
+from posse.registration import register as _register
 from posse.reward import REWARD_TERMS, RewardTerm
 from posse.scenario import Scenario, ScenarioError
 from posse.scenarios import get_scenario, scenario_names
 
 __version__ = "0.1.0"
+
+_register()
 
 
 def batch(
@@ -54,7 +58,9 @@ __all__ = [
     "ScenarioError",
     "Snapshot",
     "batch",
+    "env",
     "get_scenario",
     "observation_fields",
+    "parallel_env",
     "scenario_names",
 ]

@@ -31,13 +31,14 @@ from posse.state import (
     reward_weights,
     slot_records,
 )
-from posse.world import LOOK, START, START_FROM_POSES, STEP, advance, bad_action
+from posse.world import LOOK, START, START_FROM_POSES, STEP, advance, bad_action, first_over
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _SERIAL_BELOW: Final = 2048
 """Agents in a batch below which waking other threads costs more than it saves."""
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
+_UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
 
@@ -145,7 +146,9 @@ class Batch:
         self._weights = reward_weights(scenario)
         self._observations = _Recycler((num_worlds, rows, size))
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
-        self._flags = np.zeros((2, num_worlds), np.uint8)
+        self._flags = np.zeros((2, num_worlds), np.bool_)
+        # What every call of the kernel begins with.
+        self._fixed = (*self._tables, self._weights, *self._arrays.all())
         self._orders = np.full(num_worlds, STEP, np.uint8)
         self._threads: ThreadPoolExecutor | None = None
         self._process = -1
@@ -157,7 +160,10 @@ class Batch:
         self._parts = list(zip(edges[:-1], edges[1:], strict=True))
 
     def __getstate__(self) -> dict[str, Any]:
-        derived = ("_config", "_tables", "_weights", "_observations", "_terms", "_flags", "_scratch", "_orders")
+        derived = (
+            "_config", "_tables", "_weights", "_fixed",
+            "_observations", "_terms", "_flags", "_scratch", "_orders",
+        )  # fmt: skip
         threads = ("_threads", "_process", "_parts")
         return {k: v for k, v in self.__dict__.items() if k not in derived + threads}
 
@@ -284,28 +290,51 @@ class Batch:
             ValueError: Actions of a wrong type or shape, not finite, or outside [-1, 1]. Nothing is
                 changed.
         """
+        self._check_running()
+        observations, rewards, terms, over = self._advance(self.check_actions(actions))
+        terminated, truncated = self._flags.copy()
+        infos: dict[str, Any] = {
+            "score": self._arrays.world["score"].copy(),
+            "reward_terms": {term.name: terms[:, :, k] for k, term in enumerate(REWARD_TERMS)},
+        }
+        if over:
+            observations = self._end(observations, terminated | truncated, infos)
+        return observations, rewards, terminated, truncated, infos
+
+    def advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+        """Advance every world by one control step as :meth:`step` does, but pack up nothing.
+
+        For the environments of one world, where the packing would take longer than the step. The
+        actions are taken as they are: they must have been through :meth:`check_actions`, or
+        through as good a check. No episode is started in the mode "same_step".
+
+        Returns:
+            observations (E, rows, F), rewards (E, rows), reward terms (E, rows, K) in the order of
+            ``REWARD_TERMS``, and how many worlds' episodes are over.
+
+        Raises:
+            ResetNeeded: As :meth:`step`.
+        """
+        self._check_running()
+        return self._advance(actions)
+
+    def _advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+        observations, terms = self._observations.take(), self._terms.take()
+        rewards = np.empty(self.observation_shape[:2], np.float32)
+        over = self._run(self._orders, actions, observations, rewards, terms)
+        return observations, rewards, terms, over
+
+    def _check_running(self) -> None:
+        """Raise if a step is not possible now."""
         if not self._started:
             raise ResetNeeded("step before reset: call reset() first")
-        checked = self.check_actions(actions)
-        world = self._arrays.world
-        if self.autoreset == "disabled" and world["over"].any():
-            over = np.flatnonzero(world["over"])
+        if self.autoreset == "disabled" and first_over(self._arrays.world) >= 0:
+            over = np.flatnonzero(self._arrays.world["over"])
             raise ResetNeeded(
                 f"step after the end of world {over[0]}"
                 + (f" and {len(over) - 1} more" if len(over) > 1 else "")
                 + ': call reset(options={"reset_mask": mask}) first'
             )
-        observations, terms = self._observations.take(), self._terms.take()
-        rewards = np.empty(self.observation_shape[:2], np.float32)
-        self._run(self._orders, checked, observations, rewards, terms)
-        terminated, truncated = self._flags[0] != 0, self._flags[1] != 0
-        infos: dict[str, Any] = {
-            "score": world["score"].copy(),
-            "reward_terms": {term.name: terms[:, :, k] for k, term in enumerate(REWARD_TERMS)},
-        }
-        if self._flags.any():
-            observations = self._end(observations, terminated | truncated, infos)
-        return observations, rewards, terminated, truncated, infos
 
     def _end(
         self, observations: FloatArray, ended: BoolArray, infos: dict[str, Any]
@@ -349,21 +378,21 @@ class Batch:
         observations: FloatArray,
         rewards: FloatArray,
         terms: FloatArray,
-    ) -> None:
-        """Have the kernel do what each world is ordered to, spread over the threads."""
+    ) -> int:
+        """Have the kernel do what each world is ordered to, spread over the threads.
+
+        Returns how many worlds' episodes are over.
+        """
         arguments = (
-            *self._tables, self._weights, *self._arrays.all(),
-            actions, observations, rewards, terms, self._flags, orders,
+            *self._fixed, actions, observations, rewards, terms, self._flags, orders,
         )  # fmt: skip
         scratch = self._scratch
-        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        if _UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
-                advance(*arguments, scratch[0], 0, self.num_worlds)
-            return
+                return int(advance(*arguments, scratch[0], 0, self.num_worlds))
         (first, last), *others = self._parts
         if not others:
-            advance(*arguments, scratch[0], first, last)
-            return
+            return advance(*arguments, scratch[0], first, last)
         if self._threads is None or self._process != os.getpid():
             self._threads = ThreadPoolExecutor(len(others), "posse")
             self._process = os.getpid()  # threads do not survive a fork
@@ -371,9 +400,8 @@ class Batch:
             self._threads.submit(advance, *arguments, scratch[k], *part)
             for k, part in enumerate(others, 1)
         ]
-        advance(*arguments, scratch[0], first, last)
-        for part in waiting:
-            part.result()
+        over = advance(*arguments, scratch[0], first, last)
+        return over + sum(part.result() for part in waiting)
 
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
         """Start an episode in the chosen worlds; return every world's observations."""

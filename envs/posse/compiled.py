@@ -38,6 +38,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # error_model="numpy": division by zero gives inf or nan, as in numpy, and no branch to raise from.
 # nogil: other Python threads run on while a batch is stepped.
+# _nrt: no reference counts, so nothing compiled may make an array (a reduction over prange does).
 _OPTIONS: Final[dict[str, Any]] = {
     "nogil": True,
     "error_model": "numpy",

@@ -350,7 +350,7 @@ def _write_neighbours(
     t = trackers[i]
     x, y, hc, hs = t.x, t.y, t.heading_cos, t.heading_sin
     places, perfect = c.neighbours, c.perfect_radio != 0
-    if perfect and c.num_trackers <= _COUNTED and w.working == c.num_trackers <= places + 1:
+    if perfect and c.num_trackers <= _COUNTED and w.working == c.num_trackers == places + 1:
         _write_all_neighbours(c, w, trackers, i, x, y, hc, hs, message[0], nearest, o, k)
         return
     filled = 0

@@ -11,7 +11,7 @@ import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from posse.formation import FORMATIONS, slot_offsets
 from posse.reward import REWARD_TERMS
@@ -153,8 +153,7 @@ class Scenario:
     """Weight of each reward term by name (``posse.reward_terms()`` lists them); others weigh 0."""
 
     def __post_init__(self) -> None:
-        weights = dict(self.reward_weights)
-        object.__setattr__(self, "reward_weights", tuple(sorted(weights.items())))
+        object.__setattr__(self, "reward_weights", _weights(self.reward_weights))
         _check(self)
 
     @property
@@ -276,7 +275,18 @@ def _check(s: Scenario) -> None:
     _check_rewards(s)
 
 
-def _fail(name: str, value: object, allowed: str) -> None:
+def _weights(given: object) -> tuple[tuple[str, float], ...]:
+    """Return reward weights in the one order that makes equal scenarios compare equal."""
+    try:
+        weights = dict(given)  # type: ignore[call-overload]
+        return tuple(sorted(weights.items()))
+    except (TypeError, ValueError):
+        raise ScenarioError(
+            f"reward_weights={given!r} is not possible: it must map names of reward terms to numbers"
+        ) from None
+
+
+def _fail(name: str, value: object, allowed: str) -> NoReturn:
     raise ScenarioError(f"{name}={value!r} is not possible: {allowed}")
 
 
@@ -284,6 +294,7 @@ _INTEGERS = (
     "version", "num_trackers", "horizon", "num_obstacles", "sonar_beams", "radio_delay",
     "message_size", "breaks",
 )  # fmt: skip
+_GREATEST_WHOLE: Final = 2**62
 _PAIRS = ("obstacle_radius", "start_distance", "break_window")
 _TEXTS = ("name", "target_motion", "formation", "break_choice")
 _MAY_BE_INFINITE = (
@@ -292,7 +303,9 @@ _MAY_BE_INFINITE = (
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    return not isinstance(value, int) or abs(value) <= _GREATEST_WHOLE
 
 
 def _check_types(s: Scenario) -> None:
@@ -322,44 +335,50 @@ def _check_types(s: Scenario) -> None:
                 _fail(name, value, "it must be finite")
 
 
+# What float32 can work with: finer or wider than this, steps and squares would be lost to rounding.
+_SMALL: Final = 1e-3
+_WIDE: Final = 1e4
+_WIDEST: Final = 1e6
+"""Robots are never farther apart than this, m: what stands for an unlimited range."""
+
 # name -> (least, greatest, least is allowed)
 _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
     "version": (1, math.inf, True),
     "num_trackers": (1, MAX_TRACKERS, True),
-    "tracker_speed": (0, 1000, False),
-    "tracker_turn_rate": (0, math.inf, False),
-    "tracker_acceleration": (0, math.inf, False),
-    "tracker_turn_acceleration": (0, math.inf, False),
-    "robot_radius": (0, math.inf, False),
-    "target_speed": (0, math.inf, True),
-    "target_turn_rate": (0, math.inf, False),
-    "formation_distance": (0, math.inf, False),
-    "formation_spacing": (0, math.inf, False),
-    "tolerance": (0, math.inf, False),
+    "tracker_speed": (_SMALL, 1000, True),
+    "tracker_turn_rate": (_SMALL, _WIDE, True),
+    "tracker_acceleration": (_SMALL, math.inf, True),
+    "tracker_turn_acceleration": (_SMALL, math.inf, True),
+    "robot_radius": (_SMALL, _WIDE, True),
+    "target_speed": (0, 1000, True),
+    "target_turn_rate": (_SMALL, _WIDE, True),
+    "formation_distance": (0, _WIDE, False),
+    "formation_spacing": (0, _WIDE, False),
+    "tolerance": (_SMALL, _WIDE, True),
     "settle_time": (0, math.inf, False),
-    "control_step": (0, math.inf, False),
-    "physics_step": (0, math.inf, False),
+    "control_step": (1e-4, 100, True),
+    "physics_step": (1e-4, 100, True),
     "horizon": (1, 1_000_000, True),
     "arena": (0, math.inf, False),
     "num_obstacles": (0, MAX_OBSTACLES, True),
-    "obstacle_gap": (0, math.inf, True),
+    "obstacle_gap": (0, _WIDE, True),
     "sensing_range": (0, math.inf, False),
     "field_of_view": (0, 2 * math.pi + 1e-9, False),
     "range_noise": (0, 0.3, True),
     "bearing_noise": (0, 0.5, True),
     "velocity_smoothing": (0, math.inf, True),
     "sonar_beams": (0, 64, True),
-    "sonar_range": (0, math.inf, False),
+    "sonar_range": (_SMALL, _WIDE, True),
     "radio_range": (0, math.inf, False),
     "radio_delay": (0, 100, True),
     "radio_loss": (0, 0.999, True),
     "message_size": (0, 64, True),
-    "forget_after": (0, math.inf, False),
+    "forget_after": (0, _WIDE, False),
     "num_neighbours": (0, MAX_TRACKERS - 1, True),
     "breaks": (0, MAX_TRACKERS - 1, True),
     "sensor_outages": (0, 1, True),
     "radio_outages": (0, 1, True),
-    "outage_time": (0, math.inf, False),
+    "outage_time": (0, _WIDE, False),
 }
 
 
@@ -438,6 +457,13 @@ def _check_formation(s: Scenario) -> None:
 
 
 def _check_place(s: Scenario) -> None:
+    if s.range_bound > _WIDEST:
+        raise ScenarioError(
+            f"robots could come {s.range_bound:.3g} m apart, at most {_WIDEST:g} m is possible: "
+            f"lower tracker_speed={s.tracker_speed:g}, horizon={s.horizon}, "
+            f"control_step={s.control_step:g}, start_distance={s.start_distance} or "
+            f"arena={s.arena:g}"
+        )
     if s.start_distance[0] <= 2 * s.robot_radius:
         _fail(
             "start_distance", s.start_distance,
@@ -471,11 +497,44 @@ def _check_place(s: Scenario) -> None:
             f"with obstacle_gap={s.obstacle_gap:g} do not fit in arena={s.arena:g}: "
             "lower their number, radius or gap, or raise arena"
         )
-    if excluded > 0.25 * s.arena**2:
+    circle = s.target_speed / s.target_turn_rate + s.robot_radius + SAFE_MARGIN
+    blocked = s.num_obstacles * math.pi * (s.obstacle_radius[1] + circle) ** 2
+    if s.target_motion != "agent" and blocked > 0.9 * (s.arena - 2 * circle) ** 2:
         raise ScenarioError(
-            f"{s.num_trackers} trackers do not fit in arena={s.arena:g}: raise it, or lower "
-            "num_trackers or robot_radius"
+            f"num_obstacles={s.num_obstacles} leave no room to a target that needs {circle:.3g} m "
+            f"to turn round at target_turn_rate={s.target_turn_rate:g}: lower their number or "
+            "target_speed, or raise target_turn_rate or arena"
         )
+    room = _room_to_start(s)
+    width = s.obstacle_radius[1] + s.robot_radius + START_CLEARANCE
+    room *= 1 - min(1, s.num_obstacles * math.pi * width**2 / s.arena**2)
+    if excluded > room:
+        raise ScenarioError(
+            f"{s.num_trackers} trackers do not fit at start_distance={s.start_distance} in "
+            f"arena={s.arena:g}: widen them, or lower num_trackers or robot_radius"
+        )
+
+
+def _room_to_start(s: Scenario) -> float:
+    """Return the area within the walls where trackers may start, for the worst place of the target.
+
+    By summing over a grid of distances and bearings, m².
+    """
+    least, most = s.start_distance
+    inner = s.arena / 2 - s.robot_radius - START_CLEARANCE
+    distances = [least + (most - least) * (k + 0.5) / 16 for k in range(16)]
+    bearings = [2 * math.pi * (k + 0.5) / 64 for k in range(64)]
+    areas = []
+    for at in (0.0, s.target_extent):  # the middle, and a corner
+        area = 0.0
+        for d in distances:
+            inside = sum(
+                abs(at + d * math.cos(b)) <= inner and abs(at + d * math.sin(b)) <= inner
+                for b in bearings
+            )
+            area += inside / 64 * 2 * math.pi * d * (most - least) / 16
+        areas.append(area)
+    return min(areas)
 
 
 START_CLEARANCE: Final = 0.2

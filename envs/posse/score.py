@@ -117,8 +117,6 @@ def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
     w.tracker_steps += np.float32(w.working)
     if w.working > 0:
         w.bound_sum += np.float32(bound) / np.float32(w.working)
-    if w.detected_at < 0 and sight > _ZERO:
-        w.detected_at = w.step
     if connected(c, w, trackers):
         w.connected_sum += _ONE
     if w.held >= c.settle_steps:

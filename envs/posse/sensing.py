@@ -85,6 +85,8 @@ def look(c: Record, w: Record, t: Record, obstacles: Records, number: int) -> No
     t.sees = t.broken_at == NEVER and in_sight(c, w, t, obstacles, dx, dy)
     if not t.sees:
         return
+    if w.detected_at < 0:
+        w.detected_at = w.step
     if c.range_noise > _ZERO or c.bearing_noise > _ZERO:
         first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
         scale = _ONE + c.range_noise * first

@@ -69,6 +69,7 @@ WORLD: Final = _record(
     ("frame_cos", _F), ("frame_sin", _F),  # the slot frame, ψ
     ("goal_cos", _F), ("goal_sin", _F),  # where a scripted target wants to head
     ("weave_amplitude", _F), ("weave_rate", _F), ("weave_phase", _F),  # accelerating motion
+    ("pressed", _F),  # smart motion: for how long the team has kept station, s; < 0: it darts
     ("touching", _U),  # trackers that touch the target, a bit each
     ("near", _I),  # 1: something may touch the target in the next step
     ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
@@ -194,7 +195,7 @@ class WorldArrays:
         for field in dataclasses.fields(self):
             array = getattr(self, field.name)
             if array.dtype.names is None:
-                names[field.name] = array
+                names[field.name] = array.view()
             else:
                 for part in array.dtype.names:
                     names[f"{field.name}_{part}"] = array[part]
@@ -202,12 +203,13 @@ class WorldArrays:
 
 
 def perfect_radio(scenario: Scenario) -> bool:
-    """Say whether every tracker hears every other at once, always."""
+    """Say whether every tracker hears every other at once, always; what breaks falls silent."""
     return (
         math.isinf(scenario.radio_range)
         and scenario.radio_delay == 0
         and scenario.radio_loss == 0
         and scenario.radio_outages == 0
+        and scenario.breaks == 0
     )
 
 
@@ -233,7 +235,7 @@ def config_record(scenario: Scenario) -> Records:
     c.settle_steps = max(1, round(s.settle_time / s.control_step))
     c.outage_steps = max(1, round(s.outage_time / s.control_step))
     c.break_from, c.break_until = (round(share * s.horizon) for share in s.break_window)
-    c.forget_steps = max(1, round(s.forget_after / s.control_step))
+    c.forget_steps = int(s.forget_after / s.control_step + 1e-6)
     c.radio_delay, c.breaks = s.radio_delay, s.breaks
     c.break_nearest = s.break_choice == BREAK_CHOICES[0]
     c.motion = TARGET_MOTIONS.index(s.target_motion)

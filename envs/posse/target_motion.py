@@ -15,8 +15,10 @@ import numpy as np
 
 from posse.arrays import Record, Records
 from posse.compiled import compiled
+from posse.formation import follow_heading
 from posse.kinematics import arc, turn_towards
 from posse.randomness import TARGET, between, uniform
+from posse.state import NEVER
 
 CONSTANT: Final = 0
 ACCELERATING: Final = 1
@@ -36,16 +38,34 @@ _WEAVE_MOST_RATE: Final = np.float32(0.8)
 _WEAVE_LEAST: Final = np.float32(0.4)  # least and greatest turn, as shares of the limit
 _WEAVE_MOST: Final = np.float32(0.9)
 
+# The smart motion. It weighs these many directions, every so many control steps.
 SMART_DIRECTIONS: Final = 16
-SMART_REPLAN: Final = 3  # control steps between two plans
-_DIRECTION_COS: Final = np.cos(2 * np.pi * np.arange(SMART_DIRECTIONS) / 16).astype(np.float32)
-_DIRECTION_SIN: Final = np.sin(2 * np.pi * np.arange(SMART_DIRECTIONS) / 16).astype(np.float32)
+SMART_REPLAN: Final = 5
+_FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
+_LOATH_TO_TURN: Final = np.float32(0.5)  # s of head start that half an about-turn has to be worth
+_LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
+_PATIENCE: Final = np.float32(4.0)  # s of station keeping that provoke a dart
+_STATION_MARGIN: Final = np.float32(1.0)  # m beyond the farthest slot that count as near
+_STATION_SPEED: Final = np.float32(0.75)  # relative speed, as a share of V - v_t, that counts
+_DANGER: Final = np.float32(0.6)  # a tracker this near provokes a dart, x formation_distance
+_DART_TIME: Final = np.float32(1.3 * math.pi)  # a dart lasts 1.3 times as long as an about-turn
+_DART_MOMENTS: Final = 8  # at which a dart is looked at beforehand
+_DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
+_DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
+_DART_STRIDE: Final = 2  # every second direction is played through
+_DART_CLEARANCE: Final = np.float32(0.3)  # m between the rims of the target and a tracker
+_BLOCKED: Final = np.float32(100.0)
+
+_ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
+_DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
+_DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 
 
 @compiled
 def draw_motion(c: Record, w: Record) -> None:
     """Draw what an episode's target motion depends on besides its start."""
     w.weave_amplitude, w.weave_rate, w.weave_phase = _ZERO, _ZERO, _ZERO
+    w.pressed = _ZERO
     if c.motion == ACCELERATING:
         limit = c.target_turn_rate
         w.weave_amplitude = between(_WEAVE_LEAST, _WEAVE_MOST, w.key, 0, TARGET, 100) * limit
@@ -61,7 +81,7 @@ def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records
         turn = w.weave_amplitude * np.float32(math.sin(w.weave_rate * time + w.weave_phase))
         _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, _ZERO, turn, c.dt)
     elif c.motion == SMART and w.step % SMART_REPLAN == 0:
-        plan_escape(c, w, trackers, obstacles)
+        evade(c, w, trackers, obstacles)
     if c.walled:
         mirror_at_walls(c, w)
     turn = turn_towards(
@@ -73,8 +93,54 @@ def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records
 
 
 @compiled
+def evade(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+    """Set the goal heading of a smart target.
+
+    It makes ground through the widest gap, until the team keeps station on it or a tracker comes
+    too near. Then it darts: it takes the turn that tears the formation apart, and holds it.
+    """
+    past = np.float32(SMART_REPLAN) * c.dt
+    if w.pressed < _ZERO:
+        w.pressed = min(_ZERO, w.pressed + past)
+        return
+    pressure = team_pressure(c, w, trackers)
+    w.pressed = max(_ZERO, w.pressed + pressure * past)
+    if w.pressed >= _PATIENCE:
+        w.pressed = -_DART_TIME / c.target_turn_rate
+        plan_dart(c, w, trackers, obstacles)
+    else:
+        plan_escape(c, w, trackers, obstacles)
+
+
+@compiled
+def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
+    """Return how committed the team is: from -1, no tracker keeps station, to 1, all of them do.
+
+    A tracker keeps station when it is about as near as a slot is and moves as the target does. One
+    that comes nearer than any slot is a danger: it counts for as much as patience lasts.
+    """
+    near = c.slots_reach + _STATION_MARGIN
+    slow = _STATION_SPEED * (c.tracker_speed - c.target_speed)
+    danger = max(_DANGER * c.formation_distance, c.radius + c.radius)
+    vx, vy = c.target_speed * w.heading_cos, c.target_speed * w.heading_sin
+    committed = _ZERO
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            continue
+        dx, dy = t.x - w.x, t.y - w.y
+        d2 = dx * dx + dy * dy
+        if d2 < danger * danger:
+            return _BLOCKED
+        ux, uy = t.speed * t.heading_cos - vx, t.speed * t.heading_sin - vy
+        if d2 < near * near and ux * ux + uy * uy < slow * slow:
+            committed += _ONE
+    return _TWO * committed / np.float32(max(w.working, 1)) - _ONE
+
+
+@compiled
 def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
-    """Set the goal heading of a smart target: through the widest gap the team leaves.
+    """Set the goal heading through the widest gap that the team leaves.
 
     For every direction u, the soonest that any tracker, straight on at full speed, could be where
     the target then is: the least root t of |p - u v t| = V t. The target takes the direction where
@@ -82,20 +148,80 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
     """
     v, most = c.target_speed, c.tracker_speed
     a = most * most - v * v
-    best = np.float32(-1.0)
+    best = np.float32(-1e9)
+    old_cos, old_sin = w.goal_cos, w.goal_sin
     for k in range(SMART_DIRECTIONS):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         soonest = np.float32(1e9)
         for i in range(c.num_trackers):
             t = trackers[i]
-            px = t.x + _HALF * t.speed * t.heading_cos - w.x
-            py = t.y + _HALF * t.speed * t.heading_sin - w.y
+            if t.broken_at != NEVER:
+                continue
+            px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
+            py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
             b = v * (px * ux + py * uy)
             d2 = px * px + py * py
-            time = (np.float32(math.sqrt(b * b + a * d2)) - b) / a
-            soonest = min(soonest, time)
-        turn = _ONE - (ux * w.heading_cos + uy * w.heading_sin)
-        value = soonest - _HALF * turn
+            soonest = min(soonest, np.float32(math.sqrt(b * b + a * d2)) - b)
+        value = soonest / a + _LOATH_TO_TURN * (ux * old_cos + uy * old_sin)
+        if c.walled:
+            value += free_time(c, w, obstacles, ux, uy)
+        if value > best:
+            best = value
+            w.goal_cos, w.goal_sin = ux, uy
+
+
+@compiled
+def free_time(
+    c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32
+) -> np.float32:
+    """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
+    far = c.target_speed * _LOOKOUT
+    inner = c.half_arena - c.safe_distance
+    if abs(ux) > _TINY:
+        far = min(far, (inner - w.x) / ux if ux > _ZERO else (-inner - w.x) / ux)
+    if abs(uy) > _TINY:
+        far = min(far, (inner - w.y) / uy if uy > _ZERO else (-inner - w.y) / uy)
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        ox, oy = o.x - w.x, o.y - w.y
+        along, across = ox * ux + oy * uy, ox * uy - oy * ux
+        reach = o.radius + c.safe_distance
+        if along > _ZERO and abs(across) < reach:
+            far = min(far, max(_ZERO, along - reach))
+    return far / c.target_speed
+
+
+@compiled
+def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+    """Set the goal heading whose turn tears the formation apart.
+
+    Every direction is played through, the trackers holding the speed and turn rate that they have:
+    the best one moves them farthest from where they stand around the target, and does not lead
+    into one of them.
+    """
+    moment = _DART_TIME / (c.target_turn_rate * np.float32(_DART_MOMENTS))
+    clear = c.radius + c.radius + _DART_CLEARANCE
+    best = np.float32(-1e9)
+    for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):
+        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
+        value = _ZERO
+        for i in range(c.num_trackers):
+            t = trackers[i]
+            hc, hs, tc, ts = w.heading_cos, w.heading_sin, t.heading_cos, t.heading_sin
+            moved_x, moved_y = _ZERO, _ZERO  # by how much, seen from the target
+            for _ in range(_DART_MOMENTS):
+                old_c, old_s = hc, hs
+                hc, hs = follow_heading(hc, hs, ux, uy, _DART_TURN_COS, _DART_TURN_SIN)
+                dx, dy, tc, ts = arc(tc, ts, t.speed, t.turn_rate, moment)
+                moved_x += dx - _HALF * c.target_speed * moment * (old_c + hc)
+                moved_y += dy - _HALF * c.target_speed * moment * (old_s + hs)
+                x, y = t.x - w.x + moved_x, t.y - w.y + moved_y
+                if x * x + y * y < clear * clear:
+                    value -= _BLOCKED
+            if t.broken_at == NEVER:
+                value += np.float32(math.sqrt(moved_x * moved_x + moved_y * moved_y))
+        if c.walled:
+            value += free_time(c, w, obstacles, ux, uy)
         if value > best:
             best = value
             w.goal_cos, w.goal_sin = ux, uy

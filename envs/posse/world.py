@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.arrays import FloatArray, Record, Records
+from posse.arrays import BoolArray, FloatArray, Record, Records
 from posse.compiled import compiled, kernel
 from posse.contact import free_move, meet
 from posse.faults import apply_faults
@@ -260,12 +260,12 @@ def advance(
     observations: FloatArray,
     rewards: FloatArray,
     terms: FloatArray,
-    flags: npt.NDArray[np.uint8],
+    flags: BoolArray,
     orders: npt.NDArray[np.uint8],
     nearest: FloatArray,
     first: int,
     last: int,
-) -> None:
+) -> int:
     """Do what each world is ordered to, for worlds ``first`` to ``last``; the only loop over worlds.
 
     ================== =============================================================================
@@ -276,9 +276,10 @@ def advance(
     ================== =============================================================================
 
     Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K) and flags (2, E):
-    terminated, truncated.
+    terminated, truncated. Returns how many of these worlds' episodes are over.
     """
     c = config[0]
+    over = 0
     for e in range(first, last):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
         order = orders[e]
@@ -301,12 +302,23 @@ def advance(
                 )  # fmt: skip
             rewards[e, :] = _ZERO
             terms[e, :, :] = _ZERO
-        flags[0, e] = w.terminated
+        flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
+        over += w.over != 0
         observe(
             c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
             beams, nearest, observations[e],
         )  # fmt: skip
+    return over
+
+
+@kernel
+def first_over(world: Records) -> int:
+    """Return the first world whose episode is over, or -1."""
+    for e in range(len(world)):
+        if world[e].over != 0:
+            return e
+    return -1
 
 
 @kernel

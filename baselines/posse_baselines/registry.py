@@ -1,0 +1,83 @@
+"""Policies by name, by file, or by where their class is."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from posse_baselines.oracle import Oracle
+from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.pursuit import Pursuit
+from posse_baselines.simple import Idle, Random
+
+_MAKERS: Final[dict[str, Callable[[], Policy]]] = {
+    "random": Random,
+    "idle": Idle,
+    "pursuit": Pursuit,
+    "oracle": Oracle,
+}
+_FILES: Final[dict[str, Callable[[Path], Policy]]] = {}
+"""Readers of policy files, by suffix: whoever brings a kind of file adds its reader here."""
+
+
+def policy_names() -> tuple[str, ...]:
+    """Return the names of all policies that come with the package."""
+    return tuple(_MAKERS)
+
+
+def load(policy: str | Path) -> Policy:
+    """Return a policy by name, from a file, or from ``"package.module:Class"``.
+
+    A class is called without arguments; an object that is a policy already is taken as it is.
+
+    Raises:
+        PolicyError: Nothing of that name (the message has near ones), a file that is missing or of
+            an unknown kind, a module or class that cannot be found, or one that is no policy.
+    """
+    text = str(policy)
+    if text in _MAKERS:
+        return _MAKERS[text]()
+    path = Path(text)
+    if path.suffix in _FILES or path.is_file():
+        return _from_file(path)
+    if ":" in text:
+        return _from_module(text)
+    near = difflib.get_close_matches(text, _MAKERS, n=3, cutoff=0.5)
+    hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+    raise PolicyError(
+        f"unknown policy {text!r}{hint}; policies are: {', '.join(_MAKERS)}, a file, or "
+        '"package.module:Class"'
+    )
+
+
+def _from_file(path: Path) -> Policy:
+    if path.suffix not in _FILES:
+        known = ", ".join(_FILES) or "none yet"
+        raise PolicyError(f"{path} is no policy file: known kinds are {known}")
+    if not path.is_file():
+        raise PolicyError(f"there is no policy file {path}")
+    return _FILES[path.suffix](path)
+
+
+def _from_module(text: str) -> Policy:
+    module_name, _, attribute = text.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except ImportError as error:
+        raise PolicyError(f"cannot import {module_name!r} of policy {text!r}: {error}") from error
+    if not hasattr(module, attribute):
+        names = [name for name in vars(module) if not name.startswith("_")]
+        near = difflib.get_close_matches(attribute, names, n=3)
+        hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+        raise PolicyError(f"module {module_name!r} has no {attribute!r}{hint}")
+    found: Any = getattr(module, attribute)
+    made = found() if isinstance(found, type) else found
+    if not isinstance(made, Policy):
+        raise PolicyError(
+            f"{text!r} is no policy: it must have name, message_size, reads_state, begin, act, "
+            "restart and annotations, as posse_baselines.Policy says"
+        )
+    return made

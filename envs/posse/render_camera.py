@@ -1,0 +1,84 @@
+"""Where the picture looks: world metres to pixels.
+
+A walled arena is shown whole. On the open plane the camera follows the robots: it holds them all,
+keeps its scale while it can, and moves smoothly in *simulated* time, so that what it shows is a
+function of the states drawn and of nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Points = npt.NDArray[np.float64]
+
+_MARGIN: Final = 0.7  # m, between the outermost robot and the picture's edge
+_LEAST_SPAN: Final = 8.0  # m, across the shorter side: a team in formation with room around it
+_LEVEL: Final = 1.25  # the scales it settles on lie this factor apart
+_ZOOM_TIME: Final = 1.0  # s, time constant of a change of scale
+_FOLLOW_TIME: Final = 0.8  # s, time constant of a change of place
+
+
+class Camera:
+    """A view of the plane in a rectangle of pixels, x to the right and y up.
+
+    Args:
+        viewport: Left, top, width and height of the rectangle, px.
+        arena: Side of the walled square, m; ``inf``: the open plane.
+
+    Attributes:
+        centre: What is in the middle of the view, (2,) m.
+        scale: Pixels a metre.
+    """
+
+    def __init__(self, viewport: tuple[int, int, int, int], arena: float) -> None:
+        self.viewport = viewport
+        self._arena = arena
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget where it looked: the next :meth:`follow` jumps."""
+        self.centre: Points = np.zeros(2)
+        self._level: int | None = None
+        self.scale = 1.0
+        if math.isfinite(self._arena):
+            self.scale = min(self.viewport[2:]) / (self._arena + 2 * _MARGIN)
+
+    def follow(self, points: Points, time: float) -> None:
+        """Move on towards a view that holds every point (K, 2) m, ``time`` s after the last one."""
+        if math.isfinite(self._arena):
+            return
+        lowest, highest = points.min(axis=0), points.max(axis=0)
+        middle = (lowest + highest) / 2
+        pixels = np.array(self.viewport[2:], np.float64)
+        least = _LEAST_SPAN / min(pixels)  # m a pixel
+        needed = max(least, float(((highest - lowest + 2 * _MARGIN) / pixels).max()))
+        level = math.ceil(math.log(needed / least, _LEVEL) - 1e-9)
+        # It widens at once when it has to, and narrows only when there is a level to spare.
+        first = self._level is None
+        if self._level is None or level > self._level or level < self._level - 1:
+            self._level = level
+        wanted = least * _LEVEL**self._level
+        if first:
+            self.centre, self.scale = middle, 1 / wanted
+            return
+        self.centre = self.centre + (1 - math.exp(-time / _FOLLOW_TIME)) * (middle - self.centre)
+        zoom = (1 - math.exp(-time / _ZOOM_TIME)) * math.log(wanted * self.scale)
+        reach = np.abs(points - self.centre).max(axis=0) + _MARGIN / 2
+        held = float((2 * reach / pixels).max())
+        self.scale = min(self.scale / math.exp(zoom), 1 / held)
+
+    def project(self, points: Points) -> Points:
+        """Return the pixel coordinates (..., 2) of points (..., 2) m."""
+        left, top, width, height = self.viewport
+        x = left + width / 2 + (points[..., 0] - self.centre[0]) * self.scale
+        y = top + height / 2 - (points[..., 1] - self.centre[1]) * self.scale
+        return np.stack([x, y], axis=-1)
+
+    def bounds(self) -> tuple[Points, Points]:
+        """Return the lower left and the upper right corner of what is in view, (2,) m each."""
+        half = np.array(self.viewport[2:], np.float64) / (2 * self.scale)
+        return self.centre - half, self.centre + half

@@ -1,0 +1,215 @@
+"""One world, as the environments of one world share it: seeds, the end, state, pictures, pickling."""
+
+from __future__ import annotations
+
+import importlib
+import secrets
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+
+from posse.arrays import FloatArray
+from posse.batch import Batch
+from posse.global_state import StateLayout
+from posse.reward import REWARD_TERMS
+from posse.scenario import Scenario
+from posse.scenarios import get_scenario
+from posse.state import NEVER
+
+RENDER_MODES: Final = ("human", "rgb_array")
+TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
+_OPTIONS: Final = ("tracker_pose", "target_pose")
+
+
+class SingleWorld:
+    """A batch of one world, with what an environment of one world needs around it.
+
+    Args:
+        scenario: What the world is like.
+        seed: Of every random draw; ``None``: one from the system's entropy, at the first reset.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Which world of the seed.
+        render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
+
+    Attributes:
+        running: Whether a step is possible: after a reset, and before the end.
+
+    Raises:
+        ValueError: An unknown split or render mode, a negative seed or number of the world.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        render_mode: str | None = None,
+    ) -> None:
+        check_render_mode(render_mode)
+        self.scenario = scenario
+        self.batch = Batch(
+            scenario,
+            1,
+            seed=0 if seed is None else seed,
+            split=split,
+            first_world=first_world,
+            autoreset="next_step",  # never comes to it: the end is looked after here
+            num_threads=1,
+        )
+        self.render_mode = render_mode
+        self.running = False
+        self._seeded = seed is not None
+        self._started = False
+        self._state_layout: StateLayout | None = None
+        self._renderer: Any = None
+        self._prepare()
+
+    def _prepare(self) -> None:
+        # Views made once: making one takes longer than reading it.
+        self._score = self.batch.worlds["score"]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_renderer": None, "_score": None, "_state_layout": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepare()
+
+    @property
+    def score(self) -> float:
+        """The present step's score."""
+        return float(self._score.item())
+
+    @property
+    def state_layout(self) -> StateLayout:
+        """What :meth:`state` is made of."""
+        if self._state_layout is None:
+            self._state_layout = StateLayout(self.scenario)
+        return self._state_layout
+
+    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+        """Start an episode and return the observations (rows, F).
+
+        Args:
+            seed: Start over from episode 0 of this seed; ``None``: the next episode.
+            options: ``"tracker_pose"`` (N, 3) and ``"target_pose"`` (3,): start from these.
+
+        Raises:
+            ValueError: A bad seed or option; nothing is changed.
+        """
+        for key in options or ():
+            if key not in _OPTIONS:
+                raise ValueError(f"unknown option {key!r}; options are: {', '.join(_OPTIONS)}")
+        if seed is None and not self._seeded:
+            seed = secrets.randbits(32)
+        observations = self.batch.reset(seed=seed, options=options)
+        self.running = self._seeded = self._started = True
+        return observations[0]
+
+    def advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+        """Make a control step; actions (1, rows, 2 + m) that were checked.
+
+        Returns:
+            observations (1, rows, F), rewards (1, rows), reward terms (1, rows, K), and 1 where
+            the episode is over.
+        """
+        result = self.batch.advance(actions)
+        if result[3]:
+            self.running = False
+        return result
+
+    def check_running(self) -> None:
+        """Raise if a step is not possible now.
+
+        Raises:
+            ResetNeeded: Before the first reset, or after the end of the episode.
+        """
+        if not self.running:
+            when = "after the end of the episode" if self._started else "before reset"
+            raise ResetNeeded(f"step {when}: call reset() first")
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the episode was terminated, rather than truncated."""
+        return bool(self.batch.worlds["terminated"][0])
+
+    def metrics(self) -> dict[str, float]:
+        """Return every metric by name, of the episode as it stands."""
+        return {name: float(value[0]) for name, value in self.batch.metrics().items()}
+
+    def working(self) -> npt.NDArray[np.bool_]:
+        """Return which trackers work, (N,)."""
+        working: npt.NDArray[np.bool_] = self.batch.arrays.tracker["broken_at"][0] == NEVER
+        return working
+
+    def state(self) -> FloatArray:
+        """Return everything there is to know of the world, (S,) float32.
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        if not self._started:
+            raise ResetNeeded("state before reset: call reset() first")
+        return self.state_layout.vector(self.batch.arrays)[0]
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Draw the world: the picture (H, W, 3) in the mode "rgb_array", a window in "human".
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        if not self._started:
+            raise ResetNeeded("render before reset: call reset() first")
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            self._renderer = new_renderer(self.scenario, self.render_mode)
+        picture: npt.NDArray[np.uint8] | None = self._renderer.draw(self.batch)
+        return picture
+
+    def close(self) -> None:
+        """Close the window, if there is one; may be called again."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def new_renderer(scenario: Scenario, render_mode: str) -> Any:
+    """Return a renderer; what draws is loaded when something is to be drawn, and not before."""
+    return importlib.import_module("posse.render").Renderer(scenario, render_mode)
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Raise ValueError for a render mode that there is not."""
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise ValueError(
+            f"unknown render_mode {render_mode!r}; modes are: {', '.join(RENDER_MODES)}, None"
+        )
+
+
+def frames_per_second(scenario: Scenario) -> int:
+    """Return how many pictures a second show the world in real time."""
+    return max(1, round(1 / scenario.control_step))
+
+
+def shortened(
+    scenario: str | Scenario, horizon: int | None, overrides: Mapping[str, Any]
+) -> Scenario:
+    """Return a scenario with overrides, its episodes cut to ``horizon`` steps unless that is None.
+
+    That is what ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium) mean. Where an
+    episode becomes shorter than ``settle_time``, that is cut to the episode's length.
+    """
+    changed = dict(overrides)
+    if horizon is None:
+        return get_scenario(scenario, **changed)
+    full = get_scenario(scenario, **changed)
+    changed["horizon"] = horizon
+    if isinstance(horizon, int) and horizon > 0:
+        changed["settle_time"] = min(full.settle_time, horizon * full.control_step)
+    return get_scenario(scenario, **changed)

@@ -1,0 +1,175 @@
+"""A batch of worlds as one TorchRL environment: the batch's natural form for TorchRL users.
+
+TorchRL steps batches and resets parts of them, which is what the engine does, so the adapter only
+names things. E = worlds, N = trackers, F = observation length, m = message size::
+
+    TensorDict (E,)
+        ("agents", "observation")       (E, N, F) float32
+        ("agents", "action")            (E, N, 2 + m) float32 in [-1, 1]
+        ("agents", "reward")            (E, N, 1) float32
+        "score"                         (E, 1) float32, of the present step; 0 at the start
+        "done", "terminated", "truncated"   (E, 1) bool
+
+Where the target is an agent too, it has a group of its own, ``"target"``, with N = 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import posse
+import torch
+from posse.actions import agent_names
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Binary, Bounded, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+TRACKERS: Final = "agents"
+"""The group of the trackers, by the name that TorchRL's multi-agent examples use."""
+TARGET: Final = "target"
+"""The group of a target that is an agent."""
+
+
+class PosseEnv(EnvBase):
+    """A batch of E worlds of one scenario, ``batch_size=[E]``.
+
+    Worlds whose episodes end are reset by TorchRL (rollouts and collectors do so by themselves), a
+    part of the batch at a time. On the CPU the tensors share the memory of the engine's arrays,
+    which are never overwritten while a tensor holds them.
+
+    Args:
+        scenario: A scenario, or the name of one.
+        num_worlds: E, at least 1.
+        device: Where tensors live. The worlds are stepped on the CPU; for another device each
+            step costs a copy each way.
+        settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
+            and any setting of the scenario. The mode of automatic resets is not among them.
+
+    Attributes:
+        batch: The engine, for its layout, its state and its metrics.
+        group_map: The agents' names by group.
+
+    Raises:
+        TypeError: ``autoreset`` among the settings.
+        ValueError: As :func:`posse.batch`.
+    """
+
+    def __init__(
+        self,
+        scenario: str | posse.Scenario = "constant",
+        num_worlds: int = 1,
+        *,
+        device: torch.device | str = "cpu",
+        **settings: Any,
+    ) -> None:
+        if "autoreset" in settings:
+            raise TypeError(
+                f"autoreset={settings['autoreset']!r} cannot be chosen: TorchRL resets the worlds "
+                "that are done by itself; leave it out"
+            )
+        self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", **settings)
+        super().__init__(device=device, batch_size=(num_worlds,))
+        trackers = self.batch.scenario.num_trackers
+        names = agent_names(self.batch.scenario)
+        self._rows = {TRACKERS: slice(0, trackers)}
+        if len(names) > trackers:
+            self._rows[TARGET] = slice(trackers, None)
+        self.group_map = {group: names[rows] for group, rows in self._rows.items()}
+        self._seed: int | None = None
+        self._make_specs()
+
+    def _make_specs(self) -> None:
+        worlds, rows, width = self.batch.action_shape
+        low, high = (
+            torch.from_numpy(bound).expand(worlds, rows, -1) for bound in self.batch.layout.bounds()
+        )
+        observation = Composite(shape=(worlds,))
+        action = Composite(shape=(worlds,))
+        reward = Composite(shape=(worlds,))
+        for group, part in self._rows.items():
+            count = len(self.group_map[group])
+            observation[group] = Composite(
+                observation=Bounded(low[:, part], high[:, part], dtype=torch.float32),
+                shape=(worlds, count),
+            )
+            action[group] = Composite(
+                action=Bounded(-1.0, 1.0, (worlds, count, width), dtype=torch.float32),
+                shape=(worlds, count),
+            )
+            reward[group] = Composite(
+                reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count)
+            )
+        observation["score"] = Bounded(0.0, 1.0, (worlds, 1), dtype=torch.float32)
+        flag = Binary(1, (worlds, 1), dtype=torch.bool)
+        self.observation_spec = observation.to(self.device)
+        self.action_spec = action.to(self.device)
+        self.reward_spec = reward.to(self.device)
+        self.done_spec = Composite(
+            done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(worlds,)
+        ).to(self.device)
+
+    def _set_seed(self, seed: int | None) -> None:
+        """Have the next reset of all worlds start over from episode 0 of a seed."""
+        self._seed = seed
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
+        """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
+
+        ``seed`` and ``options`` (start poses) may be given to :meth:`reset` as they are to
+        :meth:`posse.Batch.reset`.
+        """
+        options = dict(kwargs.get("options") or {})
+        marks = None if tensordict is None else tensordict.get("_reset", None)
+        if marks is not None and not bool(marks.all()):
+            options["reset_mask"] = marks.reshape(self.batch.num_worlds).cpu().numpy()
+            seed = kwargs.get("seed")
+        else:
+            seed = kwargs.get("seed", self._seed)
+            self._seed = None
+        observations = self.batch.reset(seed=seed, options=options)
+        worlds = self.batch.worlds
+        terminated = worlds["terminated"] != 0
+        truncated = (worlds["over"] != 0) & ~terminated
+        return self._pack(observations, terminated, truncated)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        if tensordict.get("_step", None) is not None:
+            raise NotImplementedError(
+                "the worlds of a PosseEnv are stepped together, none can wait for the others: "
+                "use rollout(..., break_when_any_done=False), which resets those that are done, "
+                "and not break_when_all_done=True"
+            )
+        actions = [tensordict.get((group, "action")) for group in self._rows]
+        together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
+        observations, rewards, terminated, truncated, _ = self.batch.step(
+            together.detach().cpu().numpy()
+        )
+        packed = self._pack(observations, terminated, truncated)
+        each = self._tensor(rewards[..., None])
+        for group, part in self._rows.items():
+            packed.set((group, "reward"), each[:, part])
+        return packed
+
+    def _pack(
+        self,
+        observations: npt.NDArray[np.float32],
+        terminated: npt.NDArray[np.bool_],
+        truncated: npt.NDArray[np.bool_],
+    ) -> TensorDict:
+        """Return all but the rewards under TorchRL's names."""
+        each = self._tensor(observations)
+        packed = TensorDict({}, batch_size=self.batch_size, device=self.device)
+        for group, part in self._rows.items():
+            size = (*self.batch_size, len(self.group_map[group]))
+            packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
+        packed.set("score", self._tensor(self.batch.worlds["score"][:, None].copy()))
+        packed.set("done", self._tensor((terminated | truncated)[:, None]))
+        packed.set("terminated", self._tensor(terminated[:, None]))
+        packed.set("truncated", self._tensor(truncated[:, None]))
+        return packed
+
+    def _tensor(self, array: npt.NDArray[Any]) -> torch.Tensor:
+        """Return an array as a tensor on the device, without a copy where that is the CPU."""
+        return torch.from_numpy(array).to(self.device)
