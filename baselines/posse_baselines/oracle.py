@@ -22,9 +22,9 @@ from posse_baselines.parallel import most_parts, over_worlds
 from posse_baselines.policy import (
     BasePolicy, Memory, PolicyError, check_fits, check_observations, message_size_of,
 )  # fmt: skip
-from posse_baselines.safeguard import DISC, put_disc, put_wall, safe_velocity
+from posse_baselines.safeguard import BODY, DISC, command, put_disc, put_wall, safe_velocity
 from posse_baselines.steering import (
-    approach_velocity, follow_velocity, intercept_time, write_motion,
+    approach_velocity, intercept_time, write_motion,
 )  # fmt: skip
 
 _MOST_DISCS: Final = 24
@@ -63,9 +63,7 @@ class OracleSettings:
     """The target is taken to keep its present velocity for about so long, s, then its mean one."""
     mean_time: float = 6.0
     """Time constant of that mean, s."""
-    horizon: float = 1.6
-    """How far the safeguard looks ahead, s."""
-    margin: float = 0.12
+    margin: float = 0.2
     """Free width that it keeps, m."""
 
 
@@ -78,6 +76,7 @@ class _OracleMemory:
     costs: FloatArray
     work: FloatArray
     discs: Records
+    bodies: Records
 
 
 SETTINGS_FIELDS: Final = tuple(OracleSettings.__dataclass_fields__)
@@ -129,7 +128,7 @@ class Oracle(BasePolicy):
         return _OracleMemory(
             batch, config_record(layout.scenario), slot_records(layout.scenario), plans,
             np.zeros((parts, n, n), np.float32), np.zeros((parts, WORK_ROWS, n + 1), np.float32),
-            np.zeros((parts, _MOST_DISCS), DISC),
+            np.zeros((parts, _MOST_DISCS), DISC), np.zeros(parts, BODY),
         )  # fmt: skip
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -147,7 +146,7 @@ class Oracle(BasePolicy):
             lead_all,
             (
                 m.config, m.slots, settings, arrays.world, arrays.tracker, arrays.obstacle,
-                m.plans, m.costs, m.work, m.discs, actions,
+                m.plans, m.costs, m.work, m.discs, m.bodies, actions,
             ),
             num_worlds,
             n,
@@ -178,6 +177,7 @@ def lead(
     cost: FloatArray,
     work: FloatArray,
     discs: Records,
+    body: Record,
     actions: FloatArray,
 ) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
@@ -187,6 +187,8 @@ def lead(
     turn_acceleration = _UNLIMITED
     if c.turn_acceleration_time > 0.0:
         turn_acceleration = c.tracker_turn_rate / c.turn_acceleration_time
+    body.max_speed, body.max_omega, body.dt = speed, c.tracker_turn_rate, dt
+    body.acceleration, body.turn_acceleration = acceleration, turn_acceleration
     vx, vy = float(w.speed * w.heading_cos), float(w.speed * w.heading_sin)
     # The slot frame turns towards the heading, at its limit until it is there.
     psi = math.atan2(w.frame_sin, w.frame_cos)
@@ -220,14 +222,10 @@ def lead(
         wanted, heading = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
         wx, wy = wanted * math.cos(heading), wanted * math.sin(heading)
         count = surround(c, w, trackers, obstacles, i, s.margin, discs)
-        theta = math.atan2(t.heading_sin, t.heading_cos)
-        reaction = dt + 0.3 * min(1.0, c.acceleration_time)
-        wx, wy, dodging = safe_velocity(
-            discs, count, theta, t.speed, wx, wy, speed, c.tracker_turn_rate, reaction, s.horizon
-        )
-        v, omega = follow_velocity(
-            theta, wx, wy, 0.0, speed, c.tracker_turn_rate, turn_acceleration, dt
-        )
+        body.theta = math.atan2(t.heading_sin, t.heading_cos)
+        body.speed, body.omega = t.speed, t.turn_rate
+        wx, wy, _ = safe_velocity(body, discs, count, wx, wy)
+        v, omega = command(body, wx, wy)
         write_motion(actions[i], v, omega, speed, c.tracker_turn_rate)
 
 
@@ -325,6 +323,7 @@ def lead_all(
     costs: FloatArray,
     work: FloatArray,
     discs: Records,
+    bodies: Records,
     actions: FloatArray,
     part: int,
     first: int,
@@ -334,5 +333,5 @@ def lead_all(
     for e in range(first, last):
         lead(
             config[0], slots, settings[0], world[e], tracker[e], obstacle[e], plans[e],
-            costs[part], work[part], discs[part], actions[e],
+            costs[part], work[part], discs[part], bodies[part], actions[e],
         )  # fmt: skip

@@ -1,9 +1,9 @@
 """The safeguard: the velocity nearest to the wanted one that runs into nothing.
 
-What surrounds a tracker is a list of discs, each with a velocity: team-mates, the target, obstacles.
-A velocity is judged by when the tracker would come too near to any of them (the velocity obstacles
-of Fiorini and Shiller 1998). The tracker goes on as it does now until it has turned, and only then
-takes the new velocity: a unicycle cannot do otherwise.
+What surrounds a tracker is a list of discs, each with a velocity: team-mates, the target, obstacles,
+walls. A velocity is judged by playing out how the robot takes it up within its limits, since a
+unicycle moves on for a while as it does now: how long it would spend too near to anything, whether
+and when it would touch, and how far it ends from where the wanted velocity leads.
 """
 
 from __future__ import annotations
@@ -13,13 +13,42 @@ from typing import Any, Final
 
 import numpy as np
 
+from posse.arrays import Record, Records
 from posse.compiled import compiled
+from posse_baselines.guidance import clip, wrap
 
-_DIRECTIONS: Final = 12  # to each side, besides straight on
-_SPEEDS: Final = 3
-_NEVER: Final = 1e6
-_KEEP_RIGHT: Final = 0.03
-"""By how much passing on the right is preferred, as a share of the greatest speed."""
+LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
+"""Steps in which a velocity is played out, s."""
+
+_STEPS: Final = np.array(LOOK_AHEAD)
+_HORIZON: Final = sum(LOOK_AHEAD)
+_DIRECTIONS: Final = 8  # to each side, besides straight on
+_SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed
+_KEEP_RIGHT: Final = 0.02  # by how much passing on the right is preferred
+_CONTACT: Final = 0.015  # m; a narrower gap counts as a contact
+_CONTACT_COST: Final = 4.0
+_INTRUSION_COST: Final = 3.0
+_BRAKING_SHARE: Final = 0.8
+
+BODY: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("theta", np.float64),  # heading, rad
+                ("speed", np.float64),  # m/s
+                ("omega", np.float64),  # turn rate, rad/s
+                ("max_speed", np.float64),
+                ("max_omega", np.float64),
+                ("acceleration", np.float64),  # greatest change of the speed, m/s²
+                ("turn_acceleration", np.float64),  # greatest change of the turn rate, rad/s²
+                ("dt", np.float64),  # control step, s
+            ],
+            align=True,
+        ),
+    )
+)
+"""A robot as it moves now, and what it can do."""
 
 DISC: Final[np.dtype[Any]] = np.dtype(
     (
@@ -39,12 +68,21 @@ DISC: Final[np.dtype[Any]] = np.dtype(
 )
 """Something that must not be touched, in axes that have the tracker at the origin."""
 
+_PLANET: Final = 1000.0  # radius of the disc that stands for a wall, m
+
 
 @compiled
 def put_disc(
-    discs: Any, count: int, x: float, y: float, speed_x: float, speed_y: float, reach: float, margin: float
+    discs: Records,
+    count: int,
+    x: float,
+    y: float,
+    speed_x: float,
+    speed_y: float,
+    reach: float,
+    margin: float,
 ) -> int:
-    """Add a disc to a list with ``count`` entries; return the new count. A full list stays as it is."""
+    """Add a disc to a list of ``count`` entries; return the new count. A full list stays as it is."""
     if count >= len(discs):
         return count
     d = discs[count]
@@ -54,121 +92,116 @@ def put_disc(
 
 @compiled
 def put_wall(
-    discs: Any, count: int, distance: float, normal_x: float, normal_y: float, radius: float, margin: float
-) -> int:
-    """Add a wall, ``distance`` away along its outward normal: a disc as large as a planet."""
-    reach = 1000.0
-    away = distance - radius + reach
-    return put_disc(discs, count, normal_x * away, normal_y * away, 0.0, 0.0, reach, margin)
-
-
-@compiled
-def time_to_reach(x: float, y: float, speed_x: float, speed_y: float, reach: float) -> float:
-    """Return when (s) something at (x, y), moving at a relative velocity, is within ``reach``.
-
-    0 for what is already there and comes nearer; ``1e6`` for what never comes.
-    """
-    closing = x * speed_x + y * speed_y
-    if closing >= 0.0:
-        return _NEVER
-    gap = x * x + y * y - reach * reach
-    if gap <= 0.0:
-        return 0.0
-    square = speed_x * speed_x + speed_y * speed_y
-    under_root = closing * closing - square * gap
-    if under_root <= 0.0:
-        return _NEVER
-    return (-closing - math.sqrt(under_root)) / square
-
-
-@compiled
-def danger(
-    discs: Any,
+    discs: Records,
     count: int,
-    own_x: float,
-    own_y: float,
-    speed_x: float,
-    speed_y: float,
-    delay: float,
-    horizon: float,
-) -> float:
-    """Return how dangerous a velocity (m/s) is: 0 nothing within the horizon, more the sooner.
+    distance: float,
+    normal_x: float,
+    normal_y: float,
+    radius: float,
+    margin: float,
+) -> int:
+    """Add a wall, ``distance`` (m) away along its outward normal: a disc as large as a planet."""
+    away = distance - radius + _PLANET
+    return put_disc(discs, count, normal_x * away, normal_y * away, 0.0, 0.0, _PLANET, margin)
 
-    The tracker moves on with its own velocity for ``delay`` seconds, then takes the new one.
+
+@compiled
+def turn_command(body: Record, error: float, time: float) -> float:
+    """Return the turn rate (rad/s) that brings a heading error (rad) to zero without overshooting."""
+    most = math.sqrt(2.0 * _BRAKING_SHARE * body.turn_acceleration * abs(error))
+    return clip(error / time, -min(most, body.max_omega), min(most, body.max_omega))
+
+
+@compiled
+def cost_of(
+    body: Record,
+    discs: Records,
+    count: int,
+    speed: float,
+    heading: float,
+    wanted_x: float,
+    wanted_y: float,
+    enough: float,
+) -> tuple[float, float]:
+    """Return (cost, danger) of taking up a speed (m/s) and heading (rad); gives up above ``enough``.
+
+    The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a
+    price for a contact, the higher the sooner. The cost adds how far the robot ends from where the
+    wanted velocity leads, as a share of the greatest distance.
     """
-    worst = 0.0
-    for k in range(count):
-        d = discs[k]
-        distance2 = d.x * d.x + d.y * d.y
-        # How it lies after the delay.
-        x = d.x + (d.speed_x - own_x) * delay
-        y = d.y + (d.speed_y - own_y) * delay
-        ux, uy = d.speed_x - speed_x, d.speed_y - speed_y
-        # Within the margin already: what counts is not to come nearer still.
-        keep = d.reach + d.margin
-        if distance2 < keep * keep:
-            keep = max(d.reach + 0.02, math.sqrt(distance2) - 0.02)
-        soft = time_to_reach(x, y, ux, uy, keep)
-        if soft < horizon:
-            hard = time_to_reach(x, y, ux, uy, d.reach + 0.02)
-            value = (1.0 - soft / horizon) + 4.0 * max(0.0, 1.0 - hard / horizon)
-            worst = max(worst, value)
-    return worst
+    x, y, danger, time = 0.0, 0.0, 0.0, 0.0
+    v, omega = body.speed, body.omega
+    error = wrap(heading - body.theta)
+    theta = body.theta
+    for k in range(len(_STEPS)):
+        step = _STEPS[k]
+        change = body.turn_acceleration * step
+        omega = clip(turn_command(body, error, step), omega - change, omega + change)
+        change = body.acceleration * step
+        v = clip(max(0.0, speed * math.cos(error)), v - change, v + change)
+        middle = theta + 0.5 * omega * step
+        x += v * step * math.cos(middle)
+        y += v * step * math.sin(middle)
+        theta += omega * step
+        error = wrap(error - omega * step)
+        time += step
+        weight = _INTRUSION_COST * step / _HORIZON
+        for j in range(count):
+            d = discs[j]
+            dx, dy = d.x + d.speed_x * time - x, d.y + d.speed_y * time - y
+            far = d.reach + d.margin
+            d2 = dx * dx + dy * dy
+            if d2 < far * far:
+                gap = math.sqrt(d2) - d.reach
+                if gap < _CONTACT:
+                    danger += _CONTACT_COST * (1.2 - time / _HORIZON)
+                    return danger + 2.0, danger
+                danger += weight * (1.0 - gap / d.margin)
+        if danger > enough:
+            return danger, danger
+    scale = 1.0 / (body.max_speed * _HORIZON)
+    short_x, short_y = x * scale - wanted_x / body.max_speed, y * scale - wanted_y / body.max_speed
+    return danger + math.hypot(short_x, short_y), danger
 
 
 @compiled
 def safe_velocity(
-    discs: Any,
-    count: int,
-    theta: float,
-    speed: float,
-    wanted_x: float,
-    wanted_y: float,
-    max_speed: float,
-    max_omega: float,
-    reaction: float,
-    horizon: float,
+    body: Record, discs: Records, count: int, wanted_x: float, wanted_y: float
 ) -> tuple[float, float, bool]:
-    """Return the velocity (m/s) to take instead of a wanted one, and whether it is another one.
-
-    ``theta`` (rad) and ``speed`` (m/s) are the tracker's own; ``reaction`` (s) is how long it takes
-    to change its speed; ``horizon`` (s) is how far ahead it looks.
-    """
+    """Return the velocity (m/s) to take instead of a wanted one, and whether it is another one."""
     if count == 0:
         return wanted_x, wanted_y, False
-    own_x, own_y = speed * math.cos(theta), speed * math.sin(theta)
     wanted = math.hypot(wanted_x, wanted_y)
-    heading = math.atan2(wanted_y, wanted_x) if wanted > 1e-6 else theta
-    delay = _delay(theta, heading, max_omega, reaction)
-    least = danger(discs, count, own_x, own_y, wanted_x, wanted_y, delay, horizon)
-    if least <= 0.0:
+    heading = math.atan2(wanted_y, wanted_x) if wanted > 1e-6 else body.theta
+    least, danger = cost_of(body, discs, count, wanted, heading, wanted_x, wanted_y, 1e9)
+    if danger <= 0.0:
         return wanted_x, wanted_y, False
-    best_x, best_y = wanted_x, wanted_y
-    least *= 2.0
-    for k in range(-_DIRECTIONS, _DIRECTIONS + 1):
+    best_speed, best_heading = wanted, heading
+    cost, _ = cost_of(body, discs, count, 0.0, body.theta, wanted_x, wanted_y, least)
+    if cost < least:
+        least, best_speed, best_heading = cost, 0.0, body.theta
+    for k in range(-_DIRECTIONS, _DIRECTIONS):
         angle = heading + k * (math.pi / _DIRECTIONS)
-        cosine, sine = math.cos(angle), math.sin(angle)
-        delay = _delay(theta, angle, max_omega, reaction)
-        for level in range(_SPEEDS):
-            value = max_speed * level / (_SPEEDS - 1)
-            if level == 0 and k != 0:
-                continue
-            x, y = value * cosine, value * sine
-            away = math.hypot(x - wanted_x, y - wanted_y) / max_speed
+        for level in range(len(_SPEED_LEVELS)):
+            speed = body.max_speed * _SPEED_LEVELS[level]
+            cost, _ = cost_of(body, discs, count, speed, angle, wanted_x, wanted_y, least)
             if k > 0:
-                away += _KEEP_RIGHT
-            if 0.5 * away >= least:
-                continue
-            cost = 0.5 * away + 2.0 * danger(
-                discs, count, own_x, own_y, x, y, delay, horizon
-            )
+                cost += _KEEP_RIGHT
             if cost < least:
-                least, best_x, best_y = cost, x, y
-    return best_x, best_y, True
+                least, best_speed, best_heading = cost, speed, angle
+    return best_speed * math.cos(best_heading), best_speed * math.sin(best_heading), True
 
 
 @compiled
-def _delay(theta: float, heading: float, max_omega: float, reaction: float) -> float:
-    error = heading - theta
-    error -= 2.0 * math.pi * math.floor((error + math.pi) / (2.0 * math.pi))
-    return reaction + 0.5 * abs(error) / max_omega
+def command(body: Record, speed_x: float, speed_y: float) -> tuple[float, float]:
+    """Return the command (V, ω) of a robot that takes up a velocity (m/s) within its limits.
+
+    V is the part of the velocity that lies ahead, and 0 while it points backwards. A velocity of
+    nearly nothing keeps the heading.
+    """
+    speed = math.hypot(speed_x, speed_y)
+    if speed < 1e-3:
+        return 0.0, 0.0
+    error = wrap(math.atan2(speed_y, speed_x) - body.theta)
+    ahead = clip(speed * math.cos(error), 0.0, body.max_speed)
+    return ahead, turn_command(body, error, body.dt)

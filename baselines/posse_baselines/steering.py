@@ -1,4 +1,4 @@
-"""From where a tracker wants to go to what it does: intercept times, braking, turning within limits."""
+"""When a point can be met, and with what velocity to approach it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 from posse.arrays import FloatArray
 from posse.compiled import compiled
 from posse_baselines.formation_control import cartesian_slot_velocity
-from posse_baselines.guidance import clip, regulate_heading, wrap
+from posse_baselines.guidance import clip
 
 NEVER: Final = 1e6
 """s. What stands for a meeting that does not happen."""
@@ -53,35 +53,6 @@ def approach_velocity(
     return cartesian_slot_velocity(
         offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
     )
-
-
-@compiled
-def follow_velocity(
-    theta: float,
-    speed_x: float,
-    speed_y: float,
-    wanted_rate: float,
-    max_speed: float,
-    max_omega: float,
-    turn_acceleration: float,
-    dt: float,
-) -> tuple[float, float]:
-    """Return the command (V, ω) of a robot that takes up a wanted velocity (m/s).
-
-    The intact law steers; a robot whose turn rate changes by at most ``turn_acceleration``
-    (rad/s²) slows its turn in time. V is the part of the velocity that lies ahead, and 0 while it
-    points backwards. A velocity of nearly nothing keeps the heading.
-    """
-    speed = math.hypot(speed_x, speed_y)
-    if speed < 1e-3:
-        return 0.0, 0.0
-    heading = math.atan2(speed_y, speed_x)
-    error = wrap(heading - theta)
-    most = min(max_omega, math.sqrt(2.0 * _SPEED_LEFT * turn_acceleration * abs(error)))
-    # While the robot barely moves, the direction of its wanted velocity is mostly noise.
-    most = max(most, abs(wanted_rate))
-    omega = regulate_heading(theta, heading, wanted_rate, min(most, max_omega), dt)
-    return clip(speed * math.cos(error), 0.0, max_speed), omega
 
 
 @compiled

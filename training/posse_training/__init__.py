@@ -1,1 +1,7 @@
-"""Learning, evaluation, reports and the command line of posse."""
+"""Learning, evaluation and reports: what needs more than the worlds and their policies."""
+
+from __future__ import annotations
+
+from posse_training.evaluation import Results, evaluate
+
+__all__ = ["Results", "evaluate"]

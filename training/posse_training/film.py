@@ -131,8 +131,15 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
     shown = max(2, round(frame_time * 100)) * 10  # ms; players slow down what is faster than 2/100 s
     times = [shown] * len(images)
     times[-1] = max(shown, round(_LAST_SHOWN * 1000))
+    # optimize=False: the palette is right as it is; to look for a smaller one takes 20 ms a frame.
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=times, loop=0, disposal=1
+        path,
+        save_all=True,
+        append_images=images[1:],
+        duration=times,
+        loop=0,
+        disposal=1,
+        optimize=False,
     )
 
 

@@ -1,0 +1,36 @@
+"""What the adapters' tests share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import posse
+
+SOLO_SCENARIOS = tuple(
+    name for name in posse.scenario_names() if posse.get_scenario(name).breaks == 0
+)
+"""Scenarios that a single tracker fits: none in which one of several breaks."""
+
+# Short, with everything in it that an episode can have.
+EVERYTHING: dict[str, Any] = {
+    "scenario": "field", "horizon": 12, "settle_time": 0.5, "break_window": (0.2, 0.6),
+    "sensor_outages": 1.0, "radio_outages": 1.0, "outage_time": 0.4,
+}  # fmt: skip
+
+
+def same(a: Any, b: Any) -> bool:
+    """Say whether two nested structures are equal: types, keys, dtypes, values; nan equals nan."""
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a)
+    if isinstance(a, (list, tuple)):
+        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, np.ndarray):
+        if a.dtype == object:
+            return a.shape == b.shape and all(same(x, y) for x, y in zip(a, b, strict=True))
+        exact = np.issubdtype(a.dtype, np.floating)
+        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=exact)
+    return bool(a == b or (a != a and b != b))
