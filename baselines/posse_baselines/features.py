@@ -24,6 +24,7 @@ from posse_baselines.policy import PolicyError
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _LARGE: Final = np.float32(1e9)
+_BIT: Final = np.uint64(1)
 _SMALL: Final = np.float32(1e-6)
 _NEAR: Final = np.float32(0.3)  # m, the default tolerance
 _FAR: Final = np.float32(3.0)
@@ -33,9 +34,9 @@ _OLD: Final = np.float32(2.0)  # s, how far a fix is carried on
 
 _MATES: Final = 3
 NUM_FEATURES: Final = 25 + 4 * _MATES
-MOST: Final = 64
-"""Trackers that an assignment may have."""
-SCRATCH: Final = 3 * MOST
+MOST: Final = 16
+"""Trackers that an assignment takes into account: this one and the nearest that it knows of."""
+SCRATCH: Final = MOST * (3 + 64)
 """float32 numbers of working memory that :func:`write_features` takes."""
 
 _NAMES: Final = (
@@ -77,14 +78,6 @@ def _soft(x: np.float32, y: np.float32, scale: np.float32, out: FloatArray) -> N
 
 
 @compiled
-def _distance(
-    mates_x: FloatArray, mates_y: FloatArray, j: int, x: np.float32, y: np.float32
-) -> np.float32:
-    dx, dy = mates_x[j] - x, mates_y[j] - y
-    return np.float32(math.sqrt(dx * dx + dy * dy))
-
-
-@compiled
 def _slot_x(slots: FloatArray, s: int, x: np.float32, c: np.float32, n: np.float32) -> np.float32:
     return x + slots[s, 0] * c - slots[s, 1] * n
 
@@ -95,53 +88,38 @@ def _slot_y(slots: FloatArray, s: int, y: np.float32, c: np.float32, n: np.float
 
 
 @compiled
-def assign(
-    count: int,
-    xs: FloatArray,
-    ys: FloatArray,
-    chosen: FloatArray,
-    slots: FloatArray,
-    x: np.float32,
-    y: np.float32,
-    c: np.float32,
-    n: np.float32,
-) -> None:
-    """Give each of ``count`` robots at (xs, ys) a slot of its own, ``chosen``.
+def assign(count: int, num_slots: int, ways: FloatArray, chosen: FloatArray) -> None:
+    """Give each of ``count`` robots a slot of its own, ``chosen`` (-1: none is left for it).
 
     The nearest pair first, then swaps as long as one shortens the sum of the ways: what every
-    tracker that knows of the same robots comes to as well. (x, y) is the target, (c, n) ψ.
+    tracker that knows of the same robots comes to as well. ``ways[j * num_slots + s]`` is the
+    distance of robot j from slot s, m.
     """
     for j in range(count):
         chosen[j] = -_ONE
-    for _ in range(count):
+    taken = np.uint64(0)
+    for _ in range(min(count, num_slots)):
         best, robot, slot = _LARGE, -1, -1
-        for s in range(len(slots)):
-            free = True
-            for j in range(count):
-                if chosen[j] == s:
-                    free = False
-            if not free:
+        for j in range(count):
+            if chosen[j] >= _ZERO:
                 continue
-            sx, sy = _slot_x(slots, s, x, c, n), _slot_y(slots, s, y, c, n)
-            for j in range(count):
-                if chosen[j] < _ZERO:
-                    d = _distance(xs, ys, j, sx, sy)
-                    if d < best:
-                        best, robot, slot = d, j, s
+            for s in range(num_slots):
+                way = ways[j * num_slots + s]
+                if way < best and (taken >> np.uint64(s)) & _BIT == np.uint64(0):
+                    best, robot, slot = way, j, s
         if robot < 0:
             break
         chosen[robot] = np.float32(slot)
+        taken |= _BIT << np.uint64(slot)
     for _ in range(count):
         swapped = False
-        for i in range(count):
+        for i in range(1, count):
             for j in range(i):
                 a, b = int(chosen[i]), int(chosen[j])
                 if a < 0 or b < 0:
                     continue
-                ax, ay = _slot_x(slots, a, x, c, n), _slot_y(slots, a, y, c, n)
-                bx, by = _slot_x(slots, b, x, c, n), _slot_y(slots, b, y, c, n)
-                now = _distance(xs, ys, i, ax, ay) + _distance(xs, ys, j, bx, by)
-                then = _distance(xs, ys, i, bx, by) + _distance(xs, ys, j, ax, ay)
+                now = ways[i * num_slots + a] + ways[j * num_slots + b]
+                then = ways[i * num_slots + b] + ways[j * num_slots + a]
                 if then < now - _SMALL * now:
                     chosen[i], chosen[j] = np.float32(b), np.float32(a)
                     swapped = True
@@ -173,7 +151,8 @@ def write_features(
     """Write the features of one observation (F,) to ``out`` (NUM_FEATURES,)."""
     for k in range(NUM_FEATURES):
         out[k] = _ZERO
-    xs, ys, chosen = scratch[:MOST], scratch[MOST : 2 * MOST], scratch[2 * MOST :]
+    xs, ys = scratch[:MOST], scratch[MOST : 2 * MOST]
+    chosen, ways = scratch[2 * MOST : 3 * MOST], scratch[3 * MOST :]
     count = _gather_team(row, at, xs, ys)
     top, speed = row[at[_MAX_SPEED]], row[at[_SPEED]]
     out[0] = speed / top
@@ -195,7 +174,13 @@ def write_features(
     k = at[_FRAME]
     c, n = row[k], row[k + 1]
     k = at[_HEADING]
-    assign(count, xs, ys, chosen, slots, x, y, c, n)
+    num_slots = len(slots)
+    for s in range(num_slots):
+        sx, sy = _slot_x(slots, s, x, c, n), _slot_y(slots, s, y, c, n)
+        for j in range(count):
+            wx, wy = xs[j] - sx, ys[j] - sy
+            ways[j * num_slots + s] = np.float32(math.sqrt(wx * wx + wy * wy))
+    assign(count, num_slots, ways, chosen)
     mine = int(chosen[0])
     if mine < 0:
         mine = 0
@@ -223,8 +208,7 @@ def write_features(
     for j in range(1, count):
         s = int(chosen[j])
         if s >= 0:
-            sx, sy = _slot_x(slots, s, x, c, n), _slot_y(slots, s, y, c, n)
-            held += _distance(xs, ys, j, sx, sy) < _NEAR
+            held += ways[j * num_slots + s] < _NEAR
     o[19] = np.float32(held) / np.float32(max(count - 1, 1))
     o[20] = row[at[_SEEN]]
     o[21] = row[at[_AGE]] / (row[at[_AGE]] + _ONE)

@@ -63,7 +63,7 @@ class OracleSettings:
     """The target is taken to keep its present velocity for about so long, s, then its mean one."""
     mean_time: float = 6.0
     """Time constant of that mean, s."""
-    margin: float = 0.2
+    margin: float = 0.15
     """Free width that it keeps, m."""
 
 

@@ -41,7 +41,9 @@ def batch(
     )
 
 
-def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
+def observation_fields(
+    scenario: str | Scenario = "constant", **overrides: Any
+) -> tuple[Field, ...]:
     """Return every field of a scenario's observation, in order: name, size, unit, range, meaning."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
 

@@ -1,7 +1,7 @@
 """What an action may be, and how the adapters take one: checked, and said by name what is wrong.
 
-An action is a robot's (speed, turn rate), each in [-1, 1], and after them the message. Learners that
-choose among a few actions get a `Discrete` variant: three speeds times five turn rates.
+An action is a robot's (speed, turn rate), each in [-1, 1], and after them the message. Learners
+that choose among a few actions get a `Discrete` variant: three speeds times five turn rates.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class ActionReader:
         """
         try:
             array = np.array([actions[agent] for agent in self._agents])
-        except (KeyError, TypeError, ValueError):  # told apart below
+        except (KeyError, IndexError, TypeError, ValueError):  # told apart below
             return self._by_agent_slowly(actions)
         if len(actions) != len(self._agents) or array.shape != self._shape:
             return self._by_agent_slowly(actions)
@@ -99,7 +99,8 @@ class ActionReader:
             ValueError: As :meth:`by_agent`.
         """
         array = self._row(agent, action)
-        return self._in_space(array[None], (agent,))[0, 0]
+        checked: FloatArray = self._in_space(array[None], (agent,))[0, 0]
+        return checked
 
     def _checked(self, array: npt.NDArray[Any], given: Any) -> FloatArray:
         if self._discrete:
@@ -118,9 +119,7 @@ class ActionReader:
     def _by_agent_slowly(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return the actions, or find out which of them is wrong in which way."""
         if not isinstance(actions, Mapping):
-            raise ValueError(
-                f"actions must be a dictionary by agent, got {type(actions).__name__}"
-            )
+            raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
         known = f"agents are: {', '.join(self._agents)}"
         for agent in actions:
             if agent not in self._agents:
@@ -139,9 +138,7 @@ class ActionReader:
             kind = "a whole number" if self._discrete else "real numbers"
             raise ValueError(f"action of {agent} must be {kind}, got {action!r} ({array.dtype})")
         if array.shape != self._shape[1:]:
-            raise ValueError(
-                f"action of {agent} has shape {array.shape}, wanted {self._shape[1:]}"
-            )
+            raise ValueError(f"action of {agent} has shape {array.shape}, wanted {self._shape[1:]}")
         return array if self._discrete else array.astype(np.float32)
 
     def _in_space(self, array: npt.NDArray[Any], agents: Sequence[str]) -> FloatArray:
@@ -153,7 +150,8 @@ class ActionReader:
                 raise ValueError(
                     f"action of {agents[i]} is {array[i]}, outside 0 to {len(MOTIONS) - 1}"
                 )
-            return MOTIONS[array][None]
+            motions: FloatArray = MOTIONS[array][None]
+            return motions
         kernel = np.ascontiguousarray(array, np.float32)[None]
         position = bad_action(kernel)
         if position >= 0:

@@ -5,10 +5,11 @@ Everything else (PettingZoo, Gymnasium, training, evaluation) stands on :class:`
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final
@@ -39,6 +40,8 @@ _SERIAL_BELOW: Final = 2048
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
 _UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
+_TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
+_kernel: Final[Callable[..., int]] = advance
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
 
@@ -91,7 +94,8 @@ class Batch:
             the next episode and ignores its action; ``"same_step"``: the next episode starts at
             once and the last observation is ``infos["final_obs"]``; ``"disabled"``: the caller
             resets, with ``options={"reset_mask": mask}``.
-        num_threads: Threads that step the worlds; default: as many as cores. Never changes a result.
+        num_threads: Threads that step the worlds; default: as many as cores. Never changes a
+            result.
 
     Attributes:
         layout: Where each field lies in an observation.
@@ -157,7 +161,7 @@ class Batch:
             threads = 1
         edges = [num_worlds * k // threads for k in range(threads + 1)]
         self._scratch = [np.empty((2, scenario.num_trackers), np.float32) for _ in edges]
-        self._parts = list(zip(edges[:-1], edges[1:], strict=True))
+        self._parts = list(itertools.pairwise(edges))
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (
@@ -259,7 +263,9 @@ class Batch:
         observations = self._start(chosen, START)
         if poses:
             for name, pose in poses.items():
-                _write_poses(self._arrays.tracker if name == "tracker_pose" else world, pose, chosen)
+                _write_poses(
+                    self._arrays.tracker if name == "tracker_pose" else world, pose, chosen
+                )
             try:
                 self._check_overlap(chosen)
             except ValueError:
@@ -295,7 +301,7 @@ class Batch:
         terminated, truncated = self._flags.copy()
         infos: dict[str, Any] = {
             "score": self._arrays.world["score"].copy(),
-            "reward_terms": {term.name: terms[:, :, k] for k, term in enumerate(REWARD_TERMS)},
+            "reward_terms": dict(zip(_TERM_NAMES, terms.transpose(2, 0, 1), strict=True)),
         }
         if over:
             observations = self._end(observations, terminated | truncated, infos)
@@ -336,9 +342,7 @@ class Batch:
                 + ': call reset(options={"reset_mask": mask}) first'
             )
 
-    def _end(
-        self, observations: FloatArray, ended: BoolArray, infos: dict[str, Any]
-    ) -> FloatArray:
+    def _end(self, observations: FloatArray, ended: BoolArray, infos: dict[str, Any]) -> FloatArray:
         """Report the episodes that ended; in the mode "same_step", start the next ones."""
         infos["metrics"], infos["_metrics"] = self.metrics(), ended
         if self.autoreset != "same_step":
@@ -389,18 +393,18 @@ class Batch:
         scratch = self._scratch
         if _UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
-                return int(advance(*arguments, scratch[0], 0, self.num_worlds))
+                return int(_kernel(*arguments, scratch[0], 0, self.num_worlds))
         (first, last), *others = self._parts
         if not others:
-            return advance(*arguments, scratch[0], first, last)
+            return _kernel(*arguments, scratch[0], first, last)
         if self._threads is None or self._process != os.getpid():
             self._threads = ThreadPoolExecutor(len(others), "posse")
             self._process = os.getpid()  # threads do not survive a fork
         waiting = [
-            self._threads.submit(advance, *arguments, scratch[k], *part)
+            self._threads.submit(_kernel, *arguments, scratch[k], *part)
             for k, part in enumerate(others, 1)
         ]
-        over = advance(*arguments, scratch[0], first, last)
+        over = _kernel(*arguments, scratch[0], first, last)
         return over + sum(part.result() for part in waiting)
 
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
@@ -425,7 +429,10 @@ class Batch:
 
     def _check_poses(self, options: Mapping[str, Any]) -> dict[str, npt.NDArray[np.float64]]:
         poses = {}
-        for name, shape in (("tracker_pose", (self.scenario.num_trackers, 3)), ("target_pose", (3,))):
+        for name, shape in (
+            ("tracker_pose", (self.scenario.num_trackers, 3)),
+            ("target_pose", (3,)),
+        ):
             if options.get(name) is None:
                 continue
             full = (self.num_worlds, *shape)
@@ -449,10 +456,7 @@ class Batch:
         """Raise if robots stand inside each other, an obstacle or a wall."""
         s, world, tracker = self.scenario, self._arrays.world, self._arrays.tracker
         robots = np.stack(
-            [
-                np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen]
-                for k in ("x", "y")
-            ],
+            [np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen] for k in ("x", "y")],
             axis=-1,
         ).astype(np.float64)
         names = [*(f"tracker_{i}" for i in range(s.num_trackers)), "the target"]
@@ -476,9 +480,7 @@ class Batch:
                 raise ValueError(f"{name} would start in an obstacle: move it")
 
 
-def _write_poses(
-    records: Records, poses: npt.NDArray[np.float64], chosen: BoolArray
-) -> None:
+def _write_poses(records: Records, poses: npt.NDArray[np.float64], chosen: BoolArray) -> None:
     records["x"][chosen] = poses[chosen][..., 0]
     records["y"][chosen] = poses[chosen][..., 1]
     records["heading_cos"][chosen] = np.cos(poses[chosen][..., 2])

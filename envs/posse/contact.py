@@ -153,10 +153,11 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
             dx, dy = o.x - x, o.y - y
             d = c.radius + o.radius
             d2 = dx * dx + dy * dy
+            if d2 < (d + least) * (d + least):
+                least = np.float32(math.sqrt(d2)) - d
             if d2 <= (d + step + TOUCHING_GAP) * (d + step + TOUCHING_GAP):
                 near = True
                 gap = np.float32(math.sqrt(d2)) - d
-                least = min(least, gap)
                 if gap <= TOUCHING_GAP:
                     surroundings |= _BIT << np.uint64(k)
         if c.walled:

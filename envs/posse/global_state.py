@@ -1,9 +1,10 @@
 """Everything there is to know of a world, as one flat float32 vector: for critics that see it all.
 
-It holds what decides how the world goes on, chance apart: poses, speeds, the slot frame ψ, where the
-target is bound for, obstacles, faults past and to come, every tracker's fix, and the radio: what was
-heard last, and what is in flight. What follows from these (sonar, contacts, occupied slots) is left
-out, and so are the sums behind the metrics. To add an entry, add its line to :func:`_entries`.
+It holds what decides how the world goes on, chance apart: poses, speeds, the slot frame ψ, where
+the target is bound for, obstacles, faults past and to come, every tracker's fix, and the radio:
+what was heard last, and what is in flight. What follows from these (sonar, contacts, occupied
+slots) is left out, and so are the sums behind the metrics. To add an entry, add its line to the
+function of its part below.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ class StateLayout:
         for entry in self.entries:
             start = self.offsets[entry.name]
             part = vectors[..., start : start + int(np.prod(entry.shape))]
-            views[entry.name] = part.reshape(*vectors.shape[:-1], *entry.shape)
+            views[entry.name] = part.reshape((*vectors.shape[:-1], *entry.shape))
         return views
 
 

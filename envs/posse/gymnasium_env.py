@@ -169,7 +169,7 @@ class TeamEnv(gymnasium.Env[FloatArray, Any]):
         row = rewards[0].tolist()
         return observations[0], sum(row) / len(row), terminated, truncated, info
 
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
 
         Raises:

@@ -1,4 +1,4 @@
-"""The worlds as PettingZoo environments: every tracker an agent, and the target too, if asked for."""
+"""The worlds as PettingZoo environments: trackers are agents, and the target, if asked for."""
 
 from __future__ import annotations
 
@@ -167,9 +167,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
 
     def step(
         self, actions: Mapping[str, Any]
-    ) -> tuple[
-        dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos
-    ]:
+    ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos]:
         """Advance the world by one control step.
 
         Args:
@@ -266,7 +264,7 @@ class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):
 
 
 class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
-    """:class:`TeamParallelEnv` with the agents in turns: nothing moves before the last has acted."""
+    """:class:`TeamParallelEnv` in turns: nothing moves before the last agent has acted."""
 
     def __init__(self, env: TeamParallelEnv) -> None:
         super().__init__(_InTurns(env))
@@ -291,10 +289,10 @@ class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:
-    """Return a PettingZoo environment in which all agents act at once; see :class:`TeamParallelEnv`."""
+    """Return a PettingZoo environment whose agents act at once: :class:`TeamParallelEnv`."""
     return TeamParallelEnv(scenario, **settings)
 
 
 def env(scenario: str | Scenario = "constant", **settings: Any) -> TeamAECEnv:
-    """Return a PettingZoo environment in which agents act in turns; see :class:`TeamParallelEnv`."""
+    """Return a PettingZoo environment whose agents act in turns: :class:`TeamAECEnv`."""
     return TeamAECEnv(TeamParallelEnv(scenario, **settings))

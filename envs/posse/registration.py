@@ -16,9 +16,7 @@ def register() -> None:
     """Register every id, once however often it is called."""
     for name, (entry_point, vector_entry_point) in _GYMNASIUM.items():
         if name not in gymnasium.registry:
-            gymnasium.register(
-                name, entry_point=entry_point, vector_entry_point=vector_entry_point
-            )
+            gymnasium.register(name, entry_point=entry_point, vector_entry_point=vector_entry_point)
     if _PETTINGZOO not in pettingzoo.parallel_registry:
         pettingzoo.register("parallel", _PETTINGZOO, "posse.pettingzoo_env:parallel_env")
         pettingzoo.register("aec", _PETTINGZOO, "posse.pettingzoo_env:env")

@@ -141,4 +141,6 @@ class Canvas:
 
 def pixels(surface: pygame.Surface) -> npt.NDArray[np.uint8]:
     """Return a copy of a surface as (H, W, 3) uint8."""
-    return np.ascontiguousarray(pygame.surfarray.array3d(surface).swapaxes(0, 1))
+    width, height = surface.get_size()
+    flat = np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8)
+    return flat.reshape(height, width, 3).copy()

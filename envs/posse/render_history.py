@@ -10,6 +10,7 @@ import numpy as np
 from posse.render_scene import Floats, Scene
 
 _TRAIL_TIME: Final = 6.0  # s
+_MARK_TIME: Final = 0.2  # s, between two marks of a trail
 _FLASH_TIME: Final = 0.8  # s
 
 
@@ -48,18 +49,18 @@ class History:
         A moment noted twice counts once; one before the last (a restored batch) starts over.
         """
         self._step_time = scene.scenario.control_step
-        last = self._marks[-1][0] if self._marks else -1
+        marks, last = self._marks, self._marks[-1][0] if self._marks else -1
         begun = scene.episode != self._episode or scene.step < last
         if begun:
             self._episode = scene.episode
-            self._marks.clear()
+            marks.clear()
             self._contacts.clear()
-        elif scene.step == last:
-            self._marks.pop()
-        self._marks.append((scene.step, np.vstack([scene.position, scene.target])))
+        elif scene.step == last or self._is_close(marks):
+            marks.pop()
+        marks.append((scene.step, np.vstack([scene.position, scene.target])))
         for i in np.flatnonzero(scene.struck).tolist():
             self._contacts[scene.step, i] = scene.position[i]
-        self._marks = [m for m in self._marks if self._age(m[0]) <= _TRAIL_TIME]
+        self._marks = [m for m in marks if self._age(m[0]) <= _TRAIL_TIME]
         self._contacts = {
             key: place for key, place in self._contacts.items() if self._age(key[0]) < _FLASH_TIME
         }
@@ -75,6 +76,12 @@ class History:
             Flash(place, self._age(step) / _FLASH_TIME)
             for (step, _), place in self._contacts.items()
         ]
+
+    def _is_close(self, marks: list[tuple[int, Floats]]) -> bool:
+        """Say whether the last mark is too close to the one before to be worth keeping."""
+        if len(marks) < 2:
+            return False
+        return (marks[-1][0] - marks[-2][0]) * self._step_time < _MARK_TIME - 1e-9
 
     def _age(self, step: int) -> float:
         return (self._marks[-1][0] - step) * self._step_time

@@ -16,7 +16,7 @@ DESIGN_SIZE: Final = 640
 
 PAPER: Final[Colour] = (255, 255, 255)
 GROUND: Final[Colour] = (248, 249, 251)
-GRID: Final[Colour] = (230, 234, 239)
+GRID: Final[Colour] = (212, 218, 225)
 WALL: Final[Colour] = (120, 127, 137)
 OBSTACLE: Final[Colour] = (205, 210, 217)
 OBSTACLE_RIM: Final[Colour] = (168, 175, 184)

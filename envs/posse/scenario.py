@@ -338,8 +338,8 @@ def _check_types(s: Scenario) -> None:
 # What float32 can work with: finer or wider than this, steps and squares would be lost to rounding.
 _SMALL: Final = 1e-3
 _WIDE: Final = 1e4
-_WIDEST: Final = 1e6
-"""Robots are never farther apart than this, m: what stands for an unlimited range."""
+FAR: Final = 1.0e6
+"""What stands for an unlimited range in the kernels; robots never come farther apart, m."""
 
 # name -> (least, greatest, least is allowed)
 _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
@@ -457,9 +457,9 @@ def _check_formation(s: Scenario) -> None:
 
 
 def _check_place(s: Scenario) -> None:
-    if s.range_bound > _WIDEST:
+    if s.range_bound > FAR:
         raise ScenarioError(
-            f"robots could come {s.range_bound:.3g} m apart, at most {_WIDEST:g} m is possible: "
+            f"robots could come {s.range_bound:.3g} m apart, at most {FAR:g} m is possible: "
             f"lower tracker_speed={s.tracker_speed:g}, horizon={s.horizon}, "
             f"control_step={s.control_step:g}, start_distance={s.start_distance} or "
             f"arena={s.arena:g}"

@@ -1,4 +1,4 @@
-"""One world, as the environments of one world share it: seeds, the end, state, pictures, pickling."""
+"""One world, and what the environments of one world share: seeds, the end, state, pictures."""
 
 from __future__ import annotations
 
@@ -109,7 +109,8 @@ class SingleWorld:
             seed = secrets.randbits(32)
         observations = self.batch.reset(seed=seed, options=options)
         self.running = self._seeded = self._started = True
-        return observations[0]
+        first: FloatArray = observations[0]
+        return first
 
     def advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Make a control step; actions (1, rows, 2 + m) that were checked.
@@ -155,7 +156,8 @@ class SingleWorld:
         """
         if not self._started:
             raise ResetNeeded("state before reset: call reset() first")
-        return self.state_layout.vector(self.batch.arrays)[0]
+        state: FloatArray = self.state_layout.vector(self.batch.arrays)[0]
+        return state
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the world: the picture (H, W, 3) in the mode "rgb_array", a window in "human".
@@ -210,6 +212,6 @@ def shortened(
         return get_scenario(scenario, **changed)
     full = get_scenario(scenario, **changed)
     changed["horizon"] = horizon
-    if isinstance(horizon, int) and horizon > 0:
+    if horizon > 0:
         changed["settle_time"] = min(full.settle_time, horizon * full.control_step)
     return get_scenario(scenario, **changed)

@@ -18,13 +18,11 @@ import numpy.typing as npt
 from posse.arrays import FloatArray, Record, Records
 from posse.formation import FORMATIONS, slot_offsets
 from posse.reward import REWARD_TERMS
-from posse.scenario import BREAK_CHOICES, SAFE_MARGIN, TARGET_MOTIONS, Scenario
+from posse.scenario import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS, Scenario
 
 SPLITS: Final = ("train", "validation", "test")
 NEVER: Final = np.int32(2**30)
 """A control step that no episode reaches."""
-FAR: Final = 1.0e6
-"""What stands for an unlimited range inside the kernels, m."""
 
 
 def _record(*fields: tuple[str, type]) -> np.dtype[Any]:

@@ -1,4 +1,4 @@
-"""The worlds as Gymnasium vector environments: thousands of them, stepped by one call of the engine."""
+"""The worlds as Gymnasium vector environments: thousands of them, stepped by one call."""
 
 from __future__ import annotations
 
@@ -148,9 +148,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             self.render()
         return self._observed(observations), {}
 
-    def step(
-        self, actions: Any
-    ) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
+    def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
         """Advance every world by one control step.
 
         Args:
@@ -187,13 +185,14 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             raise ValueError(
                 f"actions{list(where)} = {array[where]} lies outside 0 to {len(MOTIONS) - 1}"
             )
-        return MOTIONS[array].reshape(self.batch.action_shape)
+        motions: FloatArray = MOTIONS[array].reshape(self.batch.action_shape)
+        return motions
 
     def _infos(self, observations: FloatArray, ended: BoolArray, found: _Info) -> _Info:
         """Bring the batch's infos to the form of Gymnasium's own vector environments."""
         last = found.get("final_obs", observations)
         entries: _Info = {
-            "score": found["score"],
+            "score": found["score"].astype(np.float64),
             "reward_terms": {k: self._of_agents(v) for k, v in found["reward_terms"].items()},
         }
         if self.scenario.breaks:
@@ -222,9 +221,10 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         return observations
 
     def _rewarded(self, rewards: FloatArray) -> _Rewards:
-        return rewards.mean(axis=1, dtype=np.float64)
+        mean: _Rewards = rewards.mean(axis=1, dtype=np.float64)
+        return mean
 
-    def _of_agents(self, values: FloatArray) -> FloatArray:
+    def _of_agents(self, values: FloatArray) -> npt.NDArray[Any]:
         return values
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
@@ -259,8 +259,8 @@ class SoloVectorEnv(TeamVectorEnv):
     def _rewarded(self, rewards: FloatArray) -> _Rewards:
         return rewards[:, 0].astype(np.float64)
 
-    def _of_agents(self, values: FloatArray) -> FloatArray:
-        return values[:, 0]
+    def _of_agents(self, values: FloatArray) -> npt.NDArray[Any]:
+        return values[:, 0].astype(np.float64)
 
 
 def _masked(entries: _Info, mask: BoolArray) -> _Info:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import posse
 
@@ -18,6 +19,11 @@ EVERYTHING: dict[str, Any] = {
     "scenario": "field", "horizon": 12, "settle_time": 0.5, "break_window": (0.2, 0.6),
     "sensor_outages": 1.0, "radio_outages": 1.0, "outage_time": 0.4,
 }  # fmt: skip
+
+
+def f32(values: Any) -> npt.NDArray[np.float32]:
+    """Return an array as policies give it."""
+    return np.array(values, np.float32)
 
 
 def same(a: Any, b: Any) -> bool:

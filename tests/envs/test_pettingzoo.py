@@ -21,12 +21,11 @@ from pettingzoo.test import (
     seed_test,
     state_test,
 )
+from tests.envs.adapters import EVERYTHING, f32, same
 
 import posse
 from posse.actions import MOTIONS
 from posse.pettingzoo_env import TeamParallelEnv
-
-from tests.envs.adapters import EVERYTHING, same
 
 VARIANTS: list[dict[str, Any]] = [
     *({"scenario": name} for name in posse.scenario_names()),
@@ -35,7 +34,9 @@ VARIANTS: list[dict[str, Any]] = [
     {"scenario": "field", "message_size": 2},
     {"scenario": "constant", "num_trackers": 1},
 ]
-variants = pytest.mark.parametrize("settings", VARIANTS, ids=lambda s: "-".join(map(str, s.values())))
+variants = pytest.mark.parametrize(
+    "settings", VARIANTS, ids=lambda s: "-".join(map(str, s.values()))
+)
 
 
 def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
@@ -100,8 +101,8 @@ def test_agents_come_by_name_and_the_target_last() -> None:
 
 
 def test_a_target_that_is_an_agent_goes_where_it_wants() -> None:
-    ahead, circling = np.float32([1, 0]), np.float32([1, 1])
-    rest = {f"tracker_{i}": np.float32([-1, 0]) for i in range(5)}
+    ahead, circling = f32([1, 0]), f32([1, 1])
+    rest = {f"tracker_{i}": f32([-1, 0]) for i in range(5)}
     places = []
     for action in (ahead, circling):
         env = posse.parallel_env("constant", target="agent")
@@ -144,7 +145,8 @@ def test_the_same_seed_gives_the_same_episodes_in_another_process() -> None:
         "env = posse.parallel_env('field', horizon=20, settle_time=1.0)\n"
         "env.reset(seed=7)\n"
         "for k in range(15):\n"
-        "    env.step({a: np.float32([np.sin(k + i), np.cos(k)]) for i, a in enumerate(env.agents)})\n"
+        "    env.step({a: np.float32([np.sin(k + i), np.cos(k)])\n"
+        "              for i, a in enumerate(env.agents)})\n"
         "print(env.state().tobytes().hex())\n"
     )
     results = {
@@ -168,9 +170,7 @@ def test_an_environment_is_the_first_world_of_a_batch() -> None:
             for i, agent in enumerate(env.agents):
                 assert np.array_equal(ours[agent], theirs[0, i])
             actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-            ours, rewards, *_, infos = env.step(
-                dict(zip(env.agents, actions[0], strict=True))
-            )
+            ours, rewards, *_, infos = env.step(dict(zip(env.agents, actions[0], strict=True)))
             theirs, batch_rewards, _, _, batch_infos = batch.step(actions)
             assert list(rewards.values()) == batch_rewards[0].tolist()
             for i, agent in enumerate(env.agents):
@@ -232,10 +232,12 @@ def test_the_end_is_told_once_with_every_metric() -> None:
 
 
 def test_contact_terminates_where_it_is_asked_for() -> None:
-    env = posse.parallel_env("constant", num_trackers=1, terminate_on_contact=True, target_speed=0.0)
+    env = posse.parallel_env(
+        "constant", num_trackers=1, terminate_on_contact=True, target_speed=0.0
+    )
     env.reset(options={"tracker_pose": [[-1.0, 0, 0]], "target_pose": [0.0, 0, 0]})
     for _ in range(20):
-        *_, terminations, truncations, infos = env.step({"tracker_0": np.float32([1, 0])})
+        *_, terminations, truncations, infos = env.step({"tracker_0": f32([1, 0])})
         if not env.agents:
             break
     assert terminations == {"tracker_0": True}
@@ -246,9 +248,7 @@ def test_contact_terminates_where_it_is_asked_for() -> None:
 def test_info_says_who_is_broken() -> None:
     env = posse.parallel_env("leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4))
     env.reset(seed=0)
-    working = [
-        sum(info["working"] for info in infos.values()) for *_, infos in play(env, 10)
-    ]
+    working = [sum(info["working"] for info in infos.values()) for *_, infos in play(env, 10)]
     assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
 
 
@@ -282,7 +282,7 @@ def test_what_is_returned_is_never_overwritten() -> None:
     assert np.array_equal(state, before)
 
 
-@pytest.mark.parametrize("replica", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])
+@pytest.mark.parametrize("replica", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])  # noqa: S301
 def test_a_copy_made_in_mid_episode_goes_on_alike(replica: Any) -> None:
     env = posse.parallel_env(**EVERYTHING)
     env.reset(seed=3)
@@ -368,7 +368,7 @@ def test_turns_refuse_a_bad_action_in_its_own_turn() -> None:
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     with pytest.raises(ValueError, match=r"tracker_1: speed = 2\.0"):
-        env.step(np.float32([2, 0]))
+        env.step(f32([2, 0]))
     assert env.agent_selection == "tracker_1"
-    env.step(np.float32([1, 0]))
+    env.step(f32([1, 0]))
     assert env.agent_selection == "tracker_2"

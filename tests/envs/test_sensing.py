@@ -78,12 +78,8 @@ def test_a_dead_sensor_sees_nothing_and_comes_back() -> None:
     assert abs(struck.mean() - 0.5) < 4 * 0.5 / math.sqrt(struck.size)
     whole = struck & (from_step > 0) & (from_step < 80)
     assert (dead[whole] == 20).all()
-    assert stats_spread(from_step[struck] / 100)
-
-
-def stats_spread(shares: np.ndarray) -> bool:
-    """Say whether shares of the horizon look uniform."""
-    return bool(abs(shares.mean() - 0.5) < 4 * 0.289 / math.sqrt(len(shares)))
+    begins = from_step[struck] / 100
+    assert abs(begins.mean() - 0.5) < 4 * 0.289 / math.sqrt(len(begins)), "uniform"
 
 
 def test_without_noise_a_fix_is_exact() -> None:
@@ -134,10 +130,10 @@ def test_a_smoothed_velocity_settles_with_its_time_constant() -> None:
     assert left == pytest.approx(math.exp(-0.5 / 0.5), abs=1e-3)
 
 
-@pytest.mark.parametrize("beams", [1, 2, 4, 8, 13, 64])
+@pytest.mark.parametrize("beams", [1, 2, 4, 8, 13, 32])
 def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
     batch = posse.batch(
-        "obstacles", 30, num_trackers=8, sonar_beams=beams, start_distance=(1.0, 10.0),
+        "obstacles", 12, num_trackers=8, sonar_beams=beams, start_distance=(1.0, 10.0),
         target_motion="agent",
     )  # fmt: skip
     observations = batch.reset(seed=5)
@@ -147,7 +143,7 @@ def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
         if beams == 1:
             readings = readings[..., None]
         state = snapshot(batch)
-        for e in range(30):
+        for e in range(12):
             world = one_world(state, e)
             for i in range(9):
                 found = sonar(batch.scenario, world, i)
@@ -155,7 +151,7 @@ def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
                 near += int((found < 2.0).sum())
         for _ in range(30):
             observations = batch.step(np.full(batch.action_shape, 0.3))[0]
-    assert near > 100
+    assert near > 50
 
 
 def test_the_sonar_reads_the_free_width_straight_ahead() -> None:

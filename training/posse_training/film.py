@@ -16,7 +16,9 @@ from posse_baselines.policy import Policy, PolicyError, begin
 
 Frame = npt.NDArray[np.uint8]
 
-_COLOURS: Final = 128
+_FLAT: Final = 48  # colours kept as they are
+_BLENDS: Final = 64  # colours for the anti-aliased edges between them
+_TRANSPARENT: Final = 255
 _SAMPLED: Final = 12  # frames that the palette is made from
 _SEAM: Final = 2  # px between panels
 _SEAM_GREY: Final = 205
@@ -31,7 +33,7 @@ def film(
     seed: int = 0,
     world: int = 0,
     split: str = "test",
-    seconds: float = 30.0,
+    seconds: float = 25.0,
     speed: float = 1.5,
     every: int = 1,
     size: int | None = None,
@@ -120,44 +122,69 @@ def _side_by_side(panels: Sequence[Iterator[Frame]]) -> Iterator[Frame]:
 def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
     """Write frames (H, W, 3) as a GIF that repeats for ever, ``frame_time`` s each.
 
-    All frames share one palette and are not dithered: flat colours stay flat, and what does not
-    change between two frames costs nothing.
+    All frames share one palette and are not dithered, so that flat colours stay flat; what a frame
+    shares with the one before is left transparent, and costs next to nothing.
     """
     palette = _palette(frames)
-    images = [
-        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-        for frame in frames
-    ]
-    shown = max(2, round(frame_time * 100)) * 10  # ms; players slow down what is faster than 2/100 s
-    times = [shown] * len(images)
-    times[-1] = max(shown, round(_LAST_SHOWN * 1000))
-    # optimize=False: the palette is right as it is; to look for a smaller one takes 20 ms a frame.
+    table = palette.getpalette()
+    images: list[Image.Image] = []
+    before: npt.NDArray[np.uint8] | None = None
+    for frame in frames:
+        indices = np.asarray(
+            Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        )
+        shown = indices
+        if before is not None:
+            shown = np.where(indices == before, np.uint8(_TRANSPARENT), indices)
+        before = indices
+        image = Image.fromarray(shown)
+        image.putpalette(table or [])
+        images.append(image)
+    # In 1/1000 s; a GIF counts in 1/100, and players slow down what is faster than two of them.
+    shown_for = max(2, round(frame_time * 100)) * 10
+    times = [shown_for] * len(images)
+    times[-1] = max(shown_for, round(_LAST_SHOWN * 1000))
     images[0].save(
         path,
         save_all=True,
         append_images=images[1:],
         duration=times,
         loop=0,
-        disposal=1,
+        disposal=1,  # each frame is laid over the one before
+        transparency=_TRANSPARENT,
         optimize=False,
     )
 
 
 def _palette(frames: Sequence[Frame]) -> Image.Image:
-    """Return an image that carries the palette of all frames.
+    """Return an image that carries the palette of all frames, :data:`_TRANSPARENT` left free.
 
-    A colour weighs by the logarithm of its area: the few pixels of a robot matter as much as the
-    wide ground.
+    The commonest colours are kept as they are: the flat ones, of which the picture is composed. The
+    blends at their edges share what is left.
     """
     chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLED).round().astype(int))
     pixels = np.concatenate([frames[k].reshape(-1, 3) for k in chosen]).astype(np.int32)
     codes, counts = np.unique(pixels @ (65536, 256, 1), return_counts=True)
-    often = counts >= len(chosen)  # colours of single pixels are not worth an entry
-    codes, counts = codes[often], counts[often]
-    weighted = np.repeat(codes, np.log2(counts).astype(int) + 1)
-    colours = np.stack([weighted >> 16, (weighted >> 8) & 255, weighted & 255], -1)
-    image = Image.fromarray(colours.astype(np.uint8)[None])
-    return image.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+    order = np.argsort(-counts, kind="stable")
+    codes, counts = codes[order], counts[order]
+    flat, blends = codes[:_FLAT], codes[_FLAT:]
+    entries = _colours(flat).tolist()
+    if len(blends):
+        # By the logarithm of its area: the rim of a robot matters as much as that of an arena.
+        weighted = np.repeat(blends, np.log2(counts[_FLAT:]).astype(int) + 1)
+        image = Image.fromarray(_colours(weighted)[None])
+        blended = image.quantize(_BLENDS, method=Image.Quantize.MEDIANCUT)
+        entries += np.reshape(blended.getpalette() or [], (-1, 3))[:_BLENDS].tolist()
+    # Unused entries repeat the first, so that no pixel is ever given the transparent one.
+    entries += [entries[0]] * (256 - len(entries))
+    carrier = Image.new("P", (1, 1))
+    carrier.putpalette([value for entry in entries for value in entry])
+    return carrier
+
+
+def _colours(codes: npt.NDArray[np.int32]) -> Frame:
+    """Return (K, 3) red, green, blue of colours coded as 0xRRGGBB."""
+    return np.stack([codes >> 16, (codes >> 8) & 255, codes & 255], axis=-1).astype(np.uint8)
 
 
 def _check(

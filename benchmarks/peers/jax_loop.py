@@ -1,0 +1,74 @@
+"""How the simulators in JAX are stepped: worlds by vmap, steps by scan, all of it compiled once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from serve import ACTION_SETS, Built
+
+Tree = Any
+"""Arrays in whatever structure."""
+
+
+def build(
+    env: Any,
+    step: Callable[[Any, Any, Any], tuple[Tree, Tree, Tree]],
+    draw_actions: Callable[[Any, int], Tree],
+    worlds: int,
+    agents: int,
+    observation: int,
+) -> Built:
+    """Return a batch of worlds.
+
+    Args:
+        env: Has ``reset(key)`` -> observations, state.
+        step: Of one world: (key, state, actions) -> observations, state, rewards.
+        draw_actions: (key, B) -> actions of B worlds.
+        worlds: B.
+        agents: Agents in a world.
+        observation: Numbers in one agent's observation.
+    """
+    key = jax.random.key(0)
+    key, reset_key, action_key = jax.random.split(key, 3)
+    actions = jax.jit(
+        lambda k: jax.vmap(lambda one: draw_actions(one, worlds))(jax.random.split(k, ACTION_SETS))
+    )(action_key)
+    observations, state = jax.jit(jax.vmap(env.reset))(jax.random.split(reset_key, worlds))
+    chunk = max(8, min(256, 65_536 // worlds))
+
+    # The latest observations and the sum of the rewards are kept, so that no step's can be left
+    # out; a learner that keeps all of them would pay for more memory traffic than this.
+    def one_step(carry: Tree, k: Any) -> tuple[Tree, None]:
+        key, state, _, returns = carry
+        key, step_key = jax.random.split(key)
+        now = jax.tree.map(lambda a: a[k % ACTION_SETS], actions)
+        observations, state, rewards = jax.vmap(step)(
+            jax.random.split(step_key, worlds), state, now
+        )
+        returns = jax.tree.map(jnp.add, returns, rewards)
+        return (key, state, observations, returns), None
+
+    @jax.jit
+    def many_steps(carry: Tree) -> Tree:
+        return jax.lax.scan(one_step, carry, jnp.arange(chunk))[0]
+
+    shapes = jax.eval_shape(
+        jax.vmap(step),
+        jax.random.split(key, worlds),
+        state,
+        jax.tree.map(lambda a: a[0], actions),
+    )[2]
+    returns = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
+    carry = (key, state, observations, returns)
+
+    def run(steps: int) -> None:
+        nonlocal carry
+        for _ in range(steps // chunk):
+            carry = many_steps(carry)
+        jax.block_until_ready(carry)
+
+    return Built(run, agents, observation, chunk)

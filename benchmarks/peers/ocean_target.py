@@ -1,0 +1,53 @@
+"""PufferLib Ocean `target`, in C on one core: 5 agents and 1 goal, as many as ours has robots.
+
+The loop over steps and worlds is C too: the mark for what compiled code reaches. Its source comes
+out of PufferLib's source distribution; see ``ocean_source`` in ``peers.py``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+from serve import ACTION_SETS, Built, serve
+
+HERE = Path(__file__).parent
+SOURCE = Path(sys.argv[1])
+AGENTS, GOALS = 5, 1
+
+
+def library() -> Path:
+    """Compile the worlds, once for each run of the benchmark, and return the shared library."""
+    path = SOURCE / "worlds.so"
+    subprocess.run(
+        [
+            "cc", "-O3", "-march=native", "-DNDEBUG", "-w", "-shared", "-fPIC",
+            f"-I{HERE / 'ocean'}", f"-I{SOURCE}", str(HERE / "ocean" / "worlds.c"),
+            "-lm", "-o", str(path),
+        ],
+        check=True,
+    )  # fmt: skip
+    return path
+
+
+worlds_in_c = ctypes.CDLL(str(library()))
+
+
+def build(worlds: int, variant: str) -> Built:
+    """Return a number of worlds; what an earlier call allocated is not given back."""
+    size = worlds_in_c.build(worlds, AGENTS, GOALS)
+    draws = random.Random(0)
+    numbers = ACTION_SETS * worlds * AGENTS
+    flat = [n for _ in range(numbers) for n in (draws.randrange(9), draws.randrange(5))]
+    actions = (ctypes.c_int * len(flat))(*flat)
+
+    def run(steps: int) -> None:
+        worlds_in_c.run(steps, actions, ACTION_SETS)
+
+    return Built(run, AGENTS, size)
+
+
+serve(build)

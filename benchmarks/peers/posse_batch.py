@@ -1,0 +1,27 @@
+"""Ours: the engine itself, `smart` worlds of 5 trackers."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import posse
+
+from serve import ACTION_SETS, Built, serve
+
+
+def build(worlds: int, variant: str) -> Built:
+    """Return a batch; as many threads as this process may use."""
+    batch = posse.batch("smart", worlds, seed=0, num_threads=len(os.sched_getaffinity(0)))
+    draws = np.random.default_rng(0).uniform(-1, 1, (ACTION_SETS, *batch.action_shape))
+    actions = draws.astype(np.float32)
+    batch.reset()
+
+    def run(steps: int) -> None:
+        for k in range(steps):
+            batch.step(actions[k % ACTION_SETS])
+
+    return Built(run, batch.scenario.num_trackers, batch.layout.size)
+
+
+serve(build, "numpy", "numba")

@@ -1,0 +1,103 @@
+"""What every runner does alike: build a simulator, step it for a while, say how long it took.
+
+A runner is a small script, run by the interpreter of its own virtual environment. It talks with
+``peers.py`` over its standard streams, one JSON object a line, and waits, taking no processor time,
+between two requests:
+
+===================================  ============================================================
+``{"build": B, "variant": name}``    builds B worlds, warms up, finds out how many steps fill a
+                                     sample; answers what it built
+``{"sample": true}``                 steps them; answers steps a second and processor time taken
+===================================  ============================================================
+
+This file needs nothing but Python, since it runs in every peer's environment.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import resource
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+ACTION_SETS = 16
+"""Random actions are drawn before the clock starts, this many for every agent, and then repeated."""
+SAMPLE_SECONDS = 0.25
+
+
+@dataclass(frozen=True)
+class Built:
+    """B worlds of one simulator, ready to be stepped."""
+
+    run: Callable[[int], None]
+    """Make a number of steps, with fresh actions for each; return when they are done."""
+    agents: int
+    """Agents in a world that are given an action."""
+    observation: int
+    """Numbers in one agent's observation (the longest, where they differ)."""
+    chunk: int = 1
+    """Steps are made in whole multiples of this."""
+
+
+def serve(build: Callable[[int, str], Built], *packages: str) -> None:
+    """Answer requests until the standard input ends.
+
+    Args:
+        build: Makes a number of worlds in a named variant.
+        packages: Whose versions are reported.
+    """
+    answers, sys.stdout = sys.stdout, sys.stderr  # nothing that a library prints gets in between
+    built: Built | None = None
+    steps = 0
+    for line in sys.stdin:
+        request: dict[str, Any] = json.loads(line)
+        if "build" in request:
+            built = None  # lets go of the last one's memory first
+            began = time.perf_counter()
+            built = build(request["build"], request["variant"])
+            built.run(built.chunk)
+            warm_up = time.perf_counter() - began
+            steps = _steps_of_a_sample(built)
+            answer: dict[str, Any] = {
+                "agents": built.agents,
+                "observation": built.observation,
+                "steps": steps,
+                "warm_up_seconds": warm_up,
+                "versions": {name: importlib.metadata.version(name) for name in packages},
+            }
+        else:
+            assert built is not None
+            processor = _processor_seconds()
+            began = time.perf_counter()
+            built.run(steps)
+            seconds = time.perf_counter() - began
+            answer = {
+                "seconds": seconds,
+                "steps_per_second": steps / seconds,
+                "processor_seconds": _processor_seconds() - processor,
+            }
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+
+def _steps_of_a_sample(built: Built) -> int:
+    """Return how many steps take about SAMPLE_SECONDS, found by doubling."""
+    steps = built.chunk
+    while True:
+        began = time.perf_counter()
+        built.run(steps)
+        seconds = time.perf_counter() - began
+        if seconds >= SAMPLE_SECONDS / 4:
+            wanted = steps * SAMPLE_SECONDS / seconds
+            return max(1, round(wanted / built.chunk)) * built.chunk
+        steps *= 2
+
+
+def _processor_seconds() -> float:
+    """Return the processor time of this process, all threads, user and system."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime

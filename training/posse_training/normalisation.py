@@ -1,0 +1,86 @@
+"""Inputs brought to mean 0 and deviation 1, by statistics that travel with the policy as numbers.
+
+The statistics are buffers of a layer inside the policy. So replay buffers and rollouts hold the
+observations themselves, a policy is never separated from its statistics, and they change only
+between rollouts: a rollout is learned from with the very numbers that it was played with.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import nn
+
+LIMIT: Final = 10.0
+"""Greatest absolute value of a normalised input."""
+_LEAST_DEVIATION: Final = 1e-3
+_REMEMBERED: Final = 2_000_000.0
+"""Rows after which the newest begin to outweigh the oldest."""
+
+
+class Normaliser(BaseFeaturesExtractor):
+    """x → clip((x - mean) * scale, ±limit), the statistics being buffers."""
+
+    mean: torch.Tensor
+    scale: torch.Tensor
+
+    def __init__(self, observation_space: spaces.Box) -> None:
+        size = observation_space.shape[0]
+        super().__init__(observation_space, size)
+        self.register_buffer("mean", torch.zeros(size))
+        self.register_buffer("scale", torch.ones(size))
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """Return the normalised observations, of the same shape."""
+        return ((observations - self.mean) * self.scale).clamp_(-LIMIT, LIMIT)
+
+
+class RunningStatistics:
+    """Mean and deviation of all rows that were added, (size,) each."""
+
+    def __init__(self, size: int) -> None:
+        self.count = 0.0
+        self.mean = np.zeros(size)
+        self.variance = np.ones(size)
+
+    def add(self, rows: npt.NDArray[np.float32]) -> None:
+        """Take account of rows (..., size)."""
+        flat = rows.reshape(-1, rows.shape[-1])
+        count = len(flat)
+        mean = flat.mean(axis=0, dtype=np.float64)
+        variance = flat.var(axis=0, dtype=np.float64)
+        total = self.count + count
+        delta = mean - self.mean
+        self.variance = (
+            self.variance * self.count + variance * count + delta**2 * self.count * count / total
+        ) / total
+        self.mean = self.mean + delta * count / total
+        self.count = min(total, _REMEMBERED)
+
+    @property
+    def scale(self) -> npt.NDArray[np.float64]:
+        """What a difference from the mean is multiplied by, (size,); 0 where nothing ever varies."""
+        deviation = np.sqrt(self.variance)
+        return np.where(deviation < _LEAST_DEVIATION, 0.0, 1 / np.maximum(deviation, 1e-12))
+
+    def apply(self, policy: nn.Module) -> None:
+        """Write the statistics into every normaliser of a policy."""
+        mean, scale = torch.as_tensor(self.mean), torch.as_tensor(self.scale)
+        for module in policy.modules():
+            if isinstance(module, Normaliser):
+                module.mean.copy_(mean)
+                module.scale.copy_(scale)
+
+    def save(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the statistics as arrays by name."""
+        return {"count": np.array([self.count]), "mean": self.mean, "variance": self.variance}
+
+    def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
+        """Take the statistics of :meth:`save`."""
+        self.count = float(saved["count"][0])
+        self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()
