@@ -16,6 +16,9 @@ from posse_baselines.policy import (
     stack_agents,
 )
 from posse_baselines.registry import load, policy_names
+from posse_baselines.tracker_env import register
+
+register()
 
 __all__ = [
     "BasePolicy",

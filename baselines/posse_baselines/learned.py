@@ -28,7 +28,7 @@ from safetensors.numpy import save_file
 
 from posse_baselines.encoding import Encoder, Encoding, encode_row
 from posse_baselines.features import SCRATCH
-from posse_baselines.parallel import over_worlds
+from posse_baselines.parallel import most_parts, over_worlds
 from posse_baselines.policy import (
     BasePolicy,
     Memory,
@@ -148,6 +148,7 @@ def _act(
     squashed: int,
     scratch: FloatArray,
     actions: FloatArray,
+    part: int,
     first: int,
     last: int,
 ) -> None:
@@ -155,11 +156,11 @@ def _act(
     widest = 0
     for k in range(len(sizes)):
         widest = max(widest, sizes[k])
+    work = scratch[part, :SCRATCH]
     for e in range(first, last):
-        work = scratch[e, :SCRATCH]
         for i in range(observations.shape[1]):
-            x = scratch[e, SCRATCH : SCRATCH + widest]
-            y = scratch[e, SCRATCH + widest :]
+            x = scratch[part, SCRATCH : SCRATCH + widest]
+            y = scratch[part, SCRATCH + widest :]
             encode_row(
                 observations[e, i], columns, unknown, offsets, slots, with_features, work, x
             )
@@ -232,7 +233,7 @@ class LearnedPolicy(BasePolicy):
         """
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)
-        scratch = np.empty((num_worlds, SCRATCH + 2 * max(self.network.sizes)), np.float32)
+        scratch = np.empty((most_parts(), SCRATCH + 2 * max(self.network.sizes)), np.float32)
         return layout, num_worlds, encoder, scratch
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:

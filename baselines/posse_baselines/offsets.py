@@ -8,6 +8,7 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.arrays import Records
+from posse.scenario import OPEN_PLANE_EXTENT
 
 _FIELDS: Final = (
     "heading", "position", "speed", "turn_rate", "touching", "working",
@@ -18,6 +19,9 @@ _FIELDS: Final = (
     "neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing",
     "neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message",
 )  # fmt: skip
+
+_MOST_SIGHT: Final = 8.0  # m; obstacles hide more the farther one looks
+_OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 
 OFFSETS: Final[np.dtype[Any]] = np.dtype(
     (
@@ -34,6 +38,8 @@ OFFSETS: Final[np.dtype[Any]] = np.dtype(
                 ("radius", np.float32),  # of a robot's disc, m
                 ("extent", np.float32),  # greatest coordinate of a place that can be reached, m
                 ("walled", np.int32),
+                ("sight", np.float32),  # how far its target sensor reaches, m
+                ("area", np.float32),  # half the side of the square that is to be searched, m
             ],
             align=True,
         ),
@@ -58,5 +64,7 @@ def offsets_of(layout: ObservationLayout) -> Records:
     record["sonar_range"] = scenario.sonar_range
     record["radius"] = scenario.robot_radius
     record["extent"] = scenario.position_bound
+    record["sight"] = min(scenario.sensing_range, _MOST_SIGHT)
+    record["area"] = min(scenario.arena / 2, _OPEN_AREA)
     record["walled"] = np.isfinite(scenario.arena)
     return record

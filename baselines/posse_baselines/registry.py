@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+from posse_baselines.ddcs import DDCS, Settings
 from posse_baselines.oracle import Oracle
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.pursuit import Pursuit
@@ -17,6 +18,13 @@ _MAKERS: Final[dict[str, Callable[[], Policy]]] = {
     "random": Random,
     "idle": Idle,
     "pursuit": Pursuit,
+    "ddcs-distributed": DDCS,
+    "ddcs-centralized": lambda: DDCS(Settings(model="centralized")),
+    "ddcs-centralized-no-exchange": lambda: DDCS(
+        Settings(model="centralized", exchange=False), "ddcs-centralized-no-exchange"
+    ),
+    "ddcs-no-radio": lambda: DDCS(Settings(radio=False), "ddcs-no-radio"),
+    "pngl": lambda: DDCS(Settings(guidance="pngl"), "pngl"),
     "oracle": Oracle,
 }
 _FILES: Final[dict[str, Callable[[Path], Policy]]] = {}

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import jax
-from camar import camar_v0
-
 import jax_loop
+from camar import camar_v0
 from serve import Built, serve
 
 
@@ -19,6 +18,7 @@ def build(worlds: int, variant: str) -> Built:
         frameskip=1,
         map_kwargs={"num_rows": 8, "num_cols": 8, "obstacle_density": 0.05, "num_agents": 5},
     )
+
     def step(key: Any, state: Any, actions: Any) -> tuple[Any, Any, Any]:
         observations, state, rewards, _, _ = env.step(key, state, actions)
         return observations, state, rewards
@@ -27,9 +27,7 @@ def build(worlds: int, variant: str) -> Built:
         shape = (count, env.num_agents, env.action_size)
         return jax.random.uniform(key, shape, minval=-1.0, maxval=1.0)
 
-    return jax_loop.build(
-        env, step, draw, worlds, env.num_agents, env.observation_size
-    )
+    return jax_loop.build(env, step, draw, worlds, env.num_agents, env.observation_size)
 
 
 serve(build, "camar", "jax")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gymnasium
 import numpy as np
-
 from serve import ACTION_SETS, Built, serve
 
 

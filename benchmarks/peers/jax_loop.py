@@ -1,14 +1,20 @@
-"""How the simulators in JAX are stepped: worlds by vmap, steps by scan, all of it compiled once."""
+"""How the simulators in JAX are stepped: worlds by vmap, steps by scan, compiled as a whole."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-
 from serve import ACTION_SETS, Built
+
+# Compiling takes longer than measuring. What is compiled depends on the number of threads.
+_KEPT = Path(sys.prefix) / f"compiled-{len(os.sched_getaffinity(0))}"
+jax.config.update("jax_compilation_cache_dir", str(_KEPT))
 
 Tree = Any
 """Arrays in whatever structure."""
@@ -38,7 +44,7 @@ def build(
         lambda k: jax.vmap(lambda one: draw_actions(one, worlds))(jax.random.split(k, ACTION_SETS))
     )(action_key)
     observations, state = jax.jit(jax.vmap(env.reset))(jax.random.split(reset_key, worlds))
-    chunk = max(8, min(256, 65_536 // worlds))
+    chunk = max(1, min(256, 8192 // worlds))
 
     # The latest observations and the sum of the rewards are kept, so that no step's can be left
     # out; a learner that keeps all of them would pay for more memory traffic than this.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import jax
-import jaxmarl
-
 import jax_loop
+import jaxmarl
 from serve import Built, serve
 
 

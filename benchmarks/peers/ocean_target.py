@@ -41,7 +41,8 @@ def build(worlds: int, variant: str) -> Built:
     size = worlds_in_c.build(worlds, AGENTS, GOALS)
     draws = random.Random(0)
     numbers = ACTION_SETS * worlds * AGENTS
-    flat = [n for _ in range(numbers) for n in (draws.randrange(9), draws.randrange(5))]
+    pairs = draws.choices([(turn, push) for turn in range(9) for push in range(5)], k=numbers)
+    flat = [part for pair in pairs for part in pair]
     actions = (ctypes.c_int * len(flat))(*flat)
 
     def run(steps: int) -> None:

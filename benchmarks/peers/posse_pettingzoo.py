@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import posse
-
 from serve import ACTION_SETS, Built, serve
+
+import posse
 
 
 def build(worlds: int, variant: str) -> Built:

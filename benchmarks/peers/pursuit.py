@@ -6,7 +6,6 @@ import warnings
 
 import numpy as np
 from pettingzoo.sisl import pursuit_v5
-
 from serve import ACTION_SETS, Built, serve
 
 

@@ -7,7 +7,7 @@ between two requests:
 ===================================  ============================================================
 ``{"build": B, "variant": name}``    builds B worlds, warms up, finds out how many steps fill a
                                      sample; answers what it built
-``{"sample": true}``                 steps them; answers steps a second and processor time taken
+``{"sample": true}``                 steps them; answers how often, and in what time
 ===================================  ============================================================
 
 This file needs nothing but Python, since it runs in every peer's environment.
@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import Any
 
 ACTION_SETS = 16
-"""Random actions are drawn before the clock starts, this many for every agent, and then repeated."""
+"""Random actions are drawn before the clock starts, so many for every agent, and then repeated."""
 SAMPLE_SECONDS = 0.25
 
 
@@ -65,7 +65,6 @@ def serve(build: Callable[[int, str], Built], *packages: str) -> None:
             answer: dict[str, Any] = {
                 "agents": built.agents,
                 "observation": built.observation,
-                "steps": steps,
                 "warm_up_seconds": warm_up,
                 "versions": {name: importlib.metadata.version(name) for name in packages},
             }
@@ -76,8 +75,8 @@ def serve(build: Callable[[int, str], Built], *packages: str) -> None:
             built.run(steps)
             seconds = time.perf_counter() - began
             answer = {
+                "steps": steps,
                 "seconds": seconds,
-                "steps_per_second": steps / seconds,
                 "processor_seconds": _processor_seconds() - processor,
             }
         answers.write(json.dumps(answer) + "\n")

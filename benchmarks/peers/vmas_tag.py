@@ -6,7 +6,6 @@ import os
 
 import torch
 import vmas
-
 from serve import ACTION_SETS, Built, serve
 
 

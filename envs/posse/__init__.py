@@ -44,7 +44,7 @@ def batch(
 def observation_fields(
     scenario: str | Scenario = "constant", **overrides: Any
 ) -> tuple[Field, ...]:
-    """Return every field of a scenario's observation, in order: name, size, unit, range, meaning."""
+    """Return every field of a scenario's observation, in order: name, size, unit, range, ..."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
 
 

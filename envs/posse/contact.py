@@ -94,6 +94,20 @@ def free_move(
 
 
 @compiled
+def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
+    """Say whether a robot touches an obstacle or a wall."""
+    inner = c.half_arena - c.radius - TOUCHING_GAP
+    if c.walled and max(abs(robot.x), abs(robot.y)) >= inner:
+        return True
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy, reach = o.x - robot.x, o.y - robot.y, c.radius + o.radius + TOUCHING_GAP
+        if dx * dx + dy * dy <= reach * reach:
+            return True
+    return False
+
+
+@compiled
 def meet(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Work out who touches whom, count the contacts that begin, and flag who is near to anything.
 

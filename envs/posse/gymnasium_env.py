@@ -23,7 +23,7 @@ from posse.single_world import (
 from posse.spaces import box
 
 
-class TeamEnv(gymnasium.Env[FloatArray, Any]):
+class TeamEnv(gymnasium.Env[Any, Any]):
     """``posse/Team-v0``: one agent drives the whole team.
 
     **Observation**: ``Box`` (N, F) float32, what each tracker is given; its fields are

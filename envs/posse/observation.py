@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
+from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
 from posse.scenario import Scenario
 from posse.sensing import ping
@@ -274,6 +275,15 @@ def _write_neighbour(
 
 
 @compiled
+def _write_no_neighbour(o: FloatArray) -> None:
+    """Write the part of a place that is not filled."""
+    o[:] = _ZERO
+    o[0] = _MINUS_ONE
+    o[1] = _MINUS_ONE
+    o[2] = _MINUS_ONE
+
+
+@compiled
 def _write_message(said: FloatArray, o: FloatArray) -> None:
     for q in range(len(said)):
         o[9 + q] = said[q]
@@ -374,10 +384,7 @@ def _write_neighbours(
     for p in range(places):
         part = o[k + p * size : k + (p + 1) * size]
         if p >= filled:
-            part[:] = _ZERO
-            part[0] = _MINUS_ONE
-            part[1] = _MINUS_ONE
-            part[2] = _MINUS_ONE
+            _write_no_neighbour(part)
             continue
         j = int(nearest[1, p])
         if perfect:
@@ -426,20 +433,27 @@ def observe_target(
     nearest: FloatArray,
     o: FloatArray,
 ) -> None:
-    """Write what a target that is an agent is given: it knows where every tracker is, (F,)."""
-    k = _write_own(c, w, w.touching != np.uint64(0), 1, o, 0)
+    """Write what a target that is an agent is given, (F,): it knows where trackers are."""
+    touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
+    k = _write_own(c, w, touching, 1, o, 0)
     k = _write_task(c, w, -1, c.target_speed, c.target_turn_rate, o, k)
+    o[k - 3], o[k - 2] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
     k = _write_no_target(o, k)
     ping(c, w, w, -1, trackers, obstacles, beams, o[k : k + c.sonar_beams])
     k += c.sonar_beams
-    # As many trackers as there are places: those of the lowest numbers, if not all fit.
+    filled = 0
+    for j in range(c.num_trackers if c.neighbours > 0 else 0):
+        dx, dy = trackers[j].x - w.x, trackers[j].y - w.y
+        filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, nearest)
     size = 9 + c.message_size
-    for j in range(c.neighbours):
-        part = o[k + j * size : k + (j + 1) * size]
-        part[:] = _ZERO
-        _write_neighbour(
-            w.heading_cos, w.heading_sin, w.x, w.y, trackers[j], j, _ZERO, part
-        )
+    for p in range(c.neighbours):
+        part = o[k + p * size : k + (p + 1) * size]
+        _write_no_neighbour(part)
+        if p < filled:
+            j = int(nearest[1, p])
+            _write_neighbour(
+                w.heading_cos, w.heading_sin, w.x, w.y, trackers[j], j, _ZERO, part
+            )
 
 
 class ObservationLayout:

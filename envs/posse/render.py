@@ -56,9 +56,8 @@ class Renderer:
     ) -> None:
         if mode not in RENDER_MODES:
             raise ValueError(f"unknown render mode {mode!r}; modes are: {', '.join(RENDER_MODES)}")
-        if len(size) != 2 or not all(
-            isinstance(v, (int, np.integer)) and v >= LEAST_SIZE for v in size
-        ):
+        given = np.asarray(size)
+        if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
             raise ValueError(
                 f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px"
             )
@@ -140,7 +139,7 @@ class Renderer:
         return None
 
     def project(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return where points (..., 2) m lie in the last frame: (..., 2) pixels, x right, y down."""
+        """Return where points (..., 2) m lie in the last frame, (..., 2) px: right, down."""
         return self._camera.project(np.asarray(points, np.float64))
 
     def close(self) -> None:

@@ -234,7 +234,9 @@ def leader_mark(canvas: Canvas, tip: Floats, size: float) -> None:
     x, y = tip
     for grow, colour in ((1.2, PAPER), (0.0, INK)):
         side = size + grow
-        canvas.polygon([(x, y + grow), (x - side, y - 1.5 * side), (x + side, y - 1.5 * side)], colour)
+        canvas.polygon(
+            [(x, y + grow), (x - side, y - 1.5 * side), (x + side, y - 1.5 * side)], colour
+        )
 
 
 def target(d: Drawing) -> None:

@@ -35,7 +35,11 @@ def header(canvas: Canvas, scene: Scene, title: str | None, point: float) -> Non
         canvas.text(name, (left, middle), _TEXT * point, FAINT_INK)
     # Columns of a fixed width: digits that change must not push the words about.
     right = width - _EDGE * point
-    columns = ((f"{scene.score:.2f}", 38, INK), ("score", 54, FAINT_INK), (f"{scene.time:.1f} s", 0, INK))
+    columns = (
+        (f"{scene.score:.2f}", 38, INK),
+        ("score", 54, FAINT_INK),
+        (f"{scene.time:.1f} s", 0, INK),
+    )
     for text, column, colour in columns:
         canvas.text(text, (right, middle), _TEXT * point, colour, anchor=1)
         right -= column * point

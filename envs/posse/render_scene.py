@@ -105,7 +105,9 @@ def read_scene(
     scenario, state = batch.scenario, batch.state
     num_worlds = len(state["world_step"])
     if not 0 <= world < num_worlds:
-        raise ValueError(f"world={world} is not in the batch: it holds worlds 0 to {num_worlds - 1}")
+        raise ValueError(
+            f"world={world} is not in the batch: it holds worlds 0 to {num_worlds - 1}"
+        )
     of = {name: array[world] for name, array in state.items()}
     if of["world_heading_cos"] == 0 and of["world_heading_sin"] == 0:
         raise ResetNeeded("nothing to draw before reset: call reset() first")

@@ -282,7 +282,7 @@ def _weights(given: object) -> tuple[tuple[str, float], ...]:
         return tuple(sorted(weights.items()))
     except (TypeError, ValueError):
         raise ScenarioError(
-            f"reward_weights={given!r} is not possible: it must map names of reward terms to numbers"
+            f"reward_weights={given!r} is not possible: it must map names of terms to numbers"
         ) from None
 
 
@@ -476,7 +476,7 @@ def _check_place(s: Scenario) -> None:
             raise ScenarioError(
                 f"num_obstacles={s.num_obstacles} needs a walled place: set arena to its side in m"
             )
-        if excluded > 0.5 * ring:
+        if excluded > ring:
             raise ScenarioError(
                 f"{s.num_trackers} trackers do not fit at start_distance={s.start_distance}: "
                 "widen it, or lower num_trackers or robot_radius"
@@ -546,8 +546,8 @@ def _check_rewards(s: Scenario) -> None:
     for name, weight in dict(s.reward_weights).items():
         if name not in names:
             raise ScenarioError(
-                f"unknown reward term {name!r}{_near(str(name), names)}; terms are: "
-                f"{', '.join(names)}"
+                f"unknown reward term {name!r} in reward_weights{_near(str(name), names)}; "
+                f"terms are: {', '.join(names)}"
             )
         if not _is_number(weight) or not math.isfinite(weight):
             _fail(f"reward_weights[{name!r}]", weight, "a weight must be a finite number")

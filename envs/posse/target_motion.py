@@ -44,9 +44,9 @@ SMART_REPLAN: Final = 5
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
 _LOATH_TO_TURN: Final = np.float32(0.5)  # s of head start that half an about-turn has to be worth
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
-_PATIENCE: Final = np.float32(4.0)  # s of station keeping that provoke a dart
+_PATIENCE: Final = np.float32(3.0)  # s of station keeping that provoke a dart
 _STATION_MARGIN: Final = np.float32(1.0)  # m beyond the farthest slot that count as near
-_STATION_SPEED: Final = np.float32(0.75)  # relative speed, as a share of V - v_t, that counts
+_STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
 _DANGER: Final = np.float32(0.6)  # a tracker this near provokes a dart, x formation_distance
 _DART_TIME: Final = np.float32(1.3 * math.pi)  # a dart lasts 1.3 times as long as an about-turn
 _DART_MOMENTS: Final = 6  # at which a dart is looked at beforehand
@@ -80,7 +80,8 @@ def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records
     if c.motion == ACCELERATING:
         time = np.float32(w.step) * c.dt
         turn = w.weave_amplitude * np.float32(math.sin(w.weave_rate * time + w.weave_phase))
-        _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, _ZERO, turn, c.dt)
+        for _ in range(c.physics_steps):  # an arc turns by 1 rad at most
+            _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, _ZERO, turn, c.physics_dt)
     elif c.motion == SMART and w.step % SMART_REPLAN == 0:
         evade(c, w, trackers, obstacles)
     if c.walled:

@@ -559,7 +559,7 @@ class Episode:
         if len(members) < 2:
             return True
         p = positions(state)[members]
-        can = np.array([radio_alive(s, state, i) for i in members])
+        can = np.array([radio_alive(s, state, i) for i in members.tolist()])
         links = (np.abs(p[:, None] - p[None, :]) <= s.radio_range) & can[:, None] & can[None, :]
         return bool(connected_components(links, directed=False)[0] == 1)
 

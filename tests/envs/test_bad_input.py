@@ -235,15 +235,16 @@ def test_a_step_needs_an_episode() -> None:
     team = gymnasium.make(TEAM, horizon=1, settle_time=0.1).unwrapped
     solo = gymnasium.make(SOLO, horizon=1, settle_time=0.1).unwrapped
     rest = np.zeros((5, 2), np.float32)
-    for env, action in ((parallel, GOOD), (team, rest), (solo, rest[0])):
+    cases: list[tuple[Any, Any]] = [(parallel, GOOD), (team, rest), (solo, rest[0])]
+    for env, action in cases:
         with pytest.raises(ResetNeeded, match="step before reset"):
-            env.step(action)  # type: ignore[attr-defined]
-        env.reset()  # type: ignore[attr-defined]
-        env.step(action)  # type: ignore[attr-defined]
+            env.step(action)
+        env.reset()
+        env.step(action)
         with pytest.raises(ResetNeeded, match="step after the end of the episode"):
-            env.step(action)  # type: ignore[attr-defined]
-        env.reset()  # type: ignore[attr-defined]
-        env.step(action)  # type: ignore[attr-defined]
+            env.step(action)
+        env.reset()
+        env.step(action)
 
 
 def test_a_vector_step_needs_an_episode() -> None:

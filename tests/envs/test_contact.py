@@ -10,8 +10,6 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-import posse
 from tests.envs.reference import (
     Episode,
     free_gaps,
@@ -19,6 +17,8 @@ from tests.envs.reference import (
     positions,
     snapshot,
 )
+
+import posse
 
 
 def at(batch: posse.Batch, target: list[float], *trackers: list[float]) -> None:
@@ -150,7 +150,7 @@ def test_a_robot_that_is_far_from_all_is_swept_as_soon_as_it_matters() -> None:
     actions: npt.NDArray[np.float64] = np.zeros(batch.action_shape)
     for k in range(60):
         if k % 10 == 0:
-            actions = rng.uniform(-0.2, 0.2, batch.action_shape) + [0.8, 0.0]
+            actions = rng.uniform(-0.2, 0.2, batch.action_shape) + np.array([0.8, 0.0])
         infos = batch.step(actions)[-1]
         assert least_gap(batch) > 0
         state = snapshot(batch)

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from tests.envs.reference import NEVER, snapshot
 
 import posse
-from tests.envs.reference import NEVER, snapshot
 
 WINDOW = (0.3, 0.7)
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from tests.envs.reference import one_world, slots, snapshot
 
 import posse
 from posse.formation import FORMATIONS, slot_offsets
-from tests.envs.reference import one_world, slots, snapshot
 
 
 @pytest.mark.parametrize("formation", FORMATIONS)

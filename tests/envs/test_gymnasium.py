@@ -243,7 +243,9 @@ def test_a_picture_is_drawn() -> None:
     assert first.shape[2] == 3
     for _ in range(10):
         env.step(f32([1, 0]))
-    assert not np.array_equal(env.render(), first)
+    last = env.render()
+    assert isinstance(last, np.ndarray)
+    assert not np.array_equal(last, first)
     env.close()
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.envs.reference import headings, on_arc, one_world, positions, snapshot
 
 import posse
 from posse.kinematics import approach, arc, turn_towards
-from tests.envs.reference import headings, on_arc, one_world, positions, snapshot
 
 F = np.float32
 
@@ -49,7 +50,7 @@ def test_a_robot_that_holds_its_speeds_goes_round_the_circle_it_should() -> None
 
 @pytest.mark.parametrize("name", ["constant", "accelerating", "smart"])
 def test_the_physics_step_changes_nothing_but_rounding(name: str) -> None:
-    at_once = {"tracker_acceleration": math.inf, "tracker_turn_acceleration": math.inf}
+    at_once: dict[str, Any] = {"tracker_acceleration": math.inf, "tracker_turn_acceleration": math.inf}
     coarse = posse.batch(name, 8, physics_step=0.1, **at_once)
     fine = posse.batch(name, 8, physics_step=0.005, **at_once)
     coarse.reset(seed=3)

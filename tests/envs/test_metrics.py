@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.envs.reference import CASES, Episode, case_name, record
 
 import posse
-from tests.envs.reference import CASES, Episode, case_name, record
 
 
 @pytest.mark.parametrize("case", CASES, ids=case_name)
@@ -41,7 +41,14 @@ def test_the_recordings_show_what_they_should() -> None:
     for name in ("time_in_sight", "time_connected", "score", "bound"):
         assert max(seen[name]) > 0, name
         assert min(seen[name]) < 1, name
-    assert max(seen["detection_time"]) > 0
+
+
+def test_detection_is_when_the_target_first_came_into_sight() -> None:
+    batch = posse.batch(num_trackers=2, sensing_range=3.0, target_speed=0.0, horizon=40)
+    batch.reset(options={"target_pose": [0, 0, 0], "tracker_pose": [[4.05, 0, np.pi], [8, 0, 0]]})
+    for _ in range(39):
+        batch.step([[[1.0, 0.0], [-1.0, 0.0]]])
+    assert batch.metrics()["detection_time"][0] == pytest.approx(1.1)
 
 
 def test_what_is_in_sight_at_the_start_is_detected_at_once() -> None:
@@ -52,7 +59,7 @@ def test_what_is_in_sight_at_the_start_is_detected_at_once() -> None:
 
 
 def test_metrics_arrive_when_episodes_end_and_say_for_which() -> None:
-    batch = posse.batch(num_worlds=3, horizon=5)
+    batch = posse.batch(num_worlds=3, horizon=5, settle_time=0.2)
     batch.reset(seed=0)
     batch.step(np.zeros(batch.action_shape))
     batch.reset(options={"reset_mask": np.array([False, True, False])})

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.envs.reference import CASES, Senses, case_name, radio_alive, record
 
 import posse
-from tests.envs.reference import CASES, Senses, case_name, radio_alive, record
 
 
 @pytest.mark.parametrize("case", CASES, ids=case_name)
@@ -53,12 +53,9 @@ def test_what_is_said_arrives_after_exactly_the_delay(delay: int) -> None:
         actions = np.full(batch.action_shape, said, np.float32)
         observations = batch.step(actions)[0]
         mates = batch.layout.views(observations)
-        if step <= delay:
+        if step >= delay:
             # What was sent at the start, before anything could be said, holds zeros.
-            expected = 0.0 if step == delay else None
-        else:
             expected = (step - delay) / 100
-        if expected is not None:
             np.testing.assert_allclose(mates["neighbour_message"][0], expected)
             np.testing.assert_allclose(mates["neighbour_age"][0], delay * 0.1, atol=1e-6)
         else:
@@ -135,7 +132,9 @@ def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
         observations = batch.step(stay)[0]
         fixes = batch.state["tracker_fix_step"][0]
         # Said at step k, a fix is heard at k + 2, and passed on with the next broadcast, k + 3.
-        assert fixes.tolist() == [max(-1, step - lag) if step >= lag else -1 for lag in (0, 2, 5, 8)]
+        assert fixes.tolist() == [
+            max(-1, step - lag) if step >= lag else -1 for lag in (0, 2, 5, 8)
+        ]
         views = batch.layout.views(observations)
         known = fixes >= 0
         np.testing.assert_allclose(
@@ -175,7 +174,7 @@ def test_a_message_changes_nothing_in_the_world(name: str) -> None:
 
 
 def test_the_graph_is_connected_over_hops() -> None:
-    chain = [[0, 0, 0], [4, 0, 0], [8, 0, 0]]
+    chain = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0]]
     for middle, share in ((4.0, 1.0), (3.5, 0.0)):
         chain[1][0] = middle
         batch = posse.batch(num_trackers=3, radio_range=4.2, start_distance=(1.0, 20.0))

@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 import pytest
 from scipy import stats
+from tests.envs import reference
 
 import posse
 from posse import randomness
-from tests.envs import reference
 
 
 def test_the_mixing_function_is_splitmix64s() -> None:

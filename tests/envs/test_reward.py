@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.envs.reference import CASES, Episode, case_name, record, working
 
 import posse
-from tests.envs.reference import CASES, Episode, case_name, record, working
 
 
 @pytest.mark.parametrize("case", CASES, ids=case_name)
@@ -85,7 +85,7 @@ def test_a_target_that_is_an_agent_gets_the_opposite_of_the_score() -> None:
 
 
 def test_the_start_of_an_episode_rewards_nothing() -> None:
-    batch = posse.batch(horizon=3)
+    batch = posse.batch(horizon=3, settle_time=0.2)
     batch.reset()
     for _ in range(3):
         ended = batch.step(np.zeros(batch.action_shape))

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-import posse
 from tests.envs.reference import (
     CASES,
     Episode,
@@ -19,6 +17,8 @@ from tests.envs.reference import (
     slots,
     snapshot,
 )
+
+import posse
 
 
 @pytest.mark.parametrize("case", CASES, ids=case_name)
@@ -90,13 +90,12 @@ def test_who_stands_where_is_free_and_two_in_one_slot_count_once() -> None:
 
 def test_who_touches_anything_occupies_nothing() -> None:
     batch = posse.batch(formation_spacing=0.65, robot_radius=0.3, formation_distance=1.5)
-    behind = complex(slots(batch.scenario)[0])
-    in_place(batch, tracker_0=behind + 0.05, tracker_1=behind + 0.05 + 0.6005)
+    first, second = slots(batch.scenario)[:2]
+    in_place(batch, tracker_1=complex(second + (first - second) * 0.0494 / 0.65))
     infos = batch.step(np.tile([FOLLOW, 0.0], (1, 5, 1)))[-1]
-    touching = batch.state["tracker_touching"][0] == 1
-    assert touching[0]
-    assert (batch.state["tracker_slot"][0][touching] == -1).all()
-    assert infos["score"][0] < 1.0
+    assert batch.state["tracker_touching"][0].tolist() == [1, 1, 0, 0, 0]
+    assert batch.state["tracker_slot"][0].tolist() == [-1, -1, 2, 3, 4]
+    assert infos["score"][0] == pytest.approx(0.6)
 
 
 def test_the_broken_one_is_not_counted_and_the_others_recover() -> None:

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from tests.envs.reference import can_see, one_world, positions, snapshot, sonar
 
 import posse
-from tests.envs.reference import can_see, one_world, positions, snapshot, sonar
 
 
 def offsets(batch: posse.Batch) -> tuple[np.ndarray, np.ndarray]:

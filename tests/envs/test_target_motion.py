@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from tests.envs.reference import snapshot
 
 import posse
-from tests.envs.reference import snapshot
 
 Complexes = npt.NDArray[np.complex128]
 FAR_AWAY: dict[str, Any] = {"num_trackers": 1, "start_distance": (300.0, 400.0)}
@@ -22,6 +22,7 @@ def follow(
     """Return places, headings (steps + 1, E) and turn rates (steps, E) of the targets."""
     rng = np.random.default_rng(0)
     places, courses, turns = [], [], []
+    views = None
     for step in range(steps + 1):
         state = snapshot(batch)
         places.append(state["world_x"].astype(float) + 1j * state["world_y"])
@@ -30,15 +31,12 @@ def follow(
             turns.append(state["world_turn_rate"].astype(float))
         actions = np.tile([-1.0, 0.0], (*batch.action_shape[:2], 1))
         if trackers == "chase":
-            views = batch.layout.views(last) if step else None
             actions = rng.uniform(-1, 1, batch.action_shape)
             if views is not None:
                 bearing = views["target_bearing"]
-                actions[..., 1] = np.clip(
-                    2 * np.arctan2(bearing[..., 1], bearing[..., 0]), -1, 1
-                )
+                actions[..., 1] = np.clip(2 * np.arctan2(bearing[..., 1], bearing[..., 0]), -1, 1)
                 actions[..., 0] = 1.0
-        last = batch.step(actions)[0]
+        views = batch.layout.views(batch.step(actions)[0])
     return np.array(places), np.array(courses), np.array(turns)
 
 
@@ -91,7 +89,9 @@ def test_a_long_control_step_keeps_the_goal_a_unit_vector(overrides: dict[str, A
     batch.reset(seed=3)
     _, courses, turns = follow(batch, 60)
     state = snapshot(batch)
-    np.testing.assert_allclose(np.hypot(state["world_goal_cos"], state["world_goal_sin"]), 1, atol=1e-5)
+    np.testing.assert_allclose(
+        np.hypot(state["world_goal_cos"], state["world_goal_sin"]), 1, atol=1e-5
+    )
     np.testing.assert_allclose(np.abs(courses), 1.0, atol=1e-6)
     assert np.abs(turns).max() <= overrides["target_turn_rate"]
 

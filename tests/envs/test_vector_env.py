@@ -19,8 +19,9 @@ from posse.vector_env import SoloVectorEnv, TeamVectorEnv
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 # Terminations (on contact) and truncations, at different times in different worlds, and breaks.
 BUSY: dict[str, Any] = {
-    "scenario": "obstacles", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True,
-    "arena": 12.0, "num_obstacles": 3, "start_distance": (1.0, 3.0),
+    "scenario": "constant", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True,
+    "arena": 10.0, "num_obstacles": 2, "obstacle_gap": 0.6, "start_distance": (1.0, 4.0),
+    "obstacle_radius": (0.4, 0.6),
 }  # fmt: skip
 MODES = list(AutoresetMode)
 modes = pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
@@ -51,6 +52,8 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
     settings = {**BUSY, "discrete_actions": discrete}
     if name == TEAM:
         settings.update(breaks=1, break_window=(0.2, 0.4))
+    else:  # one alone runs into something only if it is fast
+        settings.update(tracker_speed=3.0)
     ours = vector(name, autoreset_mode=mode, **settings)
     theirs = SyncVectorEnv(
         [
@@ -82,6 +85,23 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
         )
     assert terminations > 0
     assert truncations > 0
+
+
+@modes
+def test_it_agrees_where_all_episodes_end_at_once(mode: AutoresetMode) -> None:
+    settings: dict[str, Any] = {"horizon": 3, "settle_time": 0.1}
+    ours = vector(autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv(
+        [lambda i=i: gymnasium.make(TEAM, first_world=i, **settings) for i in range(E)],  # type: ignore[misc]
+        autoreset_mode=mode,
+    )
+    ours.reset(seed=6)
+    theirs.reset(seed=[6] * E)
+    for _ in range(3):
+        actions = ours.action_space.sample()
+        *_, truncated, infos = ours.step(actions)
+        assert same(infos, theirs.step(actions)[4])
+    assert truncated.all()
 
 
 @modes

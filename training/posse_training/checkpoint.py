@@ -8,10 +8,12 @@ is killed there is a whole one.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import json
 import os
 import random
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any, Final
@@ -21,6 +23,7 @@ import numpy.typing as npt
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
+from stable_baselines3.common.base_class import BaseAlgorithm
 
 try:
     import fcntl
@@ -208,3 +211,64 @@ def unflatten_tensors(value: Any, arrays: Mapping[str, npt.NDArray[Any]]) -> Any
     return value["value"]
 
 
+
+
+def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:
+    """Return all that a model needs to go on learning: networks, optimisers, counters, memory."""
+    arrays: Arrays = {}
+
+    def store(array: npt.NDArray[Any]) -> str:
+        name = f"{len(arrays)}"
+        arrays[name] = array
+        return name
+
+    names, tensors = model._get_torch_save_params()
+    parts = {name: _find(model, name).state_dict() for name in names}
+    state: dict[str, Any] = {
+        "parts": flatten_tensors(parts, store),
+        "tensors": flatten_tensors({name: _find(model, name) for name in tensors}, store),
+        "num_timesteps": model.num_timesteps,
+        "episode_num": model._episode_num,
+        "n_updates": model._n_updates,
+        "progress": model._current_progress_remaining,
+        "episodes": list(model.ep_info_buffer or ()),
+        "action_space": model.action_space.np_random.bit_generator.state,
+    }
+    arrays["last_obs"] = np.asarray(model._last_obs)
+    arrays["last_starts"] = np.asarray(model._last_episode_starts)
+    buffer = getattr(model, "replay_buffer", None)
+    if buffer is not None:
+        state["replay"] = [buffer.pos, buffer.full]
+        for name in _REPLAY:
+            arrays[f"replay.{name}"] = getattr(buffer, name)[: buffer.size()]
+    return arrays, state
+
+
+def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]) -> None:
+    """Set a model that was made with the same settings to what :func:`model_state` returned."""
+    for name, values in unflatten_tensors(state["parts"], arrays).items():
+        _find(model, name).load_state_dict(values)
+    for name, values in unflatten_tensors(state["tensors"], arrays).items():
+        _find(model, name).data.copy_(values)
+    model.num_timesteps = state["num_timesteps"]
+    model._episode_num = state["episode_num"]
+    model._n_updates = state["n_updates"]
+    model._current_progress_remaining = state["progress"]
+    model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
+    model.ep_success_buffer = deque(maxlen=model._stats_window_size)
+    model.action_space.np_random.bit_generator.state = state["action_space"]
+    model._last_obs = arrays["last_obs"].copy()
+    model._last_episode_starts = arrays["last_starts"].copy()
+    buffer = getattr(model, "replay_buffer", None)
+    if buffer is not None:
+        buffer.pos, buffer.full = state["replay"]
+        for name in _REPLAY:
+            getattr(buffer, name)[: buffer.size()] = arrays[f"replay.{name}"]
+
+
+_REPLAY: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def _find(model: BaseAlgorithm, name: str) -> Any:
+    """Return what a dotted name like ``"policy.optimizer"`` means."""
+    return functools.reduce(getattr, name.split("."), model)

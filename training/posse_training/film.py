@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 from PIL import Image
+
 from posse import Batch, Scenario, get_scenario
 from posse.render import LEAST_SIZE, Renderer
 from posse_baselines.policy import Policy, PolicyError, begin
@@ -110,7 +111,9 @@ def _side_by_side(panels: Sequence[Iterator[Frame]]) -> Iterator[Frame]:
     """Join the panels' frames; one that has ended goes on showing its last."""
     last: list[Frame | None] = [None] * len(panels)
     for frames in itertools.zip_longest(*panels):
-        last = [frame if frame is not None else old for frame, old in zip(frames, last, strict=True)]
+        last = [
+            frame if frame is not None else old for frame, old in zip(frames, last, strict=True)
+        ]
         strip: list[Frame] = []
         for frame in last:
             assert frame is not None
@@ -202,7 +205,7 @@ def _check(
     for name, value in (("seconds", seconds), ("speed", speed)):
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name}={value!r} must be a finite number above 0")
-    if not isinstance(every, int) or every < 1:
+    if every != int(every) or every < 1:
         raise ValueError(f"every={every!r} must be a whole number of control steps, at least 1")
     if size is not None and size < LEAST_SIZE:
         raise ValueError(f"size={size!r} must be at least {LEAST_SIZE} px")

@@ -1,0 +1,118 @@
+"""One tracker's step through the three layers, and the loop over all trackers of all worlds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled, kernel
+from posse_baselines.ddcs.leadership import settle_lead
+from posse_baselines.ddcs.memory import SEARCHING
+from posse_baselines.ddcs.messages import write_message
+from posse_baselines.ddcs.monitoring import hear_mates, watch_target
+from posse_baselines.ddcs.searching import look_around, wander
+from posse_baselines.ddcs.slots import choose_slot
+from posse_baselines.ddcs.surroundings import surround
+from posse_baselines.ddcs.tracking import next_task, wanted_velocity
+from posse_baselines.safeguard import command, safe_velocity
+from posse_baselines.steering import write_motion
+
+_UNLIMITED = 1e4  # m/s² or rad/s²: what stands for no limit
+
+
+@compiled
+def feel_body(f: Record, o: FloatArray, body: Record) -> None:
+    """Read from an observation (F,) how the robot moves, and what it can do."""
+    body.theta = math.atan2(o[f.heading + 1], o[f.heading])
+    body.speed, body.omega = o[f.speed], o[f.turn_rate]
+    body.max_speed, body.max_omega = o[f.max_speed], o[f.max_turn_rate]
+    body.acceleration, body.turn_acceleration = _UNLIMITED, _UNLIMITED
+    if o[f.acceleration_time] > 0.0:
+        body.acceleration = o[f.max_speed] / o[f.acceleration_time]
+    if o[f.turn_acceleration_time] > 0.0:
+        body.turn_acceleration = o[f.max_turn_rate] / o[f.turn_acceleration_time]
+    body.dt = f.dt
+
+
+@compiled
+def decide(
+    f: Record,
+    s: Record,
+    slots: Records,
+    outermost: float,
+    d: Record,
+    mates: Records,
+    seen: npt.NDArray[np.uint16],
+    o: FloatArray,
+    cost: FloatArray,
+    work: FloatArray,
+    echo: FloatArray,
+    discs: Records,
+    body: Record,
+    action: FloatArray,
+) -> None:
+    """Write the action (2 + m,) of one tracker for its observation (F,)."""
+    own = int(o[f.number])
+    x, y = float(o[f.position]), float(o[f.position + 1])
+    feel_body(f, o, body)
+    # Monitoring
+    watch_target(f, s, d, o, outermost)
+    hear_mates(f, s, d, mates, o)
+    look_around(f, s, d, mates, seen, x, y)
+    # Tracking
+    settle_lead(f, s, d, mates, own, x, y)
+    if d.known == 0:
+        d.slot, d.error = -1, -1.0
+        if d.task != SEARCHING:
+            d.lost_step, d.goal_step = d.step, -1
+        vx, vy = wander(f, s, d, mates, seen, own, x, y, body.theta, body.max_speed)
+    else:
+        if d.slot < 0 or d.step % max(1, int(round(s.replan_time / f.dt))) == 0:
+            choose_slot(
+                f, s, d, mates, slots, own, x, y, body.theta, body.max_speed, body.max_omega,
+                cost, work,
+            )  # fmt: skip
+        vx, vy = wanted_velocity(
+            f, s, d, mates, slots, own, float(o[f.formation_distance]), x, y, body
+        )
+    d.task = next_task(s, d)
+    # Actuation
+    count = surround(f, s, d, mates, own, x, y, body.theta, o, echo, discs)
+    vx, vy, _ = safe_velocity(body, discs, count, vx, vy)
+    speed, omega = command(body, vx, vy)
+    write_motion(action, speed, omega, body.max_speed, body.max_omega)
+    write_message(d, action)
+    d.step += 1
+
+
+@kernel
+def decide_all(
+    offsets: Records,
+    settings: Records,
+    slots: Records,
+    outermost: float,
+    minds: Records,
+    mates: Records,
+    seen: npt.NDArray[np.uint16],
+    observations: FloatArray,
+    costs: FloatArray,
+    work: FloatArray,
+    echoes: FloatArray,
+    discs: Records,
+    bodies: Records,
+    actions: FloatArray,
+    part: int,
+    first: int,
+    last: int,
+) -> None:
+    """Write the actions of worlds ``first`` to ``last``."""
+    f, s = offsets[0], settings[0]
+    for e in range(first, last):
+        for i in range(observations.shape[1]):
+            decide(
+                f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
+                costs[part], work[part], echoes[part], discs[part], bodies[part], actions[e, i],
+            )  # fmt: skip

@@ -1,0 +1,63 @@
+"""What trackers remember from step to step, as structured arrays with leading axes (E, N)."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+_F, _I = np.float32, np.int32
+
+
+def _record(*fields: tuple[str, type]) -> np.dtype[Any]:
+    return np.dtype((np.record, np.dtype(list(fields), align=True)))
+
+
+SEARCHING: Final = 0
+CONVERGING: Final = 1
+FLOCKING: Final = 2
+EXCHANGING: Final = 3
+TASKS: Final = ("searching", "converging", "flocking", "leader exchange")
+
+MIND: Final = _record(
+    ("step", _I),  # control steps since it began
+    # the target, as it was at the newest fix; common frame
+    ("fix_step", _I),  # own step of that fix; -1: none yet
+    ("x", _F), ("y", _F), ("theta", _F), ("psi", _F),
+    ("speed", _F), ("turn", _F),  # estimated speed, turn rate
+    ("speed_known", _I),  # 1: the speed has been measured
+    ("raw_x", _F), ("raw_y", _F),  # the fix itself, before it was blended
+    ("mean_x", _F), ("mean_y", _F),  # mean velocity
+    # the target, as it is taken to be now
+    ("now_x", _F), ("now_y", _F), ("now_theta", _F), ("now_psi", _F), ("psi_rate", _F),
+    ("age", _F),  # of the fix, s
+    ("known", _I),  # 1: there is an estimate that is not too old
+    ("sees", _I),  # 1: its own sensor has the target
+    # tracking
+    ("task", _I),
+    ("slot", _I),  # -1: none
+    ("stage", _I),  # of a pursuit: chase or maintenance
+    ("error", _F),  # distance from its place, m; -1: it has none
+    # leadership
+    ("leader", _I),  # -1: none yet
+    ("term", _I),  # how often the lead has passed, modulo 256; the higher claim wins
+    ("pulse", _I),  # the leader counts its steps, modulo 256; team-mates pass the count on
+    ("pulse_step", _I),  # own step at which the count last went up
+    ("confirmed", _I),  # 0: the leader has not been heard of since it was appointed
+    ("exchanges", _I),  # times that the lead passed to another, as far as this one knows
+    # searching
+    ("goal_x", _F), ("goal_y", _F), ("goal_step", _I),  # where to, chosen when; -1: nowhere
+    ("lost_step", _I),  # when the target was lost; -1: never seen yet
+)  # fmt: skip
+"""What one tracker has in mind."""
+
+MATE: Final = _record(
+    ("step", _I),  # own step at which it sent what follows; -1: never heard
+    ("x", _F), ("y", _F), ("speed_x", _F), ("speed_y", _F), ("theta", _F),
+    ("fresh", _I),  # 1: heard in this step
+    ("task", _I), ("leader", _I), ("term", _I), ("pulse", _I), ("slot", _I),  # -1: not said
+)  # fmt: skip
+"""What one tracker knows of a team-mate: (E, N, N), the second N by the mate's number."""
+
+GRID: Final = 16
+"""Cells of a tracker's map of where has been looked, along each axis."""

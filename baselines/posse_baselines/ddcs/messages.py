@@ -1,0 +1,44 @@
+"""What trackers tell each other, beside what the radio carries anyway: five small whole numbers."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from posse.arrays import FloatArray, Record
+from posse.compiled import compiled
+
+MESSAGE_SIZE: Final = 5
+"""Task, leader, term, pulse, slot."""
+COUNT: Final = 256
+"""Terms and pulses count modulo this."""
+
+_STEP: Final = 1.0 / 512.0
+
+
+@compiled
+def encode(value: int) -> float:
+    """Return a whole number, -1 (nothing) to 510, as a number in [0, 1); 0 is nothing."""
+    return (value + 1) * _STEP
+
+
+@compiled
+def decode(number: float) -> int:
+    """Return the whole number that :func:`encode` made a number of; any number is one."""
+    return int(round(number / _STEP)) - 1
+
+
+@compiled
+def is_newer(value: int, old: int) -> bool:
+    """Say whether a count modulo ``COUNT`` is ahead of another, the short way round."""
+    ahead = (value - old) % COUNT
+    return 0 < ahead < COUNT // 2
+
+
+@compiled
+def write_message(d: Record, action: FloatArray) -> None:
+    """Write what a mind has to say behind the motion, in an action (2 + m,)."""
+    action[2] = encode(d.task)
+    action[3] = encode(d.leader)
+    action[4] = encode(d.term)
+    action[5] = encode(d.pulse)
+    action[6] = encode(d.slot)

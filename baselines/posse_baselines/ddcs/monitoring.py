@@ -1,0 +1,150 @@
+"""The monitoring layer: one estimate of the target, and a table of the team-mates.
+
+Fixes come late, and from others; each is carried on to the present. Position is noisy, heading and
+slot frame are not, so speed is worked out along the heading, averaged over seconds.
+"""
+
+from __future__ import annotations
+
+import math
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled
+from posse_baselines.ddcs.messages import decode
+from posse_baselines.guidance import clip, wrap
+
+_TURN_MEMORY = 1.0  # s; an older turn tells little of the heading now
+_JUMP = 1.0  # m; a fix farther than this from the estimate replaces it
+_UNKNOWN_SPEED = 0.6  # of the own greatest, until it has been measured
+
+
+@compiled
+def carry_on(
+    x: float, y: float, theta: float, speed: float, turn: float, time: float
+) -> tuple[float, float, float]:
+    """Return (x, y, θ) after a time (s) at a speed, with a turn rate that fades away."""
+    turned = turn * _TURN_MEMORY * (1.0 - math.exp(-time / _TURN_MEMORY))
+    middle = theta + 0.5 * turned
+    return (
+        x + speed * time * math.cos(middle),
+        y + speed * time * math.sin(middle),
+        wrap(theta + turned),
+    )
+
+
+@compiled
+def frame_limit(speed: float, max_speed: float, outermost: float) -> float:
+    """Return ω_s (rad/s), how fast the slot frame turns for a target of a given speed (m/s)."""
+    return max(0.0, min(0.8 * (max_speed - speed), speed)) / outermost
+
+
+@compiled
+def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: float) -> None:
+    """Bring the estimate of the target up to date with an observation (F,)."""
+    dt = float(f.dt)
+    d.sees = 1 if o[f.target_seen] > 0.0 else 0
+    if o[f.target_known] > 0.0 and (s.radio or d.sees):
+        fix_step = d.step - int(round(o[f.target_age] / dt))
+        if fix_step > d.fix_step:
+            take_fix(f, s, d, o, fix_step, dt)
+    d.known = 0
+    if d.fix_step < 0:
+        return
+    d.age = (d.step - d.fix_step) * dt
+    if d.age <= s.target_lost_after:
+        d.known = 1
+    x, y, theta = carry_on(d.x, d.y, d.theta, d.speed, d.turn, d.age)
+    d.now_x, d.now_y, d.now_theta = x, y, theta
+    limit = frame_limit(d.speed, float(o[f.max_speed]), outermost)
+    d.now_psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
+    d.psi_rate = clip(wrap(theta - d.now_psi) / dt, -limit, limit)
+
+
+@compiled
+def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: float) -> None:
+    """Blend a newer fix into the estimate."""
+    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
+    r = float(o[f.target_range])
+    bc, bs = float(o[f.target_bearing]), float(o[f.target_bearing + 1])
+    x = o[f.position] + r * (bc * hc - bs * hs)
+    y = o[f.position + 1] + r * (bc * hs + bs * hc)
+    own = math.atan2(hs, hc)
+    theta = wrap(own + math.atan2(o[f.target_heading + 1], o[f.target_heading]))
+    psi = wrap(own + math.atan2(o[f.target_frame + 1], o[f.target_frame]))
+    time = (fix_step - d.fix_step) * dt
+    if d.fix_step < 0 or time > s.target_lost_after:
+        d.x, d.y, d.turn = x, y, 0.0
+        if d.speed_known == 0:
+            d.speed = _UNKNOWN_SPEED * o[f.max_speed]
+        d.mean_x, d.mean_y = d.speed * math.cos(theta), d.speed * math.sin(theta)
+    else:
+        guess_x, guess_y, _ = carry_on(d.x, d.y, d.theta, d.speed, d.turn, time)
+        turned = wrap(theta - d.theta)
+        if time <= _TURN_MEMORY:
+            d.turn = turned / time
+            middle = d.theta + 0.5 * turned
+            along = ((x - d.raw_x) * math.cos(middle) + (y - d.raw_y) * math.sin(middle)) / time
+            share = 1.0 - math.exp(-time / s.speed_memory) if d.speed_known else 1.0
+            d.speed = clip(d.speed + share * (along - d.speed), 0.0, float(o[f.max_speed]))
+            d.speed_known = 1
+        else:
+            d.turn = 0.0
+        trust = s.fix_trust
+        if math.hypot(x - guess_x, y - guess_y) > _JUMP:
+            trust = 1.0
+        d.x = guess_x + trust * (x - guess_x)
+        d.y = guess_y + trust * (y - guess_y)
+        share = 1.0 - math.exp(-time / s.mean_memory)
+        d.mean_x += share * (d.speed * math.cos(theta) - d.mean_x)
+        d.mean_y += share * (d.speed * math.sin(theta) - d.mean_y)
+    d.raw_x, d.raw_y, d.theta, d.psi, d.fix_step = x, y, theta, psi, fix_step
+
+
+@compiled
+def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -> None:
+    """Bring the table of team-mates (N,) up to date with an observation (F,)."""
+    for j in range(len(mates)):
+        mates[j].fresh = 0
+    if not s.radio:
+        return
+    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
+    for p in range(f.neighbours):
+        k = p * f.stride
+        number = int(o[f.neighbour_number + k])
+        if number < 0:
+            continue
+        mate = mates[number]
+        sent = d.step - int(round(o[f.neighbour_age + k] / f.dt))
+        if sent <= mate.step:
+            continue
+        mate.step, mate.fresh = sent, 1
+        r = float(o[f.neighbour_range + k])
+        bc, bs = float(o[f.neighbour_bearing + k]), float(o[f.neighbour_bearing + k + 1])
+        mate.x = o[f.position] + r * (bc * hc - bs * hs)
+        mate.y = o[f.position + 1] + r * (bc * hs + bs * hc)
+        c, t = float(o[f.neighbour_heading + k]), float(o[f.neighbour_heading + k + 1])
+        cosine, sine = c * hc - t * hs, c * hs + t * hc
+        speed = float(o[f.neighbour_speed + k])
+        mate.theta = math.atan2(sine, cosine)
+        mate.speed_x, mate.speed_y = speed * cosine, speed * sine
+        m = f.neighbour_message + k
+        mate.task, mate.leader, mate.term = decode(o[m]), decode(o[m + 1]), decode(o[m + 2])
+        mate.pulse, mate.slot = decode(o[m + 3]), decode(o[m + 4])
+
+
+@compiled
+def is_there(f: Record, s: Record, d: Record, mate: Record, size: int) -> bool:
+    """Say whether a team-mate counts as working and in reach."""
+    if mate.step < 0:
+        return False
+    patience = s.lost_after if f.neighbours >= size - 1 else s.claim_memory
+    return bool((d.step - mate.step) * f.dt <= patience)
+
+
+@compiled
+def mate_now(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, float]:
+    """Return where a team-mate is taken to be now; one that is silent too long has stopped."""
+    age = (d.step - mate.step) * f.dt
+    if age > s.lost_after:
+        return mate.x, mate.y
+    return mate.x + age * mate.speed_x, mate.y + age * mate.speed_y

@@ -1,0 +1,129 @@
+"""The Distributed Decision Control System as policies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import ObservationLayout
+from posse.arrays import BoolArray, FloatArray, Records
+from posse.formation import slot_offsets
+from posse.state import slot_records
+from posse_baselines.assignment import WORK_ROWS
+from posse_baselines.ddcs.controller import decide_all
+from posse_baselines.ddcs.memory import GRID, MATE, MIND
+from posse_baselines.ddcs.messages import MESSAGE_SIZE
+from posse_baselines.ddcs.settings import Settings, settings_record
+from posse_baselines.offsets import offsets_of
+from posse_baselines.parallel import most_parts, over_worlds
+from posse_baselines.policy import (
+    Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of,
+)  # fmt: skip
+from posse_baselines.safeguard import BODY, DISC
+
+_MOST_DISCS: Final = 32
+
+
+@dataclass
+class _Minds:
+    """The memory of a team in each of E worlds."""
+
+    layout: ObservationLayout
+    offsets: Records
+    slots: Records
+    outermost: float
+    minds: Records
+    """(E, N) :data:`~posse_baselines.ddcs.memory.MIND`."""
+    mates: Records
+    """(E, N, N) :data:`~posse_baselines.ddcs.memory.MATE`."""
+    seen: npt.NDArray[np.uint16]
+    """(E, N, GRID²): own step + 1 at which a place was looked at last; (E, N, 0) without need."""
+
+
+class DDCS(BasePolicy):
+    """Three layers, four tasks, from observations and messages alone.
+
+    Args:
+        settings: How the team plays.
+        name: What results call it; default: by the model.
+    """
+
+    message_size = MESSAGE_SIZE
+
+    def __init__(self, settings: Settings | None = None, name: str | None = None) -> None:
+        self.settings = settings or Settings()
+        self.name = name or f"ddcs-{self.settings.model}"
+        self._record = settings_record(self.settings)
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the minds of ``num_worlds`` teams at the start of an episode.
+
+        Raises:
+            PolicyError: The scenario's messages are too small.
+        """
+        check_fits(self, layout)
+        scenario = layout.scenario
+        n = scenario.num_trackers
+        limited = math.isfinite(scenario.sensing_range)
+        memory = _Minds(
+            layout, offsets_of(layout), slot_records(scenario),
+            max(math.hypot(x, y) for x, y in slot_offsets(scenario)),
+            np.zeros((num_worlds, n), MIND), np.zeros((num_worlds, n, n), MATE),
+            np.zeros((num_worlds, n, GRID * GRID if limited else 0), np.uint16),
+        )  # fmt: skip
+        return self.restart(memory, np.ones(num_worlds, np.bool_))
+
+    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
+        """Empty the minds of the worlds of a mask (E,)."""
+        m: _Minds = memory
+        for records in (m.minds, m.mates):
+            records[mask] = np.zeros((), records.dtype)
+        m.seen[mask] = 0
+        for name in ("fix_step", "slot", "leader", "goal_step", "lost_step", "error"):
+            m.minds[name][mask] = -1
+        for name in ("step", "task", "leader", "term", "pulse", "slot"):
+            m.mates[name][mask] = -1
+        return m
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return the actions (E, N, 2 + m) of every team."""
+        m: _Minds = memory
+        num_worlds, n = m.minds.shape
+        observations = check_observations(self, observations, num_worlds, m.layout)
+        actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
+        parts = most_parts()
+        beams = max(1, m.layout.scenario.sonar_beams)
+        work = (
+            np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)),
+            np.empty((parts, beams)), np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+        )  # fmt: skip
+        over_worlds(
+            decide_all,
+            (
+                m.offsets, self._record, m.slots, m.outermost, m.minds, m.mates, m.seen,
+                observations, *work, actions,
+            ),
+            num_worlds,
+            n,
+        )  # fmt: skip
+        return actions, m
+
+    def annotations(self, memory: Memory) -> Annotations:
+        """Return what each tracker has in mind, (E, N) each; ``estimate`` is (E, N, 3).
+
+        ``task`` (its place among ``TASKS``), ``leader`` (-1: none), ``term``, ``slot`` (-1: none),
+        ``exchanges`` (times that the lead passed on), ``estimate`` (x, y, θ of the target, common
+        frame), ``estimate_age`` (s; -1: there is no estimate).
+        """
+        minds = memory.minds
+        estimate = np.stack([minds[name] for name in ("now_x", "now_y", "now_theta")], axis=-1)
+        notes: Annotations = {
+            name: minds[name].copy() for name in ("task", "leader", "term", "slot", "exchanges")
+        }
+        notes["estimate"] = estimate
+        notes["estimate_age"] = np.where(minds["known"] != 0, minds["age"], np.float32(-1.0))
+        return notes

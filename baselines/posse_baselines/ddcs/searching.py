@@ -1,0 +1,129 @@
+"""Searching: a wander that spreads the team over the area, towards where nobody has looked yet."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.arrays import Record, Records
+from posse.compiled import compiled
+from posse_baselines.ddcs.memory import GRID
+from posse_baselines.ddcs.monitoring import is_there, mate_now
+
+_STALE = 30.0  # s; a place not looked at for so long counts as never looked at
+_AGE_WEIGHT = 0.35  # m of way that a second since the last look is worth
+_MOST_SPEED_OF_TARGET = 0.8  # of a tracker's: how fast a lost target is taken to get away
+_GOAL_TIME = 4.0  # s; a goal is thought over at least so often
+_LOOK_TIME = 0.5  # s between two entries into the map
+
+
+@compiled
+def mark_seen(
+    f: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
+) -> None:
+    """Note in a map (GRID²,) that a tracker at (x, y) looks around."""
+    cell = 2.0 * f.area / GRID
+    reach = f.sight
+    low_i = max(0, int(math.floor((x - reach + f.area) / cell)))
+    low_j = max(0, int(math.floor((y - reach + f.area) / cell)))
+    high_i = min(GRID - 1, int(math.floor((x + reach + f.area) / cell)))
+    high_j = min(GRID - 1, int(math.floor((y + reach + f.area) / cell)))
+    for i in range(low_i, high_i + 1):
+        for j in range(low_j, high_j + 1):
+            dx = (i + 0.5) * cell - f.area - x
+            dy = (j + 0.5) * cell - f.area - y
+            if dx * dx + dy * dy < reach * reach:
+                seen[i * GRID + j] = step + 1
+
+
+@compiled
+def look_around(
+    f: Record, s: Record, d: Record, mates: Records, seen: npt.NDArray[np.uint16], x: float, y: float
+) -> None:
+    """Keep the map of where this tracker and those it hears have looked."""
+    if len(seen) == 0 or d.step % max(1, int(round(_LOOK_TIME / f.dt))) != 0:
+        return
+    mark_seen(f, seen, x, y, d.step)
+    for j in range(len(mates)):
+        if mates[j].step >= 0 and (d.step - mates[j].step) * f.dt <= s.lost_after:
+            mark_seen(f, seen, mates[j].x, mates[j].y, d.step)
+
+
+@compiled
+def wander(
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    seen: npt.NDArray[np.uint16],
+    own: int,
+    x: float,
+    y: float,
+    theta: float,
+    max_speed: float,
+) -> tuple[float, float]:
+    """Return the velocity (m/s) of a tracker that searches from (x, y)."""
+    dx, dy = d.goal_x - x, d.goal_y - y
+    near = 0.5 * min(f.sight, 4.0)
+    if (
+        d.goal_step < 0
+        or dx * dx + dy * dy < near * near
+        or (d.step - d.goal_step) * f.dt > _GOAL_TIME
+    ):
+        choose_goal(f, s, d, mates, seen, own, x, y, theta)
+        dx, dy = d.goal_x - x, d.goal_y - y
+    distance = math.hypot(dx, dy)
+    if distance < 1e-6:
+        return 0.0, 0.0
+    return max_speed * dx / distance, max_speed * dy / distance
+
+
+@compiled
+def choose_goal(
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    seen: npt.NDArray[np.uint16],
+    own: int,
+    x: float,
+    y: float,
+    theta: float,
+) -> None:
+    """Set the goal: near, long not looked at, and nearer to this tracker than to any other."""
+    cell = 2.0 * f.area / GRID
+    inner = f.area - min(1.5, 0.5 * f.area)
+    best = -1e9
+    reach = 2.0 + _MOST_SPEED_OF_TARGET * (d.step - d.fix_step) * f.dt
+    d.goal_x, d.goal_y, d.goal_step = 0.0, 0.0, d.step
+    for i in range(GRID):
+        for j in range(GRID):
+            cx = min(max((i + 0.5) * cell - f.area, -inner), inner)
+            cy = min(max((j + 0.5) * cell - f.area, -inner), inner)
+            looked = seen[i * GRID + j] - 1 if len(seen) > 0 else -1
+            age = (d.step - looked) * f.dt if looked >= 0 else _STALE
+            bonus = 0.0
+            if d.fix_step >= 0:
+                # It was there, and cannot be far.
+                away = math.hypot(cx - d.now_x, cy - d.now_y)
+                if away < reach:
+                    bonus = 6.0
+                    if looked < d.lost_step:
+                        age = _STALE
+                    bonus -= 0.3 * away
+            way = math.hypot(cx - x, cy - y)
+            turn = 1.0 - ((cx - x) * math.cos(theta) + (cy - y) * math.sin(theta)) / max(way, 1e-6)
+            value = _AGE_WEIGHT * min(age, _STALE) + bonus - way - 0.8 * turn
+            for m in range(len(mates)):
+                if m != own and is_there(f, s, d, mates[m], len(mates)):
+                    mx, my = mate_now(f, s, d, mates[m])
+                    # Where it heads counts more than where it is.
+                    other = math.hypot(
+                        cx - mx - 2.0 * mates[m].speed_x, cy - my - 2.0 * mates[m].speed_y
+                    )
+                    if other < way:
+                        value -= way - other
+            if value > best:
+                best, d.goal_x, d.goal_y = value, cx, cy

@@ -1,0 +1,85 @@
+"""Who goes to which slot: everyone works out the assignment of all it knows, and takes its own part.
+
+Those who know the same come to the same result. Where they do not, as when messages are lost, the
+slots that trackers say they hold count for them (``loyalty``), and two that hold the same one are
+told apart by who is sooner there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled
+from posse_baselines.assignment import assign
+from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.guidance import wrap
+from posse_baselines.steering import intercept_time
+
+_RESERVED = 1e4  # s; what a slot costs that belongs to another
+
+
+@compiled
+def slot_place(d: Record, slot: Record) -> tuple[float, float, float, float]:
+    """Return a slot's place now (x, y) and its arm from the target (x, y), common frame, m."""
+    c, s = math.cos(d.now_psi), math.sin(d.now_psi)
+    arm_x, arm_y = slot.x * c - slot.y * s, slot.x * s + slot.y * c
+    return d.now_x + arm_x, d.now_y + arm_y, arm_x, arm_y
+
+
+@compiled
+def arrival(
+    s: Record, d: Record, dx: float, dy: float, theta: float, max_speed: float, max_omega: float
+) -> float:
+    """Return about when (s) a tracker reaches what lies (dx, dy) away and moves as the target does."""
+    vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
+    time = intercept_time(dx, dy, vx, vy, max_speed)
+    if time > s.weave_time:
+        time = intercept_time(dx, dy, d.mean_x, d.mean_y, max_speed)
+    away = abs(wrap(math.atan2(dy, dx) - theta))
+    return time + 0.5 * away / max_omega * min(1.0, time)
+
+
+@compiled
+def choose_slot(
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    slots: Records,
+    own: int,
+    x: float,
+    y: float,
+    theta: float,
+    max_speed: float,
+    max_omega: float,
+    cost: FloatArray,
+    work: FloatArray,
+) -> None:
+    """Set the slot of a mind: its part of the assignment that has all arrive soonest in total."""
+    n = len(slots)
+    if s.radio == 0:
+        d.slot = own  # nobody to ask
+        return
+    rows, mine = 0, 0
+    for j in range(n):
+        if j == own:
+            mine = rows
+            held, at_x, at_y, heading = d.slot, x, y, theta
+        elif is_there(f, s, d, mates[j], n):
+            held, heading = mates[j].slot, float(mates[j].theta)
+            at_x, at_y = mate_now(f, s, d, mates[j])
+        else:
+            continue
+        for k in range(n):
+            slot_x, slot_y, _, _ = slot_place(d, slots[k])
+            time = arrival(s, d, slot_x - at_x, slot_y - at_y, heading, max_speed, max_omega)
+            if held == k:
+                time -= s.loyalty
+            # The centralized model's leader has the first slot to itself.
+            if s.model == 1 and d.leader >= 0 and (k == 0) != (j == d.leader):
+                time += _RESERVED
+            cost[rows, k] = time + 1e-4 * j
+        rows += 1
+    assign(cost, rows, n, work)
+    d.slot = int(work[0, mine])

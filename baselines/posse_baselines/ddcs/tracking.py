@@ -1,0 +1,165 @@
+"""The tracking layer: the four tasks, and the law of the present one."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from posse.arrays import Record, Records
+from posse.compiled import compiled
+from posse_baselines.ddcs.memory import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
+from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.ddcs.slots import slot_place
+from posse_baselines.formation_control import l_phi_demand, polar_slot_velocity, separation
+from posse_baselines.guidance import (
+    deviation, lawful_heading, line_of_sight, next_stage, pursuit_speed, wrap,
+)  # fmt: skip
+from posse_baselines.safeguard import BODY
+from posse_baselines.steering import approach_velocity, intercept_time
+
+CENTRALIZED: Final = 1
+POLAR: Final = 1
+PNGL: Final = 2
+BY_SLOT: Final = 1
+
+__all__ = ["BODY", "next_task", "wanted_velocity"]
+
+
+@compiled
+def next_task(s: Record, d: Record) -> int:
+    """Return the task that follows from what the mind knows: the state machine of the DDCS.
+
+    ===================  =========================================================================
+    searching            nobody knows where the target is
+    leader exchange      another leader was appointed, and has not been heard of yet
+    converging           the target is known, the tracker's place is far
+    flocking             it is in its place; ends when it is ``far`` from it
+    ===================  =========================================================================
+    """
+    if d.known == 0:
+        return SEARCHING
+    if d.exchanges > 0 and d.confirmed == 0 and s.exchange:
+        return EXCHANGING
+    if d.error < 0.0:
+        return CONVERGING
+    limit = s.far if d.task == FLOCKING else s.near
+    return FLOCKING if d.error <= limit else CONVERGING
+
+
+@compiled
+def on_target(
+    s: Record, d: Record, slots: Records, x: float, y: float, body: Record
+) -> tuple[float, float]:
+    """Return the velocity (m/s) that takes up the slot on the target; notes the distance from it."""
+    place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
+    dx, dy = place_x - x, place_y - y
+    d.error = math.hypot(dx, dy)
+    vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
+    if s.guidance == POLAR:
+        r, sigma = line_of_sight(x, y, d.now_x, d.now_y)
+        speed, delta = polar_slot_velocity(
+            r, sigma, d.speed, d.now_theta, math.hypot(arm_x, arm_y),
+            wrap(math.atan2(arm_y, arm_x) + math.pi), d.psi_rate,
+            s.range_gain, s.bearing_gain, body.max_speed,
+        )  # fmt: skip
+        return speed * math.cos(sigma + delta), speed * math.sin(sigma + delta)
+    # Far away, the slot is met where its mean motion takes it; near, where it is.
+    time = min(intercept_time(dx, dy, vx, vy, body.max_speed), 20.0)
+    ahead = 1.0
+    if time > 0.1:
+        ahead = s.weave_time * (1.0 - math.exp(-time / s.weave_time)) / time
+    sx = ahead * (vx - d.psi_rate * arm_y) + (1.0 - ahead) * d.mean_x
+    sy = ahead * (vy + d.psi_rate * arm_x) + (1.0 - ahead) * d.mean_y
+    speed, heading = approach_velocity(dx, dy, sx, sy, s.gain, body.max_speed, body.acceleration)
+    return speed * math.cos(heading), speed * math.sin(heading)
+
+
+@compiled
+def in_pursuit(
+    s: Record, d: Record, constant: float, wanted_range: float, x: float, y: float, body: Record
+) -> tuple[float, float]:
+    """Return the velocity (m/s) of pursuit with a navigation constant K, at a wanted range.
+
+    Chase at full speed, then the speed of (13); K = 1 is velocity pursuit.
+    """
+    r, sigma = line_of_sight(x, y, d.now_x, d.now_y)
+    d.error = abs(r - wanted_range)
+    heading = lawful_heading(sigma, constant, 0.0)
+    d.stage = next_stage(d.stage, r, wanted_range, s.enter_margin, s.leave_margin)
+    speed = pursuit_speed(
+        d.stage, d.speed, deviation(d.now_theta, sigma), deviation(heading, sigma),
+        r, wanted_range, s.range_gain, body.max_speed,
+    )  # fmt: skip
+    return speed * math.cos(heading), speed * math.sin(heading)
+
+
+@compiled
+def on_leader(
+    f: Record,
+    s: Record,
+    d: Record,
+    leader: Record,
+    slots: Records,
+    x: float,
+    y: float,
+    body: Record,
+) -> tuple[float, float]:
+    """Return the velocity (m/s) wanted of a follower's control point, by l-φ on the leader.
+
+    The formation's heading is that of the slot frame, so the wanted φ turns as the frame does, less
+    the leader's own turning.
+    """
+    lx, ly = mate_now(f, s, d, leader)
+    silent = (d.step - leader.step) * f.dt > s.lost_after
+    leader_speed = 0.0 if silent else math.hypot(leader.speed_x, leader.speed_y)
+    theta = float(leader.theta)
+    own, first = slots[d.slot], slots[0]
+    along, left = own.x - first.x, own.y - first.y
+    c, sn = math.cos(d.now_psi), math.sin(d.now_psi)
+    place_x, place_y = lx + along * c - left * sn, ly + along * sn + left * c
+    dx, dy = place_x - x, place_y - y
+    d.error = math.hypot(dx, dy)
+    vx, vy = leader_speed * math.cos(theta), leader_speed * math.sin(theta)
+    if d.error > s.far:
+        speed, heading = approach_velocity(dx, dy, vx, vy, s.gain, body.max_speed, body.acceleration)
+        return speed * math.cos(heading), speed * math.sin(heading)
+    ahead_x, ahead_y = s.point_offset * math.cos(body.theta), s.point_offset * math.sin(body.theta)
+    l_now, phi = separation(lx, ly, theta, x + ahead_x, y + ahead_y)
+    l_d, phi_d = separation(lx, ly, theta, place_x + ahead_x, place_y + ahead_y)
+    # The wanted φ keeps to the slot frame: to the leader's frame it turns back as the leader turns.
+    across_rate = d.psi_rate
+    a, b = l_phi_demand(
+        l_now, phi, l_d, phi_d, leader_speed, across_rate, s.alpha_1, s.alpha_2
+    )
+    angle = theta + phi
+    return a * math.cos(angle) - b * math.sin(angle), a * math.sin(angle) + b * math.cos(angle)
+
+
+@compiled
+def wanted_velocity(
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    slots: Records,
+    own: int,
+    wanted_range: float,
+    x: float,
+    y: float,
+    body: Record,
+) -> tuple[float, float]:
+    """Return the velocity (m/s) of a tracker that knows where the target is."""
+    n = len(slots)
+    if s.guidance == PNGL:
+        constant = 1.0 + s.spread * (2.0 * own / (n - 1) - 1.0 if n > 1 else 0.0)
+        return in_pursuit(s, d, constant, wanted_range, x, y, body)
+    if s.model == CENTRALIZED and d.leader >= 0:
+        if d.leader == own:
+            if s.leader_law == BY_SLOT:
+                return on_target(s, d, slots, x, y, body)
+            wanted_range = math.hypot(slots[0].x, slots[0].y)
+            return in_pursuit(s, d, 1.0, wanted_range, x, y, body)
+        leader = mates[d.leader]
+        if is_there(f, s, d, leader, n) or (s.exchange == 0 and leader.step >= 0):
+            return on_leader(f, s, d, leader, slots, x, y, body)
+    return on_target(s, d, slots, x, y, body)

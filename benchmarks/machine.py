@@ -1,0 +1,68 @@
+"""The machine that figures were taken on, and whether it had other things to do meanwhile."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+import platform
+import time
+from pathlib import Path
+from typing import Any
+
+STAT = Path("/proc/stat")
+IDLE, IO_WAIT = 3, 4
+"""Places of the times without work in the first line of STAT."""
+
+
+def describe() -> dict[str, Any]:
+    """Return what a reader needs to compare figures: processor, cores, memory, system, date."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "memory_gib": round(_memory() / 2**30, 1),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "python": platform.python_version(),
+        "date": dt.date.today().isoformat(),
+        "load_average": os.getloadavg()[0],
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def _memory() -> int:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+class OtherWork:
+    """Measures how much of the machine something else took, between its making and a later call.
+
+    Taken from the system's own account of processor time, stolen time (another guest's of the same
+    host) included. Where there is no such account the answer is 0 and the load average, which
+    :func:`describe` reports, has to do.
+    """
+
+    def __init__(self) -> None:
+        self._began = time.perf_counter()
+        self._busy = _busy_seconds()
+
+    def cores(self, own_seconds: float) -> float:
+        """Return how many cores others kept busy, given the processor time taken by ourselves."""
+        elapsed = time.perf_counter() - self._began
+        return max(0.0, (_busy_seconds() - self._busy - own_seconds) / elapsed)
+
+
+def _busy_seconds() -> float:
+    try:
+        first = STAT.read_text(encoding="ascii").split("\n", 1)[0]
+    except OSError:
+        return 0.0
+    times = [int(number) for number in first.split()[1:9]]  # what follows is counted twice
+    ticks = sum(times) - times[IDLE] - times[IO_WAIT]
+    return ticks / os.sysconf("SC_CLK_TCK")

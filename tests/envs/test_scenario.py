@@ -1,0 +1,255 @@
+"""Scenarios: values, overrides, and that every impossible one is refused with a word on why."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pickle
+from typing import Any
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import posse
+from posse import Scenario, ScenarioError
+
+WALLED = {"arena": 20.0}
+
+# What is refused, and a word that the message must have beside the field's name.
+IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
+    ({"num_trackers": 0}, "1, 64"),
+    ({"num_trackers": 65}, "1, 64"),
+    ({"num_trackers": 2.0}, "whole"),
+    ({"num_trackers": True}, "whole"),
+    ({"version": 0}, "1"),
+    ({"name": 3}, "string"),
+    ({"tracker_speed": 0.0}, "0.001"),
+    ({"tracker_speed": -1.0}, "0.001"),
+    ({"tracker_speed": math.nan}, "number"),
+    ({"tracker_speed": "fast"}, "number"),
+    ({"tracker_speed": math.inf}, "finite"),
+    ({"tracker_speed": 10**400}, "number"),
+    ({"tracker_turn_rate": 0.0}, "0.001"),
+    ({"tracker_turn_rate": 30.0}, "physics_step"),
+    ({"tracker_acceleration": 0.0}, "0.001"),
+    ({"tracker_turn_acceleration": -1.0}, "0.001"),
+    ({"robot_radius": 0.0}, "0.001"),
+    ({"target_motion": "smrat"}, "smart"),
+    ({"target_speed": 1.0}, "tracker_speed"),
+    ({"target_speed": 1.5}, "tracker_speed"),
+    ({"target_speed": -0.1}, "0"),
+    ({"target_speed": 0.0, "target_motion": "smart"}, "constant"),
+    ({"target_turn_rate": 0.0}, "0.001"),
+    ({"target_turn_rate": 21.0}, "physics_step"),
+    ({"formation": "vedge"}, "wedge"),
+    ({"formation_distance": 0.0}, "0"),
+    ({"formation_distance": 0.3}, "target"),
+    ({"formation_spacing": 0.6}, "tolerance"),
+    ({"formation_spacing": 0.9, "robot_radius": 0.5, "formation_distance": 2.0}, "robot_radius"),
+    ({"formation_spacing": math.inf}, "finite"),
+    ({"tolerance": 0.6}, "formation_spacing"),
+    ({"settle_time": 61.0}, "60 s"),
+    ({"settle_time": 0.0}, "0"),
+    ({"control_step": 0.12}, "physics_step"),
+    ({"control_step": 0.01}, "physics_step"),
+    ({"physics_step": 0.0}, "0.0001"),
+    ({"physics_step": 1e-310}, "0.0001"),
+    ({"horizon": 0}, "1"),
+    ({"horizon": 1.5}, "whole"),
+    ({"horizon": 10**6, "tracker_speed": 900.0}, "apart"),
+    ({"terminate_on_contact": 1}, "True or False"),
+    ({"arena": -5.0}, "0"),
+    ({"arena": 5.0}, "too small"),
+    ({"arena": 1e8}, "apart"),
+    ({"num_obstacles": 3}, "arena"),
+    ({"num_obstacles": 61, **WALLED}, "60"),
+    ({"num_obstacles": 30, **WALLED}, "fit"),
+    ({"num_obstacles": 8, "arena": 22.0, "target_turn_rate": 0.2}, "turn round"),
+    ({"obstacle_radius": (0.0, 0.0), "num_obstacles": 1, **WALLED}, "above 0"),
+    ({"obstacle_radius": (0.8, 0.4)}, "least"),
+    ({"obstacle_radius": [0.4, 0.8]}, "tuple"),
+    ({"obstacle_radius": (0.4, math.inf)}, "tuple"),
+    ({"obstacle_gap": -0.1}, "0"),
+    ({"start_distance": (0.2, 3.0)}, "clear of the target"),
+    ({"start_distance": (4.0, 4.1), "num_trackers": 30}, "fit"),
+    ({"start_distance": (4.0, 4.01), "num_trackers": 64, "arena": 40.0}, "fit"),
+    ({"start_distance": (4.0, 1e20)}, "apart"),
+    ({"start_distance": 4.0}, "tuple"),
+    ({"sensing_range": 0.0}, "0"),
+    ({"sensing_range": -1.0}, "0"),
+    ({"field_of_view": 0.0}, "0"),
+    ({"field_of_view": 7.0}, "6.28"),
+    ({"range_noise": -0.1}, "0"),
+    ({"range_noise": 0.5}, "0.3"),
+    ({"bearing_noise": 1.0}, "0.5"),
+    ({"velocity_smoothing": -1.0}, "0"),
+    ({"sonar_beams": 65}, "64"),
+    ({"sonar_range": 0.0}, "0.001"),
+    ({"radio_range": -1.0}, "0"),
+    ({"radio_delay": -1}, "0"),
+    ({"radio_delay": 0.5}, "whole"),
+    ({"radio_loss": 1.0}, "0.999"),
+    ({"message_size": -1}, "0"),
+    ({"message_size": 65}, "64"),
+    ({"forget_after": 0.0}, "0"),
+    ({"num_neighbours": 64}, "63"),
+    ({"num_neighbours": -1}, "0"),
+    ({"num_neighbours": 2.5}, "whole"),
+    ({"breaks": 5}, "num_trackers - 1"),
+    ({"breaks": -1}, "0"),
+    ({"break_choice": "neares"}, "nearest"),
+    ({"break_window": (0.5, 1.5)}, "0, 1"),
+    ({"sensor_outages": 1.1}, "1"),
+    ({"radio_outages": -0.1}, "0"),
+    ({"outage_time": 0.0}, "0"),
+    ({"reward_weights": {"slots": 1.0}}, "slot"),
+    ({"reward_weights": {"slot": math.nan}}, "finite"),
+    ({"reward_weights": {"slot": "much"}}, "number"),
+    ({"reward_weights": 3}, "terms"),
+    ({"reward_weights": {1: 1.0, "slot": 1.0}}, "terms"),
+]
+
+
+@pytest.mark.parametrize(("settings", "word"), IMPOSSIBLE, ids=lambda part: str(part)[:60])
+def test_an_impossible_setting_is_refused_by_name(settings: dict[str, Any], word: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        Scenario(name="mine", **settings) if "name" not in settings else Scenario(**settings)
+    first = next(iter(settings))
+    assert first in str(refused.value)
+    assert word in str(refused.value)
+    with pytest.raises(ScenarioError):
+        posse.batch("constant", **settings)
+
+
+def test_every_field_has_an_impossible_value_among_the_tests() -> None:
+    tried = {next(iter(settings)) for settings, _ in IMPOSSIBLE}
+    assert tried == {field.name for field in dataclasses.fields(Scenario)}
+
+
+VALUES = st.one_of(
+    st.none(), st.booleans(), st.integers(-3, 100), st.integers(), st.floats(), st.text(max_size=5),
+    st.tuples(st.floats(0, 10), st.floats(0, 10)), st.lists(st.integers(), max_size=3),
+    st.dictionaries(st.text(max_size=3), st.floats(), max_size=2), st.just(10**400),
+)  # fmt: skip
+
+
+@hypothesis.settings(derandomize=True, max_examples=400, deadline=None)
+@given(
+    name=st.sampled_from(posse.scenario_names()),
+    overrides=st.dictionaries(
+        st.sampled_from([field.name for field in dataclasses.fields(Scenario)]), VALUES,
+        min_size=1, max_size=3,
+    ),
+)  # fmt: skip
+def test_nothing_but_a_scenario_error_is_ever_raised(name: str, overrides: dict[str, Any]) -> None:
+    try:
+        scenario = posse.get_scenario(name, **overrides)
+    except ScenarioError:
+        return
+    # What passes can be turned into what the kernels read, without a number lost.
+    layout = posse.ObservationLayout(scenario)
+    assert all(np.isfinite(bound).all() for bound in layout.bounds())
+    assert 0 <= scenario.slot_turn_rate < math.inf
+
+
+@hypothesis.settings(derandomize=True, max_examples=40, deadline=None)
+@given(
+    name=st.sampled_from(posse.scenario_names()),
+    target_motion=st.sampled_from(["constant", "accelerating", "smart", "agent"]),
+    formation=st.sampled_from(["wedge", "ring", "rows"]),
+    tracker_speed=st.sampled_from([0.01, 0.7, 1.0, 20.0, 500.0]),
+    target_share=st.sampled_from([0.1, 0.6, 0.99, 0.9999]),
+    turn_rate=st.sampled_from([0.001, 0.5, 2.0, 19.0]),
+    robot_radius=st.sampled_from([0.001, 0.15, 0.25]),
+    breaks=st.integers(0, 3),
+    num_trackers=st.sampled_from([1, 2, 5, 9]),
+)
+def test_what_is_allowed_runs_and_stays_finite(
+    name: str, tracker_speed: float, target_share: float, turn_rate: float, **overrides: Any
+) -> None:
+    try:
+        batch = posse.batch(
+            name, 2, tracker_speed=tracker_speed, target_speed=tracker_speed * target_share,
+            tracker_turn_rate=turn_rate, target_turn_rate=turn_rate, horizon=40, **overrides,
+        )  # fmt: skip
+    except ScenarioError:
+        return
+    observations = batch.reset(seed=1)
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        assert np.isfinite(observations).all()
+        observations, rewards, *_ = batch.step(rng.uniform(-1, 1, batch.action_shape))
+        assert np.isfinite(rewards).all()
+    for key, array in batch.state.items():
+        assert np.isfinite(array).all(), key
+
+
+def test_unknown_names_name_the_near_ones() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'smart'"):
+        posse.get_scenario("smrt")
+    with pytest.raises(ScenarioError, match="did you mean 'num_trackers'"):
+        posse.get_scenario("smart", num_tracker=3)
+    with pytest.raises(ScenarioError, match="scenarios are: constant"):
+        posse.batch("nothing like it")
+
+
+@pytest.mark.parametrize("name", posse.scenario_names())
+def test_a_named_scenario_is_a_value(name: str) -> None:
+    scenario = posse.get_scenario(name)
+    assert scenario.name == name
+    assert scenario.version >= 1
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scenario.num_trackers = 3  # type: ignore[misc]
+    twin = Scenario(**scenario.to_dict())
+    assert twin == scenario
+    assert hash(twin) == hash(scenario)
+    assert pickle.loads(pickle.dumps(scenario)) == scenario  # noqa: S301
+    assert posse.get_scenario(scenario) is scenario
+    larger = posse.get_scenario(name, num_trackers=6)
+    assert larger != scenario
+    assert larger.num_trackers == 6
+    assert scenario.num_trackers == 5, "the named one is as it was"
+    assert larger.replace(num_trackers=5) == scenario
+
+
+def test_all_the_scenarios_that_the_benchmark_names_are_there() -> None:
+    assert set(posse.scenario_names()) == {
+        "constant", "accelerating", "smart", "search", "obstacles", "radio", "leader-loss",
+        "field", "paper-centralized", "paper-distributed",
+    }  # fmt: skip
+
+
+def test_reward_weights_compare_whatever_their_order_and_kind() -> None:
+    weights = {"slot": 1.0, "contact": -1.0}
+    one = Scenario(name="mine", reward_weights=weights)
+    other = Scenario(name="mine", reward_weights=(("contact", -1.0), ("slot", 1.0)))
+    assert one == other
+    assert one.to_dict()["reward_weights"] == weights
+    weights["slot"] = 5.0
+    assert dict(one.reward_weights)["slot"] == 1.0, "nothing outside can change it"
+
+
+def test_every_field_is_documented() -> None:
+    import inspect
+
+    source = inspect.getsource(Scenario)
+    for field in dataclasses.fields(Scenario):
+        after = source.split(f"    {field.name}: ", 1)[1]
+        assert after.split("\n    ", 2)[1].startswith('"""') or ')\n    """' in after[:400], (
+            field.name
+        )
+
+
+@pytest.mark.parametrize("number", [1, 2, 64])
+@pytest.mark.parametrize("name", posse.scenario_names())
+def test_one_to_sixty_four_trackers_in_every_scenario(name: str, number: int) -> None:
+    overrides: dict[str, Any] = {"breaks": 0} if number == 1 else {}
+    if number == 64 and math.isinf(posse.get_scenario(name).arena):
+        overrides["start_distance"] = (1.5, 12.0)
+    batch = posse.batch(name, 1, num_trackers=number, **overrides)
+    observations = batch.reset(seed=0)
+    assert np.isfinite(observations).all()
+    assert np.isfinite(batch.step(np.zeros(batch.action_shape))[0]).all()
