@@ -429,7 +429,7 @@ def slots(s: posse.Scenario) -> Complexes:
     n, d, apart = s.num_trackers, s.formation_distance, s.formation_spacing
     if s.formation == "ring":
         radius = max(d, apart / (2 * math.sin(math.pi / n)) if n > 1 else d)
-        return -radius * np.exp(2j * np.pi * np.arange(n) / n)
+        return np.asarray(-radius * np.exp(2j * np.pi * np.arange(n) / n))
     if s.formation == "rows":
         wide = math.ceil(math.sqrt(n))
         places = []
@@ -520,12 +520,12 @@ class Episode:
             self._held_from = None
         elif self._held_from is None:
             self._held_from = step
-        if self._held_from is not None:
-            if step - self._held_from + 1 >= max(1, round(s.settle_time / s.control_step)):
-                if self._settled_at is None:
-                    self._settled_at = self._held_from
-                if self._lost_at is not None and self._recovered_at is None:
-                    self._recovered_at = self._held_from
+        enough = max(1, round(s.settle_time / s.control_step))
+        if self._held_from is not None and step - self._held_from + 1 >= enough:
+            if self._settled_at is None:
+                self._settled_at = self._held_from
+            if self._lost_at is not None and self._recovered_at is None:
+                self._recovered_at = self._held_from
         assert self._arrived is not None
         reach = s.tracker_speed * step * s.control_step + s.tolerance
         could = np.abs(self._start[:, None] - places[None, :]).min(axis=1) <= reach

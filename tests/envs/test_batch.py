@@ -27,7 +27,8 @@ def actions_for(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
     e = batch.first_world + np.arange(batch.num_worlds)[:, None, None]
     i = np.arange(batch.action_shape[1])[:, None]
     k = np.arange(batch.action_shape[2])
-    return np.sin(1.7 * e + 2.3 * i + 3.1 * k + 0.21 * step * (1 + i)).astype(np.float32)
+    angles = 1.7 * e + 2.3 * i + 3.1 * k + 0.21 * step * (1 + i)
+    return np.asarray(np.sin(angles), np.float32)
 
 
 def play(batch: posse.Batch, steps: int) -> list[npt.NDArray[Any]]:

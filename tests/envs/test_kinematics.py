@@ -50,7 +50,10 @@ def test_a_robot_that_holds_its_speeds_goes_round_the_circle_it_should() -> None
 
 @pytest.mark.parametrize("name", ["constant", "accelerating", "smart"])
 def test_the_physics_step_changes_nothing_but_rounding(name: str) -> None:
-    at_once: dict[str, Any] = {"tracker_acceleration": math.inf, "tracker_turn_acceleration": math.inf}
+    at_once: dict[str, Any] = {
+        "tracker_acceleration": math.inf,
+        "tracker_turn_acceleration": math.inf,
+    }
     coarse = posse.batch(name, 8, physics_step=0.1, **at_once)
     fine = posse.batch(name, 8, physics_step=0.005, **at_once)
     coarse.reset(seed=3)

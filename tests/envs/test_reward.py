@@ -25,13 +25,9 @@ def test_every_term_and_the_sum_equal_an_independent_working(case: Any) -> None:
         turn = state["tracker_turn_rate"] / s.tracker_turn_rate
         # Who of two in one slot is said to hold it is left to the engine.
         own = state["tracker_slot"] >= 0
+        expected: dict[str, Any] = {}
         if own.tolist() == [i in episode.occupied for i in range(n)]:
-            expected = {
-                "progress": episode.progress,
-                "distance": episode.distance,
-            }
-        else:
-            expected = {}
+            expected = {"progress": episode.progress, "distance": episode.distance}
         expected |= {
             "slot": own,
             "sight": state["tracker_sees"],

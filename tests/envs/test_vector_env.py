@@ -71,7 +71,8 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
     terminations = truncations = 0
     for _ in range(80):
         actions = ours.action_space.sample()
-        mine, other = ours.step(actions), theirs.step(actions)
+        mine: Any = ours.step(actions)
+        other: Any = theirs.step(actions)
         for a, b in zip(mine[:4], other[:4], strict=True):
             assert a.dtype == b.dtype
             assert np.allclose(a, b, rtol=1e-12, atol=0)

@@ -68,6 +68,11 @@ class Settings:
     """Between two assignments."""
     loyalty: float = 0.6
     """How much sooner all would have to arrive with other slots for a tracker to change, s."""
+    sight_worth: float = 10.0
+    """How much later a tracker may arrive in a slot from which the target is in sight, s."""
+    close_in_after: float = 0.7
+    """With a fix older than this, beyond what the radio is late by, the team closes in on where the
+    target should be, to see it again."""
 
     # laws
     gain: float = 2.0

@@ -16,6 +16,7 @@ from posse_baselines.ddcs.monitoring import is_there, mate_now
 from posse_baselines.guidance import wrap
 from posse_baselines.steering import intercept_time
 
+_IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
 _RESERVED = 1e4  # s; what a slot costs that belongs to another
 
 
@@ -76,6 +77,9 @@ def choose_slot(
             time = arrival(s, d, slot_x - at_x, slot_y - at_y, heading, max_speed, max_omega)
             if held == k:
                 time -= s.loyalty
+            # Where there are more slots than trackers, those that see the target are filled first.
+            if slots[k].x ** 2 + slots[k].y ** 2 < (_IN_SIGHT * f.sight) ** 2:
+                time -= s.sight_worth
             # The centralized model's leader has the first slot to itself.
             if s.model == 1 and d.leader >= 0 and (k == 0) != (j == d.leader):
                 time += _RESERVED

@@ -22,6 +22,8 @@ POLAR: Final = 1
 PNGL: Final = 2
 BY_SLOT: Final = 1
 
+_CLOSE_ENOUGH: Final = 0.5  # share of the sensor's reach, to see the target again
+
 __all__ = ["BODY", "next_task", "wanted_velocity"]
 
 
@@ -48,12 +50,17 @@ def next_task(s: Record, d: Record) -> int:
 
 @compiled
 def on_target(
-    s: Record, d: Record, slots: Records, x: float, y: float, body: Record
+    f: Record, s: Record, d: Record, slots: Records, x: float, y: float, body: Record
 ) -> tuple[float, float]:
     """Return the velocity (m/s) that takes up the slot on the target; notes the distance from it."""
     place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
+    d.error = math.hypot(place_x - x, place_y - y)
+    most = _CLOSE_ENOUGH * f.sight
+    arm = math.hypot(arm_x, arm_y)
+    if d.age > s.close_in_after and arm > most:
+        arm_x, arm_y = arm_x * most / arm, arm_y * most / arm
+        place_x, place_y = d.now_x + arm_x, d.now_y + arm_y
     dx, dy = place_x - x, place_y - y
-    d.error = math.hypot(dx, dy)
     vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
     if s.guidance == POLAR:
         r, sigma = line_of_sight(x, y, d.now_x, d.now_y)
@@ -156,10 +163,10 @@ def wanted_velocity(
     if s.model == CENTRALIZED and d.leader >= 0:
         if d.leader == own:
             if s.leader_law == BY_SLOT:
-                return on_target(s, d, slots, x, y, body)
+                return on_target(f, s, d, slots, x, y, body)
             wanted_range = math.hypot(slots[0].x, slots[0].y)
             return in_pursuit(s, d, 1.0, wanted_range, x, y, body)
         leader = mates[d.leader]
         if is_there(f, s, d, leader, n) or (s.exchange == 0 and leader.step >= 0):
             return on_leader(f, s, d, leader, slots, x, y, body)
-    return on_target(s, d, slots, x, y, body)
+    return on_target(f, s, d, slots, x, y, body)
