@@ -152,6 +152,8 @@ class Runner:
             line = ""
         else:
             line = self._process.stdout.readline()
+            while line and not line.startswith("{"):  # what a library prints when imported
+                line = self._process.stdout.readline()
         if not line:
             self._errors.seek(0)
             raise RuntimeError(f"{self._peer.name} stopped: {self._errors.read()[-2000:]}")

@@ -36,18 +36,18 @@ _MATES: Final = 3
 NUM_FEATURES: Final = 25 + 4 * _MATES
 MOST: Final = 16
 """Trackers that an assignment takes into account: this one and the nearest that it knows of."""
-SCRATCH: Final = MOST * (3 + 64)
+SCRATCH: Final = MOST * (4 + 64)
 """float32 numbers of working memory that :func:`write_features` takes."""
 
 _NAMES: Final = (
     "speed", "turn_rate", "max_speed", "max_turn_rate", "target_known", "target_seen", "target_age",
     "target_range", "target_bearing", "target_heading", "target_frame", "target_velocity",
-    "neighbour_number",
+    "neighbour_number", "number",
 )  # fmt: skip
 (
     _SPEED, _TURN, _MAX_SPEED, _MAX_TURN, _KNOWN, _SEEN, _AGE, _RANGE, _BEARING, _HEADING, _FRAME,
-    _VELOCITY, _MATE, _STRIDE, _PLACES,
-) = range(15)  # fmt: skip
+    _VELOCITY, _MATE, _NUMBER, _STRIDE, _PLACES,
+) = range(16)  # fmt: skip
 
 Offsets = npt.NDArray[np.int64]
 
@@ -128,20 +128,39 @@ def assign(count: int, num_slots: int, ways: FloatArray, chosen: FloatArray) -> 
 
 
 @compiled
-def _gather_team(row: FloatArray, at: Offsets, xs: FloatArray, ys: FloatArray) -> int:
+def _gather_team(
+    row: FloatArray, at: Offsets, xs: FloatArray, ys: FloatArray, numbers: FloatArray
+) -> int:
     """Write where the team is, this robot first, carried on from when it was heard; return how many."""
-    xs[0], ys[0] = _ZERO, _ZERO
+    xs[0], ys[0], numbers[0] = _ZERO, _ZERO, row[at[_NUMBER]]
     count = 1
     for p in range(at[_PLACES]):
         k = at[_MATE] + p * at[_STRIDE]
         if row[k] < _ZERO or count >= MOST:
             continue
-        age = row[k + 1]
-        reach = row[k + 7] * min(age, _OLD)
+        reach = row[k + 7] * min(row[k + 1], _OLD)
         xs[count] = row[k + 2] * row[k + 3] + row[k + 5] * reach
         ys[count] = row[k + 2] * row[k + 4] + row[k + 6] * reach
+        numbers[count] = row[k]
         count += 1
     return count
+
+
+@compiled
+def _sort_by_number(count: int, xs: FloatArray, ys: FloatArray, numbers: FloatArray) -> int:
+    """Sort robots by number, so that all of a team work out one assignment; return where robot 0 went."""
+    me = numbers[0]
+    for i in range(1, count):
+        x, y, number = xs[i], ys[i], numbers[i]
+        j = i
+        while j > 0 and numbers[j - 1] > number:
+            xs[j], ys[j], numbers[j] = xs[j - 1], ys[j - 1], numbers[j - 1]
+            j -= 1
+        xs[j], ys[j], numbers[j] = x, y, number
+    for i in range(count):
+        if numbers[i] == me:
+            return i
+    return 0
 
 
 @compiled
@@ -151,9 +170,9 @@ def write_features(
     """Write the features of one observation (F,) to ``out`` (NUM_FEATURES,)."""
     for k in range(NUM_FEATURES):
         out[k] = _ZERO
-    xs, ys = scratch[:MOST], scratch[MOST : 2 * MOST]
-    chosen, ways = scratch[2 * MOST : 3 * MOST], scratch[3 * MOST :]
-    count = _gather_team(row, at, xs, ys)
+    xs, ys, numbers = scratch[:MOST], scratch[MOST : 2 * MOST], scratch[2 * MOST : 3 * MOST]
+    chosen, ways = scratch[3 * MOST : 4 * MOST], scratch[4 * MOST :]
+    count = _gather_team(row, at, xs, ys, numbers)
     top, speed = row[at[_MAX_SPEED]], row[at[_SPEED]]
     out[0] = speed / top
     out[1] = row[at[_TURN]] / row[at[_MAX_TURN]]
@@ -174,6 +193,7 @@ def write_features(
     k = at[_FRAME]
     c, n = row[k], row[k + 1]
     k = at[_HEADING]
+    me = _sort_by_number(count, xs, ys, numbers)
     num_slots = len(slots)
     for s in range(num_slots):
         sx, sy = _slot_x(slots, s, x, c, n), _slot_y(slots, s, y, c, n)
@@ -181,7 +201,7 @@ def write_features(
             wx, wy = xs[j] - sx, ys[j] - sy
             ways[j * num_slots + s] = np.float32(math.sqrt(wx * wx + wy * wy))
     assign(count, num_slots, ways, chosen)
-    mine = int(chosen[0])
+    mine = int(chosen[me])
     if mine < 0:
         mine = 0
     dx, dy = _slot_x(slots, mine, x, c, n), _slot_y(slots, mine, y, c, n)
@@ -194,8 +214,7 @@ def write_features(
     o[8] = row[k + 1] * c - row[k] * n
     o[9], o[10] = vx, vy
     o[11], o[12] = c, n
-    o[13] = slots[mine, 0] / (_ONE - slots[mine, 0])
-    o[14] = slots[mine, 1] / _FAR
+    _soft(slots[mine, 0], slots[mine, 1], _FAR, o[13:15])
     # The slot law: the slot's velocity, and towards it in proportion to the distance.
     wx, wy = vx + _GAIN * dx, vy + _GAIN * dy
     wanted = np.float32(math.sqrt(wx * wx + wy * wy))
@@ -205,9 +224,9 @@ def write_features(
     o[17] = wy / (wanted + _SMALL)
     o[18] = max(-_ONE, min(_ONE, _TURN_GAIN * error / row[at[_MAX_TURN]]))
     held = 0
-    for j in range(1, count):
+    for j in range(count):
         s = int(chosen[j])
-        if s >= 0:
+        if s >= 0 and j != me:
             held += ways[j * num_slots + s] < _NEAR
     o[19] = np.float32(held) / np.float32(max(count - 1, 1))
     o[20] = row[at[_SEEN]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +21,7 @@ _FIELDS: Final = (
     "neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message",
 )  # fmt: skip
 
+_WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # m; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 
@@ -35,6 +37,7 @@ OFFSETS: Final[np.dtype[Any]] = np.dtype(
                 ("message_size", np.int32),
                 ("dt", np.float32),  # control step, s
                 ("sonar_range", np.float32),  # reading that means "nothing near", m
+                ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
                 ("radius", np.float32),  # of a robot's disc, m
                 ("extent", np.float32),  # greatest coordinate of a place that can be reached, m
                 ("walled", np.int32),
@@ -61,6 +64,7 @@ def offsets_of(layout: ObservationLayout) -> Records:
     record["sonar_beams"] = scenario.sonar_beams
     record["message_size"] = scenario.message_size
     record["dt"] = scenario.control_step
+    record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
     record["sonar_range"] = scenario.sonar_range
     record["radius"] = scenario.robot_radius
     record["extent"] = scenario.position_bound

@@ -50,7 +50,7 @@ def serve(build: Callable[[int, str], Built], *packages: str) -> None:
         build: Makes a number of worlds in a named variant.
         packages: Whose versions are reported.
     """
-    answers, sys.stdout = sys.stdout, sys.stderr  # nothing that a library prints gets in between
+    answers, sys.stdout = sys.stdout, sys.stderr  # what libraries print goes elsewhere
     built: Built | None = None
     steps = 0
     for line in sys.stdin:

@@ -85,13 +85,16 @@ class _Function(CPUDispatcher):
     def __init__(self, function: Callable[..., Any]) -> None:
         options = {**_OPTIONS, "nopython": True, "boundscheck": None}
         super().__init__(function, targetoptions=options)
-        options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self._linked = CPUDispatcher(function, targetoptions=options, pipeline_class=_LinkedForm)
+        self._linked = CPUDispatcher(
+            function,
+            targetoptions={**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+            pipeline_class=_LinkedForm,
+        )
 
     @property
     def _numba_type_(self) -> types.Dispatcher:
         """What compiled code takes this function for."""
-        return types.Dispatcher(self._linked)  # type: ignore[no-untyped-call]
+        return types.Dispatcher(self._linked)
 
 
 class _LinkedForm(CompilerBase):
@@ -99,8 +102,10 @@ class _LinkedForm(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
-        state.library = _LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
+        state.library = _LinkedLibrary(codegen, name)  # type: ignore[no-untyped-call]
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(state)  # type: ignore[no-untyped-call]
+        return [pipeline]
 
 
 class _LinkedLibrary(JITCodeLibrary):

@@ -34,6 +34,7 @@ from posse.render_style import (
     WALL,
     Colour,
     mix,
+    pale,
 )
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ def trackers(d: Drawing) -> None:
         if scene.task is not None and 0 <= scene.task[i] < len(TASK_COLOURS):
             colour = TASK_COLOURS[scene.task[i]]
         if scene.limited_sight and not scene.sees[i]:
-            colour = mix(colour, PAPER, 0.35)
+            colour = pale(colour)
         _wafer(d, place, heading, colour, TRACKER_RIM)
         if scene.leads is not None and scene.leads[i]:
             leader_mark(canvas, place - (0, radius + 4 * point), 5 * point)

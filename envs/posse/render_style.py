@@ -50,3 +50,16 @@ def mix(colour: Colour, ground: Colour, share: float) -> Colour:
     """Return a colour laid over a ground, as opaque as ``share`` in [0, 1] says."""
     r, g, b = (round(q + (p - q) * share) for p, q in zip(colour, ground, strict=True))
     return r, g, b
+
+
+def pale(colour: Colour) -> Colour:
+    """Return the colour of a tracker that does not have the target in its own sight."""
+    return mix(colour, PAPER, 0.45)
+
+
+PALETTE: Final[tuple[Colour, ...]] = (
+    PAPER, GROUND, GRID, WALL, OBSTACLE, OBSTACLE_RIM, INK, FAINT_INK, TARGET, SLOT, SLOT_FILLED,
+    TRACKER, TRACKER_RIM, BROKEN, LINK, SENSING, SENSING_RIM, CONTACT, pale(TRACKER),
+    *TASK_COLOURS, *(pale(colour) for colour in TASK_COLOURS),
+)  # fmt: skip
+"""Every flat colour of a picture; all others are blends of these, at edges and in what fades."""

@@ -42,7 +42,7 @@ _WEAVE_MOST: Final = np.float32(0.9)
 SMART_DIRECTIONS: Final = 16
 SMART_REPLAN: Final = 5
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
-_LOATH_TO_TURN: Final = np.float32(0.5)  # s of head start that half an about-turn has to be worth
+_LOATH_TO_TURN: Final = np.float32(0.25)  # s; an about-turn has to be worth twice that
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
 _PATIENCE: Final = np.float32(3.0)  # s of station keeping that provoke a dart
 _STATION_MARGIN: Final = np.float32(1.0)  # m beyond the farthest slot that count as near
@@ -53,8 +53,8 @@ _DART_MOMENTS: Final = 6  # at which a dart is looked at beforehand
 _DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
 _DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
 _DART_STRIDE: Final = 2  # every second direction is played through
-_DART_CLEARANCE: Final = np.float32(0.3)  # m between the rims of the target and a tracker
-_FAR: Final = np.float32(1e9)
+_CLEARANCE: Final = np.float32(0.3)  # m between the rims of the target and a tracker
+_FAR: Final = np.float32(1e3)
 _BLOCKED: Final = np.float32(100.0)
 
 _ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
@@ -150,6 +150,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
     """
     v, most = c.target_speed, c.tracker_speed
     a = most * most - v * v
+    clear = c.radius + c.radius + _CLEARANCE
     best = np.float32(-1e9)
     old_cos, old_sin = w.goal_cos, w.goal_sin
     for k in range(SMART_DIRECTIONS // 2):
@@ -159,15 +160,21 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
         for i in range(c.num_trackers):
             t = trackers[i]
             if t.broken_at != NEVER:
+                # It goes nowhere, and is met only by running into it.
+                px, py = t.x - w.x, t.y - w.y
+                if abs(px * uy - py * ux) < clear:
+                    along = (px * ux + py * uy) * a / v
+                    ahead = min(ahead, along) if along > _ZERO else ahead
+                    astern = min(astern, -along) if along < _ZERO else astern
                 continue
             px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
             py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
             b = v * (px * ux + py * uy)
             root = np.float32(math.sqrt(b * b + a * (px * px + py * py)))
             ahead, astern = min(ahead, root - b), min(astern, root + b)
-        along = _LOATH_TO_TURN * (ux * old_cos + uy * old_sin)
+        same_way = _LOATH_TO_TURN * (ux * old_cos + uy * old_sin)
         for side in range(2):
-            value = ahead / a + along if side == 0 else astern / a - along
+            value = ahead / a + same_way if side == 0 else astern / a - same_way
             if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
@@ -206,7 +213,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
     into one of them.
     """
     moment = _DART_TIME / (c.target_turn_rate * np.float32(_DART_MOMENTS))
-    clear = c.radius + c.radius + _DART_CLEARANCE
+    clear = c.radius + c.radius + _CLEARANCE
     best = np.float32(-1e9)
     for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]

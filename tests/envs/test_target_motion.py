@@ -115,13 +115,14 @@ def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, mot
     batch.reset(seed=4)
     places, courses, turns = follow(batch, 595)
     assert room(batch, places) > 0.09, "SAFE_MARGIN, rounding aside"
-    assert np.abs(turns).max() <= 1.0 + 1e-6
+    limit, step = batch.scenario.target_turn_rate, batch.scenario.target_speed * 0.1
+    assert np.abs(turns).max() <= limit * (1 + 1e-6)
     moved = np.abs(np.diff(places, axis=0))
-    assert moved.max() <= 0.06 + 1e-5
+    assert moved.max() <= step + 1e-5
     tracker = batch.state["tracker_x"][:, :, None] + 1j * batch.state["tracker_y"][:, :, None]
     away = np.abs(places.T[:, None] - tracker).min(axis=1).T  # the trackers rest
-    np.testing.assert_allclose(moved[away[1:] > 0.5], 0.06, atol=2e-4)
-    assert np.abs(np.angle(courses[1:] / courses[:-1])).max() <= 0.1 + 1e-5
+    np.testing.assert_allclose(moved[away[1:] > 0.5], step, atol=1e-3 * limit)
+    assert np.abs(np.angle(courses[1:] / courses[:-1])).max() <= 0.1 * limit + 1e-5
 
 
 @pytest.mark.parametrize("turn", [0.3, 4.0])

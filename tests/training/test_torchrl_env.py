@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import posse
 import pytest
 import torch
-from posse_training.torchrl_env import PosseEnv
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from torchrl.envs.utils import check_env_specs
+
+import posse
+from posse_training.torchrl_env import PosseEnv
 
 WORLDS = 6
 SHORT = {"horizon": 12, "settle_time": 0.5}
@@ -131,7 +132,7 @@ def test_the_horizon_truncates_and_a_contact_terminates() -> None:
     assert now["truncated"].any()
     assert not (now["terminated"] & now["truncated"]).any()
     assert torch.equal(now["done"], now["terminated"] | now["truncated"])
-    assert torch.equal(now["terminated"][:, :-1], rollout["next", "terminated"][:, :-1])
+    assert now["truncated"][:, -1].logical_or(now["terminated"].any(dim=1)).all()
 
 
 def test_a_rollout_goes_on_with_the_next_episode() -> None:
@@ -196,24 +197,23 @@ def test_a_bad_action_is_refused_and_changes_nothing() -> None:
     np.testing.assert_array_equal(env.batch.worlds, before)
 
 
-# Importing TorchRL's collectors defines a class by an old interface of its own.
-@pytest.mark.filterwarnings("ignore:Creating VanillaWeightUpdater:DeprecationWarning")
+# Importing TorchRL's collectors defines classes by an old interface of its own.
+@pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
 def test_a_collector_gathers_whole_batches() -> None:
     from torchrl.collectors import Collector
 
     env = PosseEnv("constant", WORLDS, seed=8, **SHORT)
     batch = posse.batch("constant", WORLDS, seed=8, **SHORT)
-    speed_up = TensorDict({}, [])
 
     def policy(carried: TensorDictBase) -> TensorDictBase:
-        return act(carried, np.ones(env.batch.action_shape, np.float32)).update(speed_up)
+        return act(carried, np.ones(env.batch.action_shape, np.float32))
 
     collector = Collector(
         env,
         policy,
         frames_per_batch=8 * WORLDS,
         total_frames=16 * WORLDS,
-        auto_register_policy_transforms=False,
+        auto_register_policy_transforms=False,  # there are none, and it asks for an answer
     )
     data = torch.cat([part.clone() for part in collector], dim=1)
     collector.shutdown()

@@ -13,12 +13,12 @@ from PIL import Image
 
 from posse import Batch, Scenario, get_scenario
 from posse.render import LEAST_SIZE, Renderer
+from posse.render_style import PALETTE
 from posse_baselines.policy import Policy, PolicyError, begin
 
 Frame = npt.NDArray[np.uint8]
 
-_FLAT: Final = 48  # colours kept as they are
-_BLENDS: Final = 64  # colours for the anti-aliased edges between them
+_BLENDS: Final = 40  # colours for what fades and for anti-aliased edges
 _TRANSPARENT: Final = 255
 _SAMPLED: Final = 12  # frames that the palette is made from
 _SEAM: Final = 2  # px between panels
@@ -52,7 +52,7 @@ def film(
         seconds: Simulated time to film at most, s; less where every episode ends before.
         speed: Simulated seconds in a second of the film; rounded, since a GIF counts in 1/100 s.
         every: Control steps between two frames.
-        size: Side of a panel, px; default: 560 for one, 420 for more.
+        size: Side of a panel, px; default: 560 for one, 400 for more.
         **overrides: Settings of the scenario.
 
     Returns:
@@ -69,7 +69,7 @@ def film(
         raise PolicyError(
             f"the target of {world_of.name!r} is an agent, and a policy drives trackers only"
         )
-    side = size or (560 if len(policies) == 1 else 420)
+    side = size or (560 if len(policies) == 1 else 400)
     steps = min(world_of.horizon, round(seconds / world_of.control_step))
     panels = []
     for label, policy in policies:
@@ -162,32 +162,23 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
 def _palette(frames: Sequence[Frame]) -> Image.Image:
     """Return an image that carries the palette of all frames, :data:`_TRANSPARENT` left free.
 
-    The commonest colours are kept as they are: the flat ones, of which the picture is composed. The
-    blends at their edges share what is left.
+    The flat colours of which a picture is composed are in it as they are, however small their
+    areas; the blends between them share what is left.
     """
     chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLED).round().astype(int))
     pixels = np.concatenate([frames[k].reshape(-1, 3) for k in chosen]).astype(np.int32)
     codes, counts = np.unique(pixels @ (65536, 256, 1), return_counts=True)
-    order = np.argsort(-counts, kind="stable")
-    codes, counts = codes[order], counts[order]
-    flat, blends = codes[:_FLAT], codes[_FLAT:]
-    entries = _colours(flat).tolist()
-    if len(blends):
-        # By the logarithm of its area: the rim of a robot matters as much as that of an arena.
-        weighted = np.repeat(blends, np.log2(counts[_FLAT:]).astype(int) + 1)
-        image = Image.fromarray(_colours(weighted)[None])
-        blended = image.quantize(_BLENDS, method=Image.Quantize.MEDIANCUT)
-        entries += np.reshape(blended.getpalette() or [], (-1, 3))[:_BLENDS].tolist()
+    # By the logarithm of its area: the rim of a robot matters as much as that of an arena.
+    weighted = np.repeat(codes, np.log2(counts).astype(int) + 1)
+    colours = np.stack([weighted >> 16, (weighted >> 8) & 255, weighted & 255], axis=-1)
+    image = Image.fromarray(colours.astype(np.uint8)[None])
+    blended = image.quantize(_BLENDS, method=Image.Quantize.MEDIANCUT).getpalette() or []
+    entries = [*map(list, PALETTE), *np.reshape(blended, (-1, 3))[:_BLENDS].tolist()]
     # Unused entries repeat the first, so that no pixel is ever given the transparent one.
     entries += [entries[0]] * (256 - len(entries))
     carrier = Image.new("P", (1, 1))
     carrier.putpalette([value for entry in entries for value in entry])
     return carrier
-
-
-def _colours(codes: npt.NDArray[np.int32]) -> Frame:
-    """Return (K, 3) red, green, blue of colours coded as 0xRRGGBB."""
-    return np.stack([codes >> 16, (codes >> 8) & 255, codes & 255], axis=-1).astype(np.uint8)
 
 
 def _check(

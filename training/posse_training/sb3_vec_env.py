@@ -217,13 +217,11 @@ class TeamVecEnv(VecEnv):
 
     def save(self) -> dict[str, npt.NDArray[Any]]:
         """Return all that the vector would need to go on from here, as plain arrays by name."""
-        saved: dict[str, npt.NDArray[Any]] = {}
-        for k, part in enumerate(self._parts):
-            for j, array in enumerate(part.batch.save().arrays.all()):
-                saved[f"{k}.array{j}"] = array.reshape(-1).view(np.uint8)
-            saved[f"{k}.cut_at"] = part.cut_at.copy()
-            saved[f"{k}.returns"] = part.returns.copy()
-        return saved
+        return {
+            f"{k}.{name}": np.array(array)
+            for k, part in enumerate(self._parts)
+            for name, array in self._arrays(part).items()
+        }
 
     def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
         """Go back to where :meth:`save` was called.
@@ -231,20 +229,26 @@ class TeamVecEnv(VecEnv):
         Raises:
             ValueError: What was saved is of other worlds. Nothing is changed.
         """
-        for write in (False, True):
-            for k, part in enumerate(self._parts):
-                mine = [*part.batch.arrays.all(), part.cut_at, part.returns]
-                names = [f"{k}.array{j}" for j in range(len(mine) - 2)]
-                for name, array in zip(
-                    [*names, f"{k}.cut_at", f"{k}.returns"], mine, strict=True
-                ):
-                    if name not in saved or saved[name].nbytes != array.nbytes:
-                        raise ValueError(f"the worlds saved do not fit: {name!r} is of another size")
-                    if write:
-                        array[...] = saved[name].view(array.dtype).reshape(array.shape)
-                if write:
-                    # The batch has its arrays already; this has it take them as a running episode.
-                    part.batch.restore(part.batch.save())
+        mine = {
+            f"{k}.{name}": array
+            for k, part in enumerate(self._parts)
+            for name, array in self._arrays(part).items()
+        }
+        for name, array in mine.items():
+            if name not in saved or saved[name].shape != array.shape:
+                raise ValueError(f"the worlds saved do not fit these: {name!r} is missing or of "
+                                 f"another shape than {array.shape}")
+        for name, array in mine.items():
+            array[...] = saved[name]
+        for part in self._parts:
+            # The batch has its arrays already; this has it take them as running episodes.
+            part.batch.restore(part.batch.save())
+
+    @staticmethod
+    def _arrays(part: _Part) -> dict[str, npt.NDArray[Any]]:
+        """Return every array of a part by name. Fields alone: between them lie bytes of no meaning."""
+        own = {"cut_at": part.cut_at, "returns": part.returns}
+        return {**part.batch.arrays.by_name(), **own}
 
     def close(self) -> None:
         """Do nothing: worlds hold nothing but memory."""

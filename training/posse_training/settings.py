@@ -47,6 +47,8 @@ class TrainSettings:
     """Team-mates that the policy reads, nearest first; default: as many as the largest layout has."""
     message_size: int = 0
     """Numbers that a tracker may tell its team-mates in each step."""
+    overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
+    """Settings of the scenario that are to be other than it has them."""
     reward_weights: dict[str, float] = field(default_factory=dict)
     """Weight of each reward term; none: the scenario's own."""
 
@@ -120,7 +122,7 @@ class TrainSettings:
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
         """Every scenario and team size to train on, one each, messages and rewards set."""
-        overrides: dict[str, Any] = {"message_size": self.message_size}
+        overrides: dict[str, Any] = {**self.overrides, "message_size": self.message_size}
         if self.reward_weights:
             overrides["reward_weights"] = self.reward_weights
         found = []

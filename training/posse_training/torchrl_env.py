@@ -19,12 +19,13 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-import posse
 import torch
-from posse.actions import agent_names
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Binary, Bounded, Composite, Unbounded
 from torchrl.envs import EnvBase
+
+import posse
+from posse.actions import agent_names
 
 TRACKERS: Final = "agents"
 """The group of the trackers, by the name that TorchRL's multi-agent examples use."""

@@ -13,7 +13,7 @@ from posse_baselines.ddcs.leadership import settle_lead
 from posse_baselines.ddcs.memory import SEARCHING
 from posse_baselines.ddcs.messages import write_message
 from posse_baselines.ddcs.monitoring import hear_mates, watch_target
-from posse_baselines.ddcs.searching import look_around, wander
+from posse_baselines.ddcs.searching import begin_search, look_around, wander
 from posse_baselines.ddcs.slots import choose_slot
 from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.ddcs.tracking import next_task, wanted_velocity
@@ -49,6 +49,7 @@ def decide(
     o: FloatArray,
     cost: FloatArray,
     work: FloatArray,
+    beams: FloatArray,
     echo: FloatArray,
     discs: Records,
     body: Record,
@@ -67,7 +68,7 @@ def decide(
     if d.known == 0:
         d.slot, d.error = -1, -1.0
         if d.task != SEARCHING:
-            d.lost_step, d.goal_step = d.step, -1
+            begin_search(f, d, seen)
         vx, vy = wander(f, s, d, mates, seen, own, x, y, body.theta, body.max_speed)
     else:
         if d.slot < 0 or d.step % max(1, int(round(s.replan_time / f.dt))) == 0:
@@ -80,7 +81,7 @@ def decide(
         )
     d.task = next_task(s, d)
     # Actuation
-    count = surround(f, s, d, mates, own, x, y, body.theta, o, echo, discs)
+    count = surround(f, s, d, mates, own, x, y, body.theta, o, beams, echo, discs)
     vx, vy, _ = safe_velocity(body, discs, count, vx, vy)
     speed, omega = command(body, vx, vy)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)
@@ -100,6 +101,7 @@ def decide_all(
     observations: FloatArray,
     costs: FloatArray,
     work: FloatArray,
+    beams: FloatArray,
     echoes: FloatArray,
     discs: Records,
     bodies: Records,
@@ -114,5 +116,6 @@ def decide_all(
         for i in range(observations.shape[1]):
             decide(
                 f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                costs[part], work[part], echoes[part], discs[part], bodies[part], actions[e, i],
+                costs[part], work[part], beams, echoes[part], discs[part], bodies[part],
+                actions[e, i],
             )  # fmt: skip

@@ -17,7 +17,7 @@ import math
 from posse.arrays import Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.messages import COUNT, is_newer
-from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 
 
 @compiled
@@ -90,6 +90,6 @@ def settle_lead(
             best, least, distance = nearest_tracker(f, s, d, mates, own, x, y, -1)
             if best != own and least < distance - s.lead_hysteresis:
                 appoint(d, best, (d.term + 1) % COUNT, 0)
-    elif (d.step - d.pulse_step) * f.dt > s.lost_after:
+    elif (d.step - d.pulse_step) * f.dt > patience(s, d) + 0.2:
         best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, d.leader)
         appoint(d, best, (d.term + 1) % COUNT, 0)

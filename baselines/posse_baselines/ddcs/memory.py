@@ -33,6 +33,8 @@ MIND: Final = _record(
     ("age", _F),  # of the fix, s
     ("known", _I),  # 1: there is an estimate that is not too old
     ("sees", _I),  # 1: its own sensor has the target
+    ("usual_gap", _F),  # about the longest silence of a team-mate lately, s
+    ("usual_age", _F),  # about the usual age of the fix, s
     # tracking
     ("task", _I),
     ("slot", _I),  # -1: none
@@ -48,6 +50,7 @@ MIND: Final = _record(
     # searching
     ("goal_x", _F), ("goal_y", _F), ("goal_step", _I),  # where to, chosen when; -1: nowhere
     ("lost_step", _I),  # when the target was lost; -1: never seen yet
+    ("area_x", _F), ("area_y", _F),  # middle of the area that is searched
 )  # fmt: skip
 """What one tracker has in mind."""
 

@@ -14,6 +14,10 @@ from posse_baselines.ddcs.messages import decode
 from posse_baselines.guidance import clip, wrap
 
 _TURN_MEMORY = 1.0  # s; an older turn tells little of the heading now
+_WAY_MEMORY = 3.0  # s
+_GAP_MEMORY = 10.0  # s; how long a gap in what is heard is remembered
+_LEAST_PATIENCE = 0.3  # s
+_NOT_LOST = 1.0  # s; a fix of this age is late, an older one is a loss
 _JUMP = 1.0  # m; a fix farther than this from the estimate replaces it
 _UNKNOWN_SPEED = 0.6  # of the own greatest, until it has been measured
 
@@ -22,7 +26,13 @@ _UNKNOWN_SPEED = 0.6  # of the own greatest, until it has been measured
 def carry_on(
     x: float, y: float, theta: float, speed: float, turn: float, time: float
 ) -> tuple[float, float, float]:
-    """Return (x, y, θ) after a time (s) at a speed, with a turn rate that fades away."""
+    """Return the most likely (x, y, θ) after a time (s), with a turn rate that fades away.
+
+    After a second the way fades, too: where it leads is ever less sure, and the middle of where a
+    target may be stays behind one that keeps its heading.
+    """
+    if time > 1.0:
+        time = 1.0 + _WAY_MEMORY * (1.0 - math.exp((1.0 - time) / _WAY_MEMORY))
     turned = turn * _TURN_MEMORY * (1.0 - math.exp(-time / _TURN_MEMORY))
     middle = theta + 0.5 * turned
     return (
@@ -51,6 +61,9 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
     if d.fix_step < 0:
         return
     d.age = (d.step - d.fix_step) * dt
+    if d.age <= _NOT_LOST:
+        # How late fixes usually are, so that more than that can be told from the usual.
+        d.usual_age += (dt / _GAP_MEMORY) * (d.age - d.usual_age)
     if d.age <= s.target_lost_after:
         d.known = 1
     x, y, theta = carry_on(d.x, d.y, d.theta, d.speed, d.turn, d.age)
@@ -105,6 +118,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
     """Bring the table of team-mates (N,) up to date with an observation (F,)."""
     for j in range(len(mates)):
         mates[j].fresh = 0
+    d.usual_gap -= d.usual_gap * min(1.0, f.dt / _GAP_MEMORY)
     if not s.radio:
         return
     hc, hs = float(o[f.heading]), float(o[f.heading + 1])
@@ -117,6 +131,10 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
         sent = d.step - int(round(o[f.neighbour_age + k] / f.dt))
         if sent <= mate.step:
             continue
+        if mate.step >= 0:
+            gap = float((sent - mate.step) * f.dt + o[f.neighbour_age + k])
+            if gap < s.lost_after:
+                d.usual_gap = max(d.usual_gap, gap)
         mate.step, mate.fresh = sent, 1
         r = float(o[f.neighbour_range + k])
         bc, bs = float(o[f.neighbour_bearing + k]), float(o[f.neighbour_bearing + k + 1])
@@ -133,18 +151,24 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
 
 
 @compiled
+def patience(s: Record, d: Record) -> float:
+    """Return how long (s) a silence has to be to mean something: twice the usual ones, and a little."""
+    return min(s.lost_after, _LEAST_PATIENCE + 2.0 * d.usual_gap)
+
+
+@compiled
 def is_there(f: Record, s: Record, d: Record, mate: Record, size: int) -> bool:
     """Say whether a team-mate counts as working and in reach."""
     if mate.step < 0:
         return False
-    patience = s.lost_after if f.neighbours >= size - 1 else s.claim_memory
-    return bool((d.step - mate.step) * f.dt <= patience)
+    time = patience(s, d) if f.neighbours >= size - 1 else s.claim_memory
+    return bool((d.step - mate.step) * f.dt <= time)
 
 
 @compiled
 def mate_now(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, float]:
     """Return where a team-mate is taken to be now; one that is silent too long has stopped."""
     age = (d.step - mate.step) * f.dt
-    if age > s.lost_after:
+    if age > patience(s, d):
         return mate.x, mate.y
     return mate.x + age * mate.speed_x, mate.y + age * mate.speed_y

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.arrays import BoolArray, FloatArray, Records
 from posse.formation import slot_offsets
-from posse.state import slot_records
+from posse.state import beam_directions, slot_records
 from posse_baselines.assignment import WORK_ROWS
 from posse_baselines.ddcs.controller import decide_all
 from posse_baselines.ddcs.memory import GRID, MATE, MIND
@@ -35,6 +35,8 @@ class _Minds:
     layout: ObservationLayout
     offsets: Records
     slots: Records
+    beams: FloatArray
+    """(2, S), cosine and sine of each sonar beam's direction."""
     outermost: float
     minds: Records
     """(E, N) :data:`~posse_baselines.ddcs.memory.MIND`."""
@@ -70,7 +72,7 @@ class DDCS(BasePolicy):
         n = scenario.num_trackers
         limited = math.isfinite(scenario.sensing_range)
         memory = _Minds(
-            layout, offsets_of(layout), slot_records(scenario),
+            layout, offsets_of(layout), slot_records(scenario), beam_directions(scenario),
             max(math.hypot(x, y) for x, y in slot_offsets(scenario)),
             np.zeros((num_worlds, n), MIND), np.zeros((num_worlds, n, n), MATE),
             np.zeros((num_worlds, n, GRID * GRID if limited else 0), np.uint16),
@@ -98,7 +100,7 @@ class DDCS(BasePolicy):
         parts = most_parts()
         beams = max(1, m.layout.scenario.sonar_beams)
         work = (
-            np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)),
+            np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)), m.beams,
             np.empty((parts, beams)), np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
         )  # fmt: skip
         over_worlds(

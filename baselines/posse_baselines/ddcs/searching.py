@@ -14,18 +14,20 @@ from posse_baselines.ddcs.monitoring import is_there, mate_now
 
 _STALE = 30.0  # s; a place not looked at for so long counts as never looked at
 _AGE_WEIGHT = 0.35  # m of way that a second since the last look is worth
-_MOST_SPEED_OF_TARGET = 0.8  # of a tracker's: how fast a lost target is taken to get away
+_DRIFT = 0.35  # m/s; how fast a lost target gets away from where it should be
+_TO_THE_MIDDLE = 0.5  # m of way that a metre farther from the middle is worth
 _GOAL_TIME = 4.0  # s; a goal is thought over at least so often
 _LOOK_TIME = 0.5  # s between two entries into the map
 
 
 @compiled
 def mark_seen(
-    f: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
+    f: Record, d: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
 ) -> None:
     """Note in a map (GRID²,) that a tracker at (x, y) looks around."""
     cell = 2.0 * f.area / GRID
     reach = f.sight
+    x, y = x - d.area_x, y - d.area_y
     low_i = max(0, int(math.floor((x - reach + f.area) / cell)))
     low_j = max(0, int(math.floor((y - reach + f.area) / cell)))
     high_i = min(GRID - 1, int(math.floor((x + reach + f.area) / cell)))
@@ -39,16 +41,26 @@ def mark_seen(
 
 
 @compiled
+def begin_search(f: Record, d: Record, seen: npt.NDArray[np.uint16]) -> None:
+    """Note that the target is lost; on the open plane, search about where it should be."""
+    d.lost_step, d.goal_step = d.step, -1
+    if f.walled == 0 and d.fix_step >= 0:
+        d.area_x, d.area_y = d.now_x, d.now_y
+        for k in range(len(seen)):
+            seen[k] = 0
+
+
+@compiled
 def look_around(
     f: Record, s: Record, d: Record, mates: Records, seen: npt.NDArray[np.uint16], x: float, y: float
 ) -> None:
     """Keep the map of where this tracker and those it hears have looked."""
     if len(seen) == 0 or d.step % max(1, int(round(_LOOK_TIME / f.dt))) != 0:
         return
-    mark_seen(f, seen, x, y, d.step)
+    mark_seen(f, d, seen, x, y, d.step)
     for j in range(len(mates)):
         if mates[j].step >= 0 and (d.step - mates[j].step) * f.dt <= s.lost_after:
-            mark_seen(f, seen, mates[j].x, mates[j].y, d.step)
+            mark_seen(f, d, seen, mates[j].x, mates[j].y, d.step)
 
 
 @compiled
@@ -96,12 +108,17 @@ def choose_goal(
     cell = 2.0 * f.area / GRID
     inner = f.area - min(1.5, 0.5 * f.area)
     best = -1e9
-    reach = 2.0 + _MOST_SPEED_OF_TARGET * (d.step - d.fix_step) * f.dt
+    reach = 2.0 + _DRIFT * (d.step - d.fix_step) * f.dt
     d.goal_x, d.goal_y, d.goal_step = 0.0, 0.0, d.step
+    heard = 0
+    for m in range(len(mates)):
+        if m != own and is_there(f, s, d, mates[m], len(mates)):
+            heard += 1
+    deaf = 1.0 - heard / max(1.0, min(f.neighbours, len(mates) - 1.0))
     for i in range(GRID):
         for j in range(GRID):
-            cx = min(max((i + 0.5) * cell - f.area, -inner), inner)
-            cy = min(max((j + 0.5) * cell - f.area, -inner), inner)
+            cx = d.area_x + min(max((i + 0.5) * cell - f.area, -inner), inner)
+            cy = d.area_y + min(max((j + 0.5) * cell - f.area, -inner), inner)
             looked = seen[i * GRID + j] - 1 if len(seen) > 0 else -1
             age = (d.step - looked) * f.dt if looked >= 0 else _STALE
             bonus = 0.0
@@ -113,6 +130,8 @@ def choose_goal(
                     if looked < d.lost_step:
                         age = _STALE
                     bonus -= 0.3 * away
+            # Who hears few of the others may find in the middle those who have found the target.
+            bonus -= _TO_THE_MIDDLE * deaf * math.hypot(cx - d.area_x, cy - d.area_y)
             way = math.hypot(cx - x, cy - y)
             turn = 1.0 - ((cx - x) * math.cos(theta) + (cy - y) * math.sin(theta)) / max(way, 1e-6)
             value = _AGE_WEIGHT * min(age, _STALE) + bonus - way - 0.8 * turn

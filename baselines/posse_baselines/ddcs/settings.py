@@ -29,7 +29,7 @@ class Settings:
     guidance: str = "cartesian"
     """How a slot on the target is approached: ``"cartesian"`` or ``"polar"``; ``"pngl"``: no slots,
     but the paper's own spread, by one navigation constant K a tracker."""
-    leader_law: str = "pursuit"
+    leader_law: str = "slot"
     """Of the centralized model's leader: ``"pursuit"`` (velocity pursuit, K = 1, as in the paper) or
     ``"slot"`` (it keeps the first slot)."""
     exchange: bool = True
@@ -50,7 +50,7 @@ class Settings:
     """A team-mate, or the leader's pulse, not heard for this long is gone."""
     claim_memory: float = 10.0
     """The same, for team-mates who may just have had no place in the observation."""
-    target_lost_after: float = 6.0
+    target_lost_after: float = 10.0
     """A fix older than this is no longer followed: the target is lost."""
 
     # the tasks
@@ -70,9 +70,11 @@ class Settings:
     """How much sooner all would have to arrive with other slots for a tracker to change, s."""
     sight_worth: float = 10.0
     """How much later a tracker may arrive in a slot from which the target is in sight, s."""
-    close_in_after: float = 0.7
-    """With a fix older than this, beyond what the radio is late by, the team closes in on where the
-    target should be, to see it again."""
+    close_in_after: float = 0.25
+    """With a fix older than this, beyond the usual age, the team closes in on where the target may
+    be, from all sides, to see it again."""
+    hunt_growth: float = 0.3
+    """How fast the ring grows on which it does so, m/s."""
 
     # laws
     gain: float = 2.0

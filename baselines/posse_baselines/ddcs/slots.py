@@ -13,10 +13,10 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.assignment import assign
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.guidance import wrap
 from posse_baselines.steering import intercept_time
 
 _IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
+_HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos
 _RESERVED = 1e4  # s; what a slot costs that belongs to another
 
 
@@ -26,19 +26,6 @@ def slot_place(d: Record, slot: Record) -> tuple[float, float, float, float]:
     c, s = math.cos(d.now_psi), math.sin(d.now_psi)
     arm_x, arm_y = slot.x * c - slot.y * s, slot.x * s + slot.y * c
     return d.now_x + arm_x, d.now_y + arm_y, arm_x, arm_y
-
-
-@compiled
-def arrival(
-    s: Record, d: Record, dx: float, dy: float, theta: float, max_speed: float, max_omega: float
-) -> float:
-    """Return about when (s) a tracker reaches what lies (dx, dy) away and moves as the target does."""
-    vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
-    time = intercept_time(dx, dy, vx, vy, max_speed)
-    if time > s.weave_time:
-        time = intercept_time(dx, dy, d.mean_x, d.mean_y, max_speed)
-    away = abs(wrap(math.atan2(dy, dx) - theta))
-    return time + 0.5 * away / max_omega * min(1.0, time)
 
 
 @compiled
@@ -63,6 +50,8 @@ def choose_slot(
         d.slot = own  # nobody to ask
         return
     rows, mine = 0, 0
+    c, sn = math.cos(d.now_psi), math.sin(d.now_psi)
+    vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
     for j in range(n):
         if j == own:
             mine = rows
@@ -72,13 +61,21 @@ def choose_slot(
             at_x, at_y = mate_now(f, s, d, mates[j])
         else:
             continue
+        ahead_x, ahead_y = math.cos(heading), math.sin(heading)
         for k in range(n):
-            slot_x, slot_y, _, _ = slot_place(d, slots[k])
-            time = arrival(s, d, slot_x - at_x, slot_y - at_y, heading, max_speed, max_omega)
+            slot = slots[k]
+            dx = d.now_x + slot.x * c - slot.y * sn - at_x
+            dy = d.now_y + slot.x * sn + slot.y * c - at_y
+            time = intercept_time(dx, dy, vx, vy, max_speed)
+            if time > s.weave_time:
+                time = intercept_time(dx, dy, d.mean_x, d.mean_y, max_speed)
+            # Turning towards it takes time, too; up to half a turn where it lies behind.
+            facing = (dx * ahead_x + dy * ahead_y) / max(math.hypot(dx, dy), 1e-6)
+            time += _HALF_TURN * (1.0 - facing) / max_omega * min(1.0, time)
             if held == k:
                 time -= s.loyalty
             # Where there are more slots than trackers, those that see the target are filled first.
-            if slots[k].x ** 2 + slots[k].y ** 2 < (_IN_SIGHT * f.sight) ** 2:
+            if slot.x * slot.x + slot.y * slot.y < (_IN_SIGHT * f.sight) ** 2:
                 time -= s.sight_worth
             # The centralized model's leader has the first slot to itself.
             if s.model == 1 and d.leader >= 0 and (k == 0) != (j == d.leader):

@@ -8,7 +8,7 @@ from typing import Final
 from posse.arrays import Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.memory import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
-from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.formation_control import l_phi_demand, polar_slot_velocity, separation
 from posse_baselines.guidance import (
@@ -22,7 +22,7 @@ POLAR: Final = 1
 PNGL: Final = 2
 BY_SLOT: Final = 1
 
-_CLOSE_ENOUGH: Final = 0.5  # share of the sensor's reach, to see the target again
+_FAR_SIGHT: Final = 8.0  # m; a sensor that reaches farther finds the target without being moved
 
 __all__ = ["BODY", "next_task", "wanted_velocity"]
 
@@ -49,17 +49,29 @@ def next_task(s: Record, d: Record) -> int:
 
 
 @compiled
+def hunt(s: Record, d: Record, n: int, x: float, y: float, body: Record) -> tuple[float, float]:
+    """Return the velocity (m/s) of a tracker that helps to see a target again which got out of sight.
+
+    The team spreads on a ring about where the target should be, slot by slot on either side of its
+    heading; the ring grows with the time that it was not seen.
+    """
+    side = 1.0 if d.slot % 2 else -1.0
+    angle = d.now_theta + side * ((d.slot + 1) // 2) * 2.0 * math.pi / n
+    away = s.hunt_growth * d.age
+    dx = d.now_x + away * math.cos(angle) - x
+    dy = d.now_y + away * math.sin(angle) - y
+    distance = math.hypot(dx, dy)
+    speed = min(body.max_speed, s.gain * distance)
+    return speed * dx / max(distance, 1e-6), speed * dy / max(distance, 1e-6)
+
+
+@compiled
 def on_target(
-    f: Record, s: Record, d: Record, slots: Records, x: float, y: float, body: Record
+    s: Record, d: Record, slots: Records, x: float, y: float, body: Record
 ) -> tuple[float, float]:
     """Return the velocity (m/s) that takes up the slot on the target; notes the distance from it."""
     place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
     d.error = math.hypot(place_x - x, place_y - y)
-    most = _CLOSE_ENOUGH * f.sight
-    arm = math.hypot(arm_x, arm_y)
-    if d.age > s.close_in_after and arm > most:
-        arm_x, arm_y = arm_x * most / arm, arm_y * most / arm
-        place_x, place_y = d.now_x + arm_x, d.now_y + arm_y
     dx, dy = place_x - x, place_y - y
     vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
     if s.guidance == POLAR:
@@ -117,7 +129,7 @@ def on_leader(
     the leader's own turning.
     """
     lx, ly = mate_now(f, s, d, leader)
-    silent = (d.step - leader.step) * f.dt > s.lost_after
+    silent = (d.step - leader.step) * f.dt > patience(s, d)
     leader_speed = 0.0 if silent else math.hypot(leader.speed_x, leader.speed_y)
     theta = float(leader.theta)
     own, first = slots[d.slot], slots[0]
@@ -160,13 +172,17 @@ def wanted_velocity(
     if s.guidance == PNGL:
         constant = 1.0 + s.spread * (2.0 * own / (n - 1) - 1.0 if n > 1 else 0.0)
         return in_pursuit(s, d, constant, wanted_range, x, y, body)
+    if d.age > d.usual_age + s.close_in_after and f.sight < _FAR_SIGHT:
+        place_x, place_y, _, _ = slot_place(d, slots[d.slot])
+        d.error = math.hypot(place_x - x, place_y - y)
+        return hunt(s, d, n, x, y, body)
     if s.model == CENTRALIZED and d.leader >= 0:
         if d.leader == own:
             if s.leader_law == BY_SLOT:
-                return on_target(f, s, d, slots, x, y, body)
+                return on_target(s, d, slots, x, y, body)
             wanted_range = math.hypot(slots[0].x, slots[0].y)
             return in_pursuit(s, d, 1.0, wanted_range, x, y, body)
         leader = mates[d.leader]
         if is_there(f, s, d, leader, n) or (s.exchange == 0 and leader.step >= 0):
             return on_leader(f, s, d, leader, slots, x, y, body)
-    return on_target(f, s, d, slots, x, y, body)
+    return on_target(s, d, slots, x, y, body)

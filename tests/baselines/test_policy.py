@@ -1,0 +1,232 @@
+"""What holds for every policy: shapes, ranges, equality over batches, restarts, clear refusals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import posse
+import pytest
+from posse_baselines import (
+    BasePolicy,
+    Policy,
+    PolicyError,
+    begin,
+    load,
+    play,
+    policy_names,
+    rollout,
+    split_agents,
+    stack_agents,
+)
+
+NAMES = policy_names()
+PLAYS_BY_THE_RULES = [name for name in NAMES if not load(name).reads_state]
+
+
+def batch_for(policy: Policy, scenario: str, worlds: int, **settings: Any) -> posse.Batch:
+    settings = {"message_size": policy.message_size, "horizon": 60, **settings}
+    return posse.batch(scenario, worlds, **settings)
+
+
+def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[list[Any], list[Any]]:
+    """The observations that a policy was given, and the actions that it chose."""
+    observations, memory = batch.reset(), begin(policy, batch)
+    seen, done = [], []
+    for _ in range(steps):
+        actions, memory = policy.act(observations, memory)
+        seen.append(observations)
+        done.append(actions)
+        observations, *_ = batch.step(actions)
+    return seen, done
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"num_trackers": 1},
+        {"num_trackers": 2, "formation": "ring"},
+        {"num_trackers": 7, "formation": "rows", "num_neighbours": 2},
+        {"num_trackers": 64, "formation": "rows", "start_distance": (4.0, 30.0)},
+        {"num_trackers": 3, "num_neighbours": 0, "sonar_beams": 0},
+        {"message_size": 9, "radio_range": 4.0, "radio_delay": 2, "radio_loss": 0.5},
+    ],
+)
+def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> None:
+    policy = load(name)
+    batch = batch_for(policy, "constant", 2, **settings)
+    _, done = trace(policy, batch, 12)  # the batch refuses what is not a number in [-1, 1]
+    assert done[0].shape == batch.action_shape
+    assert done[0].dtype == np.float32
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_world_plays_alike_alone_and_in_a_batch(name: str) -> None:
+    policy = load(name)
+    many = batch_for(policy, "field", 600, seed=4)  # so many that threads share them
+    alone = batch_for(policy, "field", 1, seed=4, first_world=599)
+    many_actions = trace(policy, many, 40)[1]
+    alone_actions = trace(policy, alone, 40)[1]
+    for a, b in zip(many_actions, alone_actions, strict=True):
+        np.testing.assert_array_equal(a[599], b[0])
+
+
+@pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
+def test_what_it_does_follows_from_what_it_is_given_alone(name: str) -> None:
+    policy = load(name)
+    seen, done = trace(policy, batch_for(policy, "field", 4), 30)
+    layout = batch_for(policy, "field", 4).layout
+    again = load(name)
+    memory = again.begin(layout, 4)
+    for observations, actions in zip(seen, done, strict=True):
+        repeated, memory = again.act(observations.copy(), memory)
+        np.testing.assert_array_equal(repeated, actions)
+
+
+@pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
+def test_trackers_know_only_their_own_observation(name: str) -> None:
+    # Whatever the others are given, tracker 0 does the same.
+    policy = load(name)
+    seen, done = trace(policy, batch_for(policy, "constant", 2), 20)
+    memory = policy.begin(batch_for(policy, "constant", 2).layout, 2)
+    for observations, actions in zip(seen, done, strict=True):
+        changed = observations.copy()
+        changed[:, 1:] = observations[:, :1]
+        repeated, memory = policy.act(changed, memory)
+        np.testing.assert_array_equal(repeated[:, 0], actions[:, 0])
+
+
+@pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
+def test_a_restarted_world_plays_as_a_new_one(name: str) -> None:
+    policy = load(name)
+    seen, done = trace(policy, batch_for(policy, "field", 2), 25)
+    memory = policy.begin(batch_for(policy, "field", 2).layout, 2)
+    for observations in seen:
+        actions, memory = policy.act(observations, memory)
+    memory = policy.restart(memory, np.array([False, True]))
+    differs = False
+    for observations, actions in zip(seen, done, strict=True):
+        repeated, memory = policy.act(observations, memory)
+        np.testing.assert_array_equal(repeated[1], actions[1])
+        differs |= not np.array_equal(repeated[0], actions[0])
+    assert differs == name.startswith(("ddcs", "pngl"))  # the others have nothing to forget
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
+def test_rollout_restarts_memories_when_episodes_begin(autoreset: str) -> None:
+    class Recorder(BasePolicy):
+        name = "recorder"
+
+        def act(self, observations: Any, memory: Any) -> Any:
+            return np.zeros((*observations.shape[:2], 2), np.float32), memory
+
+        def restart(self, memory: Any, mask: Any) -> Any:
+            restarted.append((count, mask.copy()))
+            return memory
+
+    batch = posse.batch("constant", 3, horizon=30, autoreset=autoreset)
+    restarted: list[Any] = []
+    begins = []
+    for count, step in enumerate(rollout(batch, Recorder())):
+        left = batch.layout.views(step.observations)["time_left"][:, 0]
+        if np.allclose(left, 3.0):
+            begins.append(count)
+        if count == 65:
+            break
+    assert len(begins) == 2
+    assert [at for at, _ in restarted] == begins
+    assert all(mask.all() for _, mask in restarted)
+
+
+def test_play_returns_the_metrics_of_one_episode_a_world() -> None:
+    for autoreset in ("next_step", "same_step", "disabled"):
+        metrics = play(posse.batch("constant", 5, horizon=40, autoreset=autoreset), load("pursuit"))
+        assert set(metrics) == {metric.name for metric in posse.METRICS}
+        np.testing.assert_allclose(metrics["duration"], 4.0)
+
+
+def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
+    from posse_baselines.simple import Random
+
+    batch = posse.batch("constant", 200)
+    _, done = trace(Random(seed=1), batch, 10)
+    draws = np.stack(done)
+    assert draws.min() >= -1.0
+    assert draws.max() < 1.0
+    assert abs(draws.mean()) < 0.02
+    assert abs(draws.std() - 3**-0.5) < 0.02
+    assert len(np.unique(draws)) > 0.98 * draws.size
+    other = Random(seed=2)
+    assert not np.array_equal(other.act(batch.reset(seed=0), begin(other, batch))[0], done[0])
+    with pytest.raises(ValueError, match="seed=-1"):
+        Random(seed=-1)
+
+
+def test_idle_trackers_stay() -> None:
+    batch = posse.batch("constant", 4, horizon=20)
+    before = batch.reset()
+    x = batch.state["tracker_x"].copy()
+    memory = begin(load("idle"), batch)
+    for _ in range(10):
+        actions, memory = load("idle").act(before, memory)
+        before, *_ = batch.step(actions)
+    np.testing.assert_array_equal(batch.state["tracker_x"], x)
+
+
+def test_pursuers_close_in_without_running_into_each_other_at_once() -> None:
+    batch = posse.batch("constant", 50, horizon=200)
+    metrics = play(batch, load("pursuit"))
+    distance = np.hypot(
+        batch.state["tracker_x"] - batch.state["world_x"][:, None],
+        batch.state["tracker_y"] - batch.state["world_y"][:, None],
+    )
+    assert np.median(distance) < 2.0
+    assert metrics["tracker_contacts"].mean() < 5.0
+
+
+# --- refusals ------------------------------------------------------------------------------------
+
+
+def test_a_policy_with_more_to_say_than_messages_hold_is_refused() -> None:
+    with pytest.raises(PolicyError, match=r"adds 5 numbers.*message_size=2.*message_size=5"):
+        load("ddcs-distributed").begin(posse.batch("constant", message_size=2).layout, 1)
+
+
+@pytest.mark.parametrize("name", ["idle", "random", "pursuit", "ddcs-distributed"])
+def test_observations_of_another_shape_are_refused(name: str) -> None:
+    policy = load(name)
+    batch = batch_for(policy, "constant", 3)
+    memory = begin(policy, batch)
+    with pytest.raises(PolicyError, match=r"shape \(2, 5, .*wanted \(3, 5, "):
+        policy.act(batch.reset()[:2], memory)
+
+
+def test_a_team_with_an_agent_for_a_target_is_not_driven_by_rollout() -> None:
+    batch = posse.batch("constant", 1, target_motion="agent")
+    with pytest.raises(PolicyError, match="target .* is an agent"):
+        next(rollout(batch, load("idle")))
+
+
+# --- PettingZoo ----------------------------------------------------------------------------------
+
+
+def test_a_parallel_environment_is_played_as_a_batch_of_one() -> None:
+    policy = load("ddcs-distributed")
+    batch = batch_for(policy, "constant", 1)
+    rows = batch.reset()[0]
+    agents = ["tracker_3", "target_0", "tracker_0", "tracker_1", "tracker_4", "tracker_2"]
+    observations = {
+        name: rows[int(name[-1])] for name in agents if name.startswith("tracker")
+    } | {"target_0": rows[0]}
+    stacked = stack_agents(observations)
+    np.testing.assert_array_equal(stacked[0], rows)
+    actions, _ = policy.act(stacked, policy.begin(batch.layout, 1))
+    split = split_agents(actions, agents)
+    assert set(split) == set(agents) - {"target_0"}
+    np.testing.assert_array_equal(split["tracker_3"], actions[0, 3])
+
+
+def test_a_team_with_a_gap_is_refused() -> None:
+    with pytest.raises(PolicyError, match="without a gap"):
+        stack_agents({"tracker_0": [0.0], "tracker_2": [0.0]})

@@ -1,0 +1,37 @@
+"""When a moving point can be met, and how a slot is approached."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from posse_baselines.steering import NEVER, approach_velocity, intercept_time
+
+PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
+PLACES = st.floats(-20.0, 20.0)
+SPEEDS = st.floats(-0.6, 0.6)
+
+
+@PROPERTY
+@given(PLACES, PLACES, SPEEDS, SPEEDS)
+def test_the_point_is_as_far_away_as_the_robot_gets_in_that_time(
+    x: float, y: float, vx: float, vy: float
+) -> None:
+    t = intercept_time(x, y, vx, vy, 1.0)
+    assert t >= 0.0
+    assert math.isclose(math.hypot(x + vx * t, y + vy * t), t, rel_tol=1e-6, abs_tol=1e-6)
+
+
+def test_a_point_that_gets_away_is_never_met() -> None:
+    assert intercept_time(1.0, 0.0, 1.2, 0.0, 1.0) == NEVER
+    assert intercept_time(2.0, 0.0, -1.0, 0.0, 1.0) == 1.0
+
+
+@PROPERTY
+@given(st.floats(0.05, 10.0), st.floats(0.2, 4.0))
+def test_an_approach_leaves_room_to_brake(distance: float, deceleration: float) -> None:
+    speed, heading = approach_velocity(distance, 0.0, 0.0, 0.0, 2.0, 1.0, deceleration)
+    assert heading == 0.0
+    assert 0.0 < speed <= 1.0
+    assert speed**2 / (2.0 * deceleration) <= distance
