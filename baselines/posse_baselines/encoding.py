@@ -75,7 +75,7 @@ class Encoding:
         if places < 0:
             raise PolicyError(f"neighbours={places} must be at least 0")
         fields = tuple(
-            EncodedField(f.name, f.size, f.unit, f.unknown or 0.0, f.of_neighbour)
+            EncodedField(f.name, f.size, f.unit, float(f.unknown or 0), f.of_neighbour)
             for f in layout.fields
         )
         return cls(kind, places, fields)

@@ -252,9 +252,9 @@ class Batch:
         poses = self._check_poses(options)
         before = self._arrays.copy() if poses else None
         world = self._arrays.world
+        new_seed = self.seed if seed is None else seed
         if seed is not None or not self._started:
-            self.seed = self.seed if seed is None else seed
-            world["seed"][chosen] = self.seed
+            world["seed"][chosen] = new_seed
             world["split"] = SPLITS.index(self.split)
             world["index"] = self.first_world + np.arange(self.num_worlds)
             world["episode"][chosen] = 0
@@ -273,7 +273,7 @@ class Batch:
                     self._arrays.write(before)
                 raise
             observations = self._start(chosen, START_FROM_POSES)
-        self._started = True
+        self.seed, self._started = new_seed, True
         return observations
 
     def step(

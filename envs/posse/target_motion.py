@@ -42,7 +42,7 @@ _WEAVE_MOST: Final = np.float32(0.9)
 SMART_DIRECTIONS: Final = 16
 SMART_REPLAN: Final = 5
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
-_LOATH_TO_TURN: Final = np.float32(0.25)  # s; an about-turn has to be worth twice that
+_LOYALTY: Final = np.float32(0.5)  # s; going back on its choice has to be worth twice that
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
 _PATIENCE: Final = np.float32(3.0)  # s of station keeping that provoke a dart
 _STATION_MARGIN: Final = np.float32(1.0)  # m beyond the farthest slot that count as near
@@ -146,11 +146,13 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
 
     For every direction u, the soonest that any tracker, straight on at full speed, could be where
     the target then is: the least root t of |p - u v t| = V t. The target takes the direction where
-    that is latest, seen from where the trackers will be shortly, and loath to turn.
+    that is latest, seen from where the trackers will be shortly, and does not go back on a choice
+    for little: among trackers that surround it, it would dither.
     """
     v, most = c.target_speed, c.tracker_speed
     a = most * most - v * v
     clear = c.radius + c.radius + _CLEARANCE
+    loyalty = _LOYALTY if w.step > 0 else _ZERO  # what it heads for at the start was not its choice
     best = np.float32(-1e9)
     old_cos, old_sin = w.goal_cos, w.goal_sin
     for k in range(SMART_DIRECTIONS // 2):
@@ -172,7 +174,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
             b = v * (px * ux + py * uy)
             root = np.float32(math.sqrt(b * b + a * (px * px + py * py)))
             ahead, astern = min(ahead, root - b), min(astern, root + b)
-        same_way = _LOATH_TO_TURN * (ux * old_cos + uy * old_sin)
+        same_way = loyalty * (ux * old_cos + uy * old_sin)
         for side in range(2):
             value = ahead / a + same_way if side == 0 else astern / a - same_way
             if c.walled and value + _LOOKOUT > best:

@@ -122,7 +122,7 @@ def test_rollout_restarts_memories_when_episodes_begin(autoreset: str) -> None:
             return np.zeros((*observations.shape[:2], 2), np.float32), memory
 
         def restart(self, memory: Any, mask: Any) -> Any:
-            restarted.append((count, mask.copy()))
+            restarted.append((count + 1, mask.copy()))  # the step under way
             return memory
 
     batch = posse.batch("constant", 3, horizon=30, autoreset=autoreset)

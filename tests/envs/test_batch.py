@@ -277,7 +277,6 @@ def test_bad_options_are_refused_and_change_nothing(options: dict[str, Any], wor
     )
 
 
-@pytest.mark.xfail(strict=True, reason="reset sets seed before the poses are checked for overlap")
 def test_a_refused_reset_leaves_the_seed() -> None:
     batch = posse.batch("field", 2, seed=9)
     batch.reset()

@@ -139,12 +139,12 @@ def start(action: str, folder: Path, settings: TrainSettings) -> subprocess.Pope
 
 @pytest.mark.slow
 def test_kill_9_loses_at_most_one_interval(tmp_path: Path) -> None:
-    settings = small(tmp_path / "x", steps=64_000, evaluate_every=16_000, checkpoint_every=1600)
+    settings = small(tmp_path / "x", steps=16_000, evaluate_every=8000, checkpoint_every=800)
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     assert start("train", whole, settings).wait() == 0
     running = start("train", killed, settings)
     kills = 0
-    for target in (1600, 20_000, 40_000):
+    for target in (800, 8000):
         reached = -1
         while running.poll() is None and reached < target:
             time.sleep(0.01)
@@ -158,7 +158,7 @@ def test_kill_9_loses_at_most_one_interval(tmp_path: Path) -> None:
         kept = read_checkpoint(killed)[1]["model"]["num_timesteps"]
         assert kept >= reached  # what was kept stays kept
         running = start("resume", killed, settings)
-    assert kills >= 2
+    assert kills >= 1
     assert running.wait() == 0
     assert_equal(numbers(whole), numbers(killed))
 

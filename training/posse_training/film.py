@@ -13,7 +13,7 @@ from PIL import Image
 
 from posse import Batch, Scenario, get_scenario
 from posse.render import LEAST_SIZE, Renderer
-from posse.render_style import PALETTE
+from posse.render_style import GRID, PALETTE
 from posse_baselines.policy import Policy, PolicyError, begin
 
 Frame = npt.NDArray[np.uint8]
@@ -22,7 +22,6 @@ _BLENDS: Final = 40  # colours for what fades and for anti-aliased edges
 _TRANSPARENT: Final = 255
 _SAMPLED: Final = 12  # frames that the palette is made from
 _SEAM: Final = 2  # px between panels
-_SEAM_GREY: Final = 205
 _LAST_SHOWN: Final = 1.5  # s, before the film starts over
 
 
@@ -117,7 +116,7 @@ def _side_by_side(panels: Sequence[Iterator[Frame]]) -> Iterator[Frame]:
         strip: list[Frame] = []
         for frame in last:
             assert frame is not None
-            seam = np.full((frame.shape[0], _SEAM, 3), _SEAM_GREY, np.uint8)
+            seam = np.full((frame.shape[0], _SEAM, 3), GRID, np.uint8)
             strip += [seam, frame] if strip else [frame]
         yield np.concatenate(strip, axis=1)
 
@@ -128,20 +127,15 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
     All frames share one palette and are not dithered, so that flat colours stay flat; what a frame
     shares with the one before is left transparent, and costs next to nothing.
     """
-    palette = _palette(frames)
-    table = palette.getpalette()
+    palette = _Palette(frames)
     images: list[Image.Image] = []
-    before: npt.NDArray[np.uint8] | None = None
+    before: Frame | None = None
     for frame in frames:
-        indices = np.asarray(
-            Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-        )
-        shown = indices
-        if before is not None:
-            shown = np.where(indices == before, np.uint8(_TRANSPARENT), indices)
+        indices = palette.indices(frame)
+        changed = indices if before is None else np.where(indices == before, _TRANSPARENT, indices)
         before = indices
-        image = Image.fromarray(shown)
-        image.putpalette(table or [])
+        image = Image.fromarray(changed.astype(np.uint8))
+        image.putpalette(palette.entries.tobytes())
         images.append(image)
     # In 1/1000 s; a GIF counts in 1/100, and players slow down what is faster than two of them.
     shown_for = max(2, round(frame_time * 100)) * 10
@@ -159,26 +153,47 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
     )
 
 
-def _palette(frames: Sequence[Frame]) -> Image.Image:
-    """Return an image that carries the palette of all frames, :data:`_TRANSPARENT` left free.
+class _Palette:
+    """The colours of all frames of a film: at most 255, since one index stands for transparent.
 
-    The flat colours of which a picture is composed are in it as they are, however small their
+    The flat colours of which a picture is composed are among them as they are, however small their
     areas; the blends between them share what is left.
+
+    Attributes:
+        entries: (K, 3) red, green, blue.
     """
-    chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLED).round().astype(int))
-    pixels = np.concatenate([frames[k].reshape(-1, 3) for k in chosen]).astype(np.int32)
-    codes, counts = np.unique(pixels @ (65536, 256, 1), return_counts=True)
-    # By the logarithm of its area: the rim of a robot matters as much as that of an arena.
-    weighted = np.repeat(codes, np.log2(counts).astype(int) + 1)
-    colours = np.stack([weighted >> 16, (weighted >> 8) & 255, weighted & 255], axis=-1)
-    image = Image.fromarray(colours.astype(np.uint8)[None])
-    blended = image.quantize(_BLENDS, method=Image.Quantize.MEDIANCUT).getpalette() or []
-    entries = [*map(list, PALETTE), *np.reshape(blended, (-1, 3))[:_BLENDS].tolist()]
-    # Unused entries repeat the first, so that no pixel is ever given the transparent one.
-    entries += [entries[0]] * (256 - len(entries))
-    carrier = Image.new("P", (1, 1))
-    carrier.putpalette([value for entry in entries for value in entry])
-    return carrier
+
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLED).round().astype(int))
+        codes, counts = np.unique([_codes(frames[k]) for k in chosen], return_counts=True)
+        # By the logarithm of its area: the rim of a robot matters as much as that of an arena.
+        blends = _colours(np.repeat(codes, np.log2(counts).astype(int) + 1))
+        image = Image.fromarray(blends[None]).quantize(_BLENDS, method=Image.Quantize.MEDIANCUT)
+        shared = np.reshape(image.getpalette() or [], (-1, 3))[:_BLENDS]
+        self.entries = np.concatenate([np.array(PALETTE), shared]).astype(np.uint8)
+        self._index = np.full(1 << 24, _TRANSPARENT, np.uint8)  # by code, as far as met
+
+    def indices(self, frame: Frame) -> Frame:
+        """Return the (H, W) indices of the entries nearest to a frame's colours."""
+        codes = _codes(frame)
+        found = self._index[codes]
+        new = np.unique(codes[found == _TRANSPARENT])
+        if len(new):
+            apart = _colours(new)[:, None].astype(np.int32) - self.entries
+            self._index[new] = (apart**2).sum(axis=-1).argmin(axis=-1)
+            found = self._index[codes]
+        return found
+
+
+def _codes(frame: Frame) -> npt.NDArray[np.int32]:
+    """Return the (H, W) colours of a frame as 0xRRGGBB."""
+    codes: npt.NDArray[np.int32] = frame.astype(np.int32) @ np.array([1 << 16, 1 << 8, 1], np.int32)
+    return codes
+
+
+def _colours(codes: npt.NDArray[np.int32]) -> Frame:
+    """Return (..., 3) red, green, blue of colours coded as 0xRRGGBB."""
+    return np.stack([codes >> 16, (codes >> 8) & 255, codes & 255], axis=-1).astype(np.uint8)
 
 
 def _check(

@@ -32,8 +32,7 @@ WORLDS: Final = 64
 FIRST_WORLD: Final = 1_000_000
 """Index of the first of them: none that the learning proper begins with."""
 _EVERY: Final = 5  # of so many control steps, one is kept: neighbours in time are much alike
-_EPOCHS: Final = 4
-_VALUE_EPOCHS: Final = 8
+_GRADIENTS: Final = 300  # in each round, at least
 _MINIBATCH: Final = 4096
 _LEARNING_RATE: Final = 1e-3
 _SETTLED: Final = 3.0  # discounted horizons before the end from which returns are not yet complete
@@ -91,15 +90,19 @@ def imitate(
         inputs = torch.from_numpy(np.concatenate([r.inputs for r in rounds]))
         actions = torch.from_numpy(np.concatenate([r.actions for r in rounds]))
         error = 0.0
-        for epoch in range(_EPOCHS):
+        for _ in range(_passes(len(inputs))):
             error = _fit(policy, optimiser, generator, inputs, actions, _action_error)
-            del epoch
         report(k + 1, total, error)
     inputs = torch.from_numpy(np.concatenate([r.value_inputs for r in played]))
     returns = torch.from_numpy(np.concatenate([r.returns for r in played]))
     if len(inputs):
-        for _ in range(_VALUE_EPOCHS):
+        for _ in range(_passes(len(inputs))):
             _fit(policy, optimiser, generator, inputs, returns, _value_error)
+
+
+def _passes(rows: int) -> int:
+    """Return how often to go through the data of a round."""
+    return -(-_GRADIENTS // -(-rows // _MINIBATCH))
 
 
 def _fit(

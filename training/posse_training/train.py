@@ -231,11 +231,9 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
 
 
 def even_minibatch(rows: int, wanted: int) -> int:
-    """Return the size nearest below or at ``wanted`` (or just above) into which rows fall evenly."""
-    parts = max(1, round(rows / wanted))
-    while rows % parts:
-        parts += 1
-    return rows // parts
+    """Return the size nearest to ``wanted``, in proportion, that rows fall into evenly."""
+    sizes = [d for k in range(1, int(rows**0.5) + 1) if rows % k == 0 for d in (k, rows // k)]
+    return min(sizes, key=lambda size: max(size / wanted, wanted / size))
 
 
 def make_logger(folder: Path, settings: TrainSettings) -> Logger:
