@@ -1,4 +1,4 @@
-"""What a learned policy's network is given: the observation, brought into the form it was trained on.
+"""What a learned policy's network is given: the observation, in the form it was trained on.
 
 A network has inputs of a fixed meaning; the observation of a scenario depends on the size of its
 team and on the length of its messages. An :class:`Encoding` says which fields the network reads and
@@ -16,15 +16,15 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+
 from posse import ObservationLayout
 from posse.arrays import FloatArray
 from posse.compiled import compiled, kernel
-
 from posse_baselines.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots")
-"""``plain``: the observation as it is; ``slots``: with :mod:`posse_baselines.features` before it."""
+"""``plain``: the observation; ``slots``: :mod:`posse_baselines.features`, then the observation."""
 
 _ABSENT: Final = -1
 Columns = npt.NDArray[np.int64]
@@ -108,9 +108,7 @@ class Encoding:
         return {
             "kind": self.kind,
             "neighbours": self.neighbours,
-            "fields": [
-                [f.name, f.size, f.unit, f.unknown, f.of_neighbour] for f in self.fields
-            ],
+            "fields": [[f.name, f.size, f.unit, f.unknown, f.of_neighbour] for f in self.fields],
         }
 
     @classmethod
@@ -127,13 +125,15 @@ class Encoding:
             )
             kind, neighbours = str(values["kind"]), int(values["neighbours"])
         except (KeyError, TypeError, ValueError) as error:
-            raise PolicyError(f"the description of the policy's inputs is damaged: {error}") from error
+            raise PolicyError(
+                f"the description of the policy's inputs is damaged: {error}"
+            ) from error
         if kind not in KINDS or neighbours < 0 or any(f.size < 1 for f in fields):
             raise PolicyError("the description of the policy's inputs is damaged")
         return cls(kind, neighbours, fields)
 
     def columns(self, layout: ObservationLayout) -> tuple[Columns, FloatArray]:
-        """Return where in a layout's observation each number lies, and what stands for a missing one.
+        """Return where in an observation each number lies, and what stands for a missing one.
 
         Both (read_size,); a column of -1 is missing.
 
@@ -145,8 +145,10 @@ class Encoding:
         for mine in self.fields:
             theirs = known.get(mine.name)
             message = mine.name == "neighbour_message"
-            if theirs is None or theirs.unit != mine.unit or (
-                theirs.size < mine.size if message else theirs.size != mine.size
+            if (
+                theirs is None
+                or theirs.unit != mine.unit
+                or (theirs.size < mine.size if message else theirs.size != mine.size)
             ):
                 found = "no such field" if theirs is None else f"{theirs.size} x {theirs.unit!r}"
                 raise PolicyError(

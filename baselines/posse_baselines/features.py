@@ -14,11 +14,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+
 from posse import ObservationLayout
 from posse.arrays import FloatArray
 from posse.compiled import compiled
 from posse.formation import slot_offsets
-
 from posse_baselines.policy import PolicyError
 
 _ZERO: Final = np.float32(0.0)
@@ -79,12 +79,12 @@ def _soft(x: np.float32, y: np.float32, scale: np.float32, out: FloatArray) -> N
 
 @compiled
 def _slot_x(slots: FloatArray, s: int, x: np.float32, c: np.float32, n: np.float32) -> np.float32:
-    return x + slots[s, 0] * c - slots[s, 1] * n
+    return np.float32(x + slots[s, 0] * c - slots[s, 1] * n)
 
 
 @compiled
 def _slot_y(slots: FloatArray, s: int, y: np.float32, c: np.float32, n: np.float32) -> np.float32:
-    return y + slots[s, 0] * n + slots[s, 1] * c
+    return np.float32(y + slots[s, 0] * n + slots[s, 1] * c)
 
 
 @compiled
@@ -131,7 +131,7 @@ def assign(count: int, num_slots: int, ways: FloatArray, chosen: FloatArray) -> 
 def _gather_team(
     row: FloatArray, at: Offsets, xs: FloatArray, ys: FloatArray, numbers: FloatArray
 ) -> int:
-    """Write where the team is, this robot first, carried on from when it was heard; return how many."""
+    """Write where the team is by now, this robot first; return how many it knows of."""
     xs[0], ys[0], numbers[0] = _ZERO, _ZERO, row[at[_NUMBER]]
     count = 1
     for p in range(at[_PLACES]):
@@ -148,7 +148,7 @@ def _gather_team(
 
 @compiled
 def _sort_by_number(count: int, xs: FloatArray, ys: FloatArray, numbers: FloatArray) -> int:
-    """Sort robots by number, so that all of a team work out one assignment; return where robot 0 went."""
+    """Sort robots by number, so that all work out one assignment; return where the first went."""
     me = numbers[0]
     for i in range(1, count):
         x, y, number = xs[i], ys[i], numbers[i]

@@ -20,12 +20,12 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from posse import ObservationLayout
-from posse.arrays import BoolArray, FloatArray
-from posse.compiled import compiled, kernel
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
+from posse import ObservationLayout
+from posse.arrays import BoolArray, FloatArray
+from posse.compiled import compiled, kernel
 from posse_baselines.encoding import Encoder, Encoding, encode_row
 from posse_baselines.features import SCRATCH
 from posse_baselines.parallel import most_parts, over_worlds
@@ -98,7 +98,7 @@ class Network:
                 raise PolicyError("a network's numbers must be finite float32")
 
     def forward(self, inputs: FloatArray) -> FloatArray:
-        """Return the actions (..., out) for inputs (..., in); plain numpy, what the kernel is tested by."""
+        """Return the actions (..., out) for inputs (..., in), in plain numpy."""
         x = np.clip((inputs - self.mean) * self.scale, -self.limit, self.limit)
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             x = x @ weight.T + bias
@@ -120,7 +120,7 @@ class Network:
 def _layer(
     x: FloatArray, size: int, weights: FloatArray, biases: FloatArray, count: int, y: FloatArray
 ) -> None:
-    """Write biases + weights x to y; weights lie input by input, so that the inner loop vectorises."""
+    """Write biases + weights x to y; weights lie input by input: the inner loop vectorises."""
     for j in range(count):
         y[j] = biases[j]
     for i in range(size):
@@ -161,9 +161,7 @@ def _act(
         for i in range(observations.shape[1]):
             x = scratch[part, SCRATCH : SCRATCH + widest]
             y = scratch[part, SCRATCH + widest :]
-            encode_row(
-                observations[e, i], columns, unknown, offsets, slots, with_features, work, x
-            )
+            encode_row(observations[e, i], columns, unknown, offsets, slots, with_features, work, x)
             for k in range(sizes[0]):
                 x[k] = min(max((x[k] - mean[k]) * scale[k], -limit), limit)
             at_weight, at_bias = 0, 0
@@ -206,7 +204,9 @@ class LearnedPolicy(BasePolicy):
                 f"the network takes {network.sizes[0]} numbers, its encoding gives {encoding.size}"
             )
         if network.sizes[-1] < 2:
-            raise PolicyError(f"the network gives {network.sizes[-1]} numbers, an action has 2 or more")
+            raise PolicyError(
+                f"the network gives {network.sizes[-1]} numbers, an action has 2 or more"
+            )
         self.network = network
         self.encoding = encoding
         self.card = dict(card)
@@ -229,7 +229,7 @@ class LearnedPolicy(BasePolicy):
         """Return the memory of ``num_worlds`` worlds: where in the layout the inputs lie.
 
         Raises:
-            PolicyError: The layout lacks something that the network reads, or has it in another size.
+            PolicyError: The layout lacks what the network reads, or has it in another size.
         """
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)

@@ -53,7 +53,7 @@ PLAN: Final[np.dtype[Any]] = np.dtype(
 class OracleSettings:
     """How the oracle plays."""
 
-    gain: float = 2.0
+    gain: float = 1.5
     """Of the slot law, 1/s."""
     replan_steps: int = 3
     """Control steps between two assignments."""

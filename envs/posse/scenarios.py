@@ -103,7 +103,8 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the one given, with any field overridden.
 
     Raises:
-        ScenarioError: An unknown name (the message has near ones), an unknown or impossible setting.
+        ScenarioError: An unknown name (the message has near ones), an unknown or impossible
+            setting.
     """
     if isinstance(scenario, Scenario):
         found = scenario

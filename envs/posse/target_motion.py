@@ -33,10 +33,10 @@ _TWO_PI: Final = np.float32(2 * math.pi)
 _TINY: Final = np.float32(1e-12)
 _SOFT_WALL: Final = np.float32(2.0)  # a goal heading is mirrored this far before a wall, m
 
-_WEAVE_LEAST_RATE: Final = np.float32(0.2)  # rad/s
-_WEAVE_MOST_RATE: Final = np.float32(0.8)
-_WEAVE_LEAST: Final = np.float32(0.4)  # least and greatest turn, as shares of the limit
-_WEAVE_MOST: Final = np.float32(0.9)
+_WEAVE_LEAST_RATE: Final = 0.2  # rad/s
+_WEAVE_MOST_RATE: Final = 0.8
+_WEAVE_LEAST: Final = 0.4  # least and greatest turn, as shares of the limit
+_WEAVE_MOST: Final = 0.9
 
 # The smart motion. It weighs these many directions, every so many control steps.
 SMART_DIRECTIONS: Final = 16
@@ -54,8 +54,9 @@ _DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # b
 _DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
 _DART_STRIDE: Final = 2  # every second direction is played through
 _CLEARANCE: Final = np.float32(0.3)  # m between the rims of the target and a tracker
-_FAR: Final = np.float32(1e3)
-_BLOCKED: Final = np.float32(100.0)
+_FAR: Final = np.float32(1e3)  # for a direction that nobody bars
+_BLOCKED: Final = np.float32(100.0)  # m; what running into a tracker takes off a dart's worth
+_ALARM: Final = np.float32(1e3)
 
 _ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
 _DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
@@ -119,7 +120,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
     """Return how committed the team is: from -1, no tracker keeps station, to 1, all of them do.
 
     A tracker keeps station when it is about as near as a slot is and moves as the target does. One
-    that comes nearer than any slot is a danger: it counts for as much as patience lasts.
+    that comes nearer than any slot is a danger, which takes more than all patience at once.
     """
     near = c.slots_reach + _STATION_MARGIN
     slow = _STATION_SPEED * (c.tracker_speed - c.target_speed)
@@ -133,7 +134,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
         dx, dy = t.x - w.x, t.y - w.y
         d2 = dx * dx + dy * dy
         if d2 < danger * danger:
-            return _BLOCKED
+            return _ALARM
         ux, uy = t.speed * t.heading_cos - vx, t.speed * t.heading_sin - vy
         if d2 < near * near and ux * ux + uy * uy < slow * slow:
             committed += _ONE
@@ -203,7 +204,7 @@ def free_time(
         reach = o.radius + c.safe_distance
         if along > _ZERO and abs(across) < reach:
             far = min(far, max(_ZERO, along - reach))
-    return far / c.target_speed
+    return np.float32(far / c.target_speed)
 
 
 @compiled
@@ -301,12 +302,7 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
         return turn
     side = _ONE
     left = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE)
-    if not left and has_free_circle(
-        c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
-    ):
-        side = -_ONE
-    elif left and turn < _ZERO and has_free_circle(
-        c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
-    ):
-        side = -_ONE
-    return side * c.target_turn_rate
+    if not left or turn < _ZERO:
+        right = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE)
+        side = -_ONE if right else _ONE
+    return np.float32(side * c.target_turn_rate)

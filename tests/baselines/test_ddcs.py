@@ -24,12 +24,15 @@ class Seen:
     state: dict[str, Any]
 
 
-def watch(scenario: str, worlds: int, steps: int, policy: DDCS | None = None, **settings: Any) -> Iterator[Seen]:
+def watch(
+    scenario: str, worlds: int, steps: int, policy: DDCS | None = None, **settings: Any
+) -> Iterator[Seen]:
+    """Play ``steps`` control steps, or to the end of the episode (0)."""
     policy = policy or DDCS()
     options = settings.pop("options", None)
     batch = posse.batch(scenario, worlds, message_size=5, autoreset="disabled", **settings)
     observations, memory = batch.reset(options=options), begin(policy, batch)
-    for _ in range(steps):
+    for _ in range(steps or batch.scenario.horizon):
         actions, memory = policy.act(observations, memory)
         state = {name: array.copy() for name, array in batch.state.items()}
         yield Seen(batch.layout.views(observations), policy.annotations(memory), state)
@@ -141,7 +144,7 @@ def test_a_broken_leader_is_replaced_by_one_that_works(model: str) -> None:
     exchanging = np.zeros(30, np.bool_)
     waited = np.zeros(30, np.int64)
     broke_leader = np.zeros(30, np.bool_)
-    for seen in watch("leader-loss", 30, 480, policy, split="train"):
+    for seen in watch("leader-loss", 30, 0, policy, split="train"):
         leader = seen.notes["leader"]
         lost = seen.state["world_lost_at"] >= 0
         dead = np.take_along_axis(~working(seen), leader, axis=1) & working(seen)
@@ -158,7 +161,7 @@ def test_a_broken_leader_is_replaced_by_one_that_works(model: str) -> None:
 def test_without_exchange_the_first_leader_stays() -> None:
     policy = DDCS(Settings(model="centralized", exchange=False))
     first = None
-    for seen in watch("leader-loss", 10, 450, policy, split="train"):
+    for seen in watch("leader-loss", 10, 0, policy, split="train"):
         first = seen.notes["leader"].copy() if first is None else first
         np.testing.assert_array_equal(seen.notes["leader"], first)
     assert (seen.notes["exchanges"] == 0).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -10,16 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import posse
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from safetensors.numpy import save_file
+
+import posse
 from posse.formation import slot_offsets
 from posse_baselines import PolicyError, play
 from posse_baselines.encoding import Encoder, Encoding
 from posse_baselines.features import NUM_FEATURES, assign
 from posse_baselines.learned import LearnedPolicy, Network
-from safetensors.numpy import save_file
 
 
 def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) -> Network:
@@ -33,7 +35,7 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) ->
         mean=draw(inputs),
         scale=np.abs(draw(inputs)),
         limit=5.0,
-        weights=tuple(draw(b, a) / np.float32(a**0.5) for a, b in zip(sizes, sizes[1:], strict=False)),
+        weights=tuple(draw(b, a) / np.float32(a**0.5) for a, b in itertools.pairwise(sizes)),
         biases=tuple(draw(b) for b in sizes[1:]),
         activation="tanh",
         output="clip",
@@ -41,7 +43,9 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) ->
     return replace(network, **changes)
 
 
-def policy_for(layout: posse.ObservationLayout, kind: str = "slots", **changes: Any) -> LearnedPolicy:
+def policy_for(
+    layout: posse.ObservationLayout, kind: str = "slots", **changes: Any
+) -> LearnedPolicy:
     encoding = Encoding.of(layout, kind)
     return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
 
@@ -240,9 +244,7 @@ class TestLayouts:
         batch = posse.batch("smart", 2)
         observations = batch.reset()
         rows = Encoder(Encoding.of(batch.layout, neighbours=2), batch.layout).encode(observations)
-        np.testing.assert_array_equal(
-            rows, observations.reshape(10, -1)[:, : rows.shape[1]]
-        )
+        np.testing.assert_array_equal(rows, observations.reshape(10, -1)[:, : rows.shape[1]])
 
     def test_the_plain_encoding_is_the_observation(self) -> None:
         batch, observations = observations_of("radio")
@@ -289,9 +291,7 @@ class TestFeatures:
         assert np.isfinite(rows).all()
 
     @settings(derandomize=True, deadline=None, max_examples=100)
-    @given(
-        robots=st.integers(1, 9), slots=st.integers(1, 12), seed=st.integers(0, 2**31)
-    )
+    @given(robots=st.integers(1, 9), slots=st.integers(1, 12), seed=st.integers(0, 2**31))
     def test_no_swap_shortens_an_assignment(self, robots: int, slots: int, seed: int) -> None:
         ways = np.random.default_rng(seed).uniform(0, 10, (robots, slots)).astype(np.float32)
         chosen = np.empty(robots, np.float32)

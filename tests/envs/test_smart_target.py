@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -107,7 +108,7 @@ def start(
     tracker_pose: object = None,
     target_pose: object = None,
     seed: int = 3,
-    **overrides: object,
+    **overrides: Any,
 ) -> posse.Batch:
     batch = posse.batch(scenario, num_worlds=worlds, seed=seed, autoreset="disabled", **overrides)
     poses = {"tracker_pose": tracker_pose, "target_pose": target_pose}
@@ -148,9 +149,7 @@ def test_it_leaves_a_ring_by_the_widest_gap(team: Controller) -> None:
     gaps = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     # Five trackers 60 degrees apart: the gap that is left is 120 degrees wide.
     bearings = gaps[:, None] + np.radians([60, 120, 180, 240, 300])
-    trackers = np.stack(
-        [4 * np.cos(bearings), 4 * np.sin(bearings), bearings + np.pi], -1
-    )
+    trackers = np.stack([4 * np.cos(bearings), 4 * np.sin(bearings), bearings + np.pi], -1)
     headings = np.random.default_rng(0).uniform(-np.pi, np.pi, 40)
     batch = start(
         40, tracker_pose=trackers, target_pose=np.stack([0 * headings, 0 * headings, headings], -1)

@@ -14,21 +14,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import posse
 import pytest
 import torch
+from rich.console import Console
+from safetensors.numpy import load_file
+from stable_baselines3 import PPO
+
+import posse
 from posse_baselines import BasePolicy, PolicyError
 from posse_baselines.learned import LearnedPolicy
-from posse_training import checkpoint, train as module
+from posse_training import checkpoint
+from posse_training import train as module
 from posse_training.checkpoint import CheckpointError, RunFolderError, locked, read_checkpoint
 from posse_training.export import export
 from posse_training.imitation import imitate
 from posse_training.normalisation import Normaliser, RunningStatistics
 from posse_training.settings import SettingsError, TrainSettings
 from posse_training.train import even_minibatch, make_env, make_model, resume, train
-from rich.console import Console
-from safetensors.numpy import load_file
-from stable_baselines3 import PPO
 
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "sac", "td3")
@@ -97,7 +99,7 @@ def test_a_training_that_was_cut_ends_where_it_would_have(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str
 ) -> None:
     train(small(tmp_path / "whole", algorithm), console=quiet())
-    write, count = module.write_checkpoint, 0
+    write, count = checkpoint.write_checkpoint, 0
 
     def cut(*arguments: Any) -> None:
         nonlocal count
@@ -182,7 +184,7 @@ def test_checkpoints_are_no_further_apart_than_asked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[int] = []
-    write = module.write_checkpoint
+    write = checkpoint.write_checkpoint
 
     def note(folder: Path, arrays: Any, state: Any) -> None:
         seen.append(state["model"]["num_timesteps"])
@@ -211,7 +213,7 @@ class TestTrouble:
                 raise OSError(28, "No space left on device")
             fsync(file)
 
-        monkeypatch.setattr(checkpoint.os, "fsync", full)
+        monkeypatch.setattr(os, "fsync", full)
         with pytest.raises(CheckpointError, match=r"No space left.*--resume"):
             train(small(folder), console=quiet())
         monkeypatch.undo()
@@ -251,7 +253,7 @@ class TestTrouble:
         finally:
             holder.kill()
             holder.wait()
-            if holder.stdout:
+            if holder.stdout is not None:
                 holder.stdout.close()
         with locked(tmp_path):  # the lock ended with its holder
             pass
@@ -373,9 +375,7 @@ def test_imitation_copies(tmp_path: Path) -> None:
     model = make_model(settings, env)
     errors: list[float] = []
     statistics = RunningStatistics(env.private_size)
-    imitate(
-        model, settings, env.encoding, _Circle(), statistics, lambda k, n, e: errors.append(e)
-    )
+    imitate(model, settings, env.encoding, _Circle(), statistics, lambda k, n, e: errors.append(e))
     assert len(errors) == 4
     assert errors[-1] < 0.02
     policy = export(model, env.encoding, {})

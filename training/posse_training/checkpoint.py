@@ -117,8 +117,8 @@ def write_checkpoint(folder: Path, arrays: Arrays, state: Mapping[str, Any]) -> 
     except OSError as error:
         kept = "the one before is kept" if path.is_file() else "there is none before it"
         raise CheckpointError(
-            f"cannot write checkpoint {path}: {error.strerror or error}; {kept}. Make room, then go "
-            f"on with: posse train --resume {folder}"
+            f"cannot write checkpoint {path}: {error.strerror or error}; {kept}. Make room, then "
+            f"go on with: posse train --resume {folder}"
         ) from error
 
 
@@ -131,7 +131,7 @@ def read_checkpoint(folder: Path) -> tuple[Arrays, dict[str, Any]]:
     path = folder / CHECKPOINT
     if not path.is_file():
         raise CheckpointError(
-            f"{folder} has no {CHECKPOINT}: nothing was kept before the training ended; start it anew"
+            f"{folder} has no {CHECKPOINT}: nothing was kept before it ended; start it anew"
         )
     try:
         with safe_open(path, framework="numpy") as file:
@@ -190,7 +190,7 @@ def restore_random_state(arrays: Arrays, state: Mapping[str, Any]) -> None:
 
 
 def flatten_tensors(value: Any, store: Callable[[npt.NDArray[Any]], str]) -> Any:
-    """Return a nest of dictionaries and lists with each tensor replaced by the name it is stored by."""
+    """Return a nest of dictionaries and lists with each tensor replaced by its name in store."""
     if isinstance(value, torch.Tensor):
         return {"tensor": store(value.detach().cpu().numpy())}
     if isinstance(value, Mapping):
@@ -209,8 +209,6 @@ def unflatten_tensors(value: Any, arrays: Mapping[str, npt.NDArray[Any]]) -> Any
     if "list" in value:
         return [unflatten_tensors(item, arrays) for item in value["list"]]
     return value["value"]
-
-
 
 
 def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:

@@ -1,7 +1,6 @@
 """The command line: ``posse train | compare | watch | reproduce | scenarios``.
 
-Each command imports what it needs when it is called, so that listing the scenarios does not wait for
-torch.
+Each command imports what it needs when it is called: listing the scenarios does not wait for torch.
 """
 
 from __future__ import annotations
@@ -197,9 +196,10 @@ class _Scenarios:
 def scenarios(arguments: list[str]) -> None:
     """List the scenarios with what tells them from the plainest one, or all settings of one."""
     which = tyro.cli(_Scenarios, prog="posse scenarios", args=arguments)
-    from posse import get_scenario, scenario_names
     from rich.console import Console
     from rich.table import Table
+
+    from posse import get_scenario, scenario_names
 
     table = Table(box=None, pad_edge=False)
     if which.name is not None:

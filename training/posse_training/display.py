@@ -113,7 +113,8 @@ class Display:
         table.add_column()
         table.add_row(
             "steps",
-            f"{self._steps:,} of {s.steps:,}   {self.rate:,.0f} a second   {_clock(self.time_left)} left",
+            f"{self._steps:,} of {s.steps:,}   {self.rate:,.0f} a second   "
+            f"{_clock(self.time_left)} left",
         )
         table.add_row("", ProgressBar(total=s.steps, completed=self._steps, width=_WIDTH))
         if self._training_score is not None:

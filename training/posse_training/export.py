@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import posse
 import stable_baselines3
 import torch
-from posse_baselines.encoding import Encoding
-from posse_baselines.learned import LearnedPolicy, Network
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
+import posse
+from posse_baselines.encoding import Encoding
+from posse_baselines.learned import LearnedPolicy, Network
 from posse_training.normalisation import LIMIT, Normaliser
 from posse_training.settings import TrainSettings
 
@@ -57,7 +57,7 @@ def export(model: BaseAlgorithm, encoding: Encoding, card: Mapping[str, Any]) ->
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], str]:
-    """Return the layers from normalised input to action, in order, and how the output is bounded."""
+    """Return the layers from normalised input to action, and how the output is bounded."""
     policy: Any = model.policy
     if hasattr(policy, "mlp_extractor"):
         return [*_flat(policy.mlp_extractor.policy_net), policy.action_net], "clip"
@@ -112,7 +112,7 @@ def make_card(
 
 
 def commit() -> str | None:
-    """Return the commit of the sources that run, with ``+`` where they were changed; ``None``: unknown."""
+    """Return the commit of the sources, with ``+`` where they were changed; ``None``: unknown."""
     here = Path(__file__).parent
     try:
         found = subprocess.run(

@@ -2,9 +2,9 @@
 
 Dataset aggregation (Ross, Gordon and Bagnell, 2011): in the first round the expert drives and is
 copied; in each further round the copy drives in more of the worlds, and the expert says what it
-would have done there. So the copy is right in the states that *it* gets into, not only in those that
-an expert does. At the end the value function is fitted to what the copy earns, or the first updates
-would undo what was copied.
+would have done there. So the copy is right in the states that *it* gets into, not only in those
+that an expert does. At the end the value function is fitted to what the copy earns, or the first
+updates would undo what was copied.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-import posse
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+import posse
 from posse import Scenario
 from posse.arrays import FloatArray
 from posse_baselines.encoding import Encoder, Encoding
 from posse_baselines.policy import Policy, begin
-from stable_baselines3.common.base_class import BaseAlgorithm
-
 from posse_training.normalisation import RunningStatistics
 from posse_training.settings import TrainSettings
 from posse_training.world_state import StateWriter
@@ -116,10 +116,10 @@ def _fit(
     """Go through the data once in a random order; return the mean error."""
     order = torch.from_numpy(generator.permutation(len(inputs)))
     total = 0.0
-    for rows in order.split(_MINIBATCH):
+    for rows in torch.split(order, _MINIBATCH):
         error = error_of(policy, inputs[rows], targets[rows])
         optimiser.zero_grad()
-        error.backward()
+        error.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
         optimiser.step()
         total += error.item() * len(rows)

@@ -64,7 +64,7 @@ class RunningStatistics:
 
     @property
     def scale(self) -> npt.NDArray[np.float64]:
-        """What a difference from the mean is multiplied by, (size,); 0 where nothing ever varies."""
+        """What a difference from the mean is multiplied by, (size,); 0 where nothing varies."""
         deviation = np.sqrt(self.variance)
         return np.where(deviation < _LEAST_DEVIATION, 0.0, 1 / np.maximum(deviation, 1e-12))
 

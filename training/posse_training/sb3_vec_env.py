@@ -1,7 +1,7 @@
 """Worlds as stable-baselines3 sees them: a vector of slots, one for each tracker of each world.
 
-All trackers share one policy, so that to a single-agent learner a batch of E worlds of N trackers is
-a vector of E x N environments. Slot ``e * N + i`` is tracker i of world e.
+All trackers share one policy, so that to a single-agent learner a batch of E worlds of N trackers
+is a vector of E x N environments. Slot ``e * N + i`` is tracker i of world e.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
-from posse import Batch
-from posse.arrays import BoolArray, FloatArray
-from posse_baselines.encoding import Encoder, Encoding
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
+from posse import Batch
+from posse.arrays import BoolArray, FloatArray
+from posse_baselines.encoding import Encoder, Encoding
 from posse_training.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -118,6 +118,16 @@ class TeamVecEnv(VecEnv):
         )
 
     @property
+    def observation_size(self) -> int:
+        """Numbers in an observation, the world's state included where it is appended."""
+        return self._size
+
+    @property
+    def action_shape(self) -> tuple[int, ...]:
+        """Shape of one slot's action, (2 + m,)."""
+        return self._actions.shape[1:]
+
+    @property
     def batches(self) -> tuple[Batch, ...]:
         """The batches, in the order of their slots."""
         return tuple(part.batch for part in self._parts)
@@ -200,7 +210,9 @@ class TeamVecEnv(VecEnv):
         metrics = part.batch.metrics()
         steps = part.batch.worlds["step"]
         for e in np.flatnonzero(ended):
-            whole = over[e] and (part.cut_at[e] == _NEVER or steps[e] == part.batch.scenario.horizon)
+            whole = over[e] and (
+                part.cut_at[e] == _NEVER or steps[e] == part.batch.scenario.horizon
+            )
             summary = {name: float(values[e]) for name, values in metrics.items()}
             for i in range(trackers):
                 info = infos[part.slots.start + e * trackers + i]
@@ -236,8 +248,10 @@ class TeamVecEnv(VecEnv):
         }
         for name, array in mine.items():
             if name not in saved or saved[name].shape != array.shape:
-                raise ValueError(f"the worlds saved do not fit these: {name!r} is missing or of "
-                                 f"another shape than {array.shape}")
+                raise ValueError(
+                    f"the worlds saved do not fit these: {name!r} is missing or of "
+                    f"another shape than {array.shape}"
+                )
         for name, array in mine.items():
             array[...] = saved[name]
         for part in self._parts:
@@ -246,7 +260,7 @@ class TeamVecEnv(VecEnv):
 
     @staticmethod
     def _arrays(part: _Part) -> dict[str, npt.NDArray[Any]]:
-        """Return every array of a part by name. Fields alone: between them lie bytes of no meaning."""
+        """Return every array of a part by name; fields alone, without the padding between them."""
         own = {"cut_at": part.cut_at, "returns": part.returns}
         return {**part.batch.arrays.by_name(), **own}
 
@@ -295,5 +309,7 @@ class TeamVecEnv(VecEnv):
         return [False] * len(self._batches_of(indices))
 
     def _batches_of(self, indices: VecEnvIndices) -> list[Batch]:
-        owners = [part.batch for part in self._parts for _ in range(part.slots.start, part.slots.stop)]
+        owners = [
+            part.batch for part in self._parts for _ in range(part.slots.start, part.slots.stop)
+        ]
         return [owners[slot] for slot in self._get_indices(indices)]

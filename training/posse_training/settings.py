@@ -44,7 +44,7 @@ class TrainSettings:
     team_sizes: tuple[int, ...] = ()
     """Numbers of trackers to train with; none: the scenario's own."""
     num_neighbours: int | None = None
-    """Team-mates that the policy reads, nearest first; default: as many as the largest layout has."""
+    """Team-mates that the policy reads, nearest first; default: as many as there are places."""
     message_size: int = 0
     """Numbers that a tracker may tell its team-mates in each step."""
     overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
@@ -159,7 +159,9 @@ class TrainSettings:
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
-                raise SettingsError(f"unknown setting {name!r}; settings are: {', '.join(sorted(known))}")
+                raise SettingsError(
+                    f"unknown setting {name!r}; settings are: {', '.join(sorted(known))}"
+                )
         fitted = dict(values)
         for name in ("hidden", "team_sizes"):
             if name in fitted:
@@ -229,7 +231,9 @@ def _check(s: TrainSettings) -> None:
         if not 0 <= value <= 1:
             raise SettingsError(f"{name}={value!r} must lie in [0, 1]")
     if not s.hidden or min(s.hidden) < 1:
-        raise SettingsError(f"hidden={s.hidden!r} must name at least one layer, each at least 1 wide")
+        raise SettingsError(
+            f"hidden={s.hidden!r} must name at least one layer, each at least 1 wide"
+        )
     if s.imitate is not None and not s.on_policy:
         raise SettingsError(f"imitate={s.imitate!r} goes with ppo and mappo, not {s.algorithm}")
     parts = s.scenarios

@@ -13,9 +13,17 @@ from typing import Any, Final
 
 import torch
 from tensordict import TensorDict, TensorDictBase
-from tensordict.nn import TensorDictModule, TensorDictSequential
+from tensordict.nn import (
+    AddStateIndependentNormalScale,
+    TensorDictModule,
+    TensorDictSequential,
+)
 from torch import nn
-from torchrl.modules import NormalParamExtractor, ProbabilisticActor, TanhNormal, ValueOperator
+from torchrl.modules import (
+    IndependentNormal,
+    ProbabilisticActor,
+    ValueOperator,
+)
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
@@ -23,6 +31,8 @@ from posse_training.torchrl_env import TRACKERS, PosseEnv
 
 OBSERVATION: Final = (TRACKERS, "observation")
 ACTION: Final = (TRACKERS, "action")
+DRAWN: Final = (TRACKERS, "drawn")
+"""What the policy drew from its normal distribution; the action is that, cut to [-1, 1]."""
 REWARD: Final = (TRACKERS, "reward")
 LOG_PROBABILITY: Final = (TRACKERS, "action_log_prob")
 VALUE: Final = (TRACKERS, "state_value")
@@ -109,7 +119,7 @@ class Agent(nn.Module):
     """The policy and the critic of every tracker.
 
     Attributes:
-        actor: Adds actions and their log-probabilities to a tensordict.
+        actor: Adds what it draws, and the log-probability of that, to a tensordict.
         critic: Adds values.
         scale: What both see observations through.
     """
@@ -120,16 +130,15 @@ class Agent(nn.Module):
         width = env.full_action_spec[ACTION].shape[-1]
         self.scale = RunningScale(size)
         policy = nn.Sequential(
-            self.scale, *_layers(size, hidden, 2 * width, 0.01), NormalParamExtractor()
+            self.scale, *_layers(size, hidden, width, 0.01), AddStateIndependentNormalScale(width)
         )
         value = nn.Sequential(self.scale, *_layers(size, hidden, 1, 1.0))
         parameters = [(TRACKERS, "loc"), (TRACKERS, "scale")]
         self.actor = ProbabilisticActor(
             TensorDictModule(policy, [OBSERVATION], parameters),
             in_keys=parameters,
-            out_keys=[ACTION],
-            distribution_class=TanhNormal,
-            distribution_kwargs={"low": -1.0, "high": 1.0},
+            out_keys=[DRAWN],
+            distribution_class=IndependentNormal,
             return_log_prob=True,
             log_prob_key=LOG_PROBABILITY,
         )
@@ -159,7 +168,9 @@ def roll_out(
     """Play for some steps; return them (E, T), and what the next rollout goes on from."""
     made = []
     for _ in range(steps):
-        made_step, carried = env.step_and_maybe_reset(actor(carried))
+        carried = actor(carried)
+        carried[ACTION] = carried[DRAWN].clamp(-1.0, 1.0)
+        made_step, carried = env.step_and_maybe_reset(carried)
         made.append(made_step)
     return torch.stack(made, dim=1), carried
 
@@ -231,7 +242,7 @@ def objectives(agent: Agent, settings: Settings) -> tuple[ClipPPOLoss, GAE]:
         entropy_coeff=settings.entropy,
     )
     loss.set_keys(
-        action=ACTION,
+        action=DRAWN,
         sample_log_prob=LOG_PROBABILITY,
         value=VALUE,
         reward=REWARD,

@@ -1,4 +1,4 @@
-"""``posse train``: from settings to a policy that ships. It reads top to bottom in the order it runs."""
+"""``posse train``: from settings to a policy that ships. It reads in the order it runs."""
 
 from __future__ import annotations
 
@@ -14,12 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import posse
 import torch
-from posse_baselines import load
-from posse_baselines.encoding import Encoding
-from posse_baselines.learned import LearnedPolicy
-from posse_baselines.policy import PolicyError
 from rich.console import Console
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -28,6 +23,11 @@ from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.noise import NormalActionNoise
 from torch import nn
 
+import posse
+from posse_baselines import load
+from posse_baselines.encoding import Encoding
+from posse_baselines.learned import LearnedPolicy
+from posse_baselines.policy import PolicyError
 from posse_training.centralized_critic import CentralizedCriticPolicy
 from posse_training.checkpoint import (
     SETTINGS,
@@ -48,6 +48,7 @@ from posse_training.evaluation import evaluate
 from posse_training.export import export, make_card
 from posse_training.imitation import imitate
 from posse_training.normalisation import Normaliser, RunningStatistics
+from posse_training.rollout_buffer import FlatRolloutBuffer
 from posse_training.sb3_vec_env import TeamVecEnv
 from posse_training.settings import SettingsError, TrainSettings, read_settings
 from posse_training.statistics import mean
@@ -58,12 +59,11 @@ LAST: Final = "last.safetensors"
 CURVE: Final = "curve.csv"
 _ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 _WARM_WORLDS: Final = 32
+_EXPLORATION: Final = 0.1  # deviation of the noise that td3 adds to its actions
 _STATISTICS_EVERY: Final = 8  # rows of a rollout that statistics are made from: one of so many
 
 
-def train(
-    settings: TrainSettings, *, console: Console | None = None, resume: bool = False
-) -> Path:
+def train(settings: TrainSettings, *, console: Console | None = None, resume: bool = False) -> Path:
     """Train a policy; return the file of the one that did best on validation worlds.
 
     Args:
@@ -85,7 +85,7 @@ def train(
         env = make_env(settings)
         model = make_model(settings, env)
         model.set_logger(make_logger(folder, settings))
-        statistics = RunningStatistics(env.observation_space.shape[0])  # type: ignore[index]
+        statistics = RunningStatistics(env.observation_size)
         display.beside(score_beside(settings, display))
         training = Training(settings, folder, env, model, statistics, display)
         if saved is not None:
@@ -129,7 +129,7 @@ def resume(folder: Path, *, console: Console | None = None, steps: int | None = 
 def open_run(
     folder: Path, settings: TrainSettings, resume: bool
 ) -> tuple[Arrays, dict[str, Any]] | None:
-    """Prepare a run folder; return its checkpoint, or ``None`` where there is nothing to go on from.
+    """Prepare a run folder; return its checkpoint, or ``None`` where there is none to go on from.
 
     Raises:
         RunFolderError: It holds a run, and is not to be gone on with; or it cannot be written to.
@@ -192,7 +192,8 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
         "features_extractor_class": Normaliser,
     }
     if not s.on_policy:
-        noise = NormalActionNoise(np.zeros(env.action_space.shape), np.full(env.action_space.shape, 0.1))  # type: ignore[arg-type]
+        shape = env.action_shape
+        noise = NormalActionNoise(np.zeros(shape), np.full(shape, _EXPLORATION))
         return (SAC if s.algorithm == "sac" else TD3)(
             "MlpPolicy",
             env,
@@ -223,6 +224,7 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
         clip_range=s.clip,
         ent_coef=s.entropy,
         vf_coef=s.value_weight,
+        rollout_buffer_class=FlatRolloutBuffer,
         policy_kwargs={**network, "log_std_init": s.log_deviation},
         stats_window_size=500,
         seed=s.seed,
@@ -272,15 +274,15 @@ def first_statistics(
     warm = make_env(few)
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
-    shape = (warm.num_envs, *env.action_space.shape)  # type: ignore[misc]
+    shape = (warm.num_envs, *warm.action_shape)
     for step in range(max(batch.scenario.horizon for batch in warm.batches)):
         if step % 20 == 0:
             actions = generator.uniform(-1, 1, shape).astype(np.float32)
-        statistics.add(warm.step(actions)[0])
+        statistics.add(np.asarray(warm.step(actions)[0]))
 
 
 def score_beside(settings: TrainSettings, display: Display) -> float | None:
-    """Return another policy's score on the validation worlds, or ``None`` if there is no such policy."""
+    """Return another policy's score on the validation worlds; ``None``: no such policy."""
     if settings.beside is None:
         return None
     display.note(f"playing {settings.beside} on the validation worlds")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+
 from posse import Batch
 from posse.arrays import FloatArray, Records
 from posse.compiled import kernel

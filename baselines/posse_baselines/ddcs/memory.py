@@ -33,6 +33,7 @@ MIND: Final = _record(
     ("age", _F),  # of the fix, s
     ("known", _I),  # 1: there is an estimate that is not too old
     ("sees", _I),  # 1: its own sensor has the target
+    ("horizon", _F),  # distance within which every team-mate that is heard is listed, m
     ("usual_gap", _F),  # about the longest silence of a team-mate lately, s
     ("usual_age", _F),  # about the usual age of the fix, s
     # tracking

@@ -122,11 +122,15 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
     if not s.radio:
         return
     hc, hs = float(o[f.heading]), float(o[f.heading + 1])
+    d.horizon = 0.0
     for p in range(f.neighbours):
         k = p * f.stride
         number = int(o[f.neighbour_number + k])
         if number < 0:
             continue
+        # Nearest first: whoever is not in the list is farther away than its last, or not heard.
+        if o[f.neighbour_age + k] < s.lost_after:
+            d.horizon = float(o[f.neighbour_range + k])
         mate = mates[number]
         sent = d.step - int(round(o[f.neighbour_age + k] / f.dt))
         if sent <= mate.step:
@@ -161,7 +165,7 @@ def is_there(f: Record, s: Record, d: Record, mate: Record, size: int) -> bool:
     """Say whether a team-mate counts as working and in reach."""
     if mate.step < 0:
         return False
-    time = patience(s, d) if f.neighbours >= size - 1 else s.claim_memory
+    time = patience(s, d) if f.neighbours >= size - 1 else s.unseen_memory
     return bool((d.step - mate.step) * f.dt <= time)
 
 

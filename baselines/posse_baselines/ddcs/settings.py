@@ -48,7 +48,7 @@ class Settings:
     """Share of a new fix in the estimate of the position, (0, 1]."""
     lost_after: float = 1.5
     """A team-mate, or the leader's pulse, not heard for this long is gone."""
-    claim_memory: float = 10.0
+    unseen_memory: float = 2.5
     """The same, for team-mates who may just have had no place in the observation."""
     target_lost_after: float = 10.0
     """A fix older than this is no longer followed: the target is lost."""
@@ -77,7 +77,7 @@ class Settings:
     """How fast the ring grows on which it does so, m/s."""
 
     # laws
-    gain: float = 2.0
+    gain: float = 1.5
     """Of the Cartesian slot law."""
     range_gain: float = 1.0
     """k_r of the polar law, and of the range in pursuit."""
@@ -101,6 +101,9 @@ class Settings:
     """Free width that is kept to robots and walls."""
     target_margin: float = 0.2
     """Free width that is kept to the target."""
+    age_margin: float = 0.15
+    """By how much more the margin of a team-mate is widened, for each second of its message's age,
+    m/s."""
     echo_margin: float = 0.25
     """Free width that is kept to what the sonar finds and nobody explains."""
 

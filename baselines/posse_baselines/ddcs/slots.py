@@ -17,6 +17,8 @@ from posse_baselines.steering import intercept_time
 
 _IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
 _HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos
+_IN_PLACE = 0.4  # m; nearer to a slot than this, a tracker is in it
+_EQUALLY_NEAR = 0.1  # m
 _RESERVED = 1e4  # s; what a slot costs that belongs to another
 
 
@@ -59,6 +61,17 @@ def choose_slot(
         elif is_there(f, s, d, mates[j], n):
             held, heading = mates[j].slot, float(mates[j].theta)
             at_x, at_y = mate_now(f, s, d, mates[j])
+        elif f.neighbours < n - 1 and mates[j].slot >= 0:
+            # No place for it in the observation, but it said which slot is its own. Were it there
+            # still, and near, it would have a place.
+            slot_x, slot_y, _, _ = slot_place(d, slots[mates[j].slot])
+            if math.hypot(slot_x - x, slot_y - y) < d.horizon - _IN_PLACE:
+                mates[j].slot = -1
+                continue
+            for k in range(n):
+                cost[rows, k] = 0.0 if k == mates[j].slot else _RESERVED
+            rows += 1
+            continue
         else:
             continue
         ahead_x, ahead_y = math.cos(heading), math.sin(heading)
@@ -83,4 +96,35 @@ def choose_slot(
             cost[rows, k] = time + 1e-4 * j
         rows += 1
     assign(cost, rows, n, work)
+    if loses_slot(f, s, d, mates, slots, own, int(work[0, mine]), x, y):
+        cost[mine, int(work[0, mine])] = _RESERVED
+        assign(cost, rows, n, work)
     d.slot = int(work[0, mine])
+
+
+@compiled
+def loses_slot(
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    slots: Records,
+    own: int,
+    slot: int,
+    x: float,
+    y: float,
+) -> bool:
+    """Say whether a team-mate that says it holds a slot has the better right to it.
+
+    The nearer one; of two that are equally near, the one of the lower number. Both come to the same
+    answer, though each may know of others that the other does not.
+    """
+    slot_x, slot_y, _, _ = slot_place(d, slots[slot])
+    mine = math.hypot(slot_x - x, slot_y - y)
+    for j in range(len(mates)):
+        if j != own and mates[j].slot == slot and is_there(f, s, d, mates[j], len(mates)):
+            at_x, at_y = mate_now(f, s, d, mates[j])
+            other = math.hypot(slot_x - at_x, slot_y - at_y)
+            if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < own):
+                return d.slot == slot
+    return False

@@ -11,7 +11,8 @@ from posse_baselines.safeguard import put_disc, put_wall
 
 _NEAR = 3.0  # m; farther things are no danger yet
 _NOTHING = 1e-3  # m; a reading this near to the sonar's reach means that nothing is there
-_EXPLAINED = 0.15  # m; an echo this near to the expected one needs no other explanation
+_EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
+_MOST_AGE = 0.7  # s; a team-mate is not made wider for an older message
 _FORGOTTEN = 30.0  # s; where a team-mate that long silent stands is anybody's guess
 
 
@@ -91,9 +92,11 @@ def surround(
         dx, dy = mx - x, my - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
             vx, vy = float(mate.speed_x), float(mate.speed_y)
-            if (d.step - mate.step) * f.dt > patience(s, d):
+            age = (d.step - mate.step) * f.dt
+            if age > patience(s, d):
                 vx, vy = 0.0, 0.0
-            count = put_disc(discs, count, dx, dy, vx, vy, two, s.margin)
+            margin = s.margin + s.age_margin * min(age, _MOST_AGE)
+            count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
             if listening:
                 expect_disc(f, beams, dx * c + dy * sn, dy * c - dx * sn, radius, echo)
     if f.walled:

@@ -1,0 +1,124 @@
+"""The command line: quick where nothing is learned, clear where something is wrong."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import pytest
+from stable_baselines3 import PPO
+
+import posse
+import posse_baselines
+from posse_training.cli import COMMANDS, main
+from posse_training.settings import (
+    ALGORITHMS,
+    SettingsError,
+    TrainSettings,
+    default_settings,
+)
+
+
+def test_listing_the_scenarios_does_not_load_torch() -> None:
+    code = (
+        "import sys; from posse_training.cli import main; status = main(['scenarios']);"
+        "print(status, 'torch' in sys.modules, 'matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1] == "0 False False", done.stderr
+    assert all(name in done.stdout for name in posse.scenario_names())
+
+
+def test_all_settings_of_a_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenarios", "radio"]) == 0
+    assert "radio_loss" in capsys.readouterr().out
+
+
+def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fly"], "unknown command 'fly'"),
+        (["scenarios", "smrt"], "did you mean 'smart'"),
+        (["train", "--scenario", "smrt"], "did you mean 'smart'"),
+        (["train", "--algorithm", "dqn"], "unknown algorithm 'dqn'"),
+        (["watch", "nobody"], "unknown policy 'nobody'"),
+    ],
+)
+def test_mistakes_are_named(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "run"
+    arguments = (
+        "train --scenario constant --steps 1_280 --num-worlds 4 --team-sizes 2 --hidden 8 8 "
+        "--rollout 40 --minibatch 80 --evaluate-worlds 2 --beside None --no-tensorboard "
+        f"--overrides horizon 40 settle_time 1.0 --folder {folder}"
+    )
+    assert main(arguments.split()) == 0
+    settings = json.loads((folder / "settings.json").read_text())
+    assert settings["steps"] == 1280
+    assert settings["overrides"] == {"horizon": 40, "settle_time": 1.0}
+    assert main(arguments.split()) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert main(["train", "--resume", str(folder), "--steps", "1600"]) == 0
+    assert json.loads((folder / "settings.json").read_text())["steps"] == 1600
+
+
+def test_watch_writes_a_film(tmp_path: Path) -> None:
+    path = tmp_path / "film.gif"
+    options = ["--scenario", "paper-distributed", "--num-trackers", "2", "--gif", str(path)]
+    assert main(["watch", "pursuit", *options]) == 0
+    assert path.read_bytes()[:4] == b"GIF8"
+
+
+class TestSettings:
+    @pytest.mark.parametrize("algorithm", ALGORITHMS)
+    @pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio"])
+    def test_every_scenario_has_defaults(self, scenario: str, algorithm: str) -> None:
+        settings = default_settings(scenario, algorithm)
+        assert TrainSettings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"steps": 0}, "steps=0 must be at least 1"),
+            ({"minibatch": 1}, "minibatch=1"),
+            ({"discount": 1.5}, "discount=1.5"),
+            ({"hidden": ()}, "hidden"),
+            ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
+            ({"imitate": "pursuit", "algorithm": "sac"}, "imitate"),
+            ({"learning_rate": float("nan")}, "learning_rate=nan"),
+        ],
+    )
+    def test_impossible_settings(self, changes: dict[str, Any], message: str) -> None:
+        with pytest.raises(SettingsError, match=message):
+            replace(TrainSettings(), **changes)
+
+    def test_unknown_settings(self) -> None:
+        with pytest.raises(SettingsError, match="unknown setting 'stepz'"):
+            TrainSettings.from_dict({"stepz": 3})
+
+
+@pytest.mark.parametrize("name", ["posse/Solo-v0", "posse/Tracker-v0"])
+def test_environments_with_one_learner_need_no_adapter(name: str) -> None:
+    assert posse_baselines  # registers posse/Tracker-v0
+    env = gym.make(name, scenario="constant")
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    before = [p.detach().clone() for p in model.policy.parameters()]
+    model.learn(128)
+    assert any((a != b).any() for a, b in zip(before, model.policy.parameters(), strict=True))
