@@ -24,7 +24,7 @@ from posse_baselines.policy import (
 )  # fmt: skip
 from posse_baselines.safeguard import BODY, DISC, command, put_disc, put_wall, safe_velocity
 from posse_baselines.steering import (
-    approach_velocity, intercept_time, write_motion,
+    approach_velocity, intercept_time, way_round, write_motion,
 )  # fmt: skip
 
 _MOST_DISCS: Final = 24
@@ -63,6 +63,8 @@ class OracleSettings:
     """The target is taken to keep its present velocity for about so long, s, then its mean one."""
     mean_time: float = 6.0
     """Time constant of that mean, s."""
+    clearance: float = 0.75
+    """Distance at which the way to a slot leads round the target, m."""
     margin: float = 0.15
     """Free width that it keeps, m."""
 
@@ -210,7 +212,8 @@ def lead(
         slot = slots[plans[i].slot]
         arm_x = slot.x * w.frame_cos - slot.y * w.frame_sin
         arm_y = slot.x * w.frame_sin + slot.y * w.frame_cos
-        x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
+        round_x, round_y = way_round(t.x - w.x, t.y - w.y, arm_x, arm_y, s.clearance)
+        x, y = w.x + round_x - t.x, w.y + round_y - t.y
         time = intercept_time(x, y, vx, vy, speed)
         ahead = 1.0
         if time > dt:

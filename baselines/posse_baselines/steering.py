@@ -13,6 +13,8 @@ from posse_baselines.guidance import clip
 NEVER: Final = 1e6
 """s. What stands for a meeting that does not happen."""
 
+_LEAST_TURN: Final = 0.6
+"""rad. How far round at least a tracker heads that is on the circle, or inside it."""
 _SPEED_LEFT: Final = 0.8
 """Share of the greatest deceleration that a planned approach uses."""
 
@@ -53,6 +55,33 @@ def approach_velocity(
     return cartesian_slot_velocity(
         offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
     )
+
+
+@compiled
+def way_round(
+    from_x: float, from_y: float, to_x: float, to_y: float, clearance: float
+) -> tuple[float, float]:
+    """Return where to head for, on the way from one place to another round the origin (m).
+
+    The place itself where the straight way keeps ``clearance`` from the origin; else the point at
+    which the tangent of that circle touches it, on the side of the shorter way.
+    """
+    way_x, way_y = to_x - from_x, to_y - from_y
+    square = way_x * way_x + way_y * way_y
+    along = -(from_x * way_x + from_y * way_y)
+    if along <= 0.0 or along >= square:
+        return to_x, to_y
+    crossing = from_x * way_y - from_y * way_x
+    if crossing * crossing >= clearance * clearance * square:
+        return to_x, to_y
+    distance = math.hypot(from_x, from_y)
+    angle = math.acos(min(1.0, clearance / max(distance, 1e-6)))
+    angle = max(angle, _LEAST_TURN)
+    if crossing < 0.0:
+        angle = -angle
+    c, s = math.cos(angle), math.sin(angle)
+    scale = clearance / max(distance, 1e-6)
+    return (from_x * c - from_y * s) * scale, (from_x * s + from_y * c) * scale
 
 
 @compiled

@@ -19,6 +19,7 @@ from tensordict.nn import (
     TensorDictSequential,
 )
 from torch import nn
+from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import (
     IndependentNormal,
     ProbabilisticActor,
@@ -168,7 +169,8 @@ def roll_out(
     """Play for some steps; return them (E, T), and what the next rollout goes on from."""
     made = []
     for _ in range(steps):
-        carried = actor(carried)
+        with set_exploration_type(ExplorationType.RANDOM):  # an actor plays its means otherwise
+            carried = actor(carried)
         carried[ACTION] = carried[DRAWN].clamp(-1.0, 1.0)
         made_step, carried = env.step_and_maybe_reset(carried)
         made.append(made_step)

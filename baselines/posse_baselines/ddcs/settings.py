@@ -96,6 +96,9 @@ class Settings:
     leave_margin: float = 0.8
     """Range beyond the wanted one at which it begins again."""
 
+    clearance: float = 0.75
+    """Distance at which the way to a slot leads round the target."""
+
     # safeguard
     margin: float = 0.15
     """Free width that is kept to robots and walls."""

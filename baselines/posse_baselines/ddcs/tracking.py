@@ -15,7 +15,7 @@ from posse_baselines.guidance import (
     deviation, lawful_heading, line_of_sight, next_stage, pursuit_speed, wrap,
 )  # fmt: skip
 from posse_baselines.safeguard import BODY
-from posse_baselines.steering import approach_velocity, intercept_time
+from posse_baselines.steering import approach_velocity, intercept_time, way_round
 
 CENTRALIZED: Final = 1
 POLAR: Final = 1
@@ -72,7 +72,8 @@ def on_target(
     """Return the velocity (m/s) that takes up the slot on the target; notes the distance from it."""
     place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
     d.error = math.hypot(place_x - x, place_y - y)
-    dx, dy = place_x - x, place_y - y
+    round_x, round_y = way_round(x - d.now_x, y - d.now_y, arm_x, arm_y, s.clearance)
+    dx, dy = d.now_x + round_x - x, d.now_y + round_y - y
     vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
     if s.guidance == POLAR:
         r, sigma = line_of_sight(x, y, d.now_x, d.now_y)
