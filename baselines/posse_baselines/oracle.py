@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,11 +20,19 @@ from posse_baselines.assignment import WORK_ROWS, assign
 from posse_baselines.guidance import wrap
 from posse_baselines.parallel import most_parts, over_worlds
 from posse_baselines.policy import (
-    BasePolicy, Memory, PolicyError, check_fits, check_observations, message_size_of,
+    BasePolicy,
+    Memory,
+    PolicyError,
+    check_fits,
+    check_observations,
+    message_size_of,
 )  # fmt: skip
 from posse_baselines.safeguard import BODY, DISC, command, put_disc, put_wall, safe_velocity
 from posse_baselines.steering import (
-    approach_velocity, intercept_time, way_round, write_motion,
+    approach_velocity,
+    intercept_time,
+    way_round,
+    write_motion,
 )  # fmt: skip
 
 _MOST_DISCS: Final = 24
@@ -95,7 +103,7 @@ class Oracle(BasePolicy):
     """
 
     name = "oracle"
-    reads_state: ClassVar[bool] = True
+    reads_state: bool = True
 
     def __init__(self, settings: OracleSettings | None = None) -> None:
         self.settings = settings or OracleSettings()
@@ -277,7 +285,13 @@ def plan(
 
 @compiled
 def surround(
-    c: Record, w: Record, trackers: Records, obstacles: Records, i: int, margin: float, discs: Records
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    i: int,
+    margin: float,
+    discs: Records,
 ) -> int:
     """List what is near tracker i; return how many things that are."""
     t = trackers[i]
@@ -285,7 +299,14 @@ def surround(
     dx, dy = w.x - t.x, w.y - t.y
     if dx * dx + dy * dy < _NEAR * _NEAR:
         count = put_disc(
-            discs, count, dx, dy, w.speed * w.heading_cos, w.speed * w.heading_sin, two, 2.0 * margin
+            discs,
+            count,
+            dx,
+            dy,
+            w.speed * w.heading_cos,
+            w.speed * w.heading_sin,
+            two,
+            2.0 * margin,
         )
     for j in range(c.num_trackers):
         other = trackers[j]

@@ -1,4 +1,4 @@
-"""Kernels over worlds, spread over threads: worlds know nothing of each other, so results are equal."""
+"""Kernels over worlds, spread over threads; worlds know nothing of each other."""
 
 from __future__ import annotations
 

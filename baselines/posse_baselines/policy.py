@@ -1,7 +1,7 @@
 """What a policy is, and how one is played: in a batch, or beside a PettingZoo environment.
 
-A policy drives the whole team, batch first (E worlds, N trackers, F numbers an observation, m numbers
-a message)::
+A policy drives the whole team, batch first (E worlds, N trackers, F numbers an observation, m
+numbers a message)::
 
     memory = policy.begin(batch.layout, batch.num_worlds)
     actions, memory = policy.act(observations, memory)      # (E, N, F) -> (E, N, 2 + m)
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -84,7 +84,7 @@ class BasePolicy:
 
     name: str = ""
     message_size: int = 0
-    reads_state: ClassVar[bool] = False
+    reads_state: bool = False
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Check that the layout fits, and return the memory of ``num_worlds`` worlds."""
@@ -124,7 +124,10 @@ def check_fits(policy: Policy | BasePolicy, layout: ObservationLayout) -> None:
 
 
 def check_observations(
-    policy: Policy | BasePolicy, observations: npt.ArrayLike, num_worlds: int, layout: ObservationLayout
+    policy: Policy | BasePolicy,
+    observations: npt.ArrayLike,
+    num_worlds: int,
+    layout: ObservationLayout,
 ) -> FloatArray:
     """Return the observations as kernels take them.
 
@@ -142,7 +145,7 @@ def check_observations(
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
-    """Return the memory of a policy that is to play in a batch; shows the state to one that reads it.
+    """Return the memory of a policy for a batch; one that reads the state is shown the batch.
 
     Raises:
         PolicyError: The policy does not fit the batch.
@@ -252,7 +255,7 @@ def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
 def split_agents(
     actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]
 ) -> dict[str, FloatArray]:
-    """Return actions (1, N, 2 + m) by the name of the tracker, for the trackers among ``agents``."""
+    """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
     return {
         name: actions[0, int(name.removeprefix("tracker_"))]
         for name in agents

@@ -12,7 +12,13 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled, kernel
 from posse_baselines.offsets import offsets_of
 from posse_baselines.parallel import over_worlds
-from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    check_fits,
+    check_observations,
+    message_size_of,
+)
 
 _KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
 _STOP: Final = 0.9  # distance from the target at which it stops, m
@@ -65,7 +71,12 @@ def pursue(f: Record, o: FloatArray, action: FloatArray) -> None:
 
 @kernel
 def pursue_all(
-    offsets: Records, observations: FloatArray, actions: FloatArray, part: int, first: int, last: int
+    offsets: Records,
+    observations: FloatArray,
+    actions: FloatArray,
+    part: int,
+    first: int,
+    last: int,
 ) -> None:
     """Write the actions of worlds ``first`` to ``last``."""
     f = offsets[0]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posse_baselines.ddcs import DDCS, Settings
+from posse_baselines.learned import LearnedPolicy
 from posse_baselines.oracle import Oracle
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.pursuit import Pursuit
@@ -27,7 +28,7 @@ _MAKERS: Final[dict[str, Callable[[], Policy]]] = {
     "pngl": lambda: DDCS(Settings(guidance="pngl"), "pngl"),
     "oracle": Oracle,
 }
-_FILES: Final[dict[str, Callable[[Path], Policy]]] = {}
+_FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file}
 """Readers of policy files, by suffix: whoever brings a kind of file adds its reader here."""
 
 

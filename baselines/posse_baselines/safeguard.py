@@ -1,7 +1,7 @@
 """The safeguard: the velocity nearest to the wanted one that runs into nothing.
 
-What surrounds a tracker is a list of discs, each with a velocity: team-mates, the target, obstacles,
-walls. A velocity is judged by playing out how the robot takes it up within its limits, since a
+What surrounds a tracker is a list of discs, each with a velocity: team-mates, the target,
+obstacles, walls. A velocity is judged by playing out how the robot takes it up within its limits, since a
 unicycle moves on for a while as it does now: how long it would spend too near to anything, whether
 and when it would touch, and how far it ends from where the wanted velocity leads.
 """
@@ -83,7 +83,7 @@ def put_disc(
     reach: float,
     margin: float,
 ) -> int:
-    """Add a disc to a list of ``count`` entries; return the new count. A full list stays as it is."""
+    """Add a disc to a list of ``count``; return the new count. A full list stays as it is."""
     if count >= len(discs):
         return count
     d = discs[count]
@@ -108,7 +108,7 @@ def put_wall(
 
 @compiled
 def turn_command(body: Record, error: float, time: float) -> float:
-    """Return the turn rate (rad/s) that brings a heading error (rad) to zero without overshooting."""
+    """Return the turn rate (rad/s) that ends a heading error (rad) without overshooting."""
     most = math.sqrt(2.0 * _BRAKING_SHARE * body.turn_acceleration * abs(error))
     return clip(error / time, -min(most, body.max_omega), min(most, body.max_omega))
 
@@ -124,7 +124,7 @@ def cost_of(
     wanted_y: float,
     enough: float,
 ) -> tuple[float, float]:
-    """Return (cost, danger) of taking up a speed (m/s) and heading (rad); gives up above ``enough``.
+    """Return (cost, danger) of taking up a speed (m/s) and heading (rad); stops above ``enough``.
 
     The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a
     price for a contact, the higher the sooner. The cost adds how far the robot ends from where the

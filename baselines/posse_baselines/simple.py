@@ -10,7 +10,13 @@ from posse import ObservationLayout
 from posse.arrays import FloatArray
 from posse.compiled import kernel
 from posse.randomness import mix
-from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    check_fits,
+    check_observations,
+    message_size_of,
+)
 
 _ONE: Final = np.float32(1.0)
 _SHIFT: Final = np.uint64(40)
@@ -49,7 +55,7 @@ class Random(BasePolicy):
     name = "random"
 
     def __init__(self, seed: int = 0) -> None:
-        if not isinstance(seed, int) or not 0 <= seed < 2**63:
+        if not 0 <= seed < 2**63:
             raise ValueError(f"seed={seed!r} must be a whole number in [0, 2**63)")
         self.seed = seed
 
@@ -69,7 +75,7 @@ class Random(BasePolicy):
 
 @kernel
 def draw_from_observations(words: FloatArray, seed: np.uint64, actions: FloatArray) -> None:
-    """Fill actions (E, N, A) with draws keyed by the seed and by observations (E, N, F) as words."""
+    """Fill actions (E, N, A) with draws keyed by the seed and observations (E, N, F) as words."""
     for e in range(words.shape[0]):
         for i in range(words.shape[1]):
             key = mix(seed, np.uint64(i))

@@ -52,9 +52,7 @@ def approach_velocity(
     distance = math.hypot(offset_x, offset_y)
     if distance > 1e-6:
         gain = min(gain, math.sqrt(2.0 * _SPEED_LEFT * deceleration / distance))
-    return cartesian_slot_velocity(
-        offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
-    )
+    return cartesian_slot_velocity(offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed)
 
 
 @compiled

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+
 from posse import ObservationLayout, Scenario, ScenarioError
 from posse.actions import ActionReader, single_action_space
 from posse.arrays import FloatArray
@@ -19,7 +20,6 @@ from posse.single_world import (
     shortened,
 )
 from posse.spaces import box
-
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
@@ -171,7 +171,7 @@ def _check(scenario: Scenario, number: int) -> None:
         raise ScenarioError(
             f"num_trackers={scenario.num_trackers} leaves no team-mates: use posse/Solo-v0"
         )
-    if not isinstance(number, int) or not 0 <= number < scenario.num_trackers:
+    if number not in range(scenario.num_trackers):
         raise ValueError(
             f"number={number!r} is not in the team: trackers are 0 to {scenario.num_trackers - 1}"
         )
@@ -180,6 +180,4 @@ def _check(scenario: Scenario, number: int) -> None:
 def register() -> None:
     """Make ``posse/Tracker-v0`` known to Gymnasium, once however often it is called."""
     if "posse/Tracker-v0" not in gymnasium.registry:
-        gymnasium.register(
-            "posse/Tracker-v0", entry_point="posse_baselines.tracker_env:TrackerEnv"
-        )
+        gymnasium.register("posse/Tracker-v0", entry_point="posse_baselines.tracker_env:TrackerEnv")

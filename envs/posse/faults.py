@@ -1,4 +1,4 @@
-"""What goes wrong in an episode: trackers break for good, sensors and radios go dead for a while."""
+"""What goes wrong in an episode: trackers break for good, sensors and radios fail for a while."""
 
 from __future__ import annotations
 

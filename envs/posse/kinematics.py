@@ -27,9 +27,7 @@ _C56: Final = np.float32(1 / 56)
 
 
 @compiled
-def half_turn(
-    turn_rate: np.float32, time: np.float32
-) -> tuple[np.float32, np.float32, np.float32]:
+def half_turn(turn_rate: np.float32, time: np.float32) -> tuple[np.float32, np.float32, np.float32]:
     """Return (cos h, sin h, sin h / h) of half the turn, h = ω dt / 2, for |h| ≤ 0.5."""
     h = _HALF * turn_rate * time
     h2 = h * h

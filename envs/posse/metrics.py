@@ -1,7 +1,7 @@
 """What an episode is summed up by: the score, and beside it figures in physical units.
 
-To add a metric, write its function here under ``@metric``: it then arrives in ``info`` at the end of
-every episode. ``nan`` stands for "never happened".
+To add a metric, write its function here under ``@metric``: it then arrives in ``info`` at the end
+of every episode. ``nan`` stands for "never happened".
 """
 
 from __future__ import annotations
@@ -45,11 +45,13 @@ def metric(unit: str) -> Callable[[_Function], _Function]:
 
 
 def _per_step(sums: npt.NDArray[Any], worlds: Records) -> _Column:
-    return np.asarray(sums, np.float64) / np.maximum(worlds["step"], 1)
+    per_step: _Column = np.asarray(sums, np.float64) / np.maximum(worlds["step"], 1)
+    return per_step
 
 
 def _per_tracker_step(sums: npt.NDArray[Any], worlds: Records) -> _Column:
-    return np.asarray(sums, np.float64) / np.maximum(worlds["tracker_steps"], 1)
+    mean: _Column = np.asarray(sums, np.float64) / np.maximum(worlds["tracker_steps"], 1)
+    return mean
 
 
 def _time(steps: npt.NDArray[Any], scenario: Scenario) -> _Column:

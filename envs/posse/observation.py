@@ -1,8 +1,9 @@
 """The observation of one robot: a flat float32 vector, its fields declared by name.
 
 The fields come in five blocks. Each block's declaration stands above the function that writes it,
-so that adding a field touches one place. Directions are cosine and sine; *ego* means the robot's own
-frame, x ahead and y to the left; the *common frame* is the one that the team agreed on at the start.
+so that adding a field touches one place. Directions are cosine and sine; *ego* means the robot's
+own frame, x ahead and y to the left; the *common frame* is the one that the team agreed on at the
+start.
 A quantity that is not known holds the field's ``unknown`` value.
 """
 
@@ -68,9 +69,7 @@ def _most_turn(s: Scenario) -> float:
 
 
 @compiled
-def _write_own(
-    c: Record, robot: Record, touching: int, working: int, o: FloatArray, k: int
-) -> int:
+def _write_own(c: Record, robot: Record, touching: int, working: int, o: FloatArray, k: int) -> int:
     o[k] = robot.heading_cos
     o[k + 1] = robot.heading_sin
     o[k + 2] = robot.x
@@ -418,9 +417,7 @@ def observe_tracker(
     k = _write_target(c, w, t, o, k)
     ping(c, w, t, i, trackers, obstacles, beams, o[k : k + c.sonar_beams])
     k += c.sonar_beams
-    _write_neighbours(
-        c, w, trackers, i, heard, heard_message, message, nearest, o, k
-    )
+    _write_neighbours(c, w, trackers, i, heard, heard_message, message, nearest, o, k)
 
 
 @compiled
@@ -451,9 +448,7 @@ def observe_target(
         _write_no_neighbour(part)
         if p < filled:
             j = int(nearest[1, p])
-            _write_neighbour(
-                w.heading_cos, w.heading_sin, w.x, w.y, trackers[j], j, _ZERO, part
-            )
+            _write_neighbour(w.heading_cos, w.heading_sin, w.x, w.y, trackers[j], j, _ZERO, part)
 
 
 class ObservationLayout:
@@ -550,6 +545,4 @@ class ObservationLayout:
 
     def describe(self) -> list[dict[str, Any]]:
         """Return every field as a plain dictionary, in order, for files and tables."""
-        return [
-            {**field.__dict__, "offset": self.offsets[field.name]} for field in self.fields
-        ]
+        return [{**field.__dict__, "offset": self.offsets[field.name]} for field in self.fields]

@@ -26,7 +26,7 @@ def radio_works(c: Record, w: Record, t: Record) -> bool:
     """Say whether a tracker can send and hear now."""
     if t.broken_at != NEVER:
         return False
-    return w.step < t.radio_dead_from or w.step >= t.radio_dead_from + c.outage_steps
+    return bool(w.step < t.radio_dead_from or w.step >= t.radio_dead_from + c.outage_steps)
 
 
 @compiled
@@ -91,9 +91,9 @@ def hear(
             dx, dy = b.x - t.x, b.y - t.y
             if dx * dx + dy * dy > reach2:
                 continue
-            if c.radio_loss > _ZERO:
-                if uniform(w.key, w.step, RADIO_LOSS, i * n + j) < c.radio_loss:
-                    continue
+            lossy = c.radio_loss > _ZERO
+            if lossy and uniform(w.key, w.step, RADIO_LOSS, i * n + j) < c.radio_loss:
+                continue
             h = heard[i, j]
             h.step = sent_at
             h.x, h.y, h.heading_cos, h.heading_sin = b.x, b.y, b.heading_cos, b.heading_sin
@@ -141,4 +141,4 @@ def connected(c: Record, w: Record, trackers: Records) -> bool:
                         reached |= bit
         waiting &= ~reached
         frontier = reached
-    return waiting == _NO_BITS
+    return bool(waiting == _NO_BITS)

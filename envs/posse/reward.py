@@ -82,7 +82,7 @@ def effort(c: Record, w: Record, t: Record) -> np.float32:
     """(V / V_max)² + (ω / ω_max)² of the motion the tracker made."""
     v = t.speed / c.tracker_speed
     turn = t.turn_rate / c.tracker_turn_rate
-    return v * v + turn * turn
+    return np.float32(v * v + turn * turn)
 
 
 @reward_term("1")
@@ -112,7 +112,7 @@ def _chain(position: int) -> Any:
     ) -> np.float32:
         value = function(c, w, t)
         terms[position] = value
-        return weights[position] * value + rest(c, w, t, weights, terms)
+        return np.float32(weights[position] * value + rest(c, w, t, weights, terms))
 
     return compiled(write)
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.arrays import FloatArray, Record, Records
+from posse.arrays import Record, Records
 from posse.compiled import compiled
 from posse.radio import connected
 from posse.state import NEVER

@@ -16,7 +16,6 @@ from posse.compiled import compiled
 from posse.faults import draw_faults
 from posse.randomness import OBSTACLES, START, between, episode_key, uniform
 from posse.scenario import START_CLEARANCE
-from posse.state import NEVER
 from posse.target_motion import AGENT, draw_motion, has_free_circle
 
 _TRIES: Final = 2000

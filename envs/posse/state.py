@@ -75,7 +75,8 @@ WORLD: Final = _record(
     # what the metrics are worked out from
     ("working", _I),  # trackers that work
     ("score", _F),  # of the present step
-    ("score_sum", np.float64), ("error_sum", np.float64), ("sight_sum", _F), ("effort_sum", np.float64),
+    ("score_sum", np.float64), ("error_sum", np.float64), ("effort_sum", np.float64),
+    ("sight_sum", _F),
     ("bound_sum", _F), ("tracker_steps", _F), ("connected_sum", _F),
     ("held", _I),  # steps on end with every working tracker in a slot of its own
     ("settled_at", _I), ("detected_at", _I), ("lost_at", _I), ("recovered_at", _I),
@@ -246,7 +247,8 @@ def config_record(scenario: Scenario) -> Records:
     c.tracker_speed, c.tracker_turn_rate = s.tracker_speed, s.tracker_turn_rate
     c.speed_change = min(s.tracker_acceleration * c.physics_dt, FAR)
     c.turn_change = min(s.tracker_turn_acceleration * c.physics_dt, FAR)
-    c.target_speed, c.target_turn_rate, c.radius = s.target_speed, s.target_turn_rate, s.robot_radius
+    c.target_speed, c.target_turn_rate = s.target_speed, s.target_turn_rate
+    c.radius = s.robot_radius
     c.tolerance = s.tolerance
     most = min(s.slot_turn_rate * s.control_step, math.pi / 2)
     c.frame_c, c.frame_s = math.cos(most), math.sin(most)

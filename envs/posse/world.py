@@ -155,9 +155,7 @@ def observe(
             observations[i],
         )  # fmt: skip
     if c.motion == AGENT:
-        observe_target(
-            c, w, trackers, obstacles, beams, nearest, observations[c.num_trackers]
-        )
+        observe_target(c, w, trackers, obstacles, beams, nearest, observations[c.num_trackers])
 
 
 @compiled
@@ -266,7 +264,7 @@ def advance(
     first: int,
     last: int,
 ) -> int:
-    """Do what each world is ordered to, for worlds ``first`` to ``last``; the only loop over worlds.
+    """Do what each world is ordered to, for worlds ``first`` to ``last``; the one loop over worlds.
 
     ================== =============================================================================
     STEP               a control step; or, where the episode is over, the start of the next one

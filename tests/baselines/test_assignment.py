@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from posse_baselines.assignment import WORK_ROWS, assign
 from scipy.optimize import linear_sum_assignment
+
+from posse_baselines.assignment import WORK_ROWS, assign
 
 
 @settings(derandomize=True, database=None, deadline=None, max_examples=60)

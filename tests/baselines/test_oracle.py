@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import posse
 import pytest
+
+import posse
 from posse_baselines import PolicyError, begin, load, play
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import posse
 import pytest
+
+import posse
 from posse_baselines import (
     BasePolicy,
     Policy,
@@ -216,9 +217,9 @@ def test_a_parallel_environment_is_played_as_a_batch_of_one() -> None:
     batch = batch_for(policy, "constant", 1)
     rows = batch.reset()[0]
     agents = ["tracker_3", "target_0", "tracker_0", "tracker_1", "tracker_4", "tracker_2"]
-    observations = {
-        name: rows[int(name[-1])] for name in agents if name.startswith("tracker")
-    } | {"target_0": rows[0]}
+    observations = {name: rows[int(name[-1])] for name in agents if name.startswith("tracker")} | {
+        "target_0": rows[0]
+    }
     stacked = stack_agents(observations)
     np.testing.assert_array_equal(stacked[0], rows)
     actions, _ = policy.act(stacked, policy.begin(batch.layout, 1))

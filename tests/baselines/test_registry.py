@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from posse_baselines import Policy, PolicyError, load, policy_names
 from posse_baselines.ddcs import DDCS
 

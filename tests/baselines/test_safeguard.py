@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from posse_baselines.safeguard import BODY, DISC, command, put_disc, put_wall, safe_velocity
 
 DT = 0.1

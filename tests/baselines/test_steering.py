@@ -6,6 +6,7 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from posse_baselines.steering import NEVER, approach_velocity, intercept_time
 
 PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)

@@ -1,13 +1,16 @@
+from typing import Any
+
 import gymnasium
 import numpy as np
-import posse
-import posse_baselines
 import pytest
 from gymnasium.utils.env_checker import check_env
+
+import posse
+import posse_baselines
 from posse_baselines import PolicyError, begin, load
 from posse_baselines.tracker_env import TrackerEnv
 
-SHORT = {"horizon": 40}
+SHORT: dict[str, Any] = {"horizon": 40}
 
 
 @pytest.mark.parametrize("scenario", ["constant", "obstacles", "field"])

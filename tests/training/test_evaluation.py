@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import posse
 import pytest
+
+import posse
 from posse.arrays import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 from posse_training import evaluate

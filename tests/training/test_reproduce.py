@@ -2,10 +2,12 @@ import json
 from pathlib import Path
 
 import numpy as np
-import posse
 import pytest
+
+import posse
 from posse_training.reproduce import (
     EXPERIMENTS,
+    Floats,
     Recording,
     Settings,
     draw_starts,
@@ -14,7 +16,7 @@ from posse_training.reproduce import (
 )
 
 
-def recording(relative: np.ndarray, speeds: np.ndarray) -> Recording:  # type: ignore[type-arg]
+def recording(relative: Floats, speeds: Floats) -> Recording:
     """Return a recording of one world whose trackers move so relative to a target that runs on."""
     steps = len(relative)
     target = np.zeros((steps, 1, 3))

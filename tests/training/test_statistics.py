@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from scipy import stats
+
 from posse_training.statistics import (
     interquartile_mean,
     mean,
@@ -7,7 +9,6 @@ from posse_training.statistics import (
     probability_of_improvement,
     share,
 )
-from scipy import stats
 
 
 def test_the_interval_of_a_mean_agrees_with_the_normal_theory() -> None:

@@ -213,6 +213,7 @@ def test_a_collector_gathers_whole_batches() -> None:
         policy,
         frames_per_batch=8 * WORLDS,
         total_frames=16 * WORLDS,
+        trust_policy=True,  # a plain function, with nothing to adapt
         auto_register_policy_transforms=False,  # there are none, and it asks for an answer
     )
     data = torch.cat([part.clone() for part in collector], dim=1)

@@ -6,10 +6,10 @@ import time
 from pathlib import Path
 from typing import Final
 
-from posse_baselines import load
 from rich.console import Console
 from rich.table import Table
 
+from posse_baselines import load
 from posse_training.evaluation import Results, evaluate, progress_bar
 from posse_training.film import film
 from posse_training.statistics import Estimate, mean, share

@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
 import posse
 from posse import Scenario, get_scenario
 from posse_baselines import Policy, load, rollout
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
 from posse_training.statistics import Estimate, mean
 
 WORLDS_AT_ONCE: Final = 500
@@ -57,13 +57,15 @@ class Results:
     @property
     def settled(self) -> npt.NDArray[np.bool_]:
         """Which episodes saw the team settle, (episodes,)."""
-        return np.isfinite(self.columns["settling_time"])
+        settled: npt.NDArray[np.bool_] = np.isfinite(self.columns["settling_time"])
+        return settled
 
     @property
     def contacts(self) -> Column:
         """Contacts of any kind, (episodes,)."""
         kinds = ("tracker_contacts", "obstacle_contacts", "target_contacts")
-        return np.sum([self.columns[kind] for kind in kinds], axis=0)
+        total: Column = np.sum([self.columns[kind] for kind in kinds], axis=0)
+        return total
 
     def estimate(self, metric: str) -> Estimate:
         """Return the mean of a metric where it is a number, with its 95 % interval."""
@@ -133,8 +135,8 @@ def evaluate(
     if episodes < 1:
         raise ValueError(f"episodes={episodes} must be at least 1")
     refuse_trained_split(policy, split)
-    overrides = {**overrides, "message_size": policy.message_size}
     settings = get_scenario(scenario, **overrides)
+    settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
     if callable(progress):
         columns = _play_all(policy, settings, episodes, seed, split, num_threads, progress)
     else:

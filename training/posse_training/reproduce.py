@@ -1,4 +1,4 @@
-"""``posse reproduce``: the paper's section 4, figures 7 to 10, over one shown run and many drawn ones.
+"""``posse reproduce``: the paper's section 4, figures 7 to 10: one shown run, and many starts.
 
 The paper gives neither scale, gains nor starts; docs/reproduction.md says what was chosen.
 """
@@ -15,16 +15,17 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
-import posse
 import tyro
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from posse_baselines import begin, load
 from rich.console import Console
 from rich.table import Table
 
-Floats = npt.NDArray[np.float64]
+import posse
+from posse_baselines import begin, load
+
+Floats = npt.NDArray[np.floating[Any]]
 
 TARGET_HEADING: Final = math.pi
 """In the paper's figure 7 the target is the leftmost robot: it heads towards -x."""
@@ -238,7 +239,7 @@ def summary(experiment: Experiment, times: Floats) -> dict[str, Any]:
         "paper_settling_time": experiment.paper_settling_time,
         "shown_settling_time": None if np.isnan(times[0]) else float(times[0]),
         "settling_time_quartiles": quartiles,
-        "settled": int(len(known)),
+        "settled": len(known),
         "starts": len(times),
     }
 

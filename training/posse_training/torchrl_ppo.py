@@ -35,6 +35,7 @@ ACTION: Final = (TRACKERS, "action")
 DRAWN: Final = (TRACKERS, "drawn")
 """What the policy drew from its normal distribution; the action is that, cut to [-1, 1]."""
 REWARD: Final = (TRACKERS, "reward")
+REWARD_NEXT: Final = ("next", *REWARD)
 LOG_PROBABILITY: Final = (TRACKERS, "action_log_prob")
 VALUE: Final = (TRACKERS, "state_value")
 LOSSES: Final = ("loss_objective", "loss_critic", "loss_entropy")
@@ -182,7 +183,7 @@ def spread_flags(rollout: TensorDictBase) -> None:
 
     Truncated stays apart from terminated: at a truncation the value of what comes next counts.
     """
-    shape = rollout["next", *REWARD].shape
+    shape = rollout[REWARD_NEXT].shape
     for flag in ("done", "terminated"):
         flags = rollout["next", flag].unsqueeze(-2).expand(shape)
         rollout.set(("next", TRACKERS, flag), flags)
@@ -230,9 +231,6 @@ def train(
         if report is not None:
             report({**figures, "agent_steps": float(agent_steps)})
     return agent
-
-
-REWARD_NEXT: Final = ("next", *REWARD)
 
 
 def objectives(agent: Agent, settings: Settings) -> tuple[ClipPPOLoss, GAE]:

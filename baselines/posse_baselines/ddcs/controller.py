@@ -71,7 +71,7 @@ def decide(
             begin_search(f, d, seen)
         vx, vy = wander(f, s, d, mates, seen, own, x, y, body.theta, body.max_speed)
     else:
-        if d.slot < 0 or d.step % max(1, int(round(s.replan_time / f.dt))) == 0:
+        if d.slot < 0 or d.step % max(1, round(s.replan_time / f.dt)) == 0:
             choose_slot(
                 f, s, d, mates, slots, own, x, y, body.theta, body.max_speed, body.max_omega,
                 cost, work,
@@ -81,7 +81,7 @@ def decide(
         )
     d.task = next_task(s, d)
     # Actuation
-    count = surround(f, s, d, mates, own, x, y, body.theta, o, beams, echo, discs)
+    count = surround(f, s, d, mates, slots, own, x, y, body.theta, o, beams, echo, discs)
     vx, vy, _ = safe_velocity(body, discs, count, vx, vy)
     speed, omega = command(body, vx, vy)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)

@@ -1,10 +1,10 @@
 """Who leads: the nearest-neighbour rule of section 3.5, agreed on without a referee.
 
-A claim is a pair (term, leader). Everyone says which claim it holds and takes over a better one that
-it hears: the higher term; of equal terms, the leader of the lower number. Only two things make a new
-term: the leader finds another clearly nearer to the target and hands over, or a tracker has not
-heard of the leader for too long and appoints the nearest one that it knows. So the whole of a radio
-graph comes to hold one claim, and two parts that meet again agree on the higher one.
+A claim is a pair (term, leader). Everyone says which claim it holds and takes over a better one
+that it hears: the higher term; of equal terms, the leader of the lower number. Only two things make
+a new term: the leader finds another clearly nearer to the target and hands over, or a tracker has
+not heard of the leader for too long and appoints the nearest one that it knows. So the whole of a
+radio graph comes to hold one claim, and two parts that meet again agree on the higher one.
 
 A leader counts its steps aloud, and the others pass the highest count on. That is how a tracker
 several hops away knows that the leader is alive.
@@ -86,7 +86,7 @@ def settle_lead(
     if not s.exchange:
         return
     if d.leader == own:
-        if d.step % max(1, int(round(s.time_lag / f.dt))) == 0:
+        if d.step % max(1, round(s.time_lag / f.dt)) == 0:
             best, least, distance = nearest_tracker(f, s, d, mates, own, x, y, -1)
             if best != own and least < distance - s.lead_hysteresis:
                 appoint(d, best, (d.term + 1) % COUNT, 0)

@@ -24,7 +24,7 @@ def encode(value: int) -> float:
 @compiled
 def decode(number: float) -> int:
     """Return the whole number that :func:`encode` made a number of; any number is one."""
-    return int(round(number / _STEP)) - 1
+    return round(number / _STEP) - 1
 
 
 @compiled

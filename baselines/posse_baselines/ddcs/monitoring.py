@@ -54,7 +54,7 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
     dt = float(f.dt)
     d.sees = 1 if o[f.target_seen] > 0.0 else 0
     if o[f.target_known] > 0.0 and (s.radio or d.sees):
-        fix_step = d.step - int(round(o[f.target_age] / dt))
+        fix_step = d.step - round(o[f.target_age] / dt)
         if fix_step > d.fix_step:
             take_fix(f, s, d, o, fix_step, dt)
     d.known = 0
@@ -132,7 +132,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
         if o[f.neighbour_age + k] < s.lost_after:
             d.horizon = float(o[f.neighbour_range + k])
         mate = mates[number]
-        sent = d.step - int(round(o[f.neighbour_age + k] / f.dt))
+        sent = d.step - round(o[f.neighbour_age + k] / f.dt)
         if sent <= mate.step:
             continue
         if mate.step >= 0:
@@ -156,8 +156,8 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
 
 @compiled
 def patience(s: Record, d: Record) -> float:
-    """Return how long (s) a silence has to be to mean something: twice the usual ones, and a little."""
-    return min(s.lost_after, _LEAST_PATIENCE + 2.0 * d.usual_gap)
+    """Return how long (s) a silence has to be to mean something: twice the usual, and a bit."""
+    return float(min(s.lost_after, _LEAST_PATIENCE + 2.0 * d.usual_gap))
 
 
 @compiled

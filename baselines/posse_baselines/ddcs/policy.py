@@ -21,7 +21,12 @@ from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.offsets import offsets_of
 from posse_baselines.parallel import most_parts, over_worlds
 from posse_baselines.policy import (
-    Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of,
+    Annotations,
+    BasePolicy,
+    Memory,
+    check_fits,
+    check_observations,
+    message_size_of,
 )  # fmt: skip
 from posse_baselines.safeguard import BODY, DISC
 

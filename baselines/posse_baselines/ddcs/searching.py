@@ -28,10 +28,10 @@ def mark_seen(
     cell = 2.0 * f.area / GRID
     reach = f.sight
     x, y = x - d.area_x, y - d.area_y
-    low_i = max(0, int(math.floor((x - reach + f.area) / cell)))
-    low_j = max(0, int(math.floor((y - reach + f.area) / cell)))
-    high_i = min(GRID - 1, int(math.floor((x + reach + f.area) / cell)))
-    high_j = min(GRID - 1, int(math.floor((y + reach + f.area) / cell)))
+    low_i = max(0, math.floor((x - reach + f.area) / cell))
+    low_j = max(0, math.floor((y - reach + f.area) / cell))
+    high_i = min(GRID - 1, math.floor((x + reach + f.area) / cell))
+    high_j = min(GRID - 1, math.floor((y + reach + f.area) / cell))
     for i in range(low_i, high_i + 1):
         for j in range(low_j, high_j + 1):
             dx = (i + 0.5) * cell - f.area - x
@@ -52,10 +52,16 @@ def begin_search(f: Record, d: Record, seen: npt.NDArray[np.uint16]) -> None:
 
 @compiled
 def look_around(
-    f: Record, s: Record, d: Record, mates: Records, seen: npt.NDArray[np.uint16], x: float, y: float
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    seen: npt.NDArray[np.uint16],
+    x: float,
+    y: float,
 ) -> None:
     """Keep the map of where this tracker and those it hears have looked."""
-    if len(seen) == 0 or d.step % max(1, int(round(_LOOK_TIME / f.dt))) != 0:
+    if len(seen) == 0 or d.step % max(1, round(_LOOK_TIME / f.dt)) != 0:
         return
     mark_seen(f, d, seen, x, y, d.step)
     for j in range(len(mates)):

@@ -30,8 +30,8 @@ class Settings:
     """How a slot on the target is approached: ``"cartesian"`` or ``"polar"``; ``"pngl"``: no slots,
     but the paper's own spread, by one navigation constant K a tracker."""
     leader_law: str = "slot"
-    """Of the centralized model's leader: ``"pursuit"`` (velocity pursuit, K = 1, as in the paper) or
-    ``"slot"`` (it keeps the first slot)."""
+    """Of the centralized model's leader: ``"pursuit"`` (velocity pursuit, K = 1, as in the paper,
+    which is off its bearing while the target turns) or ``"slot"`` (it keeps the first slot)."""
     exchange: bool = True
     """Whether the lead ever passes on; without, the first leader stays leader, even broken."""
     radio: bool = True
@@ -68,6 +68,9 @@ class Settings:
     """Between two assignments."""
     loyalty: float = 0.6
     """How much sooner all would have to arrive with other slots for a tracker to change, s."""
+    taken_cost: float = 8.0
+    """How much later a tracker may arrive elsewhere than in a slot where its sonar finds somebody
+    who is not heard, s."""
     sight_worth: float = 10.0
     """How much later a tracker may arrive in a slot from which the target is in sight, s."""
     close_in_after: float = 0.25

@@ -1,4 +1,4 @@
-"""Who goes to which slot: everyone works out the assignment of all it knows, and takes its own part.
+"""Who goes to which slot: everyone works out the assignment of all it knows, and takes its part.
 
 Those who know the same come to the same result. Where they do not, as when messages are lost, the
 slots that trackers say they hold count for them (``loyalty``), and two that hold the same one are
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.assignment import assign
@@ -17,6 +19,8 @@ from posse_baselines.steering import intercept_time
 
 _IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
 _HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos
+_BIT = np.uint64(1)
+_NO_BITS = np.uint64(0)
 _IN_PLACE = 0.4  # m; nearer to a slot than this, a tracker is in it
 _EQUALLY_NEAR = 0.1  # m
 _RESERVED = 1e4  # s; what a slot costs that belongs to another
@@ -87,6 +91,8 @@ def choose_slot(
             time += _HALF_TURN * (1.0 - facing) / max_omega * min(1.0, time)
             if held == k:
                 time -= s.loyalty
+            if j == own and d.taken & (_BIT << np.uint64(k)) != _NO_BITS:
+                time += s.taken_cost
             # Where there are more slots than trackers, those that see the target are filled first.
             if slot.x * slot.x + slot.y * slot.y < (_IN_SIGHT * f.sight) ** 2:
                 time -= s.sight_worth
@@ -126,5 +132,5 @@ def loses_slot(
             at_x, at_y = mate_now(f, s, d, mates[j])
             other = math.hypot(slot_x - at_x, slot_y - at_y)
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < own):
-                return d.slot == slot
+                return bool(d.slot == slot)
     return False

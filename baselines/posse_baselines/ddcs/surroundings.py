@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.monitoring import mate_now, patience
+from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.safeguard import put_disc, put_wall
 
+_BIT = np.uint64(1)
+_NO_BITS = np.uint64(0)
+_SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
 _NEAR = 3.0  # m; farther things are no danger yet
 _NOTHING = 1e-3  # m; a reading this near to the sonar's reach means that nothing is there
 _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
@@ -50,10 +56,39 @@ def expect_wall(
 @compiled
 def hears_echo(f: Record, o: FloatArray) -> bool:
     """Say whether any sonar beam finds anything."""
-    for k in range(f.sonar_beams):
+    for k in range(f.sonar_beams):  # noqa: SIM110 (numba compiles no generator)
         if o[f.sonar + k] < f.sonar_range - _NOTHING:
             return True
     return False
+
+
+@compiled
+def slot_in_beam(
+    f: Record,
+    d: Record,
+    slots: Records,
+    x: float,
+    y: float,
+    theta: float,
+    beam_c: float,
+    beam_s: float,
+    reading: float,
+) -> int:
+    """Return the slot whose occupant would give this echo, or -1.
+
+    Where not all team-mates have a place in the observation, an echo from a slot is taken for one
+    of them, who moves with the formation.
+    """
+    c, s = math.cos(theta), math.sin(theta)
+    ux, uy = beam_c * c - beam_s * s, beam_s * c + beam_c * s
+    for k in range(len(slots)):
+        place_x, place_y, _, _ = slot_place(d, slots[k])
+        dx, dy = place_x - x, place_y - y
+        distance = math.hypot(dx, dy)
+        if abs(distance - 2.0 * f.radius - reading) < _SLOT_ECHO:
+            if dx * ux + dy * uy >= f.wide_beam * distance:
+                return k
+    return -1
 
 
 @compiled
@@ -62,6 +97,7 @@ def surround(
     s: Record,
     d: Record,
     mates: Records,
+    slots: Records,
     own: int,
     x: float,
     y: float,
@@ -71,7 +107,7 @@ def surround(
     echo: FloatArray,
     discs: Records,
 ) -> int:
-    """List what is near the tracker; return how many things that are. ``echo`` (S,) is work space."""
+    """List what is near the tracker; return how many things. ``echo`` (S,) is work space."""
     c, sn = math.cos(theta), math.sin(theta)
     listening = hears_echo(f, o)
     for k in range(f.sonar_beams):
@@ -109,11 +145,22 @@ def surround(
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
                 if listening:
                     expect_wall(f, beams, nx * c + ny * sn, ny * c - nx * sn, away, echo)
+    d.taken = _NO_BITS
     if not listening:
         return count
+    strangers = d.known != 0 and f.neighbours < len(mates) - 1
     for k in range(f.sonar_beams):
         reading = float(o[f.sonar + k])
         if reading < f.sonar_range - _NOTHING and reading < echo[k] - _EXPLAINED:
+            if strangers:
+                k_slot = slot_in_beam(f, d, slots, x, y, theta, beams[0, k], beams[1, k], reading)
+                if k_slot >= 0:
+                    d.taken |= _BIT << np.uint64(k_slot)
+                    place_x, place_y, arm_x, arm_y = slot_place(d, slots[k_slot])
+                    vx = d.speed * math.cos(d.now_theta) - d.psi_rate * arm_y
+                    vy = d.speed * math.sin(d.now_theta) + d.psi_rate * arm_x
+                    count = put_disc(discs, count, place_x - x, place_y - y, vx, vy, two, s.margin)
+                    continue
             # It may lie anywhere in the beam's width: a disc that fills most of it.
             wide = min(0.5, 0.4 * (reading + radius))
             away = reading + radius + wide

@@ -12,9 +12,13 @@ from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.formation_control import l_phi_demand, polar_slot_velocity, separation
 from posse_baselines.guidance import (
-    deviation, lawful_heading, line_of_sight, next_stage, pursuit_speed, wrap,
+    deviation,
+    lawful_heading,
+    line_of_sight,
+    next_stage,
+    pursuit_speed,
+    wrap,
 )  # fmt: skip
-from posse_baselines.safeguard import BODY
 from posse_baselines.steering import approach_velocity, intercept_time, way_round
 
 CENTRALIZED: Final = 1
@@ -23,8 +27,6 @@ PNGL: Final = 2
 BY_SLOT: Final = 1
 
 _FAR_SIGHT: Final = 8.0  # m; a sensor that reaches farther finds the target without being moved
-
-__all__ = ["BODY", "next_task", "wanted_velocity"]
 
 
 @compiled
@@ -50,7 +52,7 @@ def next_task(s: Record, d: Record) -> int:
 
 @compiled
 def hunt(s: Record, d: Record, n: int, x: float, y: float, body: Record) -> tuple[float, float]:
-    """Return the velocity (m/s) of a tracker that helps to see a target again which got out of sight.
+    """Return the velocity (m/s) of a tracker that helps to see a target again.
 
     The team spreads on a ring about where the target should be, slot by slot on either side of its
     heading; the ring grows with the time that it was not seen.
@@ -69,7 +71,7 @@ def hunt(s: Record, d: Record, n: int, x: float, y: float, body: Record) -> tupl
 def on_target(
     s: Record, d: Record, slots: Records, x: float, y: float, body: Record
 ) -> tuple[float, float]:
-    """Return the velocity (m/s) that takes up the slot on the target; notes the distance from it."""
+    """Return the velocity (m/s) that takes up the slot on the target; note how far it is."""
     place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
     d.error = math.hypot(place_x - x, place_y - y)
     round_x, round_y = way_round(x - d.now_x, y - d.now_y, arm_x, arm_y, s.clearance)
@@ -141,16 +143,16 @@ def on_leader(
     d.error = math.hypot(dx, dy)
     vx, vy = leader_speed * math.cos(theta), leader_speed * math.sin(theta)
     if d.error > s.far:
-        speed, heading = approach_velocity(dx, dy, vx, vy, s.gain, body.max_speed, body.acceleration)
+        speed, heading = approach_velocity(
+            dx, dy, vx, vy, s.gain, body.max_speed, body.acceleration
+        )
         return speed * math.cos(heading), speed * math.sin(heading)
     ahead_x, ahead_y = s.point_offset * math.cos(body.theta), s.point_offset * math.sin(body.theta)
     l_now, phi = separation(lx, ly, theta, x + ahead_x, y + ahead_y)
     l_d, phi_d = separation(lx, ly, theta, place_x + ahead_x, place_y + ahead_y)
     # The wanted φ keeps to the slot frame: to the leader's frame it turns back as the leader turns.
     across_rate = d.psi_rate
-    a, b = l_phi_demand(
-        l_now, phi, l_d, phi_d, leader_speed, across_rate, s.alpha_1, s.alpha_2
-    )
+    a, b = l_phi_demand(l_now, phi, l_d, phi_d, leader_speed, across_rate, s.alpha_1, s.alpha_2)
     angle = theta + phi
     return a * math.cos(angle) - b * math.sin(angle), a * math.sin(angle) + b * math.cos(angle)
 
