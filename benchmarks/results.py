@@ -1,6 +1,6 @@
 """``make results``: the scripted teams on every scenario, 1,000 worlds of the test split each.
 
-Writes docs/results.md, with seed and commit, and the rows behind it. Nothing was tuned on these worlds.
+Writes docs/results.md, with seed and commit, and the rows behind it. Nothing was tuned on them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The safeguard: the velocity nearest to the wanted one that runs into nothing.
 
 What surrounds a tracker is a list of discs, each with a velocity: team-mates, the target,
-obstacles, walls. A velocity is judged by playing out how the robot takes it up within its limits, since a
-unicycle moves on for a while as it does now: how long it would spend too near to anything, whether
-and when it would touch, and how far it ends from where the wanted velocity leads.
+obstacles, walls. A velocity is judged by playing out how the robot takes it up within its limits,
+since a unicycle moves on for a while as it does now: how long it would spend too near to anything,
+whether and when it would touch, and how far it ends from where the wanted velocity leads.
 """
 
 from __future__ import annotations

@@ -31,7 +31,8 @@ def intercept_time(x: float, y: float, speed_x: float, speed_y: float, max_speed
     square = x * x + y * y
     if surplus <= 1e-9:
         return NEVER if opening >= 0.0 else min(NEVER, -0.5 * square / opening)
-    return min(NEVER, (opening + math.sqrt(opening**2 + surplus * square)) / surplus)
+    time = (opening + math.sqrt(opening**2 + surplus * square)) / surplus
+    return clip(time, 0.0, NEVER)
 
 
 @compiled

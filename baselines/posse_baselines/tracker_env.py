@@ -30,7 +30,7 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
     **Observation**: ``Box`` (F,) float32, what this tracker is given, the messages of its
     team-mates included. **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``.
     **Reward**: this tracker's own. **Info**, **start** and **end** as in ``posse/Team-v0``; reward
-    terms are plain numbers. The team's score is the team's: one tracker can raise it by at most 1/N.
+    terms are plain numbers. The score is the whole team's: one tracker raises it by at most 1/N.
 
     The scenario's ``message_size`` is as large as the team-mates need. A learner that has nothing
     to say sends zeros: with ``silent=True`` (the default) its action has two parts, and its message

@@ -40,7 +40,7 @@ _SCENARIOS: Final = (
     Scenario(
         name="obstacles",
         target_motion="smart",
-        tracker_turn_rate=2.0,
+        tracker_turn_rate=1.8,
         target_turn_rate=1.8,
         arena=20.0,
         num_obstacles=8,

@@ -1,8 +1,8 @@
 """How a scripted target moves: the three motions of the paper's section 2.
 
 Each motion sets a goal heading; one steering law turns the target to it within its turn limit. In
-an arena the goal is mirrored near walls, and a safeguard keeps the target from obstacles and walls
-exactly: it only ever takes a turn that leaves one of its two turning circles free, so that it can
+an arena the goal is mirrored near walls (the smart target looks ahead instead), and a safeguard keeps
+the target from obstacles and walls exactly: it only ever takes a turn that leaves one of its two turning circles free, so that it can
 always go on turning for ever without touching anything.
 """
 
@@ -28,6 +28,7 @@ AGENT: Final = 3
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
+_NO_BITS: Final = np.uint64(0)
 _TWO: Final = np.float32(2.0)
 _TWO_PI: Final = np.float32(2 * math.pi)
 _TINY: Final = np.float32(1e-12)
@@ -85,7 +86,7 @@ def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records
             _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, _ZERO, turn, c.physics_dt)
     elif c.motion == SMART and w.step % SMART_REPLAN == 0:
         evade(c, w, trackers, obstacles)
-    if c.walled:
+    if c.walled and c.motion != SMART:
         mirror_at_walls(c, w)
     turn = turn_towards(
         w.heading_cos, w.heading_sin, w.goal_cos, w.goal_sin, c.target_turn_rate, c.dt
@@ -103,6 +104,11 @@ def evade(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     too near. Then it darts: it takes the turn that tears the formation apart, and holds it.
     """
     past = np.float32(SMART_REPLAN) * c.dt
+    if w.touching != _NO_BITS:
+        # Held fast: the way out is where nobody stands.
+        w.pressed = _ZERO
+        plan_escape(c, w, trackers, obstacles)
+        return
     if w.pressed < _ZERO:
         w.pressed = min(_ZERO, w.pressed + past)
         return
@@ -153,7 +159,8 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
     v, most = c.target_speed, c.tracker_speed
     a = most * most - v * v
     clear = c.radius + c.radius + _CLEARANCE
-    loyalty = _LOYALTY if w.step > 0 else _ZERO  # what it heads for at the start was not its choice
+    # What it heads for at the start was not its choice, and one that ended in contact was bad.
+    loyalty = _LOYALTY if w.step > 0 and w.touching == _NO_BITS else _ZERO
     best = np.float32(-1e9)
     old_cos, old_sin = w.goal_cos, w.goal_sin
     for k in range(SMART_DIRECTIONS // 2):

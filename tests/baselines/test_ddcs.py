@@ -1,4 +1,4 @@
-"""The DDCS: tasks change when they should, the lead is agreed on, slots are shared out, fixes fused."""
+"""The DDCS: tasks change when they should, all agree on who leads, slots are shared out."""
 
 from __future__ import annotations
 
@@ -270,8 +270,7 @@ def test_pngl_spreads_bearings_by_its_constants() -> None:
     policy = DDCS(Settings(guidance="pngl"), "pngl")
     pose = [(x, y, 3.0) for x, y in ((6.0, -2.0), (6.0, -1.0), (6.0, 0.0), (6.0, 1.0), (6.0, 2.0))]
     options = {"tracker_pose": pose, "target_pose": (0.0, 0.0, 2.6)}
-    for seen in watch("constant", 1, 500, policy, options=options, robot_radius=0.01):
-        pass
+    *_, seen = watch("constant", 1, 500, policy, options=options, robot_radius=0.01)
     dx = seen.state["world_x"][0] - seen.state["tracker_x"][0]
     dy = seen.state["world_y"][0] - seen.state["tracker_y"][0]
     constants = 1.0 + 0.1 * np.linspace(-1, 1, 5)

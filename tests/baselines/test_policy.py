@@ -165,7 +165,7 @@ def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
 
 
 def test_idle_trackers_stay() -> None:
-    batch = posse.batch("constant", 4, horizon=20)
+    batch = posse.batch("constant", 4)
     before = batch.reset()
     x = batch.state["tracker_x"].copy()
     memory = begin(load("idle"), batch)
@@ -205,7 +205,7 @@ def test_observations_of_another_shape_are_refused(name: str) -> None:
 
 def test_a_team_with_an_agent_for_a_target_is_not_driven_by_rollout() -> None:
     batch = posse.batch("constant", 1, target_motion="agent")
-    with pytest.raises(PolicyError, match="target .* is an agent"):
+    with pytest.raises(PolicyError, match=r"target .* is an agent"):
         next(rollout(batch, load("idle")))
 
 

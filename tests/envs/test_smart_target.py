@@ -161,7 +161,7 @@ def test_it_leaves_a_ring_by_the_widest_gap(team: Controller) -> None:
 
 
 def test_it_heeds_where_trackers_are_going() -> None:
-    # One on each side, equally near and both going the same way: only their motion tells them apart.
+    # One on each side, equally near, both going the same way: only their motion tells them apart.
     # It leaves ahead, between them, but on the side of the one that goes away.
     for direction in (1.0, -1.0):
         theta = 0.0 if direction > 0 else math.pi
@@ -207,6 +207,17 @@ def test_it_turns_away_from_a_tracker_that_comes_too_near() -> None:
     batch = start(1, tracker_pose=trackers, target_pose=[0.0, 0.0, 0.0])
     play = Play(batch, pursuing, 25)
     assert np.abs(np.angle(play.heading)).max() > np.radians(60)
+
+
+def test_it_gets_away_from_trackers_that_hold_it_fast() -> None:
+    # Two stand in its way, touching it, on both sides of where it heads; the others are far off.
+    touching = 2 * posse.get_scenario("smart").robot_radius + 5e-4
+    held = [[touching * math.cos(b), touching * math.sin(b), b] for b in (0.7, -0.7)]
+    far = [[-15.0, y, 0.0] for y in (-2.0, 0.0, 2.0)]
+    batch = start(1, tracker_pose=held + far, target_pose=[0.0, 0.0, 0.0])
+    assert batch.state["world_touching"][0] != 0
+    play = Play(batch, resting, 40)
+    assert play.nearest[-1, 0] > 1.0
 
 
 def test_it_breaks_a_formation_that_a_constant_target_leaves_whole() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -13,7 +15,7 @@ import posse
 from posse_training.torchrl_env import PosseEnv
 
 WORLDS = 6
-SHORT = {"horizon": 12, "settle_time": 0.5}
+SHORT: dict[str, Any] = {"horizon": 12, "settle_time": 0.5}
 
 
 def some_actions(shape: tuple[int, ...], steps: int) -> npt.NDArray[np.float32]:
@@ -62,7 +64,7 @@ def test_steps_equal_those_of_the_batch() -> None:
 
 
 def test_rows_of_a_target_that_is_an_agent_come_last() -> None:
-    settings = {"target_motion": "agent", "num_trackers": 3}
+    settings: dict[str, Any] = {"target_motion": "agent", "num_trackers": 3}
     env = PosseEnv("constant", WORLDS, seed=5, **settings)
     batch = posse.batch("constant", WORLDS, seed=5, **settings)
     carried, _ = env.reset(), batch.reset()
@@ -216,7 +218,8 @@ def test_a_collector_gathers_whole_batches() -> None:
         trust_policy=True,  # a plain function, with nothing to adapt
         auto_register_policy_transforms=False,  # there are none, and it asks for an answer
     )
-    data = torch.cat([part.clone() for part in collector], dim=1)
+    parts: list[Any] = [part.clone() for part in collector]
+    data: Any = torch.cat(parts, dim=1)
     collector.shutdown()
     assert data.batch_size == (WORLDS, 16)
     batch.reset()

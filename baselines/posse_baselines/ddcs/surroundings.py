@@ -85,9 +85,9 @@ def slot_in_beam(
         place_x, place_y, _, _ = slot_place(d, slots[k])
         dx, dy = place_x - x, place_y - y
         distance = math.hypot(dx, dy)
-        if abs(distance - 2.0 * f.radius - reading) < _SLOT_ECHO:
-            if dx * ux + dy * uy >= f.wide_beam * distance:
-                return k
+        fits = abs(distance - 2.0 * f.radius - reading) < _SLOT_ECHO
+        if fits and dx * ux + dy * uy >= f.wide_beam * distance:
+            return k
     return -1
 
 
