@@ -1,8 +1,9 @@
 """How a scripted target moves: the three motions of the paper's section 2.
 
 Each motion sets a goal heading; one steering law turns the target to it within its turn limit. In
-an arena the goal is mirrored near walls (the smart target looks ahead instead), and a safeguard keeps
-the target from obstacles and walls exactly: it only ever takes a turn that leaves one of its two turning circles free, so that it can
+an arena the goal is mirrored near walls (the smart target looks ahead instead), and a safeguard
+keeps the target from obstacles and walls exactly: it only ever takes a turn that leaves one of its
+two turning circles free, so that it can
 always go on turning for ever without touching anything.
 """
 
