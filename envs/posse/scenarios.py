@@ -59,7 +59,7 @@ _SCENARIOS: Final = (
     Scenario(
         name="leader-loss",
         target_motion="accelerating",
-        tracker_turn_rate=1.2,
+        tracker_turn_rate=1.1,
         target_turn_rate=0.2,
         formation_distance=2.4,
         formation_spacing=2.4,

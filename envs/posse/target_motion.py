@@ -3,8 +3,7 @@
 Each motion sets a goal heading; one steering law turns the target to it within its turn limit. In
 an arena the goal is mirrored near walls (the smart target looks ahead instead), and a safeguard
 keeps the target from obstacles and walls exactly: it only ever takes a turn that leaves one of its
-two turning circles free, so that it can
-always go on turning for ever without touching anything.
+two turning circles free, so that it can always go on turning for ever without touching anything.
 """
 
 from __future__ import annotations
@@ -33,6 +32,7 @@ _NO_BITS: Final = np.uint64(0)
 _TWO: Final = np.float32(2.0)
 _TWO_PI: Final = np.float32(2 * math.pi)
 _TINY: Final = np.float32(1e-12)
+_ROUNDING: Final = np.float32(1e-3)  # m, far more than an episode of rounding adds up to
 _SOFT_WALL: Final = np.float32(2.0)  # a goal heading is mirrored this far before a wall, m
 
 _WEAVE_LEAST_RATE: Final = 0.2  # rad/s
@@ -288,12 +288,12 @@ def has_free_circle(
     heading_cos: np.float32,
     heading_sin: np.float32,
     side: np.float32,
+    allowance: np.float32 = _ZERO,
 ) -> bool:
-    """Say whether the turning circle to one side (+1 left, -1 right) is free."""
+    """Say whether the turning circle to one side (+1 left, -1 right) is free to ``allowance``, m."""
     radius = c.target_speed / c.target_turn_rate
-    return circle_is_free(
-        c, obstacles, x - side * radius * heading_sin, y + side * radius * heading_cos, radius
-    )
+    x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
+    return circle_is_free(c, obstacles, x, y, radius - allowance)
 
 
 @compiled
@@ -308,9 +308,10 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
         return turn
     if has_free_circle(c, obstacles, x, y, hc, hs, -_ONE):
         return turn
+    # The circle it follows stays free but for rounding, which must not make it change sides.
+    x, y, hc, hs = w.x, w.y, w.heading_cos, w.heading_sin
     side = _ONE
-    left = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE)
-    if not left or turn < _ZERO:
-        right = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE)
+    if turn < _ZERO or not has_free_circle(c, obstacles, x, y, hc, hs, _ONE, _ROUNDING):
+        right = has_free_circle(c, obstacles, x, y, hc, hs, -_ONE, _ROUNDING)
         side = -_ONE if right else _ONE
     return np.float32(side * c.target_turn_rate)

@@ -69,7 +69,9 @@ def test_converging_turns_to_flocking_near_the_place_and_back_far_from_it() -> N
         # Near its place a tracker flocks, unless it is being told of a new leader.
         assert (error[task == CONVERGING] > settings.near - slack).all()
         if before is not None:
-            changes += ((before == CONVERGING) & (task == FLOCKING)).sum()
+            begins = (before == CONVERGING) & (task == FLOCKING)
+            assert (error[begins] < settings.near + slack).all()
+            changes += begins.sum()
         before = task
     assert changes >= 20 * 4
     assert (task == FLOCKING).mean() > 0.95
@@ -170,6 +172,12 @@ def test_without_exchange_the_first_leader_stays() -> None:
         first = seen.notes["leader"].copy() if first is None else first
         np.testing.assert_array_equal(seen.notes["leader"], first)
     assert (seen.notes["exchanges"] == 0).all()
+
+
+def test_without_exchange_the_first_leader_is_agreed_on_over_a_lossy_radio() -> None:
+    policy = DDCS(Settings(exchange=False))
+    *_, seen = watch("constant", 20, 60, policy, split="train", radio_loss=0.5, radio_delay=2)
+    assert agree(seen).all()
 
 
 def test_two_halves_out_of_reach_have_a_leader_each_and_agree_when_they_meet() -> None:

@@ -72,9 +72,7 @@ def settle_lead(
             if is_newer(mate.pulse, d.pulse):
                 d.pulse, d.pulse_step = mate.pulse, d.step
                 d.confirmed = 1
-        elif (s.exchange or d.leader < 0) and better_claim(
-            mate.term, mate.leader, d.term, d.leader
-        ):
+        elif better_claim(mate.term, mate.leader, d.term, d.leader):
             appoint(d, mate.leader, mate.term, mate.pulse)
     if d.leader == own:
         d.pulse, d.pulse_step, d.confirmed = (d.pulse + 1) % COUNT, d.step, 1

@@ -1,0 +1,164 @@
+"""``make bench``: how fast the worlds run on this machine.
+
+Agent-steps a second of batches, the same observations written by a plain copy, environment steps
+of one world through the interfaces, and what the first step of a fresh process costs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import machine
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+import posse
+
+FIRST_STEP = (
+    "import gymnasium, posse; "
+    "env = gymnasium.make('posse/Team-v0', scenario='smart'); "
+    "env.reset(seed=0); env.step(env.action_space.sample())"
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What ``make bench`` takes."""
+
+    scenario: str = "smart"
+    worlds: tuple[int, ...] = (1, 32, 1024, 4096, 16384)
+    seconds: float = 1.0
+    """Each figure is the median of five runs of this length."""
+    cold: bool = True
+    """Also time the first step of a fresh process, without and with kernels kept on disk."""
+    out: Path = Path("runs/bench/speed.json")
+
+
+def per_second(step: Callable[[], object], seconds: float) -> list[float]:
+    """Return calls a second, the median, least and greatest of five runs."""
+    step()
+    rates = []
+    for _ in range(5):
+        calls, started = 0, time.perf_counter()
+        while time.perf_counter() - started < seconds / 5 or calls < 3:
+            step()
+            calls += 1
+        rates.append(calls / (time.perf_counter() - started))
+    return [statistics.median(rates), min(rates), max(rates)]
+
+
+def batches(settings: Settings) -> list[dict[str, Any]]:
+    """Measure batches with one thread and with all, and a plain copy of their observations."""
+    rows = []
+    for count in settings.worlds:
+        for threads in sorted({1, os.cpu_count() or 1}):
+            batch = posse.batch(settings.scenario, count, num_threads=threads)
+            observations = batch.reset(seed=0)
+            rng = np.random.default_rng(0)
+            actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+            copy = np.empty_like(observations)
+            agents = observations.shape[0] * observations.shape[1]
+            rate = per_second(lambda b=batch, a=actions: b.step(a), settings.seconds)
+            plain = per_second(lambda c=copy, o=observations: np.copyto(c, o), settings.seconds)
+            rows.append(
+                {
+                    "worlds": count,
+                    "threads": threads,
+                    "agent_steps": [r * agents for r in rate],
+                    "copies": [r * agents for r in plain],
+                    "times_a_copy": plain[0] / rate[0],
+                    "observation_length": observations.shape[2],
+                    "bytes_a_world": batch.bytes_per_world,
+                }
+            )
+    return rows
+
+
+def interfaces(settings: Settings) -> dict[str, list[float]]:
+    """Measure environment steps a second of one world, dictionaries and checks included."""
+    parallel = posse.parallel_env(settings.scenario, horizon=100_000)
+    parallel.reset(seed=0)
+    rng = np.random.default_rng(0)
+    actions = {
+        agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents
+    }
+    team: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=100_000).unwrapped
+    team.reset(seed=0)
+    action = np.stack(list(actions.values()))
+    return {
+        "PettingZoo parallel": per_second(lambda: parallel.step(actions), settings.seconds),
+        "Gymnasium Team": per_second(lambda: team.step(action), settings.seconds),
+    }
+
+
+def first_steps() -> dict[str, float]:
+    """Return seconds from a fresh process to its first step, cold and with kernels on disk."""
+    seconds = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("cold", "warm"):
+            started = time.perf_counter()
+            subprocess.run(
+                [sys.executable, "-c", FIRST_STEP],
+                check=True, env={**os.environ, "POSSE_CACHE_DIR": folder},
+            )  # fmt: skip
+            seconds[name] = time.perf_counter() - started
+    return seconds
+
+
+def main() -> None:
+    """Measure, print, and write the figures."""
+    settings = tyro.cli(Settings)
+    others = machine.OtherWork()
+    own = time.process_time()
+    rows, single = batches(settings), interfaces(settings)
+    disturbed = others.cores(time.process_time() - own)
+    figures: dict[str, Any] = {
+        "machine": machine.describe(),
+        "scenario": settings.scenario,
+        "batches": rows,
+        "one_world": single,
+        "cores_busy_with_other_work": disturbed,
+    }
+    if settings.cold:
+        figures["first_step_seconds"] = first_steps()
+    console = Console()
+    length, size = rows[0]["observation_length"], rows[0]["bytes_a_world"]
+    table = Table(
+        title=f"{settings.scenario}: {length} floats an observation, {size} bytes a world"
+    )
+    for column in ("worlds", "threads", "million agent-steps/s [range]", "times a plain copy"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        median, low, high = (x / 1e6 for x in row["agent_steps"])
+        table.add_row(
+            f"{row['worlds']:,}",
+            str(row["threads"]),
+            f"{median:.2f} [{low:.2f}, {high:.2f}]",
+            f"{row['times_a_copy']:.1f}",
+        )
+    console.print(table)
+    for name, (median, low, high) in single.items():
+        console.print(f"{name}: {median:,.0f} steps/s [{low:,.0f}, {high:,.0f}], one world")
+    for name, seconds in figures.get("first_step_seconds", {}).items():
+        console.print(f"first step of a fresh process, {name}: {seconds:.1f} s")
+    console.print(f"cores busy with other work meanwhile: {disturbed:.2f}")
+    settings.out.parent.mkdir(parents=True, exist_ok=True)
+    settings.out.write_text(json.dumps(figures, indent=2) + "\n")
+    console.print(f"figures: {settings.out}")
+
+
+if __name__ == "__main__":
+    main()
