@@ -59,7 +59,8 @@ class Peer:
 
 
 PEERS = (
-    Peer("posse", "posse_batch", None),
+    Peer("posse", "posse_batch", None, "smart"),
+    Peer("posse, field", "posse_batch", None, "field"),
     Peer("posse, PettingZoo", "posse_pettingzoo", None, batches=(1,), threaded=False),
     Peer("mpe2 simple_tag", "mpe2_tag", "mpe2", batches=(1,), threaded=False),
     Peer("PettingZoo pursuit", "pursuit", "pettingzoo", batches=(1,), threaded=False),
@@ -262,6 +263,8 @@ def run(peers: list[Peer], patience: Patience) -> tuple[list[Row], dict[str, str
                         for batch in peer.batches:
                             built = runner.build(batch)
                             row = Row(peer.name, threads, batch, **built)
+                            if peer.environment == "ocean":
+                                row.versions["pufferlib"] = PUFFERLIB
                             measure(runner, row, yardstick, agents, patience)
                             rows.append(row)
                             report(row)

@@ -12,10 +12,14 @@ Row = dict[str, Any]
 CONTENTS = {
     "posse": (
         "`smart`: 5 trackers with limits on acceleration, an evasive target, swept contacts, "
-        "target sensor with occlusion, sonar ring, radio, faults, score and every metric, "
-        "automatic resets"
+        "target sensor, sonar ring, what team-mates tell, score and every metric, automatic "
+        "resets; open plane and a perfect radio, so nothing to occlude and nothing lost"
     ),
-    "posse, PettingZoo": "the same, one world, through PettingZoo's parallel interface",
+    "posse, field": (
+        "as `posse`, and 6 obstacles that occlude, walls, short and noisy sensing, a radio with "
+        "range, delay and loss, faults and outages"
+    ),
+    "posse, PettingZoo": "as `posse`, one world, through PettingZoo's parallel interface",
     "mpe2 simple_tag": (
         "5 adversaries, 1 agent, 2 obstacles: forces, soft contacts, places of all others"
     ),
@@ -62,7 +66,7 @@ throughout."""
 OURS_OVER_THEIRS = """\
 ## Ours over theirs
 
-By the ratios to mpe2, with the same number of threads."""
+`posse`'s ratio to mpe2 over theirs, with the same number of threads."""
 
 DISTURBED = """\
 !!! warning "Other work ran on the machine"
@@ -85,7 +89,7 @@ def write_page(results: dict[str, Any], path: Path) -> None:
         CORE_FOR_CORE,
         _table(rows, lambda row: f"{statistics.median(row['per_core']) / 1e6:.3g}"),
         TIMES_MPE2,
-        _table(rows, lambda row: f"{_ratio(row):,.3g}"),
+        _table(rows, lambda row: _number(_ratio(row))),
         OURS_OVER_THEIRS,
         _ours_over_theirs(rows),
         "## What each computes",
@@ -123,6 +127,10 @@ def _speed(row: Row) -> str:
     return f"{middle / 1e6:.3g}{star}<br><small>{spread:.0%}</small>"
 
 
+def _number(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+
+
 def _ratio(row: Row) -> float:
     pairs = zip(row["samples"], row["yardstick"], strict=True)
     return statistics.median(ours / theirs for ours, theirs in pairs)
@@ -152,11 +160,11 @@ def _ours_over_theirs(rows: list[Row]) -> str:
 
     def cell(row: Row) -> str:
         mine = ours.get((row["threads"], row["batch"]))
-        return "" if mine is None else f"{mine / _ratio(row):,.3g}"
+        return "" if mine is None else _number(mine / _ratio(row))
 
     table = _table([row for row in rows if not row["name"].startswith("posse")], cell)
     if single:
-        table += f"\n\nThrough PettingZoo's own interface: {single[0]:,.3g} times mpe2."
+        table += f"\n\nThrough PettingZoo's own interface: {_number(single[0])} times mpe2."
     return table
 
 

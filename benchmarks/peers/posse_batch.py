@@ -1,4 +1,4 @@
-"""Ours: the engine itself, `smart` worlds of 5 trackers."""
+"""Ours: the engine itself, worlds of 5 trackers; the variant is the scenario."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import posse
 
 def build(worlds: int, variant: str) -> Built:
     """Return a batch; as many threads as this process may use."""
-    batch = posse.batch("smart", worlds, seed=0, num_threads=len(os.sched_getaffinity(0)))
+    batch = posse.batch(variant, worlds, seed=0, num_threads=len(os.sched_getaffinity(0)))
     draws = np.random.default_rng(0).uniform(-1, 1, (ACTION_SETS, *batch.action_shape))
     actions = draws.astype(np.float32)
     batch.reset()

@@ -15,8 +15,8 @@ _PAPER: Final = Scenario(
     tracker_speed=1.5,
     tracker_turn_rate=3.0,
     target_speed=0.5,
-    formation_distance=0.6,
-    formation_spacing=0.6,
+    formation_distance=0.8,
+    formation_spacing=0.8,
     tolerance=0.2,
 )
 _SCENARIOS: Final = (

@@ -290,7 +290,7 @@ def has_free_circle(
     side: np.float32,
     allowance: np.float32 = _ZERO,
 ) -> bool:
-    """Say whether the turning circle to one side (+1 left, -1 right) is free to ``allowance``, m."""
+    """Say whether the turning circle to one side (+1 left, -1 right) is free, to an allowance."""
     radius = c.target_speed / c.target_turn_rate
     x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
     return circle_is_free(c, obstacles, x, y, radius - allowance)

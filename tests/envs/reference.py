@@ -612,7 +612,16 @@ class Recording:
 
 CASES: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = (
     *((name, ()) for name in posse.scenario_names()),
-    ("constant", (("num_trackers", 12), ("num_neighbours", 3), ("message_size", 2))),
+    (
+        "constant",
+        (
+            ("num_trackers", 12),
+            ("num_neighbours", 3),
+            ("message_size", 2),
+            ("formation", "ring"),
+            ("formation_spacing", 0.65),
+        ),
+    ),  # a ring so tight that trackers run into the target
     ("constant", (("num_trackers", 3), ("num_neighbours", 8), ("message_size", 1))),
     ("constant", (("num_trackers", 1),)),
     ("constant", (("breaks", 2), ("formation", "ring"), ("break_window", (0.2, 0.4)))),

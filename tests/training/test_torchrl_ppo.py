@@ -69,6 +69,8 @@ def test_actions_are_drawn_and_cut_to_the_space() -> None:
 
 def test_advantages_bootstrap_what_was_truncated_and_not_what_was_terminated() -> None:
     agent, rollout = an_agent_and_its_rollout(20, terminate_on_contact=True)
+    terminated = rollout["next", "terminated"][:, :, None].float()
+    truncated = rollout["next", "truncated"][:, :, None].float()
     settings = Settings(discount=0.9, trace=0.8)
     _, advantage = objectives(agent, settings)
     spread_flags(rollout)
@@ -76,8 +78,6 @@ def test_advantages_bootstrap_what_was_truncated_and_not_what_was_terminated() -
         advantage(rollout)
         value = agent.critic.module(rollout[OBSERVATION])
         value_next = agent.critic.module(rollout["next", TRACKERS, "observation"])
-    terminated = rollout["next", "terminated"][:, :, None].float()
-    truncated = rollout["next", "truncated"][:, :, None].float()
     assert terminated.any()
     assert truncated.any()
     expected = torch.zeros_like(value)

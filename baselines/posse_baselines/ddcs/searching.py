@@ -17,7 +17,7 @@ _AGE_WEIGHT = 0.35  # m of way that a second since the last look is worth
 _DRIFT = 0.35  # m/s; how fast a lost target gets away from where it should be
 _TO_THE_MIDDLE = 0.5  # m of way that a metre farther from the middle is worth
 _GOAL_TIME = 4.0  # s; a goal is thought over at least so often
-_LOOK_TIME = 0.5  # s between two entries into the map
+_LOOK_TIME = 0.5  # s between two entries into the map, and at least between two goals
 
 
 @compiled
@@ -85,11 +85,9 @@ def wander(
     """Return the velocity (m/s) of a tracker that searches from (x, y)."""
     dx, dy = d.goal_x - x, d.goal_y - y
     near = 0.5 * min(f.sight, 4.0)
-    if (
-        d.goal_step < 0
-        or dx * dx + dy * dy < near * near
-        or (d.step - d.goal_step) * f.dt > _GOAL_TIME
-    ):
+    time = (d.step - d.goal_step) * f.dt
+    arrived = dx * dx + dy * dy < near * near and time > _LOOK_TIME
+    if d.goal_step < 0 or arrived or time > _GOAL_TIME:
         choose_goal(f, s, d, mates, seen, own, x, y, theta)
         dx, dy = d.goal_x - x, d.goal_y - y
     distance = math.hypot(dx, dy)
@@ -141,6 +139,8 @@ def choose_goal(
             way = math.hypot(cx - x, cy - y)
             turn = 1.0 - ((cx - x) * math.cos(theta) + (cy - y) * math.sin(theta)) / max(way, 1e-6)
             value = _AGE_WEIGHT * min(age, _STALE) + bonus - way - 0.8 * turn
+            if value <= best:
+                continue  # team-mates can only make it less
             for m in range(len(mates)):
                 if m != own and is_there(f, s, d, mates[m], len(mates)):
                     mx, my = mate_now(f, s, d, mates[m])
