@@ -90,14 +90,12 @@ def _task_fields(s: Scenario) -> list[Field]:
         ),
         Field("number", 1, "1", -1, n - 1, "own number, 0 to N - 1", unknown=-1),
         Field("team_size", 1, "1", n, n, "N, trackers in the team"),
-        Field(
-            "formation_distance", 1, "m",
-            s.formation_distance / _SLACK, s.formation_distance * _SLACK,
+        _known(
+            s.formation_distance, "formation_distance", "m",
             "wanted distance from the target to the nearest slot",
         ),
-        Field(
-            "formation_spacing", 1, "m",
-            s.formation_spacing / _SLACK, s.formation_spacing * _SLACK,
+        _known(
+            s.formation_spacing, "formation_spacing", "m",
             "wanted distance between neighbouring slots",
         ),
         Field("max_speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "own greatest speed"),
@@ -112,8 +110,23 @@ def _task_fields(s: Scenario) -> list[Field]:
             0, s.tracker_turn_rate / s.tracker_turn_acceleration * _SLACK,
             "from no turn to the greatest turn rate; 0: at once",
         ),
+        _known(s.tolerance, "tolerance", "m", "how near to a slot counts as in it"),
+        _known(s.robot_radius, "robot_radius", "m", "of every robot's disc"),
+        _known(s.control_step, "control_step", "s", "from one action to the next"),
+        _known(
+            s.sensing_range, "sensing_range", "m", "how far its sensor reaches; -1: any distance"
+        ),
+        _known(s.sonar_range, "sonar_range", "m", "how far its sonar reaches"),
+        _known(s.arena, "arena", "m", "side of the walled square round the origin; -1: no walls"),
         Field("time_left", 1, "s", 0, s.duration * _SLACK, "until the episode is truncated"),
     ]  # fmt: skip
+
+
+def _known(value: float, name: str, unit: str, meaning: str) -> Field:
+    """Return a field that holds a setting of the scenario; -1 stands for a boundless one."""
+    if math.isinf(value):
+        return Field(name, 1, unit, -1, -1, meaning)
+    return Field(name, 1, unit, value / _SLACK, value * _SLACK, meaning)
 
 
 @compiled
@@ -138,8 +151,14 @@ def _write_task(
     o[k + 8] = max_turn_rate
     o[k + 9] = c.acceleration_time
     o[k + 10] = c.turn_acceleration_time
-    o[k + 11] = np.float32(c.horizon - w.step) * c.dt
-    return k + 12
+    o[k + 11] = c.tolerance
+    o[k + 12] = c.radius
+    o[k + 13] = c.dt
+    o[k + 14] = c.told_sensing_range
+    o[k + 15] = c.sonar_range
+    o[k + 16] = c.told_arena
+    o[k + 17] = np.float32(c.horizon - w.step) * c.dt
+    return k + 18
 
 
 def _target_fields(s: Scenario) -> list[Field]:
@@ -434,7 +453,7 @@ def observe_target(
     touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
     k = _write_own(c, w, touching, 1, o, 0)
     k = _write_task(c, w, -1, c.target_speed, c.target_turn_rate, o, k)
-    o[k - 3], o[k - 2] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
+    o[k - 9], o[k - 8] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
     k = _write_no_target(o, k)
     ping(c, w, w, -1, trackers, obstacles, beams, o[k : k + c.sonar_beams])
     k += c.sonar_beams

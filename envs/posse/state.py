@@ -49,6 +49,7 @@ CONFIG: Final = _record(
     ("radio_range", _F), ("radio_loss", _F), ("sensor_outages", _F), ("radio_outages", _F),
     ("formation_distance", _F), ("formation_spacing", _F),
     ("acceleration_time", _F), ("turn_acceleration_time", _F),
+    ("told_sensing_range", _F), ("told_arena", _F),  # -1: boundless
 )  # fmt: skip
 """A scenario as the kernels read it."""
 
@@ -273,6 +274,8 @@ def config_record(scenario: Scenario) -> Records:
     c.formation_distance, c.formation_spacing = s.formation_distance, s.formation_spacing
     c.acceleration_time = s.tracker_speed / s.tracker_acceleration
     c.turn_acceleration_time = s.tracker_turn_rate / s.tracker_turn_acceleration
+    c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
+    c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
     return config
 
 
