@@ -32,6 +32,7 @@ from posse.state import (
     reward_weights,
     slot_records,
 )
+from posse.survey import new_scratch
 from posse.world import LOOK, START, START_FROM_POSES, STEP, advance, bad_action, first_over
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
@@ -160,7 +161,7 @@ class Batch:
         if num_worlds * rows < _SERIAL_BELOW:
             threads = 1
         edges = [num_worlds * k // threads for k in range(threads + 1)]
-        self._scratch = [np.empty((2, scenario.num_trackers), np.float32) for _ in edges]
+        self._scratch = [new_scratch() for _ in edges]
         self._parts = list(itertools.pairwise(edges))
 
     def __getstate__(self) -> dict[str, Any]:

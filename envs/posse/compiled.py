@@ -49,6 +49,10 @@ _OPTIONS: Final[dict[str, Any]] = {
     "_nrt": False,
 }
 
+# How a compiled function is compiled for the kernels that link it. To call a function with arrays
+# costs more than most of ours take: each array is passed in parts, a dozen numbers for two of them.
+_LINKED: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
+
 # Any: numba sets these names at run time, so type checkers cannot know them.
 _CONFIG: Final[Any] = numba.config
 
@@ -87,7 +91,7 @@ class _Function(CPUDispatcher):
         super().__init__(function, targetoptions=options)
         self._linked = CPUDispatcher(
             function,
-            targetoptions={**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+            targetoptions={**options, **_LINKED},
             pipeline_class=_LinkedForm,
         )
 
@@ -123,6 +127,29 @@ class _LinkedLibrary(JITCodeLibrary):
         return _NoEnvironment
 
 
+class _ShortLoops(CompilerBase):
+    """numba's compiler, optimising for loops that are short."""
+
+    def define_pipelines(self) -> list[Any]:
+        state = self.state
+        codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
+        state.library = _ShortLoopsLibrary(codegen, name)  # type: ignore[no-untyped-call]
+        state.library.enable_object_caching()
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(state)  # type: ignore[no-untyped-call]
+        return [pipeline]
+
+
+class _ShortLoopsLibrary(JITCodeLibrary):
+    """LLVM code whose vectors come from what stands side by side, not from turns of a loop."""
+
+    def _optimize_final_module(self) -> None:
+        # Once, not twice: numba's first round serves its reference counts, of which there are none.
+        passes, builder = self._codegen._module_pass_manager(
+            loop_vectorize=False, slp_vectorize=True
+        )
+        passes.run(self._final_module, builder)
+
+
 class _NoEnvironment:
     @staticmethod
     def set_env(name: str, environment: Any) -> None:
@@ -134,13 +161,16 @@ def kernel(function: F) -> F: ...
 
 
 @overload
-def kernel(*, parallel: bool = ...) -> Callable[[F], F]: ...
+def kernel(*, short_loops: bool = ...) -> Callable[[F], F]: ...
 
 
-def kernel(function: F | None = None, *, parallel: bool = False) -> F | Callable[[F], F]:
+def kernel(function: F | None = None, *, short_loops: bool = False) -> F | Callable[[F], F]:
     """Compile a function that Python calls, and keep the result on disk.
 
-    Written as ``@kernel`` or as ``@kernel(parallel=True)``, for a loop over ``numba.prange``.
+    Written as ``@kernel``, or as ``@kernel(short_loops=True)`` where the inner loops are short (over
+    trackers, beams, places). Those are not vectorised as loops, since to find out at run time
+    whether one is long enough takes longer than the loop; a loop of fixed length (over a block of
+    eight, say) is unrolled instead, and its turns are done at once.
 
     The directory is ``$POSSE_CACHE_DIR``, or ``posse`` in the user's cache directory. Where it
     cannot be written, and for functions outside a package (a script, a notebook), every process
@@ -152,7 +182,8 @@ def kernel(function: F | None = None, *, parallel: bool = False) -> F | Callable
             return function
         package = _package_directory(function)
         _package_stamp(package)
-        dispatcher = numba.njit(parallel=parallel, **_OPTIONS)(function)
+        options = {**_OPTIONS, "pipeline_class": _ShortLoops} if short_loops else _OPTIONS
+        dispatcher = numba.njit(**options)(function)
         if package is not None and _cache_directory() is not None:
             dispatcher._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
         return cast("F", dispatcher)

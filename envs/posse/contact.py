@@ -12,17 +12,15 @@ from typing import Final
 
 import numpy as np
 
-from posse.arrays import Record, Records
+from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
+from posse.survey import EXCESS, FAR, GAP, TOUCHING_GAP, find_gaps
 
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
-TOUCHING_GAP: Final = np.float32(0.001)
-"""Robots nearer than this touch, m."""
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
-_TWO: Final = np.float32(2.0)
 _BIT: Final = np.uint64(1)
 _NO_BITS: Final = np.uint64(0)
 _FIRST_WALL: Final = 60
@@ -108,97 +106,103 @@ def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
 
 
 @compiled
-def meet(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
     """Work out who touches whom, count the contacts that begin, and flag who is near to anything.
 
     ``near`` marks robots that could touch something within the next control step; the others move
-    without a sweep.
+    without a sweep. Where the discs are stands in ``s`` (:func:`posse.survey.lay_out`).
     """
-    n = c.num_trackers
-    touch = c.radius + c.radius + TOUCHING_GAP
-    touch2 = touch * touch
-    reach = touch + _TWO * c.tracker_speed * c.dt
-    reach2 = reach * reach
-    target_reach = touch + (c.tracker_speed + c.target_speed) * c.dt
-    target_reach2 = target_reach * target_reach
-    step = c.tracker_speed * c.dt
-    least2 = (w.least_gap + c.radius + c.radius) * (w.least_gap + c.radius + c.radius)
+    find_gaps(c, s)
+    inner = c.half_arena - c.radius
     least = w.least_gap
-    target_touching = _NO_BITS
-    target_near = False
-    for i in range(n):
+    target_touching, target_near = _NO_BITS, False
+    for i in range(c.num_trackers):
         t = trackers[i]
-        x, y = t.x, t.y
-        before = t.touching_trackers
-        touching = _NO_BITS
-        near = False
-        onsets = 0
-        for j in range(n):
-            if j == i:
-                continue
-            other = trackers[j]
-            dx, dy = other.x - x, other.y - y
-            d2 = dx * dx + dy * dy
-            least2 = min(least2, d2)
-            if d2 <= reach2:
-                near = True
-                if d2 <= touch2:
-                    bit = _BIT << np.uint64(j)
-                    touching |= bit
-                    if before & bit == _NO_BITS:
-                        onsets += 1
-                        if i < j:
-                            w.contacts_tracker += 1
-        dx, dy = w.x - x, w.y - y
-        d2 = dx * dx + dy * dy
-        least2 = min(least2, d2)
-        if d2 <= target_reach2:
-            near = True
-            target_near = True
-            if d2 <= touch2:
-                bit = _BIT << np.uint64(i)
-                target_touching |= bit
-                if w.touching & bit == _NO_BITS:
-                    onsets += 1
-                    w.contacts_target += 1
-        surroundings = _NO_BITS
-        for k in range(c.num_obstacles):
-            o = obstacles[k]
-            dx, dy = o.x - x, o.y - y
-            d = c.radius + o.radius
-            d2 = dx * dx + dy * dy
-            if d2 < (d + least) * (d + least):
-                least = np.float32(math.sqrt(d2)) - d
-            if d2 <= (d + step + TOUCHING_GAP) * (d + step + TOUCHING_GAP):
-                near = True
-                gap = np.float32(math.sqrt(d2)) - d
-                if gap <= TOUCHING_GAP:
-                    surroundings |= _BIT << np.uint64(k)
+        wall = FAR
         if c.walled:
-            inner = c.half_arena - c.radius
-            gap = inner - max(abs(x), abs(y))
-            least = min(least, gap)
-            if gap <= step + TOUCHING_GAP:
-                near = True
-                if inner - x <= TOUCHING_GAP:
-                    surroundings |= _BIT << np.uint64(_FIRST_WALL)
-                if inner + x <= TOUCHING_GAP:
-                    surroundings |= _BIT << np.uint64(_FIRST_WALL + 1)
-                if inner - y <= TOUCHING_GAP:
-                    surroundings |= _BIT << np.uint64(_FIRST_WALL + 2)
-                if inner + y <= TOUCHING_GAP:
-                    surroundings |= _BIT << np.uint64(_FIRST_WALL + 3)
-        begun = surroundings & ~t.touching_obstacles
-        while begun != _NO_BITS:
-            begun &= begun - _BIT
-            onsets += 1
-            w.contacts_obstacle += 1
-        t.touching_trackers = touching
-        t.touching_obstacles = surroundings
-        t.near = near
-        t.onsets = onsets
-        in_touch = touching | surroundings | (target_touching & (_BIT << np.uint64(i)))
-        t.touching = in_touch != _NO_BITS
+            wall = inner - max(abs(t.x), abs(t.y))
+        least = min(least, s[GAP + i], wall)
+        wall_near = wall <= c.tracker_speed * c.dt + TOUCHING_GAP
+        t.near = s[EXCESS + i] <= _ZERO or wall_near
+        t.onsets = 0
+        if t.near == 0:
+            t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
+            continue
+        touches_target = meet_target(c, w, t, i)
+        if touches_target:
+            target_touching |= _BIT << np.uint64(i)
+        target_near = target_near or near_target(c, w, t)
+        meet_trackers(c, w, trackers, i)
+        meet_surroundings(c, w, t, obstacles)
+        touching = t.touching_trackers | t.touching_obstacles
+        t.touching = touches_target or touching != _NO_BITS
     w.touching = target_touching
     w.near = target_near or c.num_obstacles > 0 or c.walled != 0
-    w.least_gap = min(least, np.float32(math.sqrt(least2)) - c.radius - c.radius)
+    w.least_gap = least
+
+
+@compiled
+def near_target(c: Record, w: Record, t: Record) -> bool:
+    """Say whether a tracker and the target could touch within the next control step."""
+    reach = c.radius + c.radius + TOUCHING_GAP + (c.tracker_speed + c.target_speed) * c.dt
+    dx, dy = w.x - t.x, w.y - t.y
+    return bool(dx * dx + dy * dy <= reach * reach)
+
+
+@compiled
+def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
+    """Say whether tracker i touches the target, and count the contact if it begins."""
+    touch = c.radius + c.radius + TOUCHING_GAP
+    dx, dy = w.x - t.x, w.y - t.y
+    if dx * dx + dy * dy > touch * touch:
+        return False
+    if w.touching & (_BIT << np.uint64(i)) == _NO_BITS:
+        t.onsets += 1
+        w.contacts_target += 1
+    return True
+
+
+@compiled
+def meet_trackers(c: Record, w: Record, trackers: Records, i: int) -> None:
+    """Note which other trackers tracker i touches, and count the contacts that begin."""
+    t = trackers[i]
+    touch = c.radius + c.radius + TOUCHING_GAP
+    touching = _NO_BITS
+    for j in range(c.num_trackers):
+        other = trackers[j]
+        dx, dy = other.x - t.x, other.y - t.y
+        if j != i and dx * dx + dy * dy <= touch * touch:
+            bit = _BIT << np.uint64(j)
+            touching |= bit
+            if t.touching_trackers & bit == _NO_BITS:
+                t.onsets += 1
+                if i < j:
+                    w.contacts_tracker += 1
+    t.touching_trackers = touching
+
+
+@compiled
+def meet_surroundings(c: Record, w: Record, t: Record, obstacles: Records) -> None:
+    """Note which obstacles and walls a tracker touches, and count the contacts that begin."""
+    touching = _NO_BITS
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy, reach = o.x - t.x, o.y - t.y, c.radius + o.radius + TOUCHING_GAP
+        if dx * dx + dy * dy <= reach * reach:
+            touching |= _BIT << np.uint64(k)
+    if c.walled:
+        inner = c.half_arena - c.radius - TOUCHING_GAP
+        if t.x >= inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL)
+        if t.x <= -inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL + 1)
+        if t.y >= inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL + 2)
+        if t.y <= -inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL + 3)
+    begun = touching & ~t.touching_obstacles
+    while begun != _NO_BITS:
+        begun &= begun - _BIT
+        t.onsets += 1
+        w.contacts_obstacle += 1
+    t.touching_obstacles = touching

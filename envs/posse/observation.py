@@ -24,12 +24,25 @@ from posse.formation import FORMATIONS
 from posse.scenario import Scenario
 from posse.sensing import ping
 from posse.state import NEVER
+from posse.survey import (
+    BEARING_COS,
+    BEARING_SIN,
+    DISTANCE,
+    HEADING_COS,
+    HEADING_SIN,
+    NEAREST,
+    NUMBER,
+    natural,
+    place_of,
+    survey,
+    survey_team,
+    within_one,
+)
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
-_LARGE: Final = np.float32(1e18)
-_COUNTED: Final = 12  # up to this team size, places are found by counting
+_COUNTED: Final = 16  # up to this team size, places are found by counting
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 
 
@@ -70,8 +83,8 @@ def _most_turn(s: Scenario) -> float:
 
 @compiled
 def _write_own(c: Record, robot: Record, touching: int, working: int, o: FloatArray, k: int) -> int:
-    o[k] = robot.heading_cos
-    o[k + 1] = robot.heading_sin
+    o[k] = within_one(robot.heading_cos)
+    o[k + 1] = within_one(robot.heading_sin)
     o[k + 2] = robot.x
     o[k + 3] = robot.y
     o[k + 4] = robot.speed
@@ -183,18 +196,12 @@ def _target_fields(s: Scenario) -> list[Field]:
 
 
 @compiled
-def _unit(value: np.float32) -> np.float32:
-    """Return a cosine or sine that rounding may have carried past 1, brought back."""
-    return min(max(value, _MINUS_ONE), _ONE)
-
-
-@compiled
 def _write_direction(
     hc: np.float32, hs: np.float32, x: np.float32, y: np.float32, o: FloatArray, k: int
 ) -> int:
     """Write a unit vector of the common frame in the frame whose heading is (hc, hs)."""
-    o[k] = _unit(x * hc + y * hs)
-    o[k + 1] = _unit(y * hc - x * hs)
+    o[k] = within_one(x * hc + y * hs)
+    o[k + 1] = within_one(y * hc - x * hs)
     return k + 2
 
 
@@ -274,70 +281,54 @@ def _neighbour_fields(s: Scenario) -> list[Field]:
 
 @compiled
 def _write_neighbour(
-    hc: np.float32,
-    hs: np.float32,
-    x: np.float32,
-    y: np.float32,
-    other: Record,
-    number: int,
-    age: np.float32,
-    o: FloatArray,
+    robot: Record, other: Record, number: int, age: np.float32, o: FloatArray, k: int
 ) -> None:
-    """Write a team-mate's part (9 + m,), the message excepted."""
-    o[0] = np.float32(number)
-    o[1] = age
-    k = _write_place(hc, hs, other.x - x, other.y - y, o, 2)
+    """Write what a robot knows of another from k on, (9 + m,), the message excepted."""
+    hc, hs = robot.heading_cos, robot.heading_sin
+    o[k] = np.float32(number)
+    o[k + 1] = age
+    k = _write_place(hc, hs, other.x - robot.x, other.y - robot.y, o, k + 2)
     k = _write_direction(hc, hs, other.heading_cos, other.heading_sin, o, k)
     o[k] = other.speed
     o[k + 1] = other.turn_rate
 
 
 @compiled
-def _write_no_neighbour(o: FloatArray) -> None:
-    """Write the part of a place that is not filled."""
-    o[:] = _ZERO
-    o[0] = _MINUS_ONE
-    o[1] = _MINUS_ONE
-    o[2] = _MINUS_ONE
+def _write_surveyed(
+    other: Record, j: int, age: np.float32, s: FloatArray, o: FloatArray, k: int
+) -> None:
+    """Write the same from a survey."""
+    o[k] = np.float32(j)
+    o[k + 1] = age
+    o[k + 2] = s[DISTANCE + j]
+    o[k + 3] = s[BEARING_COS + j]
+    o[k + 4] = s[BEARING_SIN + j]
+    o[k + 5] = s[HEADING_COS + j]
+    o[k + 6] = s[HEADING_SIN + j]
+    o[k + 7] = other.speed
+    o[k + 8] = other.turn_rate
 
 
 @compiled
-def _write_message(said: FloatArray, o: FloatArray) -> None:
-    for q in range(len(said)):
-        o[9 + q] = said[q]
+def _write_no_neighbour(c: Record, o: FloatArray, k: int) -> None:
+    """Write a place that is not filled, from k on."""
+    for q in range(k + 3, k + 9 + c.message_size):
+        o[q] = _ZERO
+    o[k] = _MINUS_ONE
+    o[k + 1] = _MINUS_ONE
+    o[k + 2] = _MINUS_ONE
 
 
 @compiled
-def _keep_nearest(
-    places: int, filled: int, number: int, d2: np.float32, nearest: FloatArray
-) -> int:
-    """Insert a team-mate into the (2, N) list of the nearest, row 0 distances, row 1 numbers."""
-    if filled == places and d2 >= nearest[0, places - 1]:
-        return filled
-    spot = filled if filled < places else places - 1
-    while spot > 0 and nearest[0, spot - 1] > d2:
-        nearest[0, spot] = nearest[0, spot - 1]
-        nearest[1, spot] = nearest[1, spot - 1]
-        spot -= 1
-    nearest[0, spot] = d2
-    nearest[1, spot] = np.float32(number)
-    return min(filled + 1, places)
+def _write_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
+    """Write what team-mate j said, a row of (N, m), into its place, which begins at k."""
+    for q in range(c.message_size):
+        o[k + 9 + q] = said[j, q]
 
 
 @compiled
-def _write_all_neighbours(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    i: int,
-    x: np.float32,
-    y: np.float32,
-    hc: np.float32,
-    hs: np.float32,
-    message: FloatArray,
-    nearest: FloatArray,
-    o: FloatArray,
-    k: int,
+def _write_whole_team(
+    c: Record, trackers: Records, i: int, said: FloatArray, s: FloatArray, o: FloatArray, k: int
 ) -> None:
     """Write every team-mate, nearest first, where all are heard and each has a place.
 
@@ -346,73 +337,91 @@ def _write_all_neighbours(
     """
     n, size = c.num_trackers, 9 + c.message_size
     for j in range(n):
-        dx, dy = trackers[j].x - x, trackers[j].y - y
-        nearest[0, j] = dx * dx + dy * dy
-    nearest[0, i] = _LARGE
-    for j in range(n):
         if j != i:
-            d2 = nearest[0, j]
-            place = 0
-            for other in range(n):
-                nearer = nearest[0, other] < d2 or (nearest[0, other] == d2 and other < j)
-                place += 1 if nearer else 0
-            part = o[k + place * size : k + (place + 1) * size]
-            _write_neighbour(hc, hs, x, y, trackers[j], j, _ZERO, part)
-            _write_message(message[j], part)
+            start = natural(k + place_of(j, n, s) * size)
+            _write_surveyed(trackers[j], j, _ZERO, s, o, start)
+            _write_message(c, said, j, o, start)
 
 
 @compiled
-def _write_neighbours(
+def _keep_nearest(
+    places: int, filled: int, number: int, distance: np.float32, s: FloatArray
+) -> int:
+    """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far."""
+    if filled == places:
+        if distance >= s[NEAREST + places - 1]:
+            return filled
+        filled -= 1
+    spot = filled
+    while spot > 0 and s[NEAREST + spot - 1] > distance:
+        s[NEAREST + spot] = s[NEAREST + spot - 1]
+        s[NUMBER + spot] = s[NUMBER + spot - 1]
+        spot -= 1
+    s[NEAREST + spot] = distance
+    s[NUMBER + spot] = np.float32(number)
+    return filled + 1
+
+
+@compiled
+def _write_reached(
     c: Record,
     w: Record,
     trackers: Records,
     i: int,
-    heard: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
-    nearest: FloatArray,
+    said: FloatArray,
+    s: FloatArray,
     o: FloatArray,
     k: int,
 ) -> None:
-    """Write the team-mates of tracker i, nearest first, from what it last heard of each."""
-    t = trackers[i]
-    x, y, hc, hs = t.x, t.y, t.heading_cos, t.heading_sin
-    places, perfect = c.neighbours, c.perfect_radio != 0
-    if perfect and c.num_trackers <= _COUNTED and w.working == c.num_trackers == places + 1:
-        _write_all_neighbours(c, w, trackers, i, x, y, hc, hs, message[0], nearest, o, k)
-        return
+    """Write the nearest team-mates where the radio is perfect.
+
+    Nothing is lost, so what was last heard of a team-mate is where it is; one that broke stays
+    where it was when it was last heard.
+    """
     filled = 0
-    deaf = perfect and t.broken_at != NEVER
-    if places > 0:
-        for j in range(c.num_trackers):
-            if j == i or deaf:
-                continue
-            if perfect:
-                # Nothing is lost, so what was last heard of a team-mate is where it is; one that
-                # broke stays where it was when it was last heard.
-                known = w.step - trackers[j].broken_at <= c.forget_steps
-                dx, dy = trackers[j].x - x, trackers[j].y - y
-            else:
-                h = heard[i, j]
-                known = h.step >= 0 and w.step - h.step <= c.forget_steps
-                dx, dy = h.x - x, h.y - y
-            if known:
-                filled = _keep_nearest(places, filled, j, dx * dx + dy * dy, nearest)
-    size = 9 + c.message_size
-    for p in range(places):
-        part = o[k + p * size : k + (p + 1) * size]
-        if p >= filled:
-            _write_no_neighbour(part)
-            continue
-        j = int(nearest[1, p])
-        if perfect:
+    deaf = trackers[i].broken_at != NEVER
+    for j in range(c.num_trackers if c.neighbours > 0 and not deaf else 0):
+        if j != i and w.step - trackers[j].broken_at <= c.forget_steps:
+            filled = _keep_nearest(c.neighbours, filled, j, s[DISTANCE + j], s)
+    for p in range(c.neighbours):
+        if p < filled:
+            j = int(s[NUMBER + p])
             age = max(_ZERO, np.float32(w.step - trackers[j].broken_at)) * c.dt
-            _write_neighbour(hc, hs, x, y, trackers[j], j, age, part)
-            _write_message(message[0, j], part)
+            _write_surveyed(trackers[j], j, age, s, o, k)
+            _write_message(c, said, j, o, k)
         else:
+            _write_no_neighbour(c, o, k)
+        k += 9 + natural(c.message_size)
+
+
+@compiled
+def _write_heard(
+    c: Record,
+    w: Record,
+    t: Record,
+    i: int,
+    heard: Records,
+    heard_message: FloatArray,
+    s: FloatArray,
+    o: FloatArray,
+    k: int,
+) -> None:
+    """Write the nearest team-mates from what tracker i last heard of each."""
+    filled = 0
+    for j in range(c.num_trackers if c.neighbours > 0 else 0):
+        h = heard[i, j]
+        if j != i and h.step >= 0 and w.step - h.step <= c.forget_steps:
+            dx, dy = h.x - t.x, h.y - t.y
+            filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
+    for p in range(c.neighbours):
+        if p < filled:
+            j = int(s[NUMBER + p])
             age = np.float32(w.step - heard[i, j].step) * c.dt
-            _write_neighbour(hc, hs, x, y, heard[i, j], j, age, part)
-            _write_message(heard_message[i, j], part)
+            _write_neighbour(t, heard[i, j], j, age, o, k)
+            _write_message(c, heard_message[i], j, o, k)
+        else:
+            _write_no_neighbour(c, o, k)
+        k += 9 + natural(c.message_size)
 
 
 @compiled
@@ -421,22 +430,28 @@ def observe_tracker(
     w: Record,
     trackers: Records,
     i: int,
-    obstacles: Records,
     heard: Records,
     heard_message: FloatArray,
     message: FloatArray,
-    beams: FloatArray,
-    nearest: FloatArray,
+    s: FloatArray,
     o: FloatArray,
 ) -> None:
-    """Write what tracker i is given, (F,)."""
-    t = trackers[i]
+    """Write what tracker i is given, (F,); ``s`` holds where every disc is."""
+    t, n = trackers[i], c.num_trackers
+    survey(c, t, i, s)
     k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
     k = _write_task(c, w, i, c.tracker_speed, c.tracker_turn_rate, o, k)
     k = _write_target(c, w, t, o, k)
-    ping(c, w, t, i, trackers, obstacles, beams, o[k : k + c.sonar_beams])
-    k += c.sonar_beams
-    _write_neighbours(c, w, trackers, i, heard, heard_message, message, nearest, o, k)
+    ping(c, t, s, o, k)
+    k += natural(c.sonar_beams)
+    if c.perfect_radio == 0:
+        _write_heard(c, w, t, i, heard, heard_message, s, o, k)
+        return
+    survey_team(t, n, s)
+    if n <= _COUNTED and w.working == n == c.neighbours + 1:
+        _write_whole_team(c, trackers, i, message[0], s, o, k)
+    else:
+        _write_reached(c, w, trackers, i, message[0], s, o, k)
 
 
 @compiled
@@ -445,29 +460,27 @@ def observe_target(
     w: Record,
     trackers: Records,
     obstacles: Records,
-    beams: FloatArray,
-    nearest: FloatArray,
+    s: FloatArray,
     o: FloatArray,
 ) -> None:
     """Write what a target that is an agent is given, (F,): it knows where trackers are."""
+    survey(c, w, c.num_trackers, s)
     touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
     k = _write_own(c, w, touching, 1, o, 0)
     k = _write_task(c, w, -1, c.target_speed, c.target_turn_rate, o, k)
     o[k - 9], o[k - 8] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
     k = _write_no_target(o, k)
-    ping(c, w, w, -1, trackers, obstacles, beams, o[k : k + c.sonar_beams])
-    k += c.sonar_beams
+    ping(c, w, s, o, k)
+    k += natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
-        dx, dy = trackers[j].x - w.x, trackers[j].y - w.y
-        filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, nearest)
-    size = 9 + c.message_size
+        filled = _keep_nearest(c.neighbours, filled, j, s[DISTANCE + j], s)
     for p in range(c.neighbours):
-        part = o[k + p * size : k + (p + 1) * size]
-        _write_no_neighbour(part)
+        _write_no_neighbour(c, o, k)
         if p < filled:
-            j = int(nearest[1, p])
-            _write_neighbour(w.heading_cos, w.heading_sin, w.x, w.y, trackers[j], j, _ZERO, part)
+            j = int(s[NUMBER + p])
+            _write_neighbour(w, trackers[j], j, _ZERO, o, k)
+        k += 9 + natural(c.message_size)
 
 
 class ObservationLayout:

@@ -11,14 +11,14 @@ from typing import Final
 
 import numpy as np
 
-from posse.arrays import Record, Records
+from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.radio import connected
 from posse.state import NEVER
+from posse.survey import SLOT, SLOT_DISTANCE2, find_slots
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
-_LARGE: Final = np.float32(1e12)
 _BIT: Final = np.uint64(1)
 _NO_BITS: Final = np.uint64(0)
 
@@ -31,48 +31,35 @@ def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
 
 
 @compiled
-def nearest_slot(
-    c: Record, slots: Records, taken: np.uint64, ahead: np.float32, left: np.float32
-) -> tuple[int, np.float32]:
-    """Return the nearest slot that is not in the set ``taken``, and its squared distance."""
-    best, least = -1, _LARGE
-    for s in range(c.num_trackers):
-        if taken & (_BIT << np.uint64(s)) == _NO_BITS:
-            dx, dy = ahead - slots[s].x, left - slots[s].y
-            d2 = dx * dx + dy * dy
-            if d2 < least:
-                best, least = s, d2
-    return best, least
+def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArray) -> None:
+    """Work out who occupies which slot, and how far everyone is from a slot that is free.
 
-
-@compiled
-def occupy(c: Record, w: Record, trackers: Records, slots: Records) -> None:
-    """Work out who occupies which slot, and how far everyone is from a slot that is free."""
+    Where the discs are stands in ``s`` (:func:`posse.survey.lay_out`).
+    """
+    find_slots(c, w, slots, _NO_BITS, s)
     taken = _NO_BITS
     occupied = 0
     near2 = c.tolerance * c.tolerance
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot = -1
-        ahead, left = place(c, w, t)
-        best, least = nearest_slot(c, slots, _NO_BITS, ahead, left)
+        least = s[SLOT_DISTANCE2 + i]
         # Until all slots taken are known, the distance to the nearest one of all.
         t.slot_progress = t.slot_distance
         t.slot_distance = np.float32(math.sqrt(least))
         if least <= near2 and t.broken_at == NEVER and t.touching == 0:
+            best = int(s[SLOT + i])
             bit = _BIT << np.uint64(best)
             if taken & bit == _NO_BITS:
                 taken |= bit
                 occupied += 1
                 t.slot = best
     if taken != _NO_BITS:
+        find_slots(c, w, slots, taken, s)
         for i in range(c.num_trackers):
             t = trackers[i]
-            if t.slot < 0:
-                ahead, left = place(c, w, t)
-                best, least = nearest_slot(c, slots, taken, ahead, left)
-                if best >= 0:
-                    t.slot_distance = np.float32(math.sqrt(least))
+            if t.slot < 0 and s[SLOT + i] >= _ZERO:
+                t.slot_distance = np.float32(math.sqrt(s[SLOT_DISTANCE2 + i]))
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot_progress -= t.slot_distance
@@ -91,8 +78,11 @@ def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
     if dx * dx + dy * dy > most * most:
         return False
     ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
-    _, least = nearest_slot(c, slots, _NO_BITS, ahead, left)
-    return bool(least <= reach * reach)
+    for slot in range(c.num_trackers):
+        sx, sy = ahead - slots[slot].x, left - slots[slot].y
+        if sx * sx + sy * sy <= reach * reach:
+            return True
+    return False
 
 
 @compiled

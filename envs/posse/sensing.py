@@ -11,10 +11,25 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.randomness import SENSOR_NOISE, normal_pair
 from posse.state import NEVER
+from posse.survey import (
+    AHEAD,
+    BEAM_COS,
+    BEAM_SIN,
+    BLOCK,
+    DISTANCE,
+    FAR,
+    LEFT,
+    RADIUS,
+    READING,
+    blocks,
+    lesser,
+    natural,
+    num_discs,
+)
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
-_FAR: Final = np.float32(1e9)
+_TINY: Final = np.float32(1e-9)
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of the velocity
 
 
@@ -61,14 +76,15 @@ def take_fix(
     """Give a tracker a newer fix of the target, and a velocity from this and the one before."""
     steps = step - t.fix_step
     if t.fix_step >= 0 and np.float32(steps) * c.dt <= _VELOCITY_MEMORY:
-        time = np.float32(steps) * c.dt
-        vx, vy = (x - t.fix_x) / time, (y - t.fix_y) / time
+        rate = _ONE / (np.float32(steps) * c.dt)
+        vx, vy = (x - t.fix_x) * rate, (y - t.fix_y) * rate
         keep = min(_ONE, c.smoothing * np.float32(steps))
         vx, vy = t.fix_vx + keep * (vx - t.fix_vx), t.fix_vy + keep * (vy - t.fix_vy)
         # No target is faster than a tracker (assumption ii), so noise that says so is cut.
-        speed = np.float32(math.sqrt(vx * vx + vy * vy))
-        if speed > c.tracker_speed:
-            vx, vy = vx * (c.tracker_speed / speed), vy * (c.tracker_speed / speed)
+        speed2 = vx * vx + vy * vy
+        if speed2 > c.tracker_speed * c.tracker_speed:
+            cut = c.tracker_speed / np.float32(math.sqrt(speed2))
+            vx, vy = vx * cut, vy * cut
         t.fix_vx, t.fix_vy = vx, vy
     else:
         t.fix_vx, t.fix_vy = _ZERO, _ZERO
@@ -102,33 +118,40 @@ def look(c: Record, w: Record, t: Record, obstacles: Records, number: int) -> No
 @compiled
 def listen_to_disc(
     c: Record,
-    ex: np.float32,
-    ey: np.float32,
+    ahead: np.float32,
+    left: np.float32,
+    distance: np.float32,
     radius: np.float32,
-    beams: FloatArray,
-    readings: FloatArray,
+    s: FloatArray,
 ) -> None:
-    """Shorten the sonar readings (S,) by a disc whose centre lies (ex, ey) ahead and to the left.
+    """Shorten the sonar readings by a disc whose centre lies (ahead, left) of the robot's.
 
     The disc's nearest point counts for the beam in whose width it lies; for any other beam, where
-    its axis meets the disc. Without branches, so that the compiler does several beams at once.
+    its axis meets the disc. Without branches for a beam, so that several are done at once.
     """
-    reach = c.sonar_range + c.radius + radius
-    d2 = ex * ex + ey * ey
-    if d2 >= reach * reach:
-        return
-    distance = np.float32(math.sqrt(d2))
     in_width = c.beam_cosine * distance
-    nearest = distance - radius - c.radius
+    nearest = max(distance - radius - c.radius, _ZERO)
     radius2, own = radius * radius, c.radius
-    for k in range(len(readings)):
-        along = ex * beams[0, k] + ey * beams[1, k]
-        across = ey * beams[0, k] - ex * beams[1, k]
-        under_root = radius2 - across * across
-        axis = along - np.float32(math.sqrt(max(under_root, _ZERO))) - own
-        axis = axis if under_root > _ZERO and along > _ZERO else _FAR
-        found = nearest if along >= in_width else axis
-        readings[k] = min(readings[k], found)
+    if radius2 < (_ONE - c.beam_cosine * c.beam_cosine) * distance * distance:
+        # The disc looks narrower than a beam is wide, as it nearly always does: no axis meets it
+        # but that of the beam in whose width it lies.
+        for block in range(blocks(c.sonar_beams)):
+            for q in range(BLOCK):
+                k = BLOCK * block + q
+                along = ahead * s[BEAM_COS + k] + left * s[BEAM_SIN + k]
+                found = nearest if along >= in_width else FAR
+                s[READING + k] = lesser(s[READING + k], found)
+        return
+    for block in range(blocks(c.sonar_beams)):
+        for q in range(BLOCK):
+            k = BLOCK * block + q
+            along = ahead * s[BEAM_COS + k] + left * s[BEAM_SIN + k]
+            across = left * s[BEAM_COS + k] - ahead * s[BEAM_SIN + k]
+            under_root = radius2 - across * across
+            axis = max(along - np.float32(math.sqrt(max(under_root, _ZERO))) - own, _ZERO)
+            axis = axis if (under_root > _ZERO) & (along > _ZERO) else FAR
+            found = nearest if along >= in_width else axis
+            s[READING + k] = lesser(s[READING + k], found)
 
 
 @compiled
@@ -138,56 +161,55 @@ def listen_to_wall(
     normal_x: np.float32,
     normal_y: np.float32,
     distance: np.float32,
-    beams: FloatArray,
-    readings: FloatArray,
+    s: FloatArray,
 ) -> None:
-    """Shorten the sonar readings (S,) by a wall at a distance along its outward normal."""
+    """Shorten the sonar readings by a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
         return
+    nearest, own, in_width = max(distance - c.radius, _ZERO), c.radius, c.beam_cosine
     ahead = normal_x * robot.heading_cos + normal_y * robot.heading_sin
     left = normal_y * robot.heading_cos - normal_x * robot.heading_sin
-    for k in range(len(readings)):
-        towards = ahead * beams[0, k] + left * beams[1, k]
-        if towards >= c.beam_cosine:
-            readings[k] = min(readings[k], distance - c.radius)
-        elif towards > _ZERO:
-            readings[k] = min(readings[k], distance / towards - c.radius)
+    for block in range(blocks(c.sonar_beams)):
+        for q in range(BLOCK):
+            k = BLOCK * block + q
+            towards = ahead * s[BEAM_COS + k] + left * s[BEAM_SIN + k]
+            axis = max(distance / max(towards, _TINY) - own, _ZERO)
+            axis = axis if towards > _ZERO else FAR
+            found = nearest if towards >= in_width else axis
+            s[READING + k] = lesser(s[READING + k], found)
 
 
 @compiled
-def ping(
-    c: Record,
-    w: Record,
-    robot: Record,
-    number: int,
-    trackers: Records,
-    obstacles: Records,
-    beams: FloatArray,
-    readings: FloatArray,
-) -> None:
-    """Write the sonar ring of a robot (number -1: the target), (S,) metres from its rim.
+def ping(c: Record, robot: Record, s: FloatArray, o: FloatArray, first: int) -> None:
+    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
 
-    ``beams`` (2, S) holds the cosine and sine of each beam's direction in the robot's frame.
+    It stands on the :func:`~posse.survey.survey` of the discs around the robot.
     """
-    for k in range(len(readings)):
-        readings[k] = c.sonar_range
-    hc, hs, x, y = robot.heading_cos, robot.heading_sin, robot.x, robot.y
-    for j in range(c.num_trackers):
-        if j != number:
-            dx, dy = trackers[j].x - x, trackers[j].y - y
-            listen_to_disc(c, dx * hc + dy * hs, dy * hc - dx * hs, c.radius, beams, readings)
-    if number >= 0:
-        dx, dy = w.x - x, w.y - y
-        listen_to_disc(c, dx * hc + dy * hs, dy * hc - dx * hs, c.radius, beams, readings)
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
-        dx, dy = o.x - x, o.y - y
-        listen_to_disc(c, dx * hc + dy * hs, dy * hc - dx * hs, o.radius, beams, readings)
+    nothing = c.sonar_range
+    for block in range(blocks(c.sonar_beams)):
+        for q in range(BLOCK):
+            s[READING + BLOCK * block + q] = nothing
+    reach = c.sonar_range + c.radius
+    for block in range(blocks(num_discs(c))):
+        heard = np.int32(0)
+        for q in range(BLOCK):
+            j = BLOCK * block + q
+            heard += np.int32(s[DISTANCE + j] - s[RADIUS + j] < reach)
+        for q in range(BLOCK if heard != 0 else 0):
+            j = BLOCK * block + q
+            distance = s[DISTANCE + j]
+            if distance - s[RADIUS + j] < reach:
+                listen_to_disc(c, s[AHEAD + j], s[LEFT + j], distance, s[RADIUS + j], s)
     if c.walled:
-        half = c.half_arena
-        listen_to_wall(c, robot, _ONE, _ZERO, half - x, beams, readings)
-        listen_to_wall(c, robot, -_ONE, _ZERO, half + x, beams, readings)
-        listen_to_wall(c, robot, _ZERO, _ONE, half - y, beams, readings)
-        listen_to_wall(c, robot, _ZERO, -_ONE, half + y, beams, readings)
-    for k in range(len(readings)):
-        readings[k] = max(readings[k], _ZERO)
+        half, x, y = c.half_arena, robot.x, robot.y
+        listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
+        listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
+        listen_to_wall(c, robot, _ZERO, _ONE, half - y, s)
+        listen_to_wall(c, robot, _ZERO, -_ONE, half + y, s)
+    beams = natural(c.sonar_beams)
+    whole = beams // BLOCK
+    for block in range(whole):
+        for q in range(BLOCK):
+            o[first + BLOCK * block + q] = s[READING + BLOCK * block + q]
+    for k in range(BLOCK * whole, beams):
+        o[first + k] = s[READING + k]

@@ -13,12 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from posse.arrays import Record, Records
+from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.formation import follow_heading
 from posse.kinematics import arc, turn_towards
 from posse.randomness import TARGET, between, uniform
 from posse.state import NEVER
+from posse.survey import ROOM_AHEAD, ROOM_ASTERN, lesser
 
 CONSTANT: Final = 0
 ACCELERATING: Final = 1
@@ -43,6 +44,7 @@ _WEAVE_MOST: Final = 0.9
 # The smart motion. It weighs these many directions, every so many control steps.
 SMART_DIRECTIONS: Final = 16
 SMART_REPLAN: Final = 5
+_HALF_ROUND: Final = SMART_DIRECTIONS // 2
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
 _LOYALTY: Final = np.float32(0.5)  # s; going back on its choice has to be worth twice that
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
@@ -78,7 +80,9 @@ def draw_motion(c: Record, w: Record) -> None:
 
 
 @compiled
-def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records) -> np.float32:
+def target_turn_rate(
+    c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray
+) -> np.float32:
     """Return the turn rate that a scripted target takes for the next control step, rad/s."""
     if c.motion == ACCELERATING:
         time = np.float32(w.step) * c.dt
@@ -86,7 +90,7 @@ def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records
         for _ in range(c.physics_steps):  # an arc turns by 1 rad at most
             _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, _ZERO, turn, c.physics_dt)
     elif c.motion == SMART and w.step % SMART_REPLAN == 0:
-        evade(c, w, trackers, obstacles)
+        evade(c, w, trackers, obstacles, s)
     if c.walled and c.motion != SMART:
         mirror_at_walls(c, w)
     turn = turn_towards(
@@ -98,7 +102,7 @@ def target_turn_rate(c: Record, w: Record, trackers: Records, obstacles: Records
 
 
 @compiled
-def evade(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
     """Set the goal heading of a smart target.
 
     It makes ground through the widest gap, until the team keeps station on it or a tracker comes
@@ -108,7 +112,7 @@ def evade(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     if w.touching != _NO_BITS:
         # Held fast: the way out is where nobody stands.
         w.pressed = _ZERO
-        plan_escape(c, w, trackers, obstacles)
+        plan_escape(c, w, trackers, obstacles, s)
         return
     if w.pressed < _ZERO:
         w.pressed = min(_ZERO, w.pressed + past)
@@ -119,7 +123,7 @@ def evade(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
         w.pressed = -_DART_TIME / c.target_turn_rate
         plan_dart(c, w, trackers, obstacles)
     else:
-        plan_escape(c, w, trackers, obstacles)
+        plan_escape(c, w, trackers, obstacles, s)
 
 
 @compiled
@@ -149,7 +153,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
 
 
 @compiled
-def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
     """Set the goal heading through the widest gap that the team leaves.
 
     For every direction u, the soonest that any tracker, straight on at full speed, could be where
@@ -162,36 +166,52 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records) -> 
     clear = c.radius + c.radius + _CLEARANCE
     # What it heads for at the start was not its choice, and one that ended in contact was bad.
     loyalty = _LOYALTY if w.step > 0 and w.touching == _NO_BITS else _ZERO
+    # A direction and its opposite have the square root in common.
+    for k in range(_HALF_ROUND):
+        s[ROOM_AHEAD + k], s[ROOM_ASTERN + k] = _FAR, _FAR
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            stand_in_the_way(a / v, clear, t.x - w.x, t.y - w.y, s)
+            continue
+        px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
+        py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
+        far2 = a * (px * px + py * py)
+        for k in range(_HALF_ROUND):
+            b = v * (px * _DIRECTION_COS[k] + py * _DIRECTION_SIN[k])
+            root = np.float32(math.sqrt(b * b + far2))
+            s[ROOM_AHEAD + k] = lesser(s[ROOM_AHEAD + k], root - b)
+            s[ROOM_ASTERN + k] = lesser(s[ROOM_ASTERN + k], root + b)
     best = np.float32(-1e9)
     old_cos, old_sin = w.goal_cos, w.goal_sin
-    for k in range(SMART_DIRECTIONS // 2):
+    for k in range(_HALF_ROUND):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
-        # The direction and its opposite have the square root in common.
-        ahead, astern = _FAR, _FAR
-        for i in range(c.num_trackers):
-            t = trackers[i]
-            if t.broken_at != NEVER:
-                # It goes nowhere, and is met only by running into it.
-                px, py = t.x - w.x, t.y - w.y
-                if abs(px * uy - py * ux) < clear:
-                    along = (px * ux + py * uy) * a / v
-                    ahead = min(ahead, along) if along > _ZERO else ahead
-                    astern = min(astern, -along) if along < _ZERO else astern
-                continue
-            px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
-            py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
-            b = v * (px * ux + py * uy)
-            root = np.float32(math.sqrt(b * b + a * (px * px + py * py)))
-            ahead, astern = min(ahead, root - b), min(astern, root + b)
         same_way = loyalty * (ux * old_cos + uy * old_sin)
         for side in range(2):
-            value = ahead / a + same_way if side == 0 else astern / a - same_way
+            value = s[ROOM_AHEAD + k] / a + same_way
+            if side == 1:
+                value = s[ROOM_ASTERN + k] / a - same_way
             if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
                 best = value
                 w.goal_cos, w.goal_sin = ux, uy
             ux, uy = -ux, -uy
+
+
+@compiled
+def stand_in_the_way(
+    scale: np.float32, clear: np.float32, px: np.float32, py: np.float32, s: FloatArray
+) -> None:
+    """Shorten the room by a tracker that goes nowhere, and is met only by running into it."""
+    for k in range(_HALF_ROUND):
+        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
+        if abs(px * uy - py * ux) < clear:
+            along = (px * ux + py * uy) * scale
+            if along > _ZERO:
+                s[ROOM_AHEAD + k] = min(s[ROOM_AHEAD + k], along)
+            if along < _ZERO:
+                s[ROOM_ASTERN + k] = min(s[ROOM_ASTERN + k], -along)
 
 
 @compiled

@@ -26,6 +26,7 @@ from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
 from posse.state import NEVER
+from posse.survey import lay_out, lay_out_beams
 from posse.target_motion import AGENT, target_turn_rate
 
 _ZERO: Final = np.float32(0.0)
@@ -66,7 +67,12 @@ def command(c: Record, t: Record, action: FloatArray) -> None:
 
 @compiled
 def command_target(
-    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Set the target's speed and turn rate for the control step."""
     w.speed = c.target_speed
@@ -75,19 +81,24 @@ def command_target(
         w.speed = _HALF * (action[0] + _ONE) * c.target_speed
         w.turn_rate = action[1] * c.target_turn_rate
     else:
-        w.turn_rate = target_turn_rate(c, w, trackers, obstacles)
+        w.turn_rate = target_turn_rate(c, w, trackers, obstacles, scratch)
 
 
 @compiled
 def motion(
-    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
 
     A robot that nothing can touch within the step moves on one arc; one that something is near to
     moves by physics steps, each of them swept.
     """
-    command_target(c, w, trackers, obstacles, actions)
+    command_target(c, w, trackers, obstacles, actions, scratch)
     any_near = w.near != 0 or c.whole_arcs == 0
     if not any_near:
         move(c, w, trackers, obstacles, w, -1, c.dt)
@@ -144,18 +155,14 @@ def observe(
     heard: Records,
     heard_message: FloatArray,
     message: FloatArray,
-    beams: FloatArray,
-    nearest: FloatArray,
+    scratch: FloatArray,
     observations: FloatArray,
 ) -> None:
     """Write the observations of every agent of a world, (rows, F)."""
     for i in range(c.num_trackers):
-        observe_tracker(
-            c, w, trackers, i, obstacles, heard, heard_message, message, beams, nearest,
-            observations[i],
-        )  # fmt: skip
+        observe_tracker(c, w, trackers, i, heard, heard_message, message, scratch, observations[i])
     if c.motion == AGENT:
-        observe_target(c, w, trackers, obstacles, beams, nearest, observations[c.num_trackers])
+        observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
 
 
 @compiled
@@ -169,6 +176,7 @@ def begin(
     broadcast: Records,
     heard_message: FloatArray,
     message: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Bring a world whose poses are set to the start of an episode, first sensing included."""
     rest(c, w, trackers)
@@ -176,9 +184,10 @@ def begin(
     heard_message[:] = _ZERO
     message[:] = _ZERO
     broadcast["sent"][:] = 0
-    meet(c, w, trackers, obstacles)
+    lay_out(c, w, trackers, obstacles, scratch)
+    meet(c, w, trackers, obstacles, scratch)
     sense(c, w, trackers, obstacles, heard, broadcast, heard_message, message)
-    occupy(c, w, trackers, slots)
+    occupy(c, w, trackers, slots, scratch)
     w.held, w.score = 0, _ZERO
 
 
@@ -214,11 +223,13 @@ def step(
     heard_message: FloatArray,
     message: FloatArray,
     actions: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Advance one world by one control step."""
     apply_faults(c, w, trackers)
-    motion(c, w, trackers, obstacles, actions)
-    meet(c, w, trackers, obstacles)
+    motion(c, w, trackers, obstacles, actions, scratch)
+    lay_out(c, w, trackers, obstacles, scratch)
+    meet(c, w, trackers, obstacles, scratch)
     w.step += 1
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
@@ -226,7 +237,7 @@ def step(
         for k in range(c.message_size):
             message[slot, i, k] = actions[i, 2 + k] if works else _ZERO
     sense(c, w, trackers, obstacles, heard, broadcast, heard_message, message)
-    occupy(c, w, trackers, slots)
+    occupy(c, w, trackers, slots, scratch)
     add_up(c, w, trackers, slots)
     if c.terminate_on_contact:
         for i in range(c.num_trackers):
@@ -241,7 +252,7 @@ START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
 
-@kernel
+@kernel(short_loops=True)
 def advance(
     config: Records,
     slots: Records,
@@ -260,7 +271,7 @@ def advance(
     terms: FloatArray,
     flags: BoolArray,
     orders: npt.NDArray[np.uint8],
-    nearest: FloatArray,
+    scratch: FloatArray,
     first: int,
     last: int,
 ) -> int:
@@ -277,6 +288,7 @@ def advance(
     terminated, truncated. Returns how many of these worlds' episodes are over.
     """
     c = config[0]
+    lay_out_beams(beams, scratch)
     over = 0
     for e in range(first, last):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
@@ -287,7 +299,7 @@ def advance(
         if order == STEP:
             step(
                 c, slots, w, trackers, obstacles,
-                heard[e], broadcast[e], heard_message[e], message[e], actions[e],
+                heard[e], broadcast[e], heard_message[e], message[e], actions[e], scratch,
             )  # fmt: skip
             reward(c, w, trackers, weights, rewards[e], terms[e])
         else:
@@ -296,8 +308,10 @@ def advance(
             if order != LOOK:
                 begin(
                     c, slots, w, trackers, obstacles,
-                    heard[e], broadcast[e], heard_message[e], message[e],
+                    heard[e], broadcast[e], heard_message[e], message[e], scratch,
                 )  # fmt: skip
+            else:
+                lay_out(c, w, trackers, obstacles, scratch)
             rewards[e, :] = _ZERO
             terms[e, :, :] = _ZERO
         flags[0, e] = w.terminated != 0
@@ -305,7 +319,7 @@ def advance(
         over += w.over != 0
         observe(
             c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
-            beams, nearest, observations[e],
+            scratch, observations[e],
         )  # fmt: skip
     return over
 
