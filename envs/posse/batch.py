@@ -38,6 +38,8 @@ from posse.world import LOOK, START, START_FROM_POSES, STEP, advance, bad_action
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _SERIAL_BELOW: Final = 2048
 """Agents in a batch below which waking other threads costs more than it saves."""
+_PARTS: Final = 4
+"""Parts of a batch for each thread."""
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
 _UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
@@ -160,8 +162,9 @@ class Batch:
         threads = min(self.num_threads, num_worlds)
         if num_worlds * rows < _SERIAL_BELOW:
             threads = 1
-        edges = [num_worlds * k // threads for k in range(threads + 1)]
-        self._scratch = [new_scratch() for _ in edges]
+        self._scratch = [new_scratch() for _ in range(threads)]
+        count = min(num_worlds, threads * _PARTS)
+        edges = [num_worlds * k // count for k in range(count + 1)]
         self._parts = list(itertools.pairwise(edges))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -391,22 +394,22 @@ class Batch:
         arguments = (
             *self._fixed, actions, observations, rewards, terms, self._flags, orders,
         )  # fmt: skip
-        scratch = self._scratch
         if _UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
-                return int(_kernel(*arguments, scratch[0], 0, self.num_worlds))
-        (first, last), *others = self._parts
+                return int(_kernel(*arguments, self._scratch[0], 0, self.num_worlds))
+        mine, *others = self._scratch
         if not others:
-            return _kernel(*arguments, scratch[0], first, last)
+            return _kernel(*arguments, mine, 0, self.num_worlds)
         if self._threads is None or self._process != os.getpid():
             self._threads = ThreadPoolExecutor(len(others), "posse")
             self._process = os.getpid()  # threads do not survive a fork
-        waiting = [
-            self._threads.submit(_kernel, *arguments, scratch[k], *part)
-            for k, part in enumerate(others, 1)
-        ]
-        over = _kernel(*arguments, scratch[0], first, last)
-        return over + sum(part.result() for part in waiting)
+        parts = iter(self._parts)  # each thread takes the next one: none waits for a slower one
+
+        def work(scratch: FloatArray) -> int:
+            return sum(_kernel(*arguments, scratch, *part) for part in parts)
+
+        waiting = [self._threads.submit(work, scratch) for scratch in others]
+        return work(mine) + sum(thread.result() for thread in waiting)
 
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
         """Start an episode in the chosen worlds; return every world's observations."""

@@ -49,9 +49,8 @@ _OPTIONS: Final[dict[str, Any]] = {
     "_nrt": False,
 }
 
-# How a compiled function is compiled for the kernels that link it. To call a function with arrays
-# costs more than most of ours take: each array is passed in parts, a dozen numbers for two of them.
-_LINKED: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
+# How a compiled function is compiled for the kernels that link it.
+_LINKED: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 # Any: numba sets these names at run time, so type checkers cannot know them.
 _CONFIG: Final[Any] = numba.config
@@ -69,12 +68,29 @@ _COMPILERS: Final = (
 )
 
 
-def compiled(function: F) -> F:
-    """Compile a function that kernels, and other compiled functions, call."""
-    if _CONFIG.DISABLE_JIT:
-        return function
-    _package_stamp(_package_directory(function))
-    return cast("F", _Function(function))
+@overload
+def compiled(function: F) -> F: ...
+
+
+@overload
+def compiled(*, seldom: bool = ...) -> Callable[[F], F]: ...
+
+
+def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable[[F], F]:
+    """Compile a function that kernels, and other compiled functions, call.
+
+    Written as ``@compiled``: it becomes part of whatever calls it. Or as
+    ``@compiled(seldom=True)`` for what is long and seldom run: it stays by itself, so that what
+    runs in every step lies close together and fits the processor's cache of instructions.
+    """
+
+    def decorate(function: F) -> F:
+        if _CONFIG.DISABLE_JIT:
+            return function
+        _package_stamp(_package_directory(function))
+        return cast("F", _Function(function, inline=not seldom))
+
+    return decorate if function is None else decorate(function)
 
 
 class _Function(CPUDispatcher):
@@ -83,15 +99,17 @@ class _Function(CPUDispatcher):
     numba would optimise each function by itself, turn it into machine code and wrap it for Python,
     and then do all of that again in every function that calls it. Kernels take in everything below
     them and are optimised as a whole, so the form that they link skips it: this halves the time to
-    compile. The form for Python is compiled only if Python calls it (a test, a prompt).
+    compile. They take it in at each call unless told otherwise: to call a function with arrays
+    costs more than most of ours take, since each array is passed in parts. The form for Python is
+    compiled only if Python calls it (a test, a prompt).
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], inline: bool) -> None:
         options = {**_OPTIONS, "nopython": True, "boundscheck": None}
         super().__init__(function, targetoptions=options)
         self._linked = CPUDispatcher(
             function,
-            targetoptions={**options, **_LINKED},
+            targetoptions={**options, **_LINKED, "forceinline": inline},
             pipeline_class=_LinkedForm,
         )
 
@@ -144,9 +162,8 @@ class _ShortLoopsLibrary(JITCodeLibrary):
 
     def _optimize_final_module(self) -> None:
         # Once, not twice: numba's first round serves its reference counts, of which there are none.
-        passes, builder = self._codegen._module_pass_manager(
-            loop_vectorize=False, slp_vectorize=True
-        )
+        codegen: Any = self._codegen
+        passes, builder = codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=True)
         passes.run(self._final_module, builder)
 
 
@@ -167,10 +184,10 @@ def kernel(*, short_loops: bool = ...) -> Callable[[F], F]: ...
 def kernel(function: F | None = None, *, short_loops: bool = False) -> F | Callable[[F], F]:
     """Compile a function that Python calls, and keep the result on disk.
 
-    Written as ``@kernel``, or as ``@kernel(short_loops=True)`` where the inner loops are short (over
-    trackers, beams, places). Those are not vectorised as loops, since to find out at run time
-    whether one is long enough takes longer than the loop; a loop of fixed length (over a block of
-    eight, say) is unrolled instead, and its turns are done at once.
+    Written as ``@kernel``, or as ``@kernel(short_loops=True)`` where the inner loops are short
+    (over trackers, beams, places). Those are not vectorised as loops, since to find out at run
+    time whether one is long enough takes longer than the loop; a loop of fixed length (over a
+    block of eight, say) is unrolled instead, and its turns are done at once.
 
     The directory is ``$POSSE_CACHE_DIR``, or ``posse`` in the user's cache directory. Where it
     cannot be written, and for functions outside a package (a script, a notebook), every process

@@ -123,22 +123,30 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
             wall = inner - max(abs(t.x), abs(t.y))
         least = min(least, s[GAP + i], wall)
         wall_near = wall <= c.tracker_speed * c.dt + TOUCHING_GAP
-        t.near = s[EXCESS + i] <= _ZERO or wall_near
-        t.onsets = 0
-        if t.near == 0:
-            t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
+        near = s[EXCESS + i] <= _ZERO or wall_near
+        if not near:
+            if t.near:
+                t.touching_trackers, t.touching_obstacles = _NO_BITS, _NO_BITS
+                t.near, t.touching, t.onsets = 0, 0, 0
             continue
-        touches_target = meet_target(c, w, t, i)
-        if touches_target:
-            target_touching |= _BIT << np.uint64(i)
+        t.near, t.onsets = 1, 0
         target_near = target_near or near_target(c, w, t)
-        meet_trackers(c, w, trackers, i)
-        meet_surroundings(c, w, t, obstacles)
-        touching = t.touching_trackers | t.touching_obstacles
-        t.touching = touches_target or touching != _NO_BITS
+        if meet_closely(c, w, trackers, obstacles, i):
+            target_touching |= _BIT << np.uint64(i)
     w.touching = target_touching
     w.near = target_near or c.num_obstacles > 0 or c.walled != 0
     w.least_gap = least
+
+
+@compiled(seldom=True)
+def meet_closely(c: Record, w: Record, trackers: Records, obstacles: Records, i: int) -> bool:
+    """Work out what a tracker that is near to something touches; say whether it is the target."""
+    t = trackers[i]
+    touches_target = meet_target(c, w, t, i)
+    meet_trackers(c, w, trackers, i)
+    meet_surroundings(c, w, t, obstacles)
+    t.touching = touches_target or (t.touching_trackers | t.touching_obstacles) != _NO_BITS
+    return bool(touches_target)
 
 
 @compiled

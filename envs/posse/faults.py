@@ -16,10 +16,10 @@ _BREAKS: Final = 1000  # where the draws of the breaks begin
 
 
 @compiled
-def _drawn_step(c: Record, w: Record, index: int) -> int:
-    """Return a control step drawn from the window in which trackers break."""
-    width = c.break_until - c.break_from
-    return int(c.break_from + np.int32(np.float32(width) * uniform(w.key, 0, FAULTS, index)))
+def _drawn_step(c: Record, w: Record, earliest: int, index: int) -> int:
+    """Return a control step drawn from what is left of the window in which trackers break."""
+    width = max(0, c.break_until - earliest)
+    return int(earliest + np.int32(np.float32(width) * uniform(w.key, 0, FAULTS, index)))
 
 
 @compiled
@@ -40,13 +40,16 @@ def draw_faults(c: Record, w: Record, trackers: Records) -> None:
     if c.breaks == 0:
         return
     if c.break_nearest:
-        w.break_step = _drawn_step(c, w, _BREAKS)
+        w.break_step = _drawn_step(c, w, c.break_from, _BREAKS)
+        return
+    if c.break_number >= 0:
+        trackers[c.break_number].breaks_at = _drawn_step(c, w, c.break_from, _BREAKS)
         return
     for k in range(c.breaks):
         chosen = np.int64(bits(w.key, 0, FAULTS, _BREAKS + 2 * k + 1) % np.uint64(n))
         while trackers[chosen].breaks_at != NEVER:
             chosen = (chosen + 1) % n
-        trackers[chosen].breaks_at = _drawn_step(c, w, _BREAKS + 2 * k + 2)
+        trackers[chosen].breaks_at = _drawn_step(c, w, c.break_from, _BREAKS + 2 * k + 2)
 
 
 @compiled
@@ -79,8 +82,8 @@ def apply_faults(c: Record, w: Record, trackers: Records) -> None:
         if nearest >= 0:
             break_tracker(w, trackers[nearest])
         w.breaks_left -= 1
-        # Several trackers break one after the other, an outage_time apart.
-        w.break_step = w.step + c.outage_steps
+        # Several break one after the other, each when it is nearest.
+        w.break_step = _drawn_step(c, w, w.step + 1, _BREAKS + w.breaks_left)
         return
     for i in range(c.num_trackers):
         t = trackers[i]

@@ -183,7 +183,7 @@ def _target_entries(s: Scenario) -> list[StateEntry]:
         for name in (*_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin")
     ]
     weave = s.target_turn_rate * _SLACK
-    times = (-1.0, (s.duration + s.outage_time * (s.breaks + 1)) * _SLACK)
+    times = (-1.0, (s.duration + s.control_step * s.breaks) * _SLACK)
     return [
         StateEntry("time", (), "s", 0, s.duration * _SLACK, "since the start",
                    _scaled("world", "step", dt)),

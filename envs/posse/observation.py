@@ -32,6 +32,7 @@ from posse.survey import (
     HEADING_SIN,
     NEAREST,
     NUMBER,
+    TASK,
     natural,
     place_of,
     survey,
@@ -43,6 +44,7 @@ _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _COUNTED: Final = 16  # up to this team size, places are found by counting
+_TOLD: Final = 17  # numbers of the task that are the same for all of an episode
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 
 
@@ -143,35 +145,33 @@ def _known(value: float, name: str, unit: str, meaning: str) -> Field:
 
 
 @compiled
-def _write_task(
-    c: Record,
-    w: Record,
-    number: int,
-    max_speed: np.float32,
-    max_turn_rate: np.float32,
-    o: FloatArray,
-    k: int,
-) -> int:
-    o[k] = _ZERO
-    o[k + 1] = _ZERO
-    o[k + 2] = _ZERO
-    o[k + c.formation] = _ONE
+def lay_out_task(c: Record, s: FloatArray) -> None:
+    """Write what every tracker of every world is told of its task to a row of scratch memory."""
+    for k in range(_TOLD):
+        s[TASK + k] = _ZERO
+    s[TASK + c.formation] = _ONE
+    s[TASK + 4] = np.float32(c.num_trackers)
+    s[TASK + 5] = c.formation_distance
+    s[TASK + 6] = c.formation_spacing
+    s[TASK + 7] = c.tracker_speed
+    s[TASK + 8] = c.tracker_turn_rate
+    s[TASK + 9] = c.acceleration_time
+    s[TASK + 10] = c.turn_acceleration_time
+    s[TASK + 11] = c.tolerance
+    s[TASK + 12] = c.radius
+    s[TASK + 13] = c.dt
+    s[TASK + 14] = c.told_sensing_range
+    s[TASK + 15] = c.sonar_range
+    s[TASK + 16] = c.told_arena
+
+
+@compiled
+def _write_task(c: Record, w: Record, number: int, s: FloatArray, o: FloatArray, k: int) -> int:
+    for q in range(_TOLD):
+        o[k + q] = s[TASK + q]
     o[k + 3] = np.float32(number)
-    o[k + 4] = np.float32(c.num_trackers)
-    o[k + 5] = c.formation_distance
-    o[k + 6] = c.formation_spacing
-    o[k + 7] = max_speed
-    o[k + 8] = max_turn_rate
-    o[k + 9] = c.acceleration_time
-    o[k + 10] = c.turn_acceleration_time
-    o[k + 11] = c.tolerance
-    o[k + 12] = c.radius
-    o[k + 13] = c.dt
-    o[k + 14] = c.told_sensing_range
-    o[k + 15] = c.sonar_range
-    o[k + 16] = c.told_arena
-    o[k + 17] = np.float32(c.horizon - w.step) * c.dt
-    return k + 18
+    o[k + _TOLD] = np.float32(c.horizon - w.step) * c.dt
+    return k + _TOLD + 1
 
 
 def _target_fields(s: Scenario) -> list[Field]:
@@ -362,7 +362,7 @@ def _keep_nearest(
     return filled + 1
 
 
-@compiled
+@compiled(seldom=True)
 def _write_reached(
     c: Record,
     w: Record,
@@ -394,7 +394,7 @@ def _write_reached(
         k += 9 + natural(c.message_size)
 
 
-@compiled
+@compiled(seldom=True)
 def _write_heard(
     c: Record,
     w: Record,
@@ -440,7 +440,7 @@ def observe_tracker(
     t, n = trackers[i], c.num_trackers
     survey(c, t, i, s)
     k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
-    k = _write_task(c, w, i, c.tracker_speed, c.tracker_turn_rate, o, k)
+    k = _write_task(c, w, i, s, o, k)
     k = _write_target(c, w, t, o, k)
     ping(c, t, s, o, k)
     k += natural(c.sonar_beams)
@@ -454,7 +454,7 @@ def observe_tracker(
         _write_reached(c, w, trackers, i, message[0], s, o, k)
 
 
-@compiled
+@compiled(seldom=True)
 def observe_target(
     c: Record,
     w: Record,
@@ -467,8 +467,10 @@ def observe_target(
     survey(c, w, c.num_trackers, s)
     touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
     k = _write_own(c, w, touching, 1, o, 0)
-    k = _write_task(c, w, -1, c.target_speed, c.target_turn_rate, o, k)
-    o[k - 9], o[k - 8] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
+    own = k
+    k = _write_task(c, w, -1, s, o, k)
+    o[own + 7], o[own + 8] = c.target_speed, c.target_turn_rate
+    o[own + 9], o[own + 10] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
     k = _write_no_target(o, k)
     ping(c, w, s, o, k)
     k += natural(c.sonar_beams)

@@ -49,7 +49,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
             )  # fmt: skip
 
 
-@compiled
+@compiled(seldom=True)
 def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
     """Put what every tracker says now into the (D + 1, N) ring."""
     slot = w.step % (c.radio_delay + 1)
@@ -63,7 +63,7 @@ def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
         b.fix_frame_cos, b.fix_frame_sin = t.fix_frame_cos, t.fix_frame_sin
 
 
-@compiled
+@compiled(seldom=True)
 def hear(
     c: Record,
     w: Record,
@@ -107,7 +107,7 @@ def hear(
                 )  # fmt: skip
 
 
-@compiled
+@compiled(seldom=True)
 def connected(c: Record, w: Record, trackers: Records) -> bool:
     """Say whether the working trackers are one radio graph, over any number of hops."""
     if c.perfect_radio:

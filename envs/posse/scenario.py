@@ -17,7 +17,7 @@ from posse.formation import FORMATIONS, slot_offsets
 from posse.reward import REWARD_TERMS
 
 TARGET_MOTIONS: Final = ("constant", "accelerating", "smart", "agent")
-BREAK_CHOICES: Final = ("nearest", "drawn")
+BREAK_CHOICES: Final = ("nearest", "drawn", "given")
 
 MAX_TRACKERS: Final = 64  # contacts and radio links are bits of one 64-bit word
 MAX_OBSTACLES: Final = 60  # the four walls take the last bits of the word
@@ -134,7 +134,10 @@ class Scenario:
     breaks: int = 0
     """Trackers that break for good during an episode, 0 to num_trackers - 1."""
     break_choice: str = "nearest"
-    """Which one: ``"nearest"`` to the target at that moment (where a leader is), or ``"drawn"``."""
+    """Which one: ``"nearest"`` to the target at that moment (where a leader is), ``"drawn"``, or
+    ``"given"`` by number."""
+    break_number: int = 0
+    """Number of the tracker that breaks where it is given."""
     break_window: tuple[float, float] = (0.4, 0.6)
     """When, as shares of the horizon: drawn between the two."""
     sensor_outages: float = 0.0
@@ -292,7 +295,7 @@ def _fail(name: str, value: object, allowed: str) -> NoReturn:
 
 _INTEGERS = (
     "version", "num_trackers", "horizon", "num_obstacles", "sonar_beams", "radio_delay",
-    "message_size", "breaks",
+    "message_size", "breaks", "break_number",
 )  # fmt: skip
 _GREATEST_WHOLE: Final = 2**62
 _PAIRS = ("obstacle_radius", "start_distance", "break_window")
@@ -376,6 +379,7 @@ _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
     "forget_after": (0, _WIDE, False),
     "num_neighbours": (0, MAX_TRACKERS - 1, True),
     "breaks": (0, MAX_TRACKERS - 1, True),
+    "break_number": (0, MAX_TRACKERS - 1, True),
     "sensor_outages": (0, 1, True),
     "radio_outages": (0, 1, True),
     "outage_time": (0, _WIDE, False),
@@ -426,6 +430,10 @@ def _check_motion(s: Scenario) -> None:
             )
     if s.breaks >= s.num_trackers > 0 and s.breaks > 0:
         _fail("breaks", s.breaks, f"at most num_trackers - 1 = {s.num_trackers - 1}")
+    if s.break_choice == "given" and s.breaks > 1:
+        _fail("breaks", s.breaks, 'break_choice="given" names one tracker, break_number')
+    if s.break_choice == "given" and s.break_number >= s.num_trackers:
+        _fail("break_number", s.break_number, f"trackers are 0 to {s.num_trackers - 1}")
     if s.break_window[1] > 1:
         _fail("break_window", s.break_window, "shares of the horizon lie in [0, 1]")
     if s.settle_time > s.duration:

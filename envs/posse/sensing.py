@@ -154,7 +154,7 @@ def listen_to_disc(
             s[READING + k] = lesser(s[READING + k], found)
 
 
-@compiled
+@compiled(seldom=True)
 def listen_to_wall(
     c: Record,
     robot: Record,

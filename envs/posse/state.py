@@ -35,7 +35,8 @@ CONFIG: Final = _record(
     ("num_trackers", _I), ("num_agents", _I), ("num_obstacles", _I), ("neighbours", _I),
     ("message_size", _I), ("physics_steps", _I), ("horizon", _I), ("settle_steps", _I),
     ("outage_steps", _I), ("break_from", _I), ("break_until", _I), ("forget_steps", _I),
-    ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("motion", _I),
+    ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("break_number", _I),
+    ("motion", _I),
     ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
     ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
     ("dt", _F), ("physics_dt", _F),
@@ -90,7 +91,7 @@ TRACKER: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
     ("broken_at", _I),  # control step at which it broke, NEVER while it works
-    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn")
+    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
     ("sensor_dead_from", _I), ("radio_dead_from", _I),  # outages, of outage_time each
     ("sees", _I),  # 1: its sensor has the target now
     ("near", _I),  # 1: something may touch it in the next step
@@ -238,6 +239,7 @@ def config_record(scenario: Scenario) -> Records:
     c.forget_steps = int(s.forget_after / s.control_step + 1e-6)
     c.radio_delay, c.breaks = s.radio_delay, s.breaks
     c.break_nearest = s.break_choice == BREAK_CHOICES[0]
+    c.break_number = s.break_number if s.break_choice == BREAK_CHOICES[2] else -1
     c.motion = TARGET_MOTIONS.index(s.target_motion)
     c.terminate_on_contact, c.walled = s.terminate_on_contact, math.isfinite(s.arena)
     c.sonar_beams = s.sonar_beams

@@ -47,7 +47,8 @@ SLOT_DISTANCE2: Final = 21 * _ROW  # and its distance squared, m²
 ROOM_AHEAD: Final = 22 * _ROW  # of each direction, for a target that flees
 ROOM_ASTERN: Final = 23 * _ROW
 INDEX: Final = 24 * _ROW  # 0, 1, 2, …
-SIZE: Final = 25 * _ROW
+TASK: Final = 25 * _ROW  # what every tracker is told of its task
+SIZE: Final = 26 * _ROW
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -176,7 +177,7 @@ def place_of(j: int, n: int, s: FloatArray) -> int:
             i = BLOCK * block + k
             d = s[MATE_DISTANCE + i]
             nearer += np.int32((d < mine) | ((d == mine) & (s[INDEX + i] < number)))
-    return nearer
+    return int(nearer)
 
 
 @compiled

@@ -199,7 +199,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
             ux, uy = -ux, -uy
 
 
-@compiled
+@compiled(seldom=True)
 def stand_in_the_way(
     scale: np.float32, clear: np.float32, px: np.float32, py: np.float32, s: FloatArray
 ) -> None:
@@ -214,7 +214,7 @@ def stand_in_the_way(
                 s[ROOM_ASTERN + k] = min(s[ROOM_ASTERN + k], -along)
 
 
-@compiled
+@compiled(seldom=True)
 def free_time(
     c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32
 ) -> np.float32:
@@ -235,7 +235,7 @@ def free_time(
     return np.float32(far / c.target_speed)
 
 
-@compiled
+@compiled(seldom=True)
 def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Set the goal heading whose turn tears the formation apart.
 
@@ -271,7 +271,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
             w.goal_cos, w.goal_sin = ux, uy
 
 
-@compiled
+@compiled(seldom=True)
 def mirror_at_walls(c: Record, w: Record) -> None:
     """Mirror the goal heading at a wall that is near and ahead."""
     inner = max(c.half_arena - _SOFT_WALL, c.half_arena * _HALF)
@@ -316,7 +316,7 @@ def has_free_circle(
     return circle_is_free(c, obstacles, x, y, radius - allowance)
 
 
-@compiled
+@compiled(seldom=True)
 def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
     """Return ``turn`` if a free turning circle remains after it, else the turn along a free one."""
     dx, dy, hc, hs = w.heading_cos, w.heading_sin, w.heading_cos, w.heading_sin

@@ -19,7 +19,7 @@ from posse.contact import free_move, meet
 from posse.faults import apply_faults
 from posse.formation import follow_heading
 from posse.kinematics import approach, arc
-from posse.observation import observe_target, observe_tracker
+from posse.observation import lay_out_task, observe_target, observe_tracker
 from posse.radio import hear, send, share_fixes
 from posse.reward import write_reward
 from posse.score import add_up, occupy
@@ -35,18 +35,22 @@ _HALF: Final = np.float32(0.5)
 
 
 @compiled
-def move(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    robot: Record,
-    number: int,
-    time: np.float32,
-) -> None:
-    """Move a tracker (number -1: the target) on its arc, as far as nothing blocks."""
+def move(robot: Record, time: np.float32) -> None:
+    """Move a robot that nothing is near to on its arc."""
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, time
+    )
+    robot.x += dx
+    robot.y += dy
+
+
+@compiled
+def move_swept(
+    c: Record, w: Record, trackers: Records, obstacles: Records, robot: Record, number: int
+) -> None:
+    """Move a tracker (number -1: the target) by a physics step, as far as nothing blocks."""
+    dx, dy, robot.heading_cos, robot.heading_sin = arc(
+        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
     )
     if robot.near:
         share = free_move(c, w, trackers, obstacles, number, robot.x, robot.y, dx, dy)
@@ -55,6 +59,22 @@ def move(
             robot.speed = _ZERO
     robot.x += dx
     robot.y += dy
+
+
+@compiled(seldom=True)
+def move_in_parts(
+    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray
+) -> None:
+    """Move those that something is near to, by physics steps, the target first."""
+    target_in_parts = w.near != 0 or c.whole_arcs == 0
+    for _ in range(c.physics_steps):
+        if target_in_parts:
+            move_swept(c, w, trackers, obstacles, w, -1)
+        for i in range(c.num_trackers):
+            t = trackers[i]
+            if t.broken_at == NEVER and (t.near != 0 or c.whole_arcs == 0):
+                command(c, t, actions[i])
+                move_swept(c, w, trackers, obstacles, t, i)
 
 
 @compiled
@@ -101,25 +121,17 @@ def motion(
     command_target(c, w, trackers, obstacles, actions, scratch)
     any_near = w.near != 0 or c.whole_arcs == 0
     if not any_near:
-        move(c, w, trackers, obstacles, w, -1, c.dt)
+        move(w, c.dt)
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.broken_at == NEVER:
             if c.whole_arcs and t.near == 0:
                 command(c, t, actions[i])
-                move(c, w, trackers, obstacles, t, i, c.dt)
+                move(t, c.dt)
             else:
                 any_near = True
     if any_near:
-        target_in_parts = w.near != 0 or c.whole_arcs == 0
-        for _ in range(c.physics_steps):
-            if target_in_parts:
-                move(c, w, trackers, obstacles, w, -1, c.physics_dt)
-            for i in range(c.num_trackers):
-                t = trackers[i]
-                if t.broken_at == NEVER and (t.near != 0 or c.whole_arcs == 0):
-                    command(c, t, actions[i])
-                    move(c, w, trackers, obstacles, t, i, c.physics_dt)
+        move_in_parts(c, w, trackers, obstacles, actions)
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
     )
@@ -165,7 +177,7 @@ def observe(
         observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
 
 
-@compiled
+@compiled(seldom=True)
 def begin(
     c: Record,
     slots: Records,
@@ -289,6 +301,7 @@ def advance(
     """
     c = config[0]
     lay_out_beams(beams, scratch)
+    lay_out_task(c, scratch)
     over = 0
     for e in range(first, last):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
@@ -337,7 +350,10 @@ def first_over(world: Records) -> int:
 def bad_action(actions: FloatArray) -> int:
     """Return the flat position of the first action that is not a number in [-1, 1], or -1."""
     flat = actions.reshape(-1)
-    for k in range(len(flat)):
+    bad = 0
+    for k in range(len(flat)):  # without a way out, so that many are looked at at once
+        bad += not ((flat[k] >= -_ONE) & (flat[k] <= _ONE))
+    for k in range(len(flat) if bad else 0):
         if not (flat[k] >= -_ONE and flat[k] <= _ONE):
             return k
     return -1

@@ -46,18 +46,17 @@ def doubled(x):
     return 2.0 * helper(x)
 """
 
-PARALLEL_KERNEL = """
-import numba
+SHORT_KERNEL = """
 from herd.decorators import kernel
 from herd.helpers import helper
 
-@kernel(parallel=True)
+@kernel(short_loops=True)
 def fill(out):
-    for i in numba.prange(out.shape[0]):
+    for i in range(out.shape[0]):
         out[i] = helper(i)
 """
 
-PARALLEL_MAIN = """
+SHORT_MAIN = """
 import numpy as np
 from herd.kernels import fill
 
@@ -148,9 +147,9 @@ def test_a_kernel_is_compiled_once_and_again_when_a_helper_in_another_file_chang
     assert (back.answer, back.hits) == (6.0, 1), "the first version is still filed under its stamp"
 
 
-def test_a_parallel_kernel_is_kept_too(herd: Herd, tmp_path: Path) -> None:
-    (herd.root / "herd" / "kernels.py").write_text(PARALLEL_KERNEL)
-    parallel = Herd(herd.root, PARALLEL_MAIN)
+def test_a_kernel_of_short_loops_is_kept_too(herd: Herd, tmp_path: Path) -> None:
+    (herd.root / "herd" / "kernels.py").write_text(SHORT_KERNEL)
+    parallel = Herd(herd.root, SHORT_MAIN)
     assert parallel.run(tmp_path / "cache").answer == 6.0
     again = parallel.run(tmp_path / "cache")
     assert (again.answer, again.hits, again.misses) == (6.0, 1, 0)

@@ -58,16 +58,32 @@ def test_the_nearest_to_the_target_breaks() -> None:
     assert (broken(batch).sum(axis=1) == 1).all()
 
 
-def test_several_leaders_break_one_after_the_other() -> None:
+def test_several_leaders_break_one_after_the_other_within_the_window() -> None:
     batch = posse.batch(
-        "leader-loss", 20, breaks=2, break_window=(0.2, 0.2), outage_time=1.5, autoreset="disabled",
-        horizon=100,
-    )  # fmt: skip
+        "leader-loss", 100, breaks=3, break_window=(0.2, 0.6), autoreset="disabled", horizon=100
+    )
     batch.reset(seed=3)
     for _ in range(100):
         batch.step(np.zeros(batch.action_shape))
     times = np.sort(batch.state["tracker_broken_at"], axis=1)
-    np.testing.assert_array_equal(times[:, :3], np.tile([20, 35, NEVER], (20, 1)))
+    assert (times[:, 3:] == NEVER).all()
+    assert (times[:, 0] >= 20).all()
+    assert (np.diff(times[:, :3], axis=1) >= 1).all(), "one at a time"
+    assert (times[:, 2] <= 62).all(), "the window is not left, but for a step each"
+    assert np.ptp(times[:, 0]) > 25, "the first is drawn from all of the window"
+
+
+def test_a_given_tracker_breaks_at_a_given_time() -> None:
+    batch = posse.batch(
+        "leader-loss", 20, break_choice="given", break_number=3, break_window=(0.3, 0.3),
+        autoreset="disabled", horizon=100,
+    )  # fmt: skip
+    batch.reset(seed=3)
+    for _ in range(100):
+        batch.step(np.zeros(batch.action_shape))
+    expected = np.full((20, 5), NEVER)
+    expected[:, 3] = 30
+    np.testing.assert_array_equal(batch.state["tracker_broken_at"], expected)
 
 
 def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
