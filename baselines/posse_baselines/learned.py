@@ -26,16 +26,19 @@ from safetensors.numpy import save_file
 from posse import ObservationLayout
 from posse.arrays import BoolArray, FloatArray
 from posse.compiled import compiled, kernel
+from posse_baselines.advice import MOTION, Adviser, advised, check_adviser
 from posse_baselines.encoding import Encoder, Encoding, encode_row
 from posse_baselines.features import SCRATCH
 from posse_baselines.parallel import most_parts, over_worlds
 from posse_baselines.policy import (
+    Annotations,
     BasePolicy,
     Memory,
     PolicyError,
     check_observations,
     message_size_of,
 )
+from posse_baselines.scripted import SCRIPTED
 
 FORMAT: Final = 1
 ACTIVATIONS: Final = ("tanh", "relu")
@@ -138,6 +141,7 @@ def _act(
     offsets: npt.NDArray[np.int64],
     slots: FloatArray,
     with_features: int,
+    proposals: FloatArray,
     mean: FloatArray,
     scale: FloatArray,
     limit: np.float32,
@@ -162,6 +166,8 @@ def _act(
             x = scratch[part, SCRATCH : SCRATCH + widest]
             y = scratch[part, SCRATCH + widest :]
             encode_row(observations[e, i], columns, unknown, offsets, slots, with_features, work, x)
+            for j in range(proposals.shape[2]):
+                x[sizes[0] - proposals.shape[2] + j] = proposals[e, i, j]
             for k in range(sizes[0]):
                 x[k] = min(max((x[k] - mean[k]) * scale[k], -limit), limit)
             at_weight, at_bias = 0, 0
@@ -189,6 +195,7 @@ class LearnedPolicy(BasePolicy):
         network: What chooses the actions.
         encoding: What the network is given.
         card: What the policy is: ``name``, ``trained_splits`` and whatever else its maker recorded.
+        adviser: The scripted policy that it listens to (:mod:`posse_baselines.advice`), if any.
 
     Attributes:
         trained_splits: Splits whose worlds it has learned from; an evaluation refuses them.
@@ -197,11 +204,18 @@ class LearnedPolicy(BasePolicy):
         PolicyError: Network and encoding do not fit each other.
     """
 
-    def __init__(self, network: Network, encoding: Encoding, card: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        network: Network,
+        encoding: Encoding,
+        card: Mapping[str, Any],
+        adviser: Adviser | None = None,
+    ) -> None:
         network.check()
-        if network.sizes[0] != encoding.size:
+        size = encoding.size + (0 if adviser is None else MOTION)
+        if network.sizes[0] != size:
             raise PolicyError(
-                f"the network takes {network.sizes[0]} numbers, its encoding gives {encoding.size}"
+                f"the network takes {network.sizes[0]} numbers, its encoding gives {size}"
             )
         if network.sizes[-1] < 2:
             raise PolicyError(
@@ -213,6 +227,11 @@ class LearnedPolicy(BasePolicy):
         self.name = str(self.card.get("name", "learned"))
         self.trained_splits = tuple(self.card.get("trained_splits", ("train",)))
         self.message_size = max(network.sizes[-1] - 2, encoding.message_size)
+        self.adviser = adviser
+        if adviser is not None:
+            if network.sizes[-1] != MOTION:
+                raise PolicyError("an advised network gives 2 numbers: messages are the adviser's")
+            self.message_size = max(self.message_size, adviser.message_size)
         weights = [np.ascontiguousarray(weight.T).reshape(-1) for weight in network.weights]
         self._numbers = (
             np.ascontiguousarray(network.mean),
@@ -234,25 +253,41 @@ class LearnedPolicy(BasePolicy):
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)
         scratch = np.empty((most_parts(), SCRATCH + 2 * max(self.network.sizes)), np.float32)
-        return layout, num_worlds, encoder, scratch
+        thoughts = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
+        return layout, num_worlds, encoder, scratch, thoughts
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F)."""
-        layout, num_worlds, encoder, scratch = memory
+        layout, num_worlds, encoder, scratch, thoughts = memory
         observations = check_observations(self, observations, num_worlds, layout)
         trackers = observations.shape[1]
         actions = np.empty((num_worlds, trackers, 2 + message_size_of(layout)), np.float32)
+        proposals = actions[..., :0]
+        if self.adviser is not None:
+            proposals, thoughts = self.adviser.act(observations, thoughts)
         over_worlds(
             _act,
-            (observations, *encoder.tables, *self._numbers, scratch, actions),
+            (
+                observations, *encoder.tables, np.ascontiguousarray(proposals[..., :MOTION]),
+                *self._numbers, scratch, actions,
+            ),
             num_worlds,
             trackers,
-        )
-        return actions, memory
+        )  # fmt: skip
+        if self.adviser is not None:
+            actions = advised(proposals, actions[..., :MOTION])
+        return actions, (layout, num_worlds, encoder, scratch, thoughts)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory as it is: the policy remembers nothing of its worlds."""
-        return memory
+        """Return the memory with the adviser's begun anew; the network remembers nothing."""
+        if self.adviser is None:
+            return memory
+        *rest, thoughts = memory
+        return (*rest, self.adviser.restart(thoughts, mask))
+
+    def annotations(self, memory: Memory) -> Annotations:
+        """Return what the adviser has in mind."""
+        return {} if self.adviser is None else self.adviser.annotations(memory[-1])
 
     def save(self, path: Path) -> None:
         """Write the policy as one file, and its card beside it as JSON, for people to read.
@@ -267,6 +302,7 @@ class LearnedPolicy(BasePolicy):
             "output": self.network.output,
             "encoding": self.encoding.to_dict(),
             "card": self.card,
+            "adviser": None if self.adviser is None else self.adviser.name,
         }
         text = json.dumps(description, sort_keys=True)
         metadata = {_KEY: text, "digest": _digest(tensors, text)}
@@ -320,7 +356,20 @@ class LearnedPolicy(BasePolicy):
             activation=str(description["activation"]),
             output=str(description["output"]),
         )
-        return cls(network, Encoding.from_dict(description["encoding"]), description["card"])
+        encoding = Encoding.from_dict(description["encoding"])
+        return cls(network, encoding, description["card"], _adviser(description.get("adviser")))
+
+
+def _adviser(name: str | None) -> Adviser | None:
+    """Return the adviser of a name: a scripted policy of this package, and never other code."""
+    if name is None:
+        return None
+    if name not in SCRIPTED:
+        raise PolicyError(
+            f"it listens to {name!r}, which is none of {', '.join(SCRIPTED)}: install the version "
+            "that wrote it"
+        )
+    return check_adviser(name, SCRIPTED[name]())
 
 
 def _read(path: Path) -> tuple[dict[str, FloatArray], dict[str, str]]:

@@ -99,6 +99,10 @@ class BasePolicy:
         """Return what the trackers have in mind."""
         return {}
 
+    def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
+        """Return what the policy remembers, as arrays (E, ...) by name that share its memory."""
+        return {}
+
     def __repr__(self) -> str:
         return f"<policy {self.name!r}>"
 

@@ -8,33 +8,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.ddcs import DDCS, Settings
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.oracle import Oracle
 from posse_baselines.policy import Policy, PolicyError
-from posse_baselines.pursuit import Pursuit
-from posse_baselines.simple import Idle, Random
+from posse_baselines.scripted import SCRIPTED
 
-_MAKERS: Final[dict[str, Callable[[], Policy]]] = {
-    "random": Random,
-    "idle": Idle,
-    "pursuit": Pursuit,
-    "ddcs-distributed": DDCS,
-    "ddcs-centralized": lambda: DDCS(Settings(model="centralized")),
-    "ddcs-centralized-no-exchange": lambda: DDCS(
-        Settings(model="centralized", exchange=False), "ddcs-centralized-no-exchange"
-    ),
-    "ddcs-no-radio": lambda: DDCS(Settings(radio=False), "ddcs-no-radio"),
-    "pngl": lambda: DDCS(Settings(guidance="pngl"), "pngl"),
-    "oracle": Oracle,
-}
 _FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file}
 """Readers of policy files, by suffix: whoever brings a kind of file adds its reader here."""
 
 
 def policy_names() -> tuple[str, ...]:
     """Return the names of all policies that come with the package."""
-    return tuple(_MAKERS)
+    return tuple(SCRIPTED)
 
 
 def load(policy: str | Path) -> Policy:
@@ -47,17 +31,17 @@ def load(policy: str | Path) -> Policy:
             an unknown kind, a module or class that cannot be found, or one that is no policy.
     """
     text = str(policy)
-    if text in _MAKERS:
-        return _MAKERS[text]()
+    if text in SCRIPTED:
+        return SCRIPTED[text]()
     path = Path(text)
     if path.suffix in _FILES or path.is_file():
         return _from_file(path)
     if ":" in text:
         return _from_module(text)
-    near = difflib.get_close_matches(text, _MAKERS, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(text, SCRIPTED, n=3, cutoff=0.5)
     hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
     raise PolicyError(
-        f"unknown policy {text!r}{hint}; policies are: {', '.join(_MAKERS)}, a file, or "
+        f"unknown policy {text!r}{hint}; policies are: {', '.join(SCRIPTED)}, a file, or "
         '"package.module:Class"'
     )
 

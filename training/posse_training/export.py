@@ -17,13 +17,19 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 import posse
+from posse_baselines.advice import MOTION, Adviser
 from posse_baselines.encoding import Encoding
 from posse_baselines.learned import LearnedPolicy, Network
 from posse_training.normalisation import LIMIT, Normaliser
 from posse_training.settings import TrainSettings
 
 
-def export(model: BaseAlgorithm, encoding: Encoding, card: Mapping[str, Any]) -> LearnedPolicy:
+def export(
+    model: BaseAlgorithm,
+    encoding: Encoding,
+    card: Mapping[str, Any],
+    adviser: Adviser | None = None,
+) -> LearnedPolicy:
     """Return what a model has learned as a policy that plays without torch.
 
     It acts by the mode of the distribution. Its actions are the model's
@@ -33,6 +39,7 @@ def export(model: BaseAlgorithm, encoding: Encoding, card: Mapping[str, Any]) ->
         model: PPO, SAC or TD3, with a :class:`Normaliser` before its networks.
         encoding: What the model was given of an observation.
         card: What is to be known of the policy.
+        adviser: Whose proposals the model was given, if any.
 
     Raises:
         TypeError: A model whose networks are not plain feed-forward ones.
@@ -43,17 +50,18 @@ def export(model: BaseAlgorithm, encoding: Encoding, card: Mapping[str, Any]) ->
     names: dict[type[nn.Module], str] = {nn.Tanh: "tanh", nn.ReLU: "relu"}
     if len(between) > 1 or not between <= set(names):
         raise TypeError(f"no policy file holds layers of {sorted(t.__name__ for t in between)}")
+    inputs = encoding.size + (0 if adviser is None else MOTION)
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     network = Network(
-        mean=_numbers(normaliser.mean)[: encoding.size],
-        scale=_numbers(normaliser.scale)[: encoding.size],
+        mean=_numbers(normaliser.mean)[:inputs],
+        scale=_numbers(normaliser.scale)[:inputs],
         limit=LIMIT,
         weights=tuple(_numbers(layer.weight) for layer in layers),
         biases=tuple(_numbers(layer.bias) for layer in layers),
         activation=names[between.pop()] if between else "relu",
         output=output,
     )
-    return LearnedPolicy(network, encoding, card)
+    return LearnedPolicy(network, encoding, card, adviser)
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], str]:

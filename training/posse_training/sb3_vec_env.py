@@ -19,6 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from posse import Batch
 from posse.arrays import BoolArray, FloatArray
+from posse_baselines.advice import MOTION, Advice, Adviser, advised
 from posse_baselines.encoding import Encoder, Encoding
 from posse_training.world_state import StateWriter
 
@@ -32,6 +33,7 @@ class _Part:
     batch: Batch
     encoder: Encoder
     state: StateWriter | None
+    advice: Advice | None
     slots: slice
     cut_at: npt.NDArray[np.int64]
     """Step at which a world's shortened first episode ends, (E,); -1 once it is over."""
@@ -54,6 +56,8 @@ class TeamVecEnv(VecEnv):
         batches: Batches of worlds, made with ``autoreset="disabled"`` and with equal
             ``message_size``; their team sizes may differ.
         encoding: What of an observation the policy is given.
+        adviser: A scripted policy whose proposals are appended to the observations, and which the
+            actions (2,) are added to (:mod:`posse_baselines.advice`).
         see_state: Append the state of the world, for a centralized critic
             (:mod:`posse_training.world_state`).
         staggered: Shorten the first episodes.
@@ -69,6 +73,7 @@ class TeamVecEnv(VecEnv):
         batches: Sequence[Batch],
         encoding: Encoding,
         *,
+        adviser: Adviser | None = None,
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
@@ -84,7 +89,7 @@ class TeamVecEnv(VecEnv):
                 raise ValueError(
                     f"the target of {batch.scenario.name!r} is an agent; one policy drives trackers"
                 )
-        lengths = {batch.action_shape[2] for batch in batches}
+        lengths = {MOTION} if adviser else {batch.action_shape[2] for batch in batches}
         if len(lengths) > 1:
             raise ValueError(f"batches have actions of different lengths: {sorted(lengths)}")
         self.encoding = encoding
@@ -100,6 +105,7 @@ class TeamVecEnv(VecEnv):
                     batch,
                     Encoder(encoding, batch.layout),
                     StateWriter(batch, places, obstacles) if see_state else None,
+                    Advice(adviser, batch) if adviser else None,
                     slice(slots, slots + count),
                     np.full(batch.num_worlds, _NEVER),
                     np.zeros((batch.num_worlds, batch.scenario.num_trackers)),
@@ -107,9 +113,9 @@ class TeamVecEnv(VecEnv):
             )
             slots += count
         state = self._parts[0].state
-        self.private_size = encoding.size
+        self.private_size = encoding.size + (MOTION if adviser else 0)
         """Numbers of an observation that are the tracker's own; the rest is the world's state."""
-        self._size = encoding.size + (state.size if state else 0)
+        self._size = self.private_size + (state.size if state else 0)
         self._actions = np.zeros((slots, *lengths), np.float32)
         super().__init__(
             slots,
@@ -148,6 +154,8 @@ class TeamVecEnv(VecEnv):
             if self.staggered:
                 worlds, horizon = part.batch.num_worlds, part.batch.scenario.horizon
                 part.cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
+            if part.advice is not None:
+                part.advice.restart(raw, np.ones(part.batch.num_worlds, np.bool_))
             self._encode(part, raw, observations[part.slots])
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()
@@ -173,24 +181,33 @@ class TeamVecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for part in self._parts:
             batch, slots = part.batch, part.slots
-            actions = self._actions[slots].reshape(batch.action_shape)
+            actions = self._actions[slots].reshape(*batch.action_shape[:2], -1)
+            if part.advice is not None:
+                actions = advised(part.advice.proposals, actions)
             raw, reward, terminated, truncated, _ = batch.step(actions)
             rewards[slots] = reward.reshape(-1)
             part.returns += reward
             cut = batch.worlds["step"] == part.cut_at
             over = terminated | truncated
             ended = over | cut
+            if part.advice is not None:
+                part.advice.follow(raw)
             if ended.any():
                 dones[slots] = np.repeat(ended, batch.scenario.num_trackers)
                 self._report(part, raw, ended, terminated, over, infos)
                 raw = batch.reset(options={"reset_mask": ended})
+                if part.advice is not None:
+                    part.advice.restart(raw, ended)
                 part.returns[ended] = 0
                 part.cut_at[ended] = _NEVER
             self._encode(part, raw, observations[slots])
         return observations, rewards, dones, infos
 
     def _encode(self, part: _Part, raw: FloatArray, out: FloatArray) -> None:
-        part.encoder.encode(raw, out)
+        part.encoder.encode(raw, out[:, : self.encoding.size])
+        if part.advice is not None:
+            proposals = part.advice.proposals[..., :MOTION].reshape(-1, MOTION)
+            out[:, self.encoding.size : self.private_size] = proposals
         if part.state is not None:
             part.state.write(out[:, self.private_size :])
 
@@ -262,7 +279,9 @@ class TeamVecEnv(VecEnv):
     def _arrays(part: _Part) -> dict[str, npt.NDArray[Any]]:
         """Return every array of a part by name; fields alone, without the padding between them."""
         own = {"cut_at": part.cut_at, "returns": part.returns}
-        return {**part.batch.arrays.by_name(), **own}
+        thoughts = part.advice.arrays() if part.advice is not None else {}
+        advice = {f"advice.{name}": array for name, array in thoughts.items()}
+        return {**part.batch.arrays.by_name(), **advice, **own}
 
     def close(self) -> None:
         """Do nothing: worlds hold nothing but memory."""

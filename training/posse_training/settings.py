@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from posse import Scenario, get_scenario
+from posse_baselines import load
 
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 
@@ -100,6 +101,9 @@ class TrainSettings:
     imitate_rounds: int = 8
     """Rounds of play and fit; in the first the expert drives, then more and more the copy."""
 
+    advise: str | None = None
+    """A scripted policy whose proposals the policy is given, and which its actions are added to."""
+
     # Looking after it
     evaluate_every: int = 1_000_000
     """Steps between two looks at validation worlds."""
@@ -123,6 +127,8 @@ class TrainSettings:
     def scenarios(self) -> tuple[Scenario, ...]:
         """Every scenario and team size to train on, one each, messages and rewards set."""
         overrides: dict[str, Any] = {**self.overrides, "message_size": self.message_size}
+        if self.advise is not None:
+            overrides["message_size"] = load(self.advise).message_size
         if self.reward_weights:
             overrides["reward_weights"] = self.reward_weights
         found = []
@@ -241,6 +247,11 @@ def _check(s: TrainSettings) -> None:
         raise SettingsError(
             f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and "
             "team sizes"
+        )
+    if s.advise is not None and (s.imitate is not None or s.message_size):
+        raise SettingsError(
+            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
+            "its adviser, whose messages go out"
         )
     layouts = {(p.sonar_beams, p.message_size) for p in parts}
     if len(layouts) > 1:

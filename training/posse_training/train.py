@@ -25,6 +25,7 @@ from torch import nn
 
 import posse
 from posse_baselines import load
+from posse_baselines.advice import Adviser, check_adviser
 from posse_baselines.encoding import Encoding
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policy import PolicyError
@@ -59,6 +60,7 @@ LAST: Final = "last.safetensors"
 CURVE: Final = "curve.csv"
 _ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 _WARM_WORLDS: Final = 32
+_WARM_REACH: Final = 0.1  # of random answers to an adviser
 _EXPLORATION: Final = 0.1  # deviation of the noise that td3 adds to its actions
 _STATISTICS_EVERY: Final = 8  # rows of a rollout that statistics are made from: one of so many
 
@@ -177,7 +179,16 @@ def make_env(settings: TrainSettings) -> TeamVecEnv:
     ]
     largest = max(batches, key=lambda batch: batch.layout.neighbours)
     encoding = Encoding.of(largest.layout, settings.encoding, settings.num_neighbours)
-    return TeamVecEnv(batches, encoding, see_state=settings.algorithm == "mappo")
+    return TeamVecEnv(
+        batches, encoding, adviser=make_adviser(settings), see_state=settings.algorithm == "mappo"
+    )
+
+
+def make_adviser(settings: TrainSettings) -> Adviser | None:
+    """Return the policy whose proposals are given to the learner, if any."""
+    return (
+        None if settings.advise is None else check_adviser(settings.advise, load(settings.advise))
+    )
 
 
 def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
@@ -275,9 +286,10 @@ def first_statistics(
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
     shape = (warm.num_envs, *warm.action_shape)
+    reach = 1.0 if settings.advise is None else _WARM_REACH
     for step in range(max(batch.scenario.horizon for batch in warm.batches)):
         if step % 20 == 0:
-            actions = generator.uniform(-1, 1, shape).astype(np.float32)
+            actions = generator.uniform(-reach, reach, shape).astype(np.float32)
         statistics.add(np.asarray(warm.step(actions)[0]))
 
 
@@ -376,7 +388,7 @@ class Training(BaseCallback):
         card = make_card(
             self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.curve
         )
-        return export(self.model, self.env.encoding, card)
+        return export(self.model, self.env.encoding, card, make_adviser(self.settings))
 
     def _evaluate(self) -> None:
         """Play the validation worlds; keep the policy if it is the best so far."""

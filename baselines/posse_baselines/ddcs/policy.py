@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -134,3 +134,12 @@ class DDCS(BasePolicy):
         notes["estimate"] = estimate
         notes["estimate_age"] = np.where(minds["known"] != 0, minds["age"], np.float32(-1.0))
         return notes
+
+    def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
+        """Return the minds of the trackers, field by field, as arrays that share their memory."""
+        m: _Minds = memory
+        arrays: dict[str, npt.NDArray[Any]] = {"seen": m.seen}
+        for name, records in (("minds", m.minds), ("mates", m.mates)):
+            for field in records.dtype.names or ():
+                arrays[f"{name}.{field}"] = records[field]
+        return arrays

@@ -1,0 +1,26 @@
+"""The scripted policies, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from posse_baselines.ddcs import DDCS, Settings
+from posse_baselines.oracle import Oracle
+from posse_baselines.policy import Policy
+from posse_baselines.pursuit import Pursuit
+from posse_baselines.simple import Idle, Random
+
+SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
+    "random": Random,
+    "idle": Idle,
+    "pursuit": Pursuit,
+    "ddcs-distributed": DDCS,
+    "ddcs-centralized": lambda: DDCS(Settings(model="centralized")),
+    "ddcs-centralized-no-exchange": lambda: DDCS(
+        Settings(model="centralized", exchange=False), "ddcs-centralized-no-exchange"
+    ),
+    "ddcs-no-radio": lambda: DDCS(Settings(radio=False), "ddcs-no-radio"),
+    "pngl": lambda: DDCS(Settings(guidance="pngl"), "pngl"),
+    "oracle": Oracle,
+}
