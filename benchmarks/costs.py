@@ -1,0 +1,160 @@
+"""``make bench-costs``: what a step costs, part by part, and how that grows with the worlds.
+
+One thread throughout, so that figures of different sizes compare; each is the best of many runs,
+since other work on the machine only ever adds to it.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import machine
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+import posse
+from posse import contact, score, survey, world
+from posse.compiled import kernel
+
+PARTS = (
+    "motion", "where the discs are", "contact", "target sensor and radio", "score", "metrics",
+    "reward", "observations",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What ``make bench-costs`` takes."""
+
+    seconds: float = 0.5
+    """Spent on each figure."""
+    scenarios: tuple[str, ...] = ("smart", "field")
+    """Whose steps are taken apart."""
+    team_sizes: tuple[int, ...] = (2, 3, 5, 8, 16, 32, 64)
+    obstacles: tuple[int, ...] = (0, 2, 4, 8, 16, 32)
+    worlds: tuple[int, ...] = (1, 8, 64, 512, 4096, 16_384, 65_536)
+    out: Path = Path("runs/bench/costs.json")
+
+
+@kernel(short_loops=True)
+def one_part(
+    part, config, slots, beams, weights, worlds, trackers, obstacles, heard, broadcast,
+    heard_message, message, actions, observations, rewards, terms, scratch,
+):  # type: ignore[no-untyped-def] # fmt: skip
+    """Do one part of a step in every world."""
+    c = config[0]
+    for e in range(len(worlds)):
+        w, t, o = worlds[e], trackers[e], obstacles[e]
+        if part == 0:
+            world.motion(c, w, t, o, actions[e], scratch)
+        elif part == 1:
+            survey.lay_out(c, w, t, o, scratch)
+        elif part == 2:
+            contact.meet(c, w, t, o, scratch)
+        elif part == 3:
+            w.step += 1
+            world.sense(c, w, t, o, heard[e], broadcast[e], heard_message[e], message[e])
+        elif part == 4:
+            score.occupy(c, w, t, slots, scratch)
+        elif part == 5:
+            score.add_up(c, w, t, slots)
+        elif part == 6:
+            world.reward(c, w, t, weights, rewards[e], terms[e])
+        else:
+            world.observe(
+                c, w, t, o, heard[e], heard_message[e], message[e], scratch, observations[e]
+            )
+
+
+def best(call: Callable[[], object], seconds: float) -> float:
+    """Return the least time of a call, s."""
+    call()
+    least, started = float("inf"), time.perf_counter()
+    while time.perf_counter() - started < seconds:
+        before = time.perf_counter()
+        call()
+        least = min(least, time.perf_counter() - before)
+    return least
+
+
+def moving(scenario: str, count: int, **overrides: Any) -> tuple[posse.Batch, Any]:
+    """Return worlds in which everything moves, and actions for them."""
+    batch = posse.batch(scenario, count, num_threads=1, horizon=1_000_000, **overrides)
+    batch.reset(seed=0)
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+    for _ in range(50):
+        batch.step(actions)
+    return batch, actions
+
+
+def parts(scenario: str, seconds: float) -> dict[str, float]:
+    """Return what each part of a step costs for a tracker, ns; ``"step"`` is the whole."""
+    batch, actions = moving(scenario, 256)
+    agents = batch.num_worlds * batch.scenario.num_trackers
+    observations, rewards, terms, _ = batch.advance(actions)
+    scratch = survey.new_scratch()
+    arguments = (*batch._fixed, actions, observations, rewards, terms, scratch)
+    costs = {"step": best(lambda: batch.advance(actions), seconds) / agents * 1e9}
+    snapshot = batch.save()
+    for number, name in enumerate(PARTS):
+        batch.restore(snapshot)
+        took = best(lambda n=number: one_part(n, *arguments), seconds)  # type: ignore[misc]
+        costs[name] = took / agents * 1e9
+    return costs
+
+
+def whole(scenario: str, count: int, seconds: float, **overrides: Any) -> float:
+    """Return what a step costs for a tracker, ns."""
+    batch, actions = moving(scenario, count, **overrides)
+    agents = count * batch.scenario.num_trackers
+    return best(lambda: batch.step(actions), seconds) / agents * 1e9
+
+
+def main() -> None:
+    """Measure, print, and write the figures."""
+    s = tyro.cli(Settings)
+    others, own = machine.OtherWork(), time.process_time()
+    figures: dict[str, Any] = {"machine": machine.describe()}
+    figures["parts"] = {name: parts(name, s.seconds) for name in s.scenarios}
+    figures["team_size"] = {
+        n: whole("smart", max(1, 4096 // n), s.seconds, num_trackers=n, formation="ring")
+        for n in s.team_sizes
+    }
+    figures["obstacles"] = {
+        m: whole("obstacles", 1024, s.seconds, num_obstacles=m, arena=40.0) for m in s.obstacles
+    }
+    figures["worlds"] = {e: whole("smart", e, s.seconds) for e in s.worlds}
+    figures["cores_busy_with_other_work"] = others.cores(time.process_time() - own)
+    console = Console()
+    for title, column, rows in (
+        *(
+            (f"a step of {name}, part by part", "part", figures["parts"][name])
+            for name in s.scenarios
+        ),
+        ("smart, by team size (8 nearest team-mates at most)", "trackers", figures["team_size"]),
+        ("obstacles, by their number", "obstacles", figures["obstacles"]),
+        ("smart, by number of worlds", "worlds", figures["worlds"]),
+    ):
+        table = Table(title=title)
+        table.add_column(column)
+        table.add_column("ns a tracker", justify="right")
+        for key, nanoseconds in rows.items():
+            table.add_row(f"{key:,}" if isinstance(key, int) else key, f"{nanoseconds:,.0f}")
+        console.print(table)
+    busy = figures["cores_busy_with_other_work"]
+    console.print(f"cores busy with other work meanwhile: {busy:.2f}")
+    s.out.parent.mkdir(parents=True, exist_ok=True)
+    s.out.write_text(json.dumps(figures, indent=2) + "\n")
+    console.print(f"figures: {s.out}")
+
+
+if __name__ == "__main__":
+    main()
