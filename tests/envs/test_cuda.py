@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import numba
 import numpy as np
 import pytest
-from tests.envs.cuda_cases import CASES, make, play
+from tests.envs.cuda_cases import CASES, WORLDS, make, play
 
 import posse
 
@@ -68,3 +71,41 @@ def test_what_is_missing_is_said_before_anything_else() -> None:
 def test_an_unknown_device() -> None:
     with pytest.raises(ValueError, match="unknown device 'tpu'; devices are: cpu, cuda"):
         posse.batch("smart", device="tpu")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    importlib.util.find_spec("numba_cuda") is None, reason="needs posse[cuda], though no GPU"
+)
+def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the assembly of an H100; a function that a GPU lacks, or a call left over, would show."""
+    import numba.cuda.dispatcher
+
+    from posse import cuda
+
+    device = SimpleNamespace(compute_capability=(9, 0))
+    monkeypatch.setattr(numba.cuda.dispatcher, "get_current_device", lambda: device)
+    batch = make("field", "cpu")
+    observations = batch.reset()
+    _, rewards, *_, infos = batch.step(np.zeros(batch.action_shape, np.float32))
+    flags = np.zeros((3, WORLDS), np.bool_)
+    terms = np.zeros((*rewards.shape, len(infos["reward_terms"])), np.float32)
+    orders, report = np.zeros(WORLDS, np.uint8), np.zeros(3, np.int64)
+    actions = np.zeros(batch.action_shape, np.float32)
+    kernels = {
+        cuda._advance: (
+            *batch._fixed, actions, observations, rewards, terms, flags, infos["score"], orders,
+            report,
+        ),
+        cuda._check: (batch.worlds, actions, report, True),
+        cuda._choose: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
+    }  # fmt: skip
+    for kernel, arguments in kernels.items():
+        signature = numba.types.void(*(numba.typeof(argument) for argument in arguments))
+        assembly, _ = cuda.cuda.compile(
+            kernel.py_func, signature, device=False, abi="numba", cc=(9, 0)
+        )
+        assert ".entry" in assembly
+        assert "call" not in assembly
+        if out := os.environ.get("POSSE_TEST_ASSEMBLY"):
+            Path(out, f"{kernel.py_func.__name__}.ptx").write_text(assembly)
