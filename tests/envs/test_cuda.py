@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 from tests.envs.cuda_cases import CASES, WORLDS, make, play
@@ -79,7 +78,7 @@ def test_an_unknown_device() -> None:
 )
 def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> None:
     """To the assembly of an H100; a function that a GPU lacks, or a call left over, would show."""
-    import numba.cuda.dispatcher
+    import numba.cuda.dispatcher  # only now: it looks for a driver
 
     from posse import cuda
 
@@ -101,7 +100,8 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
         cuda._choose: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
     }  # fmt: skip
     for kernel, arguments in kernels.items():
-        signature = numba.types.void(*(numba.typeof(argument) for argument in arguments))
+        types = (numba.typeof(argument) for argument in arguments)  # type: ignore[no-untyped-call]
+        signature = numba.types.void(*types)
         assembly, _ = cuda.cuda.compile(
             kernel.py_func, signature, device=False, abi="numba", cc=(9, 0)
         )
