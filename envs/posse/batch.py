@@ -193,6 +193,22 @@ class Batch:
         return self._arrays.world
 
     @property
+    def score(self) -> FloatArray:
+        """(E,) the score of the present step; 0 at the start."""
+        scores: FloatArray = self._arrays.world["score"].copy()
+        return scores
+
+    @property
+    def terminated(self) -> BoolArray:
+        """(E,) whether the last step or reset left the world's episode terminated."""
+        return np.asarray(self._arrays.world["terminated"] != 0)
+
+    @property
+    def truncated(self) -> BoolArray:
+        """(E,) whether the last step or reset left the world's episode truncated."""
+        return np.asarray(self._arrays.world["over"] != 0) & ~self.terminated
+
+    @property
     def arrays(self) -> WorldArrays:
         """The arrays themselves; whoever writes to them changes the worlds."""
         return self._arrays

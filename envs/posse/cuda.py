@@ -230,17 +230,17 @@ class CudaBatch(Batch):
 
     @property
     def score(self) -> DeviceArray:
-        """(E,) float32, of the present step, as the last step or reset left it."""
+        """(E,) the score of the present step, as the last step or reset left it."""
         return self._last.score
 
     @property
     def terminated(self) -> DeviceArray:
-        """(E,) bool, as the last step or reset left it."""
+        """(E,) whether the last step or reset left the world's episode terminated."""
         return self._last.terminated
 
     @property
     def truncated(self) -> DeviceArray:
-        """(E,) bool, as the last step or reset left it."""
+        """(E,) whether the last step or reset left the world's episode truncated."""
         return self._last.truncated
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
