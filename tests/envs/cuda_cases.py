@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,13 +17,13 @@ WORLDS: Final = 3
 
 # Episodes short enough to end and start again, close enough to touch, in every scenario.
 CASES: Final[dict[str, dict[str, Any]]] = {
-    "smart": {"scenario": "smart", "horizon": 20, "start_distance": (0.6, 1.4)},
+    "smart": {"scenario": "smart", "horizon": 15, "start_distance": (0.6, 1.4)},
     "radio": {"scenario": "radio", "message_size": 2, "num_trackers": 3},
-    "leader-loss": {"scenario": "leader-loss", "horizon": 12, "break_window": (0.2, 0.6)},
-    "field": {"scenario": "field", "horizon": 25, "sensor_outages": 1.0, "radio_outages": 1.0},
+    "leader-loss": {"scenario": "leader-loss", "horizon": 10, "break_window": (0.2, 0.6)},
+    "field": {"scenario": "field", "horizon": 18, "sensor_outages": 1.0, "radio_outages": 1.0},
     "target": {"scenario": "obstacles", "target_motion": "agent", "terminate_on_contact": True},
 }
-STEPS: Final = 30
+STEPS: Final = 24
 
 
 def make(case: str, device: str, **settings: Any) -> posse.Batch:
@@ -64,3 +68,23 @@ def play(batch: posse.Batch) -> dict[str, npt.NDArray[Any]]:
         **{f"state_{name}": np.array(array) for name, array in batch.state.items()},
         "ended": np.array(ended),
     }
+
+
+def run_in_simulator(tests: Path, **environment: str) -> None:
+    """Run a file of tests where numba simulates a GPU in plain Python."""
+    done = subprocess.run(
+        [
+            sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
+            # numpy's integers tell of the overflow that the random draws rest on.
+            "-W", "ignore:overflow encountered:RuntimeWarning",
+            str(tests),
+        ],
+        env={
+            **os.environ,
+            "NUMBA_ENABLE_CUDASIM": "1",
+            "NUMBA_DISABLE_JIT": "1",
+            **environment,
+        },
+        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr

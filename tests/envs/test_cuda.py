@@ -8,10 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from tests.envs.cuda_cases import CASES, WORLDS, make, play
+from tests.envs.cuda_cases import CASES, WORLDS, actions_for, make, on_host, play, run_in_simulator
 
 import posse
 
@@ -30,22 +31,7 @@ def test_the_cases_hold_what_they_are_for() -> None:
 def test_in_the_simulator(tmp_path: Path) -> None:
     for case in CASES:
         np.savez(tmp_path / case, **play(make(case, "cpu")))  # type: ignore[arg-type]
-    done = subprocess.run(
-        [
-            sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
-            # numpy's integers tell of the overflow that the random draws rest on.
-            "-W", "ignore:overflow encountered:RuntimeWarning",
-            str(HERE / "cuda_simulated.py"),
-        ],
-        env={
-            **os.environ,
-            "NUMBA_ENABLE_CUDASIM": "1",
-            "NUMBA_DISABLE_JIT": "1",
-            "POSSE_TEST_EXPECTED": str(tmp_path),
-        },
-        cwd=HERE.parents[1], capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
+    run_in_simulator(HERE / "cuda_simulated.py", POSSE_TEST_EXPECTED=str(tmp_path))
 
 
 def complaint(**environment: str) -> str:
@@ -109,3 +95,34 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
         assert "call" not in assembly
         if out := os.environ.get("POSSE_TEST_ASSEMBLY"):
             Path(out, f"{kernel.py_func.__name__}.ptx").write_text(assembly)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_on_a_gpu(case: str) -> None:
+    """Ten steps: integers as on the CPU, float32 within rounding; torch takes what is returned."""
+    try:
+        batch = make(case, "cuda")
+    except (ImportError, RuntimeError) as error:
+        pytest.skip(str(error))
+    other = make(case, "cpu")
+    np.testing.assert_allclose(on_host(batch.reset()), other.reset(), 1e-4, 1e-4)
+    for step in range(10):
+        actions = actions_for(other, step)
+        made, expected = batch.step(actions), other.step(actions)
+        for one, two in zip(made[:4], expected[:4], strict=True):
+            np.testing.assert_allclose(on_host(one), on_host(two), 1e-4, 1e-4)
+    for name, array in other.state.items():
+        if np.issubdtype(array.dtype, np.integer):
+            np.testing.assert_array_equal(batch.state[name], array, err_msg=name)
+    torch = pytest.importorskip("torch")
+    if torch.cuda.is_available():
+        given: Any = made[0]
+        tensor = torch.as_tensor(given, device="cuda")
+        assert tensor.data_ptr() == given.__cuda_array_interface__["data"][0]
+        np.testing.assert_array_equal(tensor.cpu().numpy(), on_host(made[0]))
+        action = torch.from_numpy(actions).cuda()
+        again = make(case, "cuda")
+        again.reset()
+        for step in range(9):
+            again.step(actions_for(other, step))
+        np.testing.assert_array_equal(on_host(again.step(action)[0]), on_host(made[0]))
