@@ -14,7 +14,7 @@ import posse
 from posse.cuda import CudaBatch
 from posse_training import torchrl_env
 
-SHORT: dict[str, Any] = {"horizon": 4, "settle_time": 0.2}
+SHORT: dict[str, Any] = {"horizon": 4, "settle_time": 0.2, "num_trackers": 2}
 
 
 @pytest.fixture
