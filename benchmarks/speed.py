@@ -1,7 +1,8 @@
 """``make bench``: how fast the worlds run on this machine.
 
 Agent-steps a second of batches, the same observations written by a plain copy, environment steps
-of one world through the interfaces, and what the first step of a fresh process costs.
+of one world through the interfaces, and what the first step of a fresh process costs. With
+``--device cuda``, batches on the GPU instead, and what share of its memory's bandwidth they take.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import machine
+import numba
 import numpy as np
 import tyro
 from rich.console import Console
@@ -39,7 +41,9 @@ class Settings:
     """What ``make bench`` takes."""
 
     scenario: str = "smart"
-    worlds: tuple[int, ...] = (1, 32, 1024, 4096, 16384)
+    device: Literal["cpu", "cuda"] = "cpu"
+    worlds: tuple[int, ...] | None = None
+    """Default: 1 to 16,384 on the CPU, 1,024 to 4 million on a GPU."""
     seconds: float = 1.0
     """Each figure is the median of five runs of this length."""
     cold: bool = True
@@ -63,7 +67,7 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
 def batches(settings: Settings) -> list[dict[str, Any]]:
     """Measure batches with one thread and with all, and a plain copy of their observations."""
     rows = []
-    for count in settings.worlds:
+    for count in settings.worlds or (1, 32, 1024, 4096, 16384):
         for threads in sorted({1, os.cpu_count() or 1}):
             batch = posse.batch(settings.scenario, count, num_threads=threads)
             observations = batch.reset(seed=0)
@@ -85,6 +89,82 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
                 }
             )
     return rows
+
+
+def finished(step: Callable[[], object], times: int) -> None:
+    """Call a function of the GPU some times, and wait until it is done."""
+    for _ in range(times):
+        step()
+    numba.cuda.synchronize()
+
+
+def bandwidth(seconds: float) -> float:
+    """Return bytes a second, read and written, of a plain copy in the GPU's memory."""
+    source, target = (numba.cuda.device_array(1 << 28, np.float32) for _ in range(2))
+    copies = per_second(lambda: finished(lambda: target.copy_to_device(source), 10), seconds)
+    return copies[0] * 10 * 2 * source.nbytes
+
+
+def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
+    """Measure batches on the GPU, beside a plain copy from its memory to its memory."""
+    limit = bandwidth(settings.seconds)
+    rows = []
+    for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
+        batch: Any = posse.batch(settings.scenario, count, device="cuda")
+        batch.reset(seed=0)
+        rng = np.random.default_rng(0)
+        actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
+        once = lambda b=batch, a=actions: b.step(a, check=False)  # noqa: E731
+        rate = [10 * r for r in per_second(lambda o=once: finished(o, 10), settings.seconds)]
+        checked = per_second(lambda b=batch, a=actions: b.step(a), settings.seconds)
+        agents = count * batch.observation_shape[1]
+        # State read and written, actions read, results written.
+        outputs = agents * (batch.observation_shape[2] + 1 + len(posse.REWARD_TERMS)) * 4
+        moved = 2 * count * batch.bytes_per_world + actions.nbytes + outputs
+        rows.append(
+            {
+                "worlds": count,
+                "agent_steps": [r * agents for r in rate],
+                "agent_steps_checked": [r * agents for r in checked],
+                "share_of_bandwidth": rate[0] * moved / limit,
+                "observation_length": batch.observation_shape[2],
+                "bytes_a_world": batch.bytes_per_world,
+            }
+        )
+    return rows
+
+
+def report_gpu(settings: Settings) -> None:
+    """Measure a GPU, print, and write the figures."""
+    from posse.cuda import check_device  # imports numba.cuda
+
+    check_device()
+    rows = gpu_batches(settings)
+    name = numba.cuda.get_current_device().name
+    figures = {
+        "device": name.decode() if isinstance(name, bytes) else str(name),
+        "machine": machine.describe(),
+        "scenario": settings.scenario,
+        "batches": rows,
+    }
+    table = Table(title=f"{settings.scenario} on {figures['device']}")
+    for column in (
+        "worlds", "million agent-steps/s [range]", "waiting for each", "share of bandwidth"
+    ):  # fmt: skip
+        table.add_column(column, justify="right")
+    for row in rows:
+        median, low, high = (x / 1e6 for x in row["agent_steps"])
+        table.add_row(
+            f"{row['worlds']:,}",
+            f"{median:.1f} [{low:.1f}, {high:.1f}]",
+            f"{row['agent_steps_checked'][0] / 1e6:.1f}",
+            f"{row['share_of_bandwidth']:.1%}",
+        )
+    console = Console()
+    console.print(table)
+    settings.out.parent.mkdir(parents=True, exist_ok=True)
+    settings.out.write_text(json.dumps(figures, indent=2) + "\n")
+    console.print(f"figures: {settings.out}")
 
 
 def interfaces(settings: Settings) -> dict[str, list[float]]:
@@ -121,6 +201,9 @@ def first_steps() -> dict[str, float]:
 def main() -> None:
     """Measure, print, and write the figures."""
     settings = tyro.cli(Settings)
+    if settings.device == "cuda":
+        report_gpu(settings)
+        return
     others = machine.OtherWork()
     own = time.process_time()
     rows, single = batches(settings), interfaces(settings)

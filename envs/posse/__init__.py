@@ -27,10 +27,15 @@ def batch(
     first_world: int = 0,
     autoreset: str = "next_step",
     num_threads: int | None = None,
+    device: str = "cpu",
     **overrides: Any,
 ) -> Batch:
-    """Return a batch of worlds, the engine under every environment; see :class:`Batch`."""
-    return Batch(
+    """Return a batch of worlds, the engine under every environment; see :class:`Batch`.
+
+    With ``device="cuda"`` the worlds live on an NVIDIA GPU: see :class:`posse.cuda.CudaBatch`,
+    which needs the extra ``cuda``.
+    """
+    return _batch_class(device)(
         get_scenario(scenario, **overrides),
         num_worlds,
         seed=seed,
@@ -39,6 +44,18 @@ def batch(
         autoreset=autoreset,
         num_threads=num_threads,
     )
+
+
+def _batch_class(device: str) -> type[Batch]:
+    """Return the class of batches on a device, or raise what keeps it from being used."""
+    if device == "cpu":
+        return Batch
+    if device == "cuda":
+        from posse.cuda import CudaBatch, check_device
+
+        check_device()
+        return CudaBatch
+    raise ValueError(f"unknown device {device!r}; devices are: cpu, cuda")
 
 
 def observation_fields(

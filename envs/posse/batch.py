@@ -197,6 +197,22 @@ class Batch:
         return self._arrays.world
 
     @property
+    def score(self) -> FloatArray:
+        """(E,) the score of the present step; 0 at the start."""
+        scores: FloatArray = self._arrays.world["score"].copy()
+        return scores
+
+    @property
+    def terminated(self) -> BoolArray:
+        """(E,) whether the last step or reset left the world's episode terminated."""
+        return np.asarray(self._arrays.world["terminated"] != 0)
+
+    @property
+    def truncated(self) -> BoolArray:
+        """(E,) whether the last step or reset left the world's episode truncated."""
+        return np.asarray(self._arrays.world["over"] != 0) & ~self.terminated
+
+    @property
     def arrays(self) -> WorldArrays:
         """The arrays themselves; whoever writes to them changes the worlds."""
         return self._arrays
@@ -245,18 +261,11 @@ class Batch:
                 inside each other, an obstacle or a wall. Nothing is changed.
         """
         options = dict(options or {})
-        for key in options:
-            if key not in _OPTIONS:
-                raise ValueError(f"unknown option {key!r}; options are: {', '.join(_OPTIONS)}")
-        if seed is not None:
-            seed = _check_seed(seed)
-        chosen = self._check_mask(options.get("reset_mask"))
-        if not self._started and not chosen.all():
-            raise ResetNeeded("the first reset starts every world: call it without reset_mask")
+        chosen = self.check_reset(seed, options)
         poses = self._check_poses(options)
         before = self._arrays.copy() if poses else None
         world = self._arrays.world
-        new_seed = self.seed if seed is None else seed
+        new_seed = self.seed if seed is None else int(seed)
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
             world["split"] = SPLITS.index(self.split)
@@ -279,6 +288,21 @@ class Batch:
             observations = self._start(chosen, START_FROM_POSES)
         self.seed, self._started = new_seed, True
         return observations
+
+    def check_reset(self, seed: int | None, options: Mapping[str, Any]) -> BoolArray:
+        """Return which worlds a reset starts, (E,), or raise what is wrong with its arguments.
+
+        Start poses are looked at later.
+        """
+        for key in options:
+            if key not in _OPTIONS:
+                raise ValueError(f"unknown option {key!r}; options are: {', '.join(_OPTIONS)}")
+        if seed is not None:
+            _check_seed(seed)
+        chosen = self._check_mask(options.get("reset_mask"))
+        if not self._started and not chosen.all():
+            raise ResetNeeded("the first reset starts every world: call it without reset_mask")
+        return chosen
 
     def step(
         self, actions: npt.ArrayLike
@@ -359,6 +383,15 @@ class Batch:
 
     def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
         """Return the actions as the kernels take them, or raise what is wrong with them."""
+        array = self.cast_actions(actions)
+        position = bad_action(array)
+        if position >= 0:
+            e, i, k = np.unravel_index(position, array.shape)
+            raise action_error((int(e), int(i), int(k)), array[e, i, k])
+        return array
+
+    def cast_actions(self, actions: npt.ArrayLike) -> FloatArray:
+        """Return the actions as contiguous float32, or raise if their type or shape is wrong."""
         array = np.asarray(actions)
         if array.dtype != np.float32:
             if array.dtype.kind not in "fiu":
@@ -369,15 +402,7 @@ class Batch:
                 f"actions have shape {array.shape}, wanted {self.action_shape}: "
                 "(worlds, agents, 2 + message_size)"
             )
-        array = np.ascontiguousarray(array)
-        position = bad_action(array)
-        if position >= 0:
-            e, i, k = np.unravel_index(position, array.shape)
-            raise ValueError(
-                f"actions[{e}, {i}, {k}] = {array[e, i, k]} is not a number in [-1, 1]: scale or "
-                "clip the policy's output first"
-            )
-        return array
+        return np.ascontiguousarray(array)
 
     def _run(
         self,
@@ -489,6 +514,15 @@ def _write_poses(records: Records, poses: npt.NDArray[np.float64], chosen: BoolA
     records["y"][chosen] = poses[chosen][..., 1]
     records["heading_cos"][chosen] = np.cos(poses[chosen][..., 2])
     records["heading_sin"][chosen] = np.sin(poses[chosen][..., 2])
+
+
+def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
+    """Return what is raised for actions[index]."""
+    e, i, k = index
+    return ValueError(
+        f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or "
+        "clip the policy's output first"
+    )
 
 
 def _check_count(name: str, value: object, least: int) -> None:

@@ -64,9 +64,7 @@ _NO_BITS: Final = np.uint64(0)
 
 def new_scratch() -> FloatArray:
     """Return scratch memory for one thread."""
-    scratch = np.zeros(SIZE, np.float32)
-    scratch[INDEX : INDEX + _ROW] = np.arange(_ROW)
-    return scratch
+    return np.zeros(SIZE, np.float32)
 
 
 @compiled
@@ -97,7 +95,12 @@ def blocks(count: int) -> int:
 
 @compiled
 def lay_out_beams(beams: FloatArray, s: FloatArray) -> None:
-    """Write the directions of the sonar's beams (2, S); those that fill a block point nowhere."""
+    """Write the directions of the sonar's beams (2, S), and what counts the places of a row.
+
+    Beams that fill a block point nowhere.
+    """
+    for k in range(_ROW):
+        s[INDEX + k] = np.float32(k)
     count = beams.shape[1]
     for k in range(BLOCK * blocks(count)):
         s[BEAM_COS + k] = beams[0, k] if k < count else _ZERO

@@ -264,6 +264,78 @@ START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
 
+@compiled
+def advance_world(
+    e: int,
+    config: Records,
+    slots: Records,
+    weights: FloatArray,
+    world: Records,
+    tracker: Records,
+    obstacle: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    actions: FloatArray,
+    observations: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+    flags: BoolArray,
+    orders: npt.NDArray[np.uint8],
+    scratch: FloatArray,
+) -> bool:
+    """Do what world e is ordered to; return whether its episode is over.
+
+    ================== =============================================================================
+    STEP               a control step; or, where the episode is over, the start of the next one
+    START              an episode drawn from the world's key
+    START_FROM_POSES   an episode from the poses that stand in the arrays
+    LOOK               nothing but the observations
+    ================== =============================================================================
+
+    Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K) and flags (2, E):
+    terminated, truncated. The scratch memory has been through :func:`prepare`.
+    """
+    c, w, trackers, obstacles = config[0], world[e], tracker[e], obstacle[e]
+    order = orders[e]
+    if order == STEP and w.over != 0:
+        w.episode += 1
+        order = START
+    if order == STEP:
+        step(
+            c, slots, w, trackers, obstacles,
+            heard[e], broadcast[e], heard_message[e], message[e], actions[e], scratch,
+        )  # fmt: skip
+        reward(c, w, trackers, weights, rewards[e], terms[e])
+    else:
+        if order == START:
+            draw_start(c, w, trackers, obstacles)
+        if order != LOOK:
+            begin(
+                c, slots, w, trackers, obstacles,
+                heard[e], broadcast[e], heard_message[e], message[e], scratch,
+            )  # fmt: skip
+        else:
+            lay_out(c, w, trackers, obstacles, scratch)
+        rewards[e, :] = _ZERO
+        terms[e, :, :] = _ZERO
+    flags[0, e] = w.terminated != 0
+    flags[1, e] = w.over != 0 and w.terminated == 0
+    observe(
+        c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
+        scratch, observations[e],
+    )  # fmt: skip
+    return bool(w.over != 0)
+
+
+@compiled
+def prepare(config: Records, beams: FloatArray, scratch: FloatArray) -> None:
+    """Write what is the same for all worlds to a thread's scratch memory."""
+    lay_out_beams(beams, scratch)
+    lay_out_task(config[0], scratch)
+
+
 @kernel(short_loops=True)
 def advance(
     config: Records,
@@ -289,51 +361,17 @@ def advance(
 ) -> int:
     """Do what each world is ordered to, for worlds ``first`` to ``last``; the one loop over worlds.
 
-    ================== =============================================================================
-    STEP               a control step; or, where the episode is over, the start of the next one
-    START              an episode drawn from the world's key
-    START_FROM_POSES   an episode from the poses that stand in the arrays
-    LOOK               nothing but the observations
-    ================== =============================================================================
-
-    Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K) and flags (2, E):
-    terminated, truncated. Returns how many of these worlds' episodes are over.
+    See :func:`advance_world`. Returns how many of these worlds' episodes are over.
     """
-    c = config[0]
-    lay_out_beams(beams, scratch)
-    lay_out_task(c, scratch)
+    prepare(config, beams, scratch)
     over = 0
     for e in range(first, last):
-        w, trackers, obstacles = world[e], tracker[e], obstacle[e]
-        order = orders[e]
-        if order == STEP and w.over != 0:
-            w.episode += 1
-            order = START
-        if order == STEP:
-            step(
-                c, slots, w, trackers, obstacles,
-                heard[e], broadcast[e], heard_message[e], message[e], actions[e], scratch,
-            )  # fmt: skip
-            reward(c, w, trackers, weights, rewards[e], terms[e])
-        else:
-            if order == START:
-                draw_start(c, w, trackers, obstacles)
-            if order != LOOK:
-                begin(
-                    c, slots, w, trackers, obstacles,
-                    heard[e], broadcast[e], heard_message[e], message[e], scratch,
-                )  # fmt: skip
-            else:
-                lay_out(c, w, trackers, obstacles, scratch)
-            rewards[e, :] = _ZERO
-            terms[e, :, :] = _ZERO
-        flags[0, e] = w.terminated != 0
-        flags[1, e] = w.over != 0 and w.terminated == 0
-        over += w.over != 0
-        observe(
-            c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
-            scratch, observations[e],
-        )  # fmt: skip
+        if advance_world(
+            e, config, slots, weights, world, tracker, obstacle,
+            heard, broadcast, heard_message, message,
+            actions, observations, rewards, terms, flags, orders, scratch,
+        ):  # fmt: skip
+            over += 1
     return over
 
 

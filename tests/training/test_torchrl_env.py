@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy.typing as npt
 import pytest
 import torch
 from tensordict import TensorDictBase
+from tests.envs.cuda_cases import run_in_simulator
 from torchrl.envs.utils import check_env_specs
 
 import posse
@@ -229,3 +231,7 @@ def test_a_collector_gathers_whole_batches() -> None:
             data["next", "agents", "observation"][:, step].numpy(), observations
         )
     assert data["next", "truncated"].squeeze(-1)[:, 11].all()
+
+
+def test_over_the_gpu_engine_in_the_simulator() -> None:
+    run_in_simulator(Path(__file__).parent / "torchrl_simulated.py")

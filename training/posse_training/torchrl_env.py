@@ -18,7 +18,6 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Binary, Bounded, Composite, Unbounded
@@ -38,13 +37,15 @@ class PosseEnv(EnvBase):
 
     Worlds whose episodes end are reset by TorchRL (rollouts and collectors do so by themselves), a
     part of the batch at a time. On the CPU the tensors share the memory of the engine's arrays,
-    which are never overwritten while a tensor holds them.
+    which are never overwritten while a tensor holds them; on a GPU, whose engine overwrites its
+    arrays, they are copied there.
 
     Args:
         scenario: A scenario, or the name of one.
         num_worlds: E, at least 1.
-        device: Where tensors live. The worlds are stepped on the CPU; for another device each
-            step costs a copy each way.
+        device: Where tensors live. On ``"cuda"`` the worlds do too, and nothing goes by way of the
+            host: it needs the extra ``cuda``. For any other device than the CPU, the worlds are
+            stepped there, and each step costs a copy each way.
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
             and any setting of the scenario. The mode of automatic resets is not among them.
 
@@ -70,7 +71,10 @@ class PosseEnv(EnvBase):
                 f"autoreset={settings['autoreset']!r} cannot be chosen: TorchRL resets the worlds "
                 "that are done by itself; leave it out"
             )
-        self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", **settings)
+        engine = "cuda" if torch.device(device).type == "cuda" else "cpu"
+        self.batch = posse.batch(
+            scenario, num_worlds, autoreset="disabled", device=engine, **settings
+        )
         super().__init__(device=device, batch_size=(num_worlds,))
         trackers = self.batch.scenario.num_trackers
         names = agent_names(self.batch.scenario)
@@ -124,16 +128,13 @@ class PosseEnv(EnvBase):
         options = dict(kwargs.get("options") or {})
         marks = None if tensordict is None else tensordict.get("_reset", None)
         if marks is not None and not bool(marks.all()):
-            options["reset_mask"] = marks.reshape(self.batch.num_worlds).cpu().numpy()
+            options["reset_mask"] = self._array(marks.reshape(self.batch.num_worlds))
             seed = kwargs.get("seed")
         else:
             seed = kwargs.get("seed", self._seed)
             self._seed = None
         observations = self.batch.reset(seed=seed, options=options)
-        worlds = self.batch.worlds
-        terminated = worlds["terminated"] != 0
-        truncated = (worlds["over"] != 0) & ~terminated
-        return self._pack(observations, terminated, truncated)
+        return self._pack(observations)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         if tensordict.get("_step", None) is not None:
@@ -144,33 +145,35 @@ class PosseEnv(EnvBase):
             )
         actions = [tensordict.get((group, "action")) for group in self._rows]
         together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
-        observations, rewards, terminated, truncated, _ = self.batch.step(
-            together.detach().cpu().numpy()
-        )
-        packed = self._pack(observations, terminated, truncated)
-        each = self._tensor(rewards[..., None])
+        observations, rewards, *_ = self.batch.step(self._array(together.detach()))
+        packed = self._pack(observations)
+        each = self._tensor(rewards).unsqueeze(-1)
         for group, part in self._rows.items():
             packed.set((group, "reward"), each[:, part])
         return packed
 
-    def _pack(
-        self,
-        observations: npt.NDArray[np.float32],
-        terminated: npt.NDArray[np.bool_],
-        truncated: npt.NDArray[np.bool_],
-    ) -> TensorDict:
+    def _pack(self, observations: Any) -> TensorDict:
         """Return all but the rewards under TorchRL's names."""
         each = self._tensor(observations)
         packed = TensorDict({}, batch_size=self.batch_size, device=self.device)
         for group, part in self._rows.items():
             size = (*self.batch_size, len(self.group_map[group]))
             packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
-        packed.set("score", self._tensor(self.batch.worlds["score"][:, None].copy()))
-        packed.set("done", self._tensor((terminated | truncated)[:, None]))
-        packed.set("terminated", self._tensor(terminated[:, None]))
-        packed.set("truncated", self._tensor(truncated[:, None]))
+        terminated = self._tensor(self.batch.terminated).unsqueeze(-1)
+        truncated = self._tensor(self.batch.truncated).unsqueeze(-1)
+        packed.set("score", self._tensor(self.batch.score).unsqueeze(-1))
+        packed.set("done", terminated | truncated)
+        packed.set("terminated", terminated)
+        packed.set("truncated", truncated)
         return packed
 
-    def _tensor(self, array: npt.NDArray[Any]) -> torch.Tensor:
-        """Return an array as a tensor on the device, without a copy where that is the CPU."""
-        return torch.from_numpy(array).to(self.device)
+    def _tensor(self, array: Any) -> torch.Tensor:
+        """Return an array of the engine as a tensor on the device."""
+        if isinstance(array, np.ndarray):
+            return torch.from_numpy(array).to(self.device)
+        # The engine's next step but one overwrites it.
+        return torch.as_tensor(array, device=self.device).clone()
+
+    def _array(self, tensor: torch.Tensor) -> Any:
+        """Return a tensor as the engine takes it."""
+        return tensor.contiguous() if tensor.device.type == "cuda" else tensor.cpu().numpy()

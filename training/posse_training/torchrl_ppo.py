@@ -202,7 +202,7 @@ def train(
     Args:
         scenario: A scenario's name.
         settings: How to learn.
-        device: Where everything lives.
+        device: Where everything lives; on ``"cuda"`` the worlds too (:class:`PosseEnv`).
         report: Given the figures of each update: ``score`` (mean over the rollout's steps),
             ``reward``, the losses, ``gradient_norm``, ``agent_steps`` so far.
         overrides: Settings of the scenario.
