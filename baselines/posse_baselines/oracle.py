@@ -230,10 +230,9 @@ def lead(
         # Far away, the slot is met where its mean motion takes it; near, where it is.
         sx = ahead * vx + (1.0 - ahead) * mean_x - ahead * rate * arm_y
         sy = ahead * vy + (1.0 - ahead) * mean_y + ahead * rate * arm_x
-        wanted, heading = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
-        wx, wy = wanted * math.cos(heading), wanted * math.sin(heading)
+        wx, wy = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
         count = surround(c, w, trackers, obstacles, i, s.margin, discs)
-        body.theta = math.atan2(t.heading_sin, t.heading_cos)
+        body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
         body.speed, body.omega = t.speed, t.turn_rate
         wx, wy, _ = safe_velocity(body, discs, count, wx, wy)
         v, omega = command(body, wx, wy)

@@ -15,7 +15,7 @@ import numpy as np
 
 from posse.arrays import Record, Records
 from posse.compiled import compiled
-from posse_baselines.guidance import clip, wrap
+from posse_baselines.guidance import clip, length, wrap
 
 LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
 """Steps in which a velocity is played out, s."""
@@ -27,8 +27,9 @@ _SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed
 _KEEP_RIGHT: Final = 0.02  # by how much passing on the right is preferred
 _LIKELY: Final = 0.6  # share of a velocity's difference by which the robot ends elsewhere, at least
 _SAME_SPEED: Final = 0.3  # m/s
-_SAME_HEADING: Final = 0.35  # rad
+_SAME_HEADING: Final = math.cos(0.35)  # cosine of the angle between two headings
 _GLANCE: Final = 0.15  # m; what a robot may be off the straight way meanwhile
+_STANDSTILL: Final = 1e-6  # m/s
 _CONTACT: Final = 0.015  # m; a narrower gap counts as a contact
 _CONTACT_COST: Final = 4.0
 _INTRUSION_COST: Final = 3.0
@@ -39,7 +40,8 @@ BODY: Final[np.dtype[Any]] = np.dtype(
         np.record,
         np.dtype(
             [
-                ("theta", np.float64),  # heading, rad
+                ("heading_cos", np.float64),
+                ("heading_sin", np.float64),
                 ("speed", np.float64),  # m/s
                 ("omega", np.float64),  # turn rate, rad/s
                 ("max_speed", np.float64),
@@ -110,6 +112,20 @@ def put_wall(
 
 
 @compiled
+def heading_error(body: Record, x: float, y: float) -> float:
+    """Return the angle (rad) by which a robot has to turn to head along a vector."""
+    c, s = body.heading_cos, body.heading_sin
+    return math.atan2(c * y - s * x, c * x + s * y)
+
+
+@compiled
+def turned(body: Record, error: float) -> tuple[float, float]:
+    """Return the direction (x, y) of a robot that has turned by an angle (rad)."""
+    c, s = math.cos(error), math.sin(error)
+    return body.heading_cos * c - body.heading_sin * s, body.heading_sin * c + body.heading_cos * s
+
+
+@compiled
 def turn_command(body: Record, error: float, time: float) -> float:
     """Return the turn rate (rad/s) that ends a heading error (rad) without overshooting."""
     most = math.sqrt(2.0 * _BRAKING_SHARE * body.turn_acceleration * abs(error))
@@ -122,12 +138,14 @@ def cost_of(
     discs: Records,
     count: int,
     speed: float,
-    heading: float,
+    error: float,
     wanted_x: float,
     wanted_y: float,
     enough: float,
 ) -> tuple[float, float]:
-    """Return (cost, danger) of taking up a speed (m/s) and heading (rad); stops above ``enough``.
+    """Return (cost, danger) of taking up a velocity; stops above ``enough``.
+
+    The velocity is a speed (m/s) and the angle to its heading from the present one (rad).
 
     The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a
     price for a contact, the higher the sooner. The cost adds how far the robot ends from where the
@@ -135,11 +153,10 @@ def cost_of(
     """
     x, y, danger, time = 0.0, 0.0, 0.0, 0.0
     v, omega = body.speed, body.omega
-    error = wrap(heading - body.theta)
     # Headings are carried as (cos, sin) and turned by short polynomials: half a turn in a step is
     # at most a quarter of a radian or so, and nobody needs more than a rough picture here.
-    c, s = math.cos(body.theta), math.sin(body.theta)
-    goal_c, goal_s = math.cos(heading), math.sin(heading)
+    c, s = body.heading_cos, body.heading_sin
+    goal_c, goal_s = turned(body, error)
     for k in range(len(_STEPS)):
         step = _STEPS[k]
         change = body.turn_acceleration * step
@@ -171,7 +188,7 @@ def cost_of(
             return danger, danger
     scale = 1.0 / (body.max_speed * _HORIZON)
     short_x, short_y = x * scale - wanted_x / body.max_speed, y * scale - wanted_y / body.max_speed
-    return danger + math.hypot(short_x, short_y), danger
+    return danger + length(short_x, short_y), danger
 
 
 @compiled
@@ -180,7 +197,6 @@ def is_clear(
     discs: Records,
     count: int,
     speed: float,
-    heading: float,
     speed_x: float,
     speed_y: float,
 ) -> bool:
@@ -188,7 +204,11 @@ def is_clear(
 
     Spares playing it out, which a team in formation would do at every step for nothing.
     """
-    if abs(speed - body.speed) > _SAME_SPEED or abs(wrap(heading - body.theta)) > _SAME_HEADING:
+    if abs(speed - body.speed) > _SAME_SPEED:
+        return False
+    # A velocity of nothing has no heading of its own.
+    ahead = speed_x * body.heading_cos + speed_y * body.heading_sin
+    if speed > _STANDSTILL and ahead < _SAME_HEADING * speed:
         return False
     for j in range(count):
         d = discs[j]
@@ -209,33 +229,34 @@ def safe_velocity(
     """Return the velocity (m/s) to take instead of a wanted one, and whether it is another one."""
     if count == 0:
         return wanted_x, wanted_y, False
-    wanted = math.hypot(wanted_x, wanted_y)
-    heading = math.atan2(wanted_y, wanted_x) if wanted > 1e-6 else body.theta
-    if is_clear(body, discs, count, wanted, heading, wanted_x, wanted_y):
+    wanted = length(wanted_x, wanted_y)
+    if is_clear(body, discs, count, wanted, wanted_x, wanted_y):
         return wanted_x, wanted_y, False
-    least, danger = cost_of(body, discs, count, wanted, heading, wanted_x, wanted_y, 1e9)
+    error = heading_error(body, wanted_x, wanted_y) if wanted > _STANDSTILL else 0.0
+    least, danger = cost_of(body, discs, count, wanted, error, wanted_x, wanted_y, 1e9)
     if danger <= 0.0:
         return wanted_x, wanted_y, False
-    best_speed, best_heading = wanted, heading
-    cost, _ = cost_of(body, discs, count, 0.0, body.theta, wanted_x, wanted_y, least)
+    best_speed, best_error = wanted, error
+    cost, _ = cost_of(body, discs, count, 0.0, 0.0, wanted_x, wanted_y, least)
     if cost < least:
-        least, best_speed, best_heading = cost, 0.0, body.theta
+        least, best_speed, best_error = cost, 0.0, 0.0
     # From straight on outwards, so that what is far from the wanted velocity is seldom played out.
     for k in range(2 * _DIRECTIONS):
         side = 1.0 if k % 2 else -1.0
-        angle = heading + side * ((k + 1) // 2) * (math.pi / _DIRECTIONS)
-        goal_x, goal_y = math.cos(angle), math.sin(angle)
+        angle = wrap(error + side * ((k + 1) // 2) * (math.pi / _DIRECTIONS))
+        goal_x, goal_y = turned(body, angle)
         for level in range(len(_SPEED_LEVELS)):
             speed = body.max_speed * _SPEED_LEVELS[level]
-            away = math.hypot(speed * goal_x - wanted_x, speed * goal_y - wanted_y) / body.max_speed
+            away = length(speed * goal_x - wanted_x, speed * goal_y - wanted_y) / body.max_speed
             if _LIKELY * away >= least:
                 continue
             cost, _ = cost_of(body, discs, count, speed, angle, wanted_x, wanted_y, least)
             if side > 0.0:
                 cost += _KEEP_RIGHT
             if cost < least:
-                least, best_speed, best_heading = cost, speed, angle
-    return best_speed * math.cos(best_heading), best_speed * math.sin(best_heading), True
+                least, best_speed, best_error = cost, speed, angle
+    goal_x, goal_y = turned(body, best_error)
+    return best_speed * goal_x, best_speed * goal_y, True
 
 
 @compiled
@@ -245,9 +266,8 @@ def command(body: Record, speed_x: float, speed_y: float) -> tuple[float, float]
     V is the part of the velocity that lies ahead, and 0 while it points backwards. A velocity of
     nearly nothing keeps the heading.
     """
-    speed = math.hypot(speed_x, speed_y)
-    if speed < 1e-3:
+    if length(speed_x, speed_y) < 1e-3:
         return 0.0, 0.0
-    error = wrap(math.atan2(speed_y, speed_x) - body.theta)
-    ahead = clip(speed * math.cos(error), 0.0, body.max_speed)
+    ahead = clip(speed_x * body.heading_cos + speed_y * body.heading_sin, 0.0, body.max_speed)
+    error = heading_error(body, speed_x, speed_y)
     return ahead, turn_command(body, error, body.dt)

@@ -17,7 +17,8 @@ LIMITS = [(1e4, 1e4), (1.0, 4.0)]  # acceleration, turn acceleration
 def body_of(theta: float, speed: float, limits: tuple[float, float]) -> Any:
     bodies = np.zeros(1, BODY)
     body = bodies[0]
-    body.theta, body.speed, body.omega = theta, speed, 0.0
+    body.heading_cos, body.heading_sin = math.cos(theta), math.sin(theta)
+    body.speed, body.omega = speed, 0.0
     body.max_speed, body.max_omega, body.dt = 1.0, 2.0, DT
     body.acceleration, body.turn_acceleration = limits
     return body
@@ -30,9 +31,10 @@ def drive(body: Any, x: float, y: float, wanted: tuple[float, float]) -> tuple[f
         dv, dw = body.acceleration * DT / 10, body.turn_acceleration * DT / 10
         body.speed = min(max(speed, body.speed - dv), body.speed + dv)
         body.omega = min(max(omega, body.omega - dw), body.omega + dw)
-        body.theta += body.omega * DT / 10
-        x += body.speed * math.cos(body.theta) * DT / 10
-        y += body.speed * math.sin(body.theta) * DT / 10
+        theta = math.atan2(body.heading_sin, body.heading_cos) + body.omega * DT / 10
+        body.heading_cos, body.heading_sin = math.cos(theta), math.sin(theta)
+        x += body.speed * body.heading_cos * DT / 10
+        y += body.speed * body.heading_sin * DT / 10
     return x, y
 
 
@@ -66,7 +68,7 @@ def test_two_that_meet_head_on_pass_each_other(limits: tuple[float, float]) -> N
         wanted = []
         for i in (0, 1):
             (x, y), (ox, oy), other = places[i], places[1 - i], pair[1 - i]
-            vx, vy = other.speed * math.cos(other.theta), other.speed * math.sin(other.theta)
+            vx, vy = other.speed * other.heading_cos, other.speed * other.heading_sin
             count = put_disc(discs, 0, ox - x, oy - y, vx, vy, 0.3, 0.15)
             goal = math.atan2(-y, goals[i] - x)
             ux, uy, _ = safe_velocity(pair[i], discs, count, math.cos(goal), math.sin(goal))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.monitoring import mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
+from posse_baselines.guidance import length
 from posse_baselines.safeguard import put_disc, put_wall
 
 _BIT = np.uint64(1)
@@ -27,7 +26,7 @@ def expect_disc(
     f: Record, beams: FloatArray, ahead: float, left: float, radius: float, echo: FloatArray
 ) -> None:
     """Lower the expected sonar readings (S,) by a disc that lies (ahead, left) of the tracker."""
-    distance = math.hypot(ahead, left)
+    distance = length(ahead, left)
     gap = distance - radius - f.radius
     if gap > f.sonar_range + 0.2:
         return
@@ -69,7 +68,8 @@ def slot_in_beam(
     slots: Records,
     x: float,
     y: float,
-    theta: float,
+    heading_c: float,
+    heading_s: float,
     beam_c: float,
     beam_s: float,
     reading: float,
@@ -79,12 +79,12 @@ def slot_in_beam(
     Where not all team-mates have a place in the observation, an echo from a slot is taken for one
     of them, who moves with the formation.
     """
-    c, s = math.cos(theta), math.sin(theta)
-    ux, uy = beam_c * c - beam_s * s, beam_s * c + beam_c * s
+    ux = beam_c * heading_c - beam_s * heading_s
+    uy = beam_s * heading_c + beam_c * heading_s
     for k in range(len(slots)):
         place_x, place_y, _, _ = slot_place(d, slots[k])
         dx, dy = place_x - x, place_y - y
-        distance = math.hypot(dx, dy)
+        distance = length(dx, dy)
         fits = abs(distance - 2.0 * f.radius - reading) < _SLOT_ECHO
         if fits and dx * ux + dy * uy >= f.wide_beam * distance:
             return k
@@ -101,14 +101,15 @@ def surround(
     own: int,
     x: float,
     y: float,
-    theta: float,
+    heading_c: float,
+    heading_s: float,
     o: FloatArray,
     beams: FloatArray,
     echo: FloatArray,
     discs: Records,
 ) -> int:
     """List what is near the tracker; return how many things. ``echo`` (S,) is work space."""
-    c, sn = math.cos(theta), math.sin(theta)
+    c, sn = heading_c, heading_s
     listening = hears_echo(f, o)
     for k in range(f.sonar_beams):
         echo[k] = f.sonar_range
@@ -116,8 +117,7 @@ def surround(
     if d.known:
         dx, dy = d.now_x - x, d.now_y - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
-            vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
-            count = put_disc(discs, count, dx, dy, vx, vy, two, s.target_margin)
+            count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, two, s.target_margin)
             if listening:
                 expect_disc(f, beams, dx * c + dy * sn, dy * c - dx * sn, radius, echo)
     for j in range(len(mates)):
@@ -153,12 +153,12 @@ def surround(
         reading = float(o[f.sonar + k])
         if reading < f.sonar_range - _NOTHING and reading < echo[k] - _EXPLAINED:
             if strangers:
-                k_slot = slot_in_beam(f, d, slots, x, y, theta, beams[0, k], beams[1, k], reading)
+                k_slot = slot_in_beam(f, d, slots, x, y, c, sn, beams[0, k], beams[1, k], reading)
                 if k_slot >= 0:
                     d.taken |= _BIT << np.uint64(k_slot)
                     place_x, place_y, arm_x, arm_y = slot_place(d, slots[k_slot])
-                    vx = d.speed * math.cos(d.now_theta) - d.psi_rate * arm_y
-                    vy = d.speed * math.sin(d.now_theta) + d.psi_rate * arm_x
+                    vx = d.speed_x - d.psi_rate * arm_y
+                    vy = d.speed_y + d.psi_rate * arm_x
                     count = put_disc(discs, count, place_x - x, place_y - y, vx, vy, two, s.margin)
                     continue
             # It may lie anywhere in the beam's width: a disc that fills most of it.
