@@ -8,9 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posse_baselines.safeguard import BODY, DISC, command, put_disc, put_wall, safe_velocity
+from posse_baselines.safeguard import (
+    BODY,
+    DISC,
+    PLAYS,
+    command,
+    put_disc,
+    put_wall,
+    safe_velocity,
+)
 
 DT = 0.1
+WORK = np.zeros(1, PLAYS)[0]
 LIMITS = [(1e4, 1e4), (1.0, 4.0)]  # acceleration, turn acceleration
 
 
@@ -49,7 +58,7 @@ def test_a_resting_disc_ahead_is_gone_round(
     for _ in range(120):
         count = put_disc(discs, 0, -x, offset - y, 0.0, 0.0, reach, 0.15)
         goal = math.atan2(-y, 4.0 - x)
-        vx, vy, _ = safe_velocity(body, discs, count, math.cos(goal), math.sin(goal))
+        vx, vy, _ = safe_velocity(body, discs, count, math.cos(goal), math.sin(goal), WORK)
         x, y = drive(body, x, y, (vx, vy))
         least = min(least, math.hypot(x, offset - y) - reach)
         if x > 3.0:
@@ -71,7 +80,7 @@ def test_two_that_meet_head_on_pass_each_other(limits: tuple[float, float]) -> N
             vx, vy = other.speed * other.heading_cos, other.speed * other.heading_sin
             count = put_disc(discs, 0, ox - x, oy - y, vx, vy, 0.3, 0.15)
             goal = math.atan2(-y, goals[i] - x)
-            ux, uy, _ = safe_velocity(pair[i], discs, count, math.cos(goal), math.sin(goal))
+            ux, uy, _ = safe_velocity(pair[i], discs, count, math.cos(goal), math.sin(goal), WORK)
             wanted.append((ux, uy))
         places = [drive(pair[i], *places[i], wanted[i]) for i in (0, 1)]
         least = min(least, math.dist(*places) - 0.3)
@@ -89,7 +98,7 @@ def test_a_resting_robot_gives_way_to_what_comes_at_it(limits: tuple[float, floa
     for k in range(80):
         comes = -4.0 + 0.6 * k * DT
         count = put_disc(discs, 0, comes - x, -y, 0.6, 0.0, 0.3, 0.2)
-        vx, vy, _ = safe_velocity(body, discs, count, 0.0, 0.0)
+        vx, vy, _ = safe_velocity(body, discs, count, 0.0, 0.0, WORK)
         x, y = drive(body, x, y, (vx, vy))
         least = min(least, math.hypot(comes + 0.06 - x, y) - 0.3)
     assert least > 0.0
@@ -101,7 +110,7 @@ def test_a_wall_stops_a_robot_that_presses_on(limits: tuple[float, float]) -> No
     discs, nearest = np.zeros(4, DISC), math.inf
     for _ in range(80):
         count = put_wall(discs, 0, 3.0 - x, 1.0, 0.0, 0.15, 0.15)
-        vx, vy, _ = safe_velocity(body, discs, count, 1.0, 0.0)
+        vx, vy, _ = safe_velocity(body, discs, count, 1.0, 0.0, WORK)
         x, y = drive(body, x, y, (vx, vy))
         nearest = min(nearest, 3.0 - 0.15 - x)
     assert 0.0 < nearest < 0.6
@@ -110,7 +119,11 @@ def test_a_wall_stops_a_robot_that_presses_on(limits: tuple[float, float]) -> No
 def test_a_wanted_velocity_that_is_safe_is_left_alone() -> None:
     discs = np.zeros(4, DISC)
     count = put_disc(discs, 0, -1.0, 0.0, 0.0, 0.0, 0.3, 0.15)
-    assert safe_velocity(body_of(0.0, 1.0, LIMITS[1]), discs, count, 1.0, 0.0) == (1.0, 0.0, False)
+    assert safe_velocity(body_of(0.0, 1.0, LIMITS[1]), discs, count, 1.0, 0.0, WORK) == (
+        1.0,
+        0.0,
+        False,
+    )
 
 
 def test_a_full_list_of_discs_stays_as_it_is() -> None:

@@ -51,6 +51,7 @@ def decide(
     echo: FloatArray,
     discs: Records,
     body: Record,
+    plays: Record,
     action: FloatArray,
 ) -> None:
     """Write the action (2 + m,) of one tracker for its observation (F,)."""
@@ -81,7 +82,7 @@ def decide(
     d.task = next_task(s, d)
     # Actuation
     count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, echo, discs)
-    vx, vy, _ = safe_velocity(body, discs, count, vx, vy)
+    vx, vy, _ = safe_velocity(body, discs, count, vx, vy, plays)
     speed, omega = command(body, vx, vy)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)
     write_message(d, action)
@@ -104,6 +105,7 @@ def decide_all(
     echoes: FloatArray,
     discs: Records,
     bodies: Records,
+    plays: Records,
     actions: FloatArray,
     part: int,
     first: int,
@@ -116,5 +118,5 @@ def decide_all(
             decide(
                 f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
                 costs[part], work[part], beams, echoes[part], discs[part], bodies[part],
-                actions[e, i],
+                plays[part], actions[e, i],
             )  # fmt: skip

@@ -28,7 +28,7 @@ from posse_baselines.policy import (
     check_observations,
     message_size_of,
 )  # fmt: skip
-from posse_baselines.safeguard import BODY, DISC
+from posse_baselines.safeguard import BODY, DISC, PLAYS
 
 _MOST_DISCS: Final = 32
 
@@ -107,6 +107,7 @@ class DDCS(BasePolicy):
         work = (
             np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)), m.beams,
             np.empty((parts, beams)), np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+            np.empty(parts, PLAYS),
         )  # fmt: skip
         over_worlds(
             decide_all,
