@@ -48,7 +48,6 @@ def decide(
     cost: FloatArray,
     work: FloatArray,
     beams: FloatArray,
-    echo: FloatArray,
     discs: Records,
     body: Record,
     plays: Record,
@@ -81,7 +80,7 @@ def decide(
         )
     d.task = next_task(s, d)
     # Actuation
-    count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, echo, discs)
+    count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, discs)
     vx, vy, _ = safe_velocity(body, discs, count, vx, vy, plays)
     speed, omega = command(body, vx, vy)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)
@@ -102,7 +101,6 @@ def decide_all(
     costs: FloatArray,
     work: FloatArray,
     beams: FloatArray,
-    echoes: FloatArray,
     discs: Records,
     bodies: Records,
     plays: Records,
@@ -117,6 +115,6 @@ def decide_all(
         for i in range(observations.shape[1]):
             decide(
                 f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                costs[part], work[part], beams, echoes[part], discs[part], bodies[part],
+                costs[part], work[part], beams, discs[part], bodies[part],
                 plays[part], actions[e, i],
             )  # fmt: skip

@@ -103,10 +103,9 @@ class DDCS(BasePolicy):
         observations = check_observations(self, observations, num_worlds, m.layout)
         actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
         parts = most_parts()
-        beams = max(1, m.layout.scenario.sonar_beams)
         work = (
             np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)), m.beams,
-            np.empty((parts, beams)), np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+            np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
             np.empty(parts, PLAYS),
         )  # fmt: skip
         over_worlds(

@@ -29,16 +29,20 @@ def mark_seen(
     cell = 2.0 * f.area / GRID
     reach = f.sight
     x, y = x - d.area_x, y - d.area_y
-    low_i = max(0, math.floor((x - reach + f.area) / cell))
-    low_j = max(0, math.floor((y - reach + f.area) / cell))
-    high_i = min(GRID - 1, math.floor((x + reach + f.area) / cell))
-    high_j = min(GRID - 1, math.floor((y + reach + f.area) / cell))
-    for i in range(low_i, high_i + 1):
-        for j in range(low_j, high_j + 1):
-            dx = (i + 0.5) * cell - f.area - x
-            dy = (j + 0.5) * cell - f.area - y
-            if dx * dx + dy * dy < reach * reach:
-                seen[i * GRID + j] = step + 1
+    for i in range(
+        max(0, math.floor((x - reach + f.area) / cell)),
+        min(GRID, math.floor((x + reach + f.area) / cell) + 1),
+    ):
+        # The middles of the cells in reach are one run of each row.
+        dx = (i + 0.5) * cell - f.area - x
+        square = reach * reach - dx * dx
+        if square <= 0.0:
+            continue
+        half = math.sqrt(square)
+        first = max(0, math.ceil((y - half + f.area) / cell - 0.5))
+        last = min(GRID - 1, math.floor((y + half + f.area) / cell - 0.5))
+        for k in range(i * GRID + first, i * GRID + last + 1):
+            seen[k] = step + 1
 
 
 @compiled
