@@ -26,21 +26,17 @@ def mark_seen(
     f: Record, d: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
 ) -> None:
     """Note in a map (GRID²,) that a tracker at (x, y) looks around."""
-    cell = 2.0 * f.area / GRID
-    reach = f.sight
-    x, y = x - d.area_x, y - d.area_y
-    for i in range(
-        max(0, math.floor((x - reach + f.area) / cell)),
-        min(GRID, math.floor((x + reach + f.area) / cell) + 1),
-    ):
-        # The middles of the cells in reach are one run of each row.
-        dx = (i + 0.5) * cell - f.area - x
-        square = reach * reach - dx * dx
+    # In cells from the map's corner; the middle of cell i is at i + 0.5.
+    scale = GRID / (2.0 * f.area)
+    x, y, reach = (x - d.area_x + f.area) * scale, (y - d.area_y + f.area) * scale, f.sight * scale
+    for i in range(max(0, math.floor(x - reach)), min(GRID, math.floor(x + reach) + 1)):
+        # The cells whose middle is in reach are one run of each row.
+        square = reach * reach - (i + 0.5 - x) ** 2
         if square <= 0.0:
             continue
         half = math.sqrt(square)
-        first = max(0, math.ceil((y - half + f.area) / cell - 0.5))
-        last = min(GRID - 1, math.floor((y + half + f.area) / cell - 0.5))
+        first = max(0, math.ceil(y - half - 0.5))
+        last = min(GRID - 1, math.floor(y + half - 0.5))
         for k in range(i * GRID + first, i * GRID + last + 1):
             seen[k] = step + 1
 

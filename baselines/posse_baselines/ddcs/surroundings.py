@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from posse.arrays import FloatArray, Record, Records
@@ -28,13 +30,13 @@ def disc_explains(
 
     ``(beam_x, beam_y)`` is the direction of the beam, ``radius`` (m) that of the disc.
     """
-    distance = length(disc.x, disc.y)
-    if reading < distance - radius - f.radius - _EXPLAINED:
+    square = disc.x * disc.x + disc.y * disc.y
+    if square > (reading + radius + f.radius + _EXPLAINED) ** 2:
         return False
     # A little wider than the beam and the disc, since the place is not known exactly.
     along = disc.x * beam_x + disc.y * beam_y
     across = disc.y * beam_x - disc.x * beam_y
-    in_width = along >= f.wide_beam * distance
+    in_width = along >= f.wide_beam * math.sqrt(square)
     return bool(in_width or (along > 0.0 and abs(across) < radius + 0.1))
 
 
