@@ -349,27 +349,24 @@ def safe_velocity(
         least, best_x, best_y = cost, 0.0, 0.0
     begin_plays(body, error, plays)
     play_all(body, discs, count, plays)
-    scale = 1.0 / (body.max_speed * _HORIZON)
+    # As shares of the greatest speed, and of how far it leads.
+    top, farthest = body.max_speed, body.max_speed * _HORIZON
+    wish_x, wish_y = wanted_x / top, wanted_y / top
     for k in range(_DIRECTIONS):
         for level in range(len(_SPEED_LEVELS)):
             m = level * _DIRECTIONS + k
-            speed = body.max_speed * _SPEED_LEVELS[level]
-            x, y = speed * plays.goal_cos[k], speed * plays.goal_sin[k]
-            away = length(x - wanted_x, y - wanted_y) / body.max_speed
+            share = _SPEED_LEVELS[level]
+            x, y = share * plays.goal_cos[k], share * plays.goal_sin[k]
             # However the robot gets there, it ends elsewhere than it should.
-            if _LIKELY * away >= least:
+            if _LIKELY * length(x - wish_x, y - wish_y) >= least:
                 continue
+            cost = plays.danger[m] + (_KEEP_RIGHT if k % 2 == 1 else 0.0)
             if plays.going[m] == 0.0:  # it touched something
-                cost = plays.danger[m] + 2.0
+                cost += 2.0
             else:
-                cost = plays.danger[m] + length(
-                    plays.x[m] * scale - wanted_x / body.max_speed,
-                    plays.y[m] * scale - wanted_y / body.max_speed,
-                )
-            if k % 2 == 1:
-                cost += _KEEP_RIGHT
+                cost += length(plays.x[m] / farthest - wish_x, plays.y[m] / farthest - wish_y)
             if cost < least:
-                least, best_x, best_y = cost, x, y
+                least, best_x, best_y = cost, top * x, top * y
     return best_x, best_y, True
 
 
