@@ -127,7 +127,9 @@ class DDCS(BasePolicy):
         frame), ``estimate_age`` (s; -1: there is no estimate).
         """
         minds = memory.minds
-        estimate = np.stack([minds[name] for name in ("now_x", "now_y", "now_theta")], axis=-1)
+        estimate = np.empty((*minds.shape, 3), np.float32)
+        for k, name in enumerate(("now_x", "now_y", "now_theta")):
+            estimate[..., k] = minds[name]
         notes: Annotations = {
             name: minds[name].copy() for name in ("task", "leader", "term", "slot", "exchanges")
         }

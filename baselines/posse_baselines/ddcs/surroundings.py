@@ -23,24 +23,6 @@ _FORGOTTEN = 30.0  # s; where a team-mate that long silent stands is anybody's g
 
 
 @compiled
-def disc_explains(
-    f: Record, disc: Record, beam_x: float, beam_y: float, radius: float, reading: float
-) -> bool:
-    """Say whether a disc that is known of gives a sonar reading (m) as short as this one.
-
-    ``(beam_x, beam_y)`` is the direction of the beam, ``radius`` (m) that of the disc.
-    """
-    square = disc.x * disc.x + disc.y * disc.y
-    if square > (reading + radius + f.radius + _EXPLAINED) ** 2:
-        return False
-    # A little wider than the beam and the disc, since the place is not known exactly.
-    along = disc.x * beam_x + disc.y * beam_y
-    across = disc.y * beam_x - disc.x * beam_y
-    in_width = along >= f.wide_beam * math.sqrt(square)
-    return bool(in_width or (along > 0.0 and abs(across) < radius + 0.1))
-
-
-@compiled
 def wall_explains(
     f: Record, x: float, y: float, beam_x: float, beam_y: float, reading: float
 ) -> bool:
@@ -69,9 +51,20 @@ def is_explained(
     beam_y: float,
     reading: float,
 ) -> bool:
-    """Say whether one of the robots that head the list, or a wall, gives a sonar reading (m)."""
+    """Say whether something that is known of gives a sonar reading (m) as short as this one.
+
+    One of the ``robots`` that head the list, or a wall. (beam_x, beam_y) is the beam's direction.
+    """
+    radius, wide_beam = float(f.radius), float(f.wide_beam)
+    reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(robots):
-        if disc_explains(f, discs[j], beam_x, beam_y, f.radius, reading):
+        dx, dy = discs[j].x, discs[j].y
+        square = dx * dx + dy * dy
+        if square > reach * reach:
+            continue
+        # A little wider than the beam and the disc, since the place is not known exactly.
+        along, across = dx * beam_x + dy * beam_y, dy * beam_x - dx * beam_y
+        if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(across) < radius + 0.1):
             return True
     return bool(f.walled) and wall_explains(f, x, y, beam_x, beam_y, reading)
 
@@ -155,9 +148,10 @@ def surround(
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
     d.taken = _NO_BITS
     strangers = d.known != 0 and f.neighbours < len(mates) - 1
+    farthest = f.sonar_range - _EXPLAINED
     for k in range(f.sonar_beams):
         reading = float(o[f.sonar + k])
-        if reading >= f.sonar_range - _EXPLAINED:
+        if reading >= farthest:
             continue
         beam_x = beams[0, k] * heading_c - beams[1, k] * heading_s
         beam_y = beams[1, k] * heading_c + beams[0, k] * heading_s
