@@ -32,7 +32,7 @@ from __future__ import annotations
 import math
 
 from posse.compiled import compiled
-from posse_baselines.guidance import MIN_RANGE, clip, line_of_sight, regulate_heading, wrap
+from posse_baselines.guidance import MIN_RANGE, clip, length, line_of_sight, regulate_heading, wrap
 
 # --- centralized: where the follower is ----------------------------------------------------------
 
@@ -298,12 +298,31 @@ def cartesian_slot_velocity(
 ) -> tuple[float, float]:
     """Return the tracker's wanted speed (m/s, [0, max_speed]) and heading (rad).
 
+    :func:`cartesian_slot_components` as :func:`drive` takes it.
+    """
+    speed_x, speed_y = cartesian_slot_components(
+        offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
+    )
+    return min(length(speed_x, speed_y), max_speed), wrap(math.atan2(speed_y, speed_x))
+
+
+@compiled
+def cartesian_slot_components(
+    offset_x: float,
+    offset_y: float,
+    slot_speed_x: float,
+    slot_speed_y: float,
+    gain: float,
+    max_speed: float,
+) -> tuple[float, float]:
+    """Return the tracker's wanted velocity (x, y) in m/s, no faster than ``max_speed``.
+
     The slot's velocity plus ``gain`` (1/s, below 1 / control step) times the slot's offset from
     the tracker (m). Where that is more than ``max_speed``, the part along the offset is shortened
     until it is not: the tracker goes at full speed, on the course that meets a slot of constant
     velocity on a straight line. A slot that outruns the tracker is followed in its own direction.
     """
-    distance = math.hypot(offset_x, offset_y)
+    distance = length(offset_x, offset_y)
     approach = gain * distance
     unit_x = offset_x / max(distance, MIN_RANGE)
     unit_y = offset_y / max(distance, MIN_RANGE)
@@ -313,8 +332,10 @@ def cartesian_slot_velocity(
         approach = min(approach, math.sqrt(surplus + opening**2) - opening)
     speed_x = slot_speed_x + approach * unit_x
     speed_y = slot_speed_y + approach * unit_y
-    speed = min(math.hypot(speed_x, speed_y), max_speed)
-    return speed, wrap(math.atan2(speed_y, speed_x))
+    speed = length(speed_x, speed_y)
+    if speed <= max_speed:
+        return speed_x, speed_y
+    return speed_x * (max_speed / speed), speed_y * (max_speed / speed)
 
 
 @compiled

@@ -58,6 +58,16 @@ def wrap(angle: float) -> float:
 
 
 @compiled
+def length(x: float, y: float) -> float:
+    """Return the length of a vector.
+
+    ``math.hypot`` takes care of lengths whose square no float holds, and of the last bit: it takes
+    several times as long, and no robot needs either.
+    """
+    return math.sqrt(x * x + y * y)
+
+
+@compiled
 def clip(value: float, low: float, high: float) -> float:
     """Return ``value``, or the end of [low, high] that it lies beyond."""
     return max(low, min(value, high))

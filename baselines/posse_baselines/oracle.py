@@ -27,7 +27,7 @@ from posse_baselines.policy import (
     check_observations,
     message_size_of,
 )  # fmt: skip
-from posse_baselines.safeguard import BODY, DISC, command, put_disc, put_wall, safe_velocity
+from posse_baselines.safeguard import BODY, DISC, PLAYS, command, put_disc, put_wall, safe_velocity
 from posse_baselines.steering import (
     approach_velocity,
     intercept_time,
@@ -87,6 +87,7 @@ class _OracleMemory:
     work: FloatArray
     discs: Records
     bodies: Records
+    plays: Records
 
 
 SETTINGS_FIELDS: Final = tuple(OracleSettings.__dataclass_fields__)
@@ -139,6 +140,7 @@ class Oracle(BasePolicy):
             batch, config_record(layout.scenario), slot_records(layout.scenario), plans,
             np.zeros((parts, n, n), np.float32), np.zeros((parts, WORK_ROWS, n + 1), np.float32),
             np.zeros((parts, _MOST_DISCS), DISC), np.zeros(parts, BODY),
+            np.zeros(parts, PLAYS),
         )  # fmt: skip
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -156,7 +158,7 @@ class Oracle(BasePolicy):
             lead_all,
             (
                 m.config, m.slots, settings, arrays.world, arrays.tracker, arrays.obstacle,
-                m.plans, m.costs, m.work, m.discs, m.bodies, actions,
+                m.plans, m.costs, m.work, m.discs, m.bodies, m.plays, actions,
             ),
             num_worlds,
             n,
@@ -188,6 +190,7 @@ def lead(
     work: FloatArray,
     discs: Records,
     body: Record,
+    plays: Record,
     actions: FloatArray,
 ) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
@@ -230,12 +233,11 @@ def lead(
         # Far away, the slot is met where its mean motion takes it; near, where it is.
         sx = ahead * vx + (1.0 - ahead) * mean_x - ahead * rate * arm_y
         sy = ahead * vy + (1.0 - ahead) * mean_y + ahead * rate * arm_x
-        wanted, heading = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
-        wx, wy = wanted * math.cos(heading), wanted * math.sin(heading)
+        wx, wy = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
         count = surround(c, w, trackers, obstacles, i, s.margin, discs)
-        body.theta = math.atan2(t.heading_sin, t.heading_cos)
+        body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
         body.speed, body.omega = t.speed, t.turn_rate
-        wx, wy, _ = safe_velocity(body, discs, count, wx, wy)
+        wx, wy, _ = safe_velocity(body, discs, count, wx, wy, plays)
         v, omega = command(body, wx, wy)
         write_motion(actions[i], v, omega, speed, c.tracker_turn_rate)
 
@@ -348,6 +350,7 @@ def lead_all(
     work: FloatArray,
     discs: Records,
     bodies: Records,
+    plays: Records,
     actions: FloatArray,
     part: int,
     first: int,
@@ -357,5 +360,5 @@ def lead_all(
     for e in range(first, last):
         lead(
             config[0], slots, settings[0], world[e], tracker[e], obstacle[e], plans[e],
-            costs[part], work[part], discs[part], bodies[part], actions[e],
+            costs[part], work[part], discs[part], bodies[part], plays[part], actions[e],
         )  # fmt: skip

@@ -10,13 +10,15 @@ from typing import Any, Final
 _SERIAL_BELOW: Final = 2048
 """Trackers below which waking another thread costs more than it saves."""
 
+_PROCESSORS: Final = os.cpu_count() or 1
+
 _pool: ThreadPoolExecutor | None = None
 _process = -1
 
 
 def most_parts() -> int:
     """Return into how many parts :func:`over_worlds` splits the worlds at most."""
-    return os.cpu_count() or 1
+    return _PROCESSORS
 
 
 def over_worlds(

@@ -15,20 +15,31 @@ import numpy as np
 
 from posse.arrays import Record, Records
 from posse.compiled import compiled
-from posse_baselines.guidance import clip, wrap
+from posse_baselines.guidance import clip, length, wrap
 
 LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
 """Steps in which a velocity is played out, s."""
 
 _STEPS: Final = np.array(LOOK_AHEAD)
 _HORIZON: Final = sum(LOOK_AHEAD)
-_DIRECTIONS: Final = 8  # to each side, besides straight on
 _SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed
+# From straight on outwards, left and right in turn; every direction at every speed is a play.
+_DIRECTIONS: Final = 16
+_TURNS: Final = np.array(
+    [
+        (1 if k % 2 else -1) * ((k + 1) // 2) * 2.0 * math.pi / _DIRECTIONS
+        for k in range(_DIRECTIONS)
+    ]
+)
+_TURN_COS: Final = np.cos(_TURNS)
+_TURN_SIN: Final = np.sin(_TURNS)
+_PLAYS: Final = _DIRECTIONS * len(_SPEED_LEVELS)
 _KEEP_RIGHT: Final = 0.02  # by how much passing on the right is preferred
 _LIKELY: Final = 0.6  # share of a velocity's difference by which the robot ends elsewhere, at least
 _SAME_SPEED: Final = 0.3  # m/s
-_SAME_HEADING: Final = 0.35  # rad
+_SAME_HEADING: Final = math.cos(0.35)  # cosine of the angle between two headings
 _GLANCE: Final = 0.15  # m; what a robot may be off the straight way meanwhile
+_STANDSTILL: Final = 1e-6  # m/s
 _CONTACT: Final = 0.015  # m; a narrower gap counts as a contact
 _CONTACT_COST: Final = 4.0
 _INTRUSION_COST: Final = 3.0
@@ -39,7 +50,8 @@ BODY: Final[np.dtype[Any]] = np.dtype(
         np.record,
         np.dtype(
             [
-                ("theta", np.float64),  # heading, rad
+                ("heading_cos", np.float64),
+                ("heading_sin", np.float64),
                 ("speed", np.float64),  # m/s
                 ("omega", np.float64),  # turn rate, rad/s
                 ("max_speed", np.float64),
@@ -71,6 +83,24 @@ DISC: Final[np.dtype[Any]] = np.dtype(
     )
 )
 """Something that must not be touched, in axes that have the tracker at the origin."""
+
+_BY_DIRECTION: Final = (
+    "error", "omega", "cos", "sin", "middle_cos", "middle_sin", "goal_cos", "goal_sin", "ahead",
+)  # fmt: skip
+_BY_PLAY: Final = ("speed", "x", "y", "danger", "going")
+PLAYS: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                *((name, np.float64, (_DIRECTIONS,)) for name in _BY_DIRECTION),
+                *((name, np.float64, (_PLAYS,)) for name in _BY_PLAY),
+            ],
+            align=True,
+        ),
+    )
+)
+"""What :func:`play_all` works in: every direction at the greatest speed, then at the next share."""
 
 _PLANET: Final = 1000.0  # radius of the disc that stands for a wall, m
 
@@ -110,10 +140,36 @@ def put_wall(
 
 
 @compiled
+def heading_error(body: Record, x: float, y: float) -> float:
+    """Return the angle (rad) by which a robot has to turn to head along a vector."""
+    c, s = body.heading_cos, body.heading_sin
+    return math.atan2(c * y - s * x, c * x + s * y)
+
+
+@compiled
+def turned(body: Record, error: float) -> tuple[float, float]:
+    """Return the direction (x, y) of a robot that has turned by an angle (rad)."""
+    c, s = math.cos(error), math.sin(error)
+    return body.heading_cos * c - body.heading_sin * s, body.heading_sin * c + body.heading_cos * s
+
+
+@compiled
 def turn_command(body: Record, error: float, time: float) -> float:
     """Return the turn rate (rad/s) that ends a heading error (rad) without overshooting."""
     most = math.sqrt(2.0 * _BRAKING_SHARE * body.turn_acceleration * abs(error))
     return clip(error / time, -min(most, body.max_omega), min(most, body.max_omega))
+
+
+@compiled
+def half_turn(turn: float) -> tuple[float, float]:
+    """Return cosine and sine of half an angle (rad), by short polynomials.
+
+    Half a turn in a step is at most a quarter of a radian or so, and nobody needs more than a rough
+    picture here.
+    """
+    half = 0.5 * turn
+    square = half * half
+    return 1.0 - square * (0.5 - square * (1.0 / 24.0)), half * (1.0 - square * (1.0 / 6.0))
 
 
 @compiled
@@ -122,12 +178,14 @@ def cost_of(
     discs: Records,
     count: int,
     speed: float,
-    heading: float,
+    error: float,
     wanted_x: float,
     wanted_y: float,
     enough: float,
 ) -> tuple[float, float]:
-    """Return (cost, danger) of taking up a speed (m/s) and heading (rad); stops above ``enough``.
+    """Return (cost, danger) of taking up a velocity; stops above ``enough``.
+
+    The velocity is a speed (m/s) and the angle to its heading from the present one (rad).
 
     The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a
     price for a contact, the higher the sooner. The cost adds how far the robot ends from where the
@@ -135,20 +193,15 @@ def cost_of(
     """
     x, y, danger, time = 0.0, 0.0, 0.0, 0.0
     v, omega = body.speed, body.omega
-    error = wrap(heading - body.theta)
-    # Headings are carried as (cos, sin) and turned by short polynomials: half a turn in a step is
-    # at most a quarter of a radian or so, and nobody needs more than a rough picture here.
-    c, s = math.cos(body.theta), math.sin(body.theta)
-    goal_c, goal_s = math.cos(heading), math.sin(heading)
+    c, s = body.heading_cos, body.heading_sin
+    goal_c, goal_s = turned(body, error)
     for k in range(len(_STEPS)):
         step = _STEPS[k]
         change = body.turn_acceleration * step
         omega = clip(turn_command(body, error, step), omega - change, omega + change)
         change = body.acceleration * step
         v = clip(speed * max(0.0, c * goal_c + s * goal_s), v - change, v + change)
-        half = 0.5 * omega * step
-        half_c = 1.0 - half * half * (0.5 - half * half * (1.0 / 24.0))
-        half_s = half * (1.0 - half * half * (1.0 / 6.0))
+        half_c, half_s = half_turn(omega * step)
         middle_c, middle_s = c * half_c - s * half_s, s * half_c + c * half_s
         x += v * step * middle_c
         y += v * step * middle_s
@@ -171,7 +224,75 @@ def cost_of(
             return danger, danger
     scale = 1.0 / (body.max_speed * _HORIZON)
     short_x, short_y = x * scale - wanted_x / body.max_speed, y * scale - wanted_y / body.max_speed
-    return danger + math.hypot(short_x, short_y), danger
+    return danger + length(short_x, short_y), danger
+
+
+@compiled
+def begin_plays(body: Record, error: float, p: Record) -> None:
+    """Set out a :data:`PLAYS` from where a body is; straight on is a turn of ``error`` (rad)."""
+    goal_c, goal_s = turned(body, error)
+    for k in range(_DIRECTIONS):
+        p.error[k], p.omega[k] = wrap(error + _TURNS[k]), body.omega
+        p.cos[k], p.sin[k] = body.heading_cos, body.heading_sin
+        p.goal_cos[k] = goal_c * _TURN_COS[k] - goal_s * _TURN_SIN[k]
+        p.goal_sin[k] = goal_s * _TURN_COS[k] + goal_c * _TURN_SIN[k]
+    for m in range(_PLAYS):
+        p.speed[m], p.x[m], p.y[m], p.danger[m], p.going[m] = body.speed, 0.0, 0.0, 0.0, 1.0
+
+
+@compiled
+def play_all(body: Record, discs: Records, count: int, p: Record) -> None:
+    """Play out all of a :data:`PLAYS` as :func:`cost_of` does one, up to the end.
+
+    That is 32 plays in the time of a few: the loops over them have no branches, and become vector
+    instructions.
+    """
+    time = 0.0
+    for n in range(len(_STEPS)):
+        step = _STEPS[n]
+        turn_change, change = body.turn_acceleration * step, body.acceleration * step
+        for k in range(_DIRECTIONS):
+            c, s, old = p.cos[k], p.sin[k], p.omega[k]
+            p.ahead[k] = max(0.0, c * p.goal_cos[k] + s * p.goal_sin[k])
+            omega = turn_command(body, p.error[k], step)
+            omega = clip(omega, old - turn_change, old + turn_change)
+            half_c, half_s = half_turn(omega * step)
+            middle_c, middle_s = c * half_c - s * half_s, s * half_c + c * half_s
+            p.omega[k], p.middle_cos[k], p.middle_sin[k] = omega, middle_c, middle_s
+            p.cos[k] = middle_c * half_c - middle_s * half_s
+            p.sin[k] = middle_s * half_c + middle_c * half_s
+            p.error[k] -= omega * step
+        for level in range(len(_SPEED_LEVELS)):
+            goal_speed = body.max_speed * _SPEED_LEVELS[level]
+            for k in range(_DIRECTIONS):
+                m = level * _DIRECTIONS + k
+                old = p.speed[m]
+                v = clip(goal_speed * p.ahead[k], old - change, old + change)
+                p.speed[m] = v
+                p.x[m] += v * step * p.middle_cos[k]
+                p.y[m] += v * step * p.middle_sin[k]
+        time += step
+        weight = _INTRUSION_COST * step / _HORIZON
+        contact_cost = _CONTACT_COST * (1.2 - time / _HORIZON)
+        for j in range(count):
+            d = discs[j]
+            disc_x, disc_y = d.x + d.speed_x * time, d.y + d.speed_y * time
+            near = d.reach + d.margin
+            least = near * near
+            hits = 0
+            for m in range(_PLAYS):
+                dx, dy = disc_x - p.x[m], disc_y - p.y[m]
+                hits += dx * dx + dy * dy < least
+            if hits == 0:
+                continue
+            by_margin = 1.0 / max(d.margin, 1e-9)
+            for m in range(_PLAYS):
+                gap = length(disc_x - p.x[m], disc_y - p.y[m]) - d.reach
+                touches = 1.0 if gap < _CONTACT else 0.0
+                intrusion = max(0.0, 1.0 - gap * by_margin)
+                price = touches * contact_cost + (1.0 - touches) * weight * intrusion
+                p.danger[m] += p.going[m] * price
+                p.going[m] *= 1.0 - touches
 
 
 @compiled
@@ -180,7 +301,6 @@ def is_clear(
     discs: Records,
     count: int,
     speed: float,
-    heading: float,
     speed_x: float,
     speed_y: float,
 ) -> bool:
@@ -188,7 +308,11 @@ def is_clear(
 
     Spares playing it out, which a team in formation would do at every step for nothing.
     """
-    if abs(speed - body.speed) > _SAME_SPEED or abs(wrap(heading - body.theta)) > _SAME_HEADING:
+    if abs(speed - body.speed) > _SAME_SPEED:
+        return False
+    # A velocity of nothing has no heading of its own.
+    ahead = speed_x * body.heading_cos + speed_y * body.heading_sin
+    if speed > _STANDSTILL and ahead < _SAME_HEADING * speed:
         return False
     for j in range(count):
         d = discs[j]
@@ -204,38 +328,46 @@ def is_clear(
 
 @compiled
 def safe_velocity(
-    body: Record, discs: Records, count: int, wanted_x: float, wanted_y: float
+    body: Record, discs: Records, count: int, wanted_x: float, wanted_y: float, plays: Record
 ) -> tuple[float, float, bool]:
-    """Return the velocity (m/s) to take instead of a wanted one, and whether it is another one."""
+    """Return the velocity (m/s) to take instead of a wanted one, and whether it is another one.
+
+    ``plays`` is a :data:`PLAYS` to work in.
+    """
     if count == 0:
         return wanted_x, wanted_y, False
-    wanted = math.hypot(wanted_x, wanted_y)
-    heading = math.atan2(wanted_y, wanted_x) if wanted > 1e-6 else body.theta
-    if is_clear(body, discs, count, wanted, heading, wanted_x, wanted_y):
+    wanted = length(wanted_x, wanted_y)
+    if is_clear(body, discs, count, wanted, wanted_x, wanted_y):
         return wanted_x, wanted_y, False
-    least, danger = cost_of(body, discs, count, wanted, heading, wanted_x, wanted_y, 1e9)
+    error = heading_error(body, wanted_x, wanted_y) if wanted > _STANDSTILL else 0.0
+    least, danger = cost_of(body, discs, count, wanted, error, wanted_x, wanted_y, 1e9)
     if danger <= 0.0:
         return wanted_x, wanted_y, False
-    best_speed, best_heading = wanted, heading
-    cost, _ = cost_of(body, discs, count, 0.0, body.theta, wanted_x, wanted_y, least)
+    best_x, best_y = wanted_x, wanted_y
+    cost, _ = cost_of(body, discs, count, 0.0, 0.0, wanted_x, wanted_y, least)
     if cost < least:
-        least, best_speed, best_heading = cost, 0.0, body.theta
-    # From straight on outwards, so that what is far from the wanted velocity is seldom played out.
-    for k in range(2 * _DIRECTIONS):
-        side = 1.0 if k % 2 else -1.0
-        angle = heading + side * ((k + 1) // 2) * (math.pi / _DIRECTIONS)
-        goal_x, goal_y = math.cos(angle), math.sin(angle)
+        least, best_x, best_y = cost, 0.0, 0.0
+    begin_plays(body, error, plays)
+    play_all(body, discs, count, plays)
+    # As shares of the greatest speed, and of how far it leads.
+    top, farthest = body.max_speed, body.max_speed * _HORIZON
+    wish_x, wish_y = wanted_x / top, wanted_y / top
+    for k in range(_DIRECTIONS):
         for level in range(len(_SPEED_LEVELS)):
-            speed = body.max_speed * _SPEED_LEVELS[level]
-            away = math.hypot(speed * goal_x - wanted_x, speed * goal_y - wanted_y) / body.max_speed
-            if _LIKELY * away >= least:
+            m = level * _DIRECTIONS + k
+            share = _SPEED_LEVELS[level]
+            x, y = share * plays.goal_cos[k], share * plays.goal_sin[k]
+            # However the robot gets there, it ends elsewhere than it should.
+            if _LIKELY * length(x - wish_x, y - wish_y) >= least:
                 continue
-            cost, _ = cost_of(body, discs, count, speed, angle, wanted_x, wanted_y, least)
-            if side > 0.0:
-                cost += _KEEP_RIGHT
+            cost = plays.danger[m] + (_KEEP_RIGHT if k % 2 == 1 else 0.0)
+            if plays.going[m] == 0.0:  # it touched something
+                cost += 2.0
+            else:
+                cost += length(plays.x[m] / farthest - wish_x, plays.y[m] / farthest - wish_y)
             if cost < least:
-                least, best_speed, best_heading = cost, speed, angle
-    return best_speed * math.cos(best_heading), best_speed * math.sin(best_heading), True
+                least, best_x, best_y = cost, top * x, top * y
+    return best_x, best_y, True
 
 
 @compiled
@@ -245,9 +377,8 @@ def command(body: Record, speed_x: float, speed_y: float) -> tuple[float, float]
     V is the part of the velocity that lies ahead, and 0 while it points backwards. A velocity of
     nearly nothing keeps the heading.
     """
-    speed = math.hypot(speed_x, speed_y)
-    if speed < 1e-3:
+    if length(speed_x, speed_y) < 1e-3:
         return 0.0, 0.0
-    error = wrap(math.atan2(speed_y, speed_x) - body.theta)
-    ahead = clip(speed * math.cos(error), 0.0, body.max_speed)
+    ahead = clip(speed_x * body.heading_cos + speed_y * body.heading_sin, 0.0, body.max_speed)
+    error = heading_error(body, speed_x, speed_y)
     return ahead, turn_command(body, error, body.dt)

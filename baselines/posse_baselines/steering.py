@@ -7,8 +7,8 @@ from typing import Final
 
 from posse.arrays import FloatArray
 from posse.compiled import compiled
-from posse_baselines.formation_control import cartesian_slot_velocity
-from posse_baselines.guidance import clip
+from posse_baselines.formation_control import cartesian_slot_components
+from posse_baselines.guidance import clip, length
 
 NEVER: Final = 1e6
 """s. What stands for a meeting that does not happen."""
@@ -45,15 +45,17 @@ def approach_velocity(
     max_speed: float,
     deceleration: float,
 ) -> tuple[float, float]:
-    """Return the wanted speed (m/s) and heading (rad) towards a moving slot, with room to brake.
+    """Return the wanted velocity (x, y) in m/s towards a moving slot, with room to brake.
 
-    :func:`~posse_baselines.formation_control.cartesian_slot_velocity` with the gain lowered where
+    :func:`~posse_baselines.formation_control.cartesian_slot_components` with the gain lowered where
     the tracker, whose speed changes by at most ``deceleration`` (m/s²), could not brake in time.
     """
-    distance = math.hypot(offset_x, offset_y)
+    distance = length(offset_x, offset_y)
     if distance > 1e-6:
         gain = min(gain, math.sqrt(2.0 * _SPEED_LEFT * deceleration / distance))
-    return cartesian_slot_velocity(offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed)
+    return cartesian_slot_components(
+        offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
+    )
 
 
 @compiled
@@ -74,7 +76,7 @@ def way_round(
     crossing = from_x * way_y - from_y * way_x
     if crossing * crossing >= clearance * clearance * square:
         return to_x, to_y
-    distance = math.hypot(from_x, from_y)
+    distance = length(from_x, from_y)
     angle = math.acos(min(1.0, clearance / max(distance, 1e-6)))
     angle = max(angle, _LEAST_TURN)
     if crossing < 0.0:

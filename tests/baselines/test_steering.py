@@ -32,8 +32,8 @@ def test_a_point_that_gets_away_is_never_met() -> None:
 @PROPERTY
 @given(st.floats(0.05, 10.0), st.floats(0.2, 4.0))
 def test_an_approach_leaves_room_to_brake(distance: float, deceleration: float) -> None:
-    speed, heading = approach_velocity(distance, 0.0, 0.0, 0.0, 2.0, 1.0, deceleration)
-    assert heading == 0.0
+    speed, aside = approach_velocity(distance, 0.0, 0.0, 0.0, 2.0, 1.0, deceleration)
+    assert aside == 0.0
     assert 0.0 < speed <= 1.0
     assert speed**2 / (2.0 * deceleration) <= distance
 

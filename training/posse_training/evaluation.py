@@ -228,9 +228,11 @@ class ExchangeCounter:
         """Look at whom the trackers follow now, (E, N) numbers; ``None``: they do not tell."""
         if leaders is None:
             return
-        numbers = np.arange(leaders.shape[1])
-        votes = (leaders[:, :, None] == numbers).sum(axis=1)
-        chosen = np.where(votes.max(axis=1) > leaders.shape[1] / 2, votes.argmax(axis=1), -1)
+        # Whom more than half follow stands in the middle of the row, sorted.
+        n = leaders.shape[1]
+        middle = np.sort(leaders, axis=1)[:, n // 2]
+        agreed = np.count_nonzero(leaders == middle[:, None], axis=1) > n / 2
+        chosen = np.where(agreed, middle, -1)
         known = (chosen >= 0) & running
         self.total[known & np.isnan(self.total)] = 0
         self.total[known & (self._leader >= 0) & (chosen != self._leader)] += 1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
@@ -26,7 +24,7 @@ _UNLIMITED = 1e4  # m/s² or rad/s²: what stands for no limit
 @compiled
 def feel_body(f: Record, o: FloatArray, body: Record) -> None:
     """Read from an observation (F,) how the robot moves, and what it can do."""
-    body.theta = math.atan2(o[f.heading + 1], o[f.heading])
+    body.heading_cos, body.heading_sin = o[f.heading], o[f.heading + 1]
     body.speed, body.omega = o[f.speed], o[f.turn_rate]
     body.max_speed, body.max_omega = o[f.max_speed], o[f.max_turn_rate]
     body.acceleration, body.turn_acceleration = _UNLIMITED, _UNLIMITED
@@ -50,14 +48,15 @@ def decide(
     cost: FloatArray,
     work: FloatArray,
     beams: FloatArray,
-    echo: FloatArray,
     discs: Records,
     body: Record,
+    plays: Record,
     action: FloatArray,
 ) -> None:
     """Write the action (2 + m,) of one tracker for its observation (F,)."""
     own = int(o[f.number])
     x, y = float(o[f.position]), float(o[f.position + 1])
+    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
     feel_body(f, o, body)
     # Monitoring
     watch_target(f, s, d, o, outermost)
@@ -69,11 +68,11 @@ def decide(
         d.slot, d.error = -1, -1.0
         if d.task != SEARCHING:
             begin_search(f, d, seen)
-        vx, vy = wander(f, s, d, mates, seen, own, x, y, body.theta, body.max_speed)
+        vx, vy = wander(f, s, d, mates, seen, own, x, y, hc, hs, body.max_speed)
     else:
         if d.slot < 0 or d.step % max(1, round(s.replan_time / f.dt)) == 0:
             choose_slot(
-                f, s, d, mates, slots, own, x, y, body.theta, body.max_speed, body.max_omega,
+                f, s, d, mates, slots, own, x, y, hc, hs, body.max_speed, body.max_omega,
                 cost, work,
             )  # fmt: skip
         vx, vy = wanted_velocity(
@@ -81,8 +80,8 @@ def decide(
         )
     d.task = next_task(s, d)
     # Actuation
-    count = surround(f, s, d, mates, slots, own, x, y, body.theta, o, beams, echo, discs)
-    vx, vy, _ = safe_velocity(body, discs, count, vx, vy)
+    count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, discs)
+    vx, vy, _ = safe_velocity(body, discs, count, vx, vy, plays)
     speed, omega = command(body, vx, vy)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)
     write_message(d, action)
@@ -102,9 +101,9 @@ def decide_all(
     costs: FloatArray,
     work: FloatArray,
     beams: FloatArray,
-    echoes: FloatArray,
     discs: Records,
     bodies: Records,
+    plays: Records,
     actions: FloatArray,
     part: int,
     first: int,
@@ -116,6 +115,6 @@ def decide_all(
         for i in range(observations.shape[1]):
             decide(
                 f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                costs[part], work[part], beams, echoes[part], discs[part], bodies[part],
-                actions[e, i],
+                costs[part], work[part], beams, discs[part], bodies[part],
+                plays[part], actions[e, i],
             )  # fmt: skip

@@ -12,12 +12,11 @@ several hops away knows that the leader is alive.
 
 from __future__ import annotations
 
-import math
-
 from posse.arrays import Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.messages import COUNT, is_newer
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
+from posse_baselines.guidance import length
 
 
 @compiled
@@ -48,12 +47,12 @@ def nearest_tracker(
 
     Of all that count as working, ``barred`` excepted (-1: nobody).
     """
-    own_distance = math.hypot(d.now_x - x, d.now_y - y)
+    own_distance = length(d.now_x - x, d.now_y - y)
     best, least = own, own_distance
     for j in range(len(mates)):
         if j != own and j != barred and is_there(f, s, d, mates[j], len(mates)):
             mate_x, mate_y = mate_now(f, s, d, mates[j])
-            distance = math.hypot(d.now_x - mate_x, d.now_y - mate_y)
+            distance = length(d.now_x - mate_x, d.now_y - mate_y)
             if distance < least:
                 best, least = j, distance
     return best, least, own_distance

@@ -29,7 +29,9 @@ MIND: Final = _record(
     ("raw_x", _F), ("raw_y", _F),  # the fix itself, before it was blended
     ("mean_x", _F), ("mean_y", _F),  # mean velocity
     # the target, as it is taken to be now
-    ("now_x", _F), ("now_y", _F), ("now_theta", _F), ("now_psi", _F), ("psi_rate", _F),
+    ("now_x", _F), ("now_y", _F), ("now_theta", _F), ("psi_rate", _F),
+    ("speed_x", _F), ("speed_y", _F),  # its velocity, m/s
+    ("frame_cos", _F), ("frame_sin", _F),  # of the slot frame's heading
     ("age", _F),  # of the fix, s
     ("known", _I),  # 1: there is an estimate that is not too old
     ("sees", _I),  # 1: its own sensor has the target
@@ -58,7 +60,8 @@ MIND: Final = _record(
 
 MATE: Final = _record(
     ("step", _I),  # own step at which it sent what follows; -1: never heard
-    ("x", _F), ("y", _F), ("speed_x", _F), ("speed_y", _F), ("theta", _F),
+    ("x", _F), ("y", _F), ("speed_x", _F), ("speed_y", _F),
+    ("heading_cos", _F), ("heading_sin", _F),
     ("fresh", _I),  # 1: heard in this step
     ("task", _I), ("leader", _I), ("term", _I), ("pulse", _I), ("slot", _I),  # -1: not said
 )  # fmt: skip

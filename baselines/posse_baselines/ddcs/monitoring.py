@@ -11,7 +11,7 @@ import math
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.messages import decode
-from posse_baselines.guidance import clip, wrap
+from posse_baselines.guidance import clip, length, wrap
 
 _TURN_MEMORY = 1.0  # s; an older turn tells little of the heading now
 _WAY_MEMORY = 3.0  # s
@@ -31,6 +31,8 @@ def carry_on(
     After a second the way fades, too: where it leads is ever less sure, and the middle of where a
     target may be stays behind one that keeps its heading.
     """
+    if time <= 0.0:
+        return x, y, theta
     if time > 1.0:
         time = 1.0 + _WAY_MEMORY * (1.0 - math.exp((1.0 - time) / _WAY_MEMORY))
     turned = turn * _TURN_MEMORY * (1.0 - math.exp(-time / _TURN_MEMORY))
@@ -69,8 +71,11 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
     x, y, theta = carry_on(d.x, d.y, d.theta, d.speed, d.turn, d.age)
     d.now_x, d.now_y, d.now_theta = x, y, theta
     limit = frame_limit(d.speed, float(o[f.max_speed]), outermost)
-    d.now_psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
-    d.psi_rate = clip(wrap(theta - d.now_psi) / dt, -limit, limit)
+    psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
+    d.psi_rate = clip(wrap(theta - psi) / dt, -limit, limit)
+    # What the rest of the step would otherwise work out again for every slot and every disc.
+    d.speed_x, d.speed_y = d.speed * math.cos(theta), d.speed * math.sin(theta)
+    d.frame_cos, d.frame_sin = math.cos(psi), math.sin(psi)
 
 
 @compiled
@@ -81,15 +86,17 @@ def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: 
     bc, bs = float(o[f.target_bearing]), float(o[f.target_bearing + 1])
     x = o[f.position] + r * (bc * hc - bs * hs)
     y = o[f.position + 1] + r * (bc * hs + bs * hc)
-    own = math.atan2(hs, hc)
-    theta = wrap(own + math.atan2(o[f.target_heading + 1], o[f.target_heading]))
-    psi = wrap(own + math.atan2(o[f.target_frame + 1], o[f.target_frame]))
+    tc, ts = float(o[f.target_heading]), float(o[f.target_heading + 1])
+    heading_c, heading_s = tc * hc - ts * hs, tc * hs + ts * hc
+    theta = math.atan2(heading_s, heading_c)
+    fc, fs = float(o[f.target_frame]), float(o[f.target_frame + 1])
+    psi = math.atan2(fc * hs + fs * hc, fc * hc - fs * hs)
     time = (fix_step - d.fix_step) * dt
     if d.fix_step < 0 or time > s.target_lost_after:
         d.x, d.y, d.turn = x, y, 0.0
         if d.speed_known == 0:
             d.speed = _UNKNOWN_SPEED * o[f.max_speed]
-        d.mean_x, d.mean_y = d.speed * math.cos(theta), d.speed * math.sin(theta)
+        d.mean_x, d.mean_y = d.speed * heading_c, d.speed * heading_s
     else:
         guess_x, guess_y, _ = carry_on(d.x, d.y, d.theta, d.speed, d.turn, time)
         turned = wrap(theta - d.theta)
@@ -103,13 +110,13 @@ def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: 
         else:
             d.turn = 0.0
         trust = s.fix_trust
-        if math.hypot(x - guess_x, y - guess_y) > _JUMP:
+        if length(x - guess_x, y - guess_y) > _JUMP:
             trust = 1.0
         d.x = guess_x + trust * (x - guess_x)
         d.y = guess_y + trust * (y - guess_y)
         share = 1.0 - math.exp(-time / s.mean_memory)
-        d.mean_x += share * (d.speed * math.cos(theta) - d.mean_x)
-        d.mean_y += share * (d.speed * math.sin(theta) - d.mean_y)
+        d.mean_x += share * (d.speed * heading_c - d.mean_x)
+        d.mean_y += share * (d.speed * heading_s - d.mean_y)
     d.raw_x, d.raw_y, d.theta, d.psi, d.fix_step = x, y, theta, psi, fix_step
 
 
@@ -147,7 +154,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
         c, t = float(o[f.neighbour_heading + k]), float(o[f.neighbour_heading + k + 1])
         cosine, sine = c * hc - t * hs, c * hs + t * hc
         speed = float(o[f.neighbour_speed + k])
-        mate.theta = math.atan2(sine, cosine)
+        mate.heading_cos, mate.heading_sin = cosine, sine
         mate.speed_x, mate.speed_y = speed * cosine, speed * sine
         m = f.neighbour_message + k
         mate.task, mate.leader, mate.term = decode(o[m]), decode(o[m + 1]), decode(o[m + 2])

@@ -28,7 +28,7 @@ from posse_baselines.policy import (
     check_observations,
     message_size_of,
 )  # fmt: skip
-from posse_baselines.safeguard import BODY, DISC
+from posse_baselines.safeguard import BODY, DISC, PLAYS
 
 _MOST_DISCS: Final = 32
 
@@ -103,10 +103,10 @@ class DDCS(BasePolicy):
         observations = check_observations(self, observations, num_worlds, m.layout)
         actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
         parts = most_parts()
-        beams = max(1, m.layout.scenario.sonar_beams)
         work = (
             np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)), m.beams,
-            np.empty((parts, beams)), np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+            np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+            np.empty(parts, PLAYS),
         )  # fmt: skip
         over_worlds(
             decide_all,
@@ -127,7 +127,9 @@ class DDCS(BasePolicy):
         frame), ``estimate_age`` (s; -1: there is no estimate).
         """
         minds = memory.minds
-        estimate = np.stack([minds[name] for name in ("now_x", "now_y", "now_theta")], axis=-1)
+        estimate = np.empty((*minds.shape, 3), np.float32)
+        for k, name in enumerate(("now_x", "now_y", "now_theta")):
+            estimate[..., k] = minds[name]
         notes: Annotations = {
             name: minds[name].copy() for name in ("task", "leader", "term", "slot", "exchanges")
         }

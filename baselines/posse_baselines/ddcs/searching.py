@@ -11,6 +11,7 @@ from posse.arrays import Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.memory import GRID
 from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.guidance import length
 
 _STALE = 30.0  # s; a place not looked at for so long counts as never looked at
 _AGE_WEIGHT = 0.35  # m of way that a second since the last look is worth
@@ -25,19 +26,19 @@ def mark_seen(
     f: Record, d: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
 ) -> None:
     """Note in a map (GRID²,) that a tracker at (x, y) looks around."""
-    cell = 2.0 * f.area / GRID
-    reach = f.sight
-    x, y = x - d.area_x, y - d.area_y
-    low_i = max(0, math.floor((x - reach + f.area) / cell))
-    low_j = max(0, math.floor((y - reach + f.area) / cell))
-    high_i = min(GRID - 1, math.floor((x + reach + f.area) / cell))
-    high_j = min(GRID - 1, math.floor((y + reach + f.area) / cell))
-    for i in range(low_i, high_i + 1):
-        for j in range(low_j, high_j + 1):
-            dx = (i + 0.5) * cell - f.area - x
-            dy = (j + 0.5) * cell - f.area - y
-            if dx * dx + dy * dy < reach * reach:
-                seen[i * GRID + j] = step + 1
+    # In cells from the map's corner; the middle of cell i is at i + 0.5.
+    scale = GRID / (2.0 * f.area)
+    x, y, reach = (x - d.area_x + f.area) * scale, (y - d.area_y + f.area) * scale, f.sight * scale
+    for i in range(max(0, math.floor(x - reach)), min(GRID, math.floor(x + reach) + 1)):
+        # The cells whose middle is in reach are one run of each row.
+        square = reach * reach - (i + 0.5 - x) ** 2
+        if square <= 0.0:
+            continue
+        half = math.sqrt(square)
+        first = max(0, math.ceil(y - half - 0.5))
+        last = min(GRID - 1, math.floor(y + half - 0.5))
+        for k in range(i * GRID + first, i * GRID + last + 1):
+            seen[k] = step + 1
 
 
 @compiled
@@ -79,7 +80,8 @@ def wander(
     own: int,
     x: float,
     y: float,
-    theta: float,
+    heading_c: float,
+    heading_s: float,
     max_speed: float,
 ) -> tuple[float, float]:
     """Return the velocity (m/s) of a tracker that searches from (x, y)."""
@@ -88,9 +90,9 @@ def wander(
     time = (d.step - d.goal_step) * f.dt
     arrived = dx * dx + dy * dy < near * near and time > _LOOK_TIME
     if d.goal_step < 0 or arrived or time > _GOAL_TIME:
-        choose_goal(f, s, d, mates, seen, own, x, y, theta)
+        choose_goal(f, s, d, mates, seen, own, x, y, heading_c, heading_s)
         dx, dy = d.goal_x - x, d.goal_y - y
-    distance = math.hypot(dx, dy)
+    distance = length(dx, dy)
     if distance < 1e-6:
         return 0.0, 0.0
     return max_speed * dx / distance, max_speed * dy / distance
@@ -106,7 +108,8 @@ def choose_goal(
     own: int,
     x: float,
     y: float,
-    theta: float,
+    heading_c: float,
+    heading_s: float,
 ) -> None:
     """Set the goal: near, long not looked at, and nearer to this tracker than to any other."""
     cell = 2.0 * f.area / GRID
@@ -128,16 +131,16 @@ def choose_goal(
             bonus = 0.0
             if d.fix_step >= 0:
                 # It was there, and cannot be far.
-                away = math.hypot(cx - d.now_x, cy - d.now_y)
+                away = length(cx - d.now_x, cy - d.now_y)
                 if away < reach:
                     bonus = 6.0
                     if looked < d.lost_step:
                         age = _STALE
                     bonus -= 0.3 * away
             # Who hears few of the others may find in the middle those who have found the target.
-            bonus -= _TO_THE_MIDDLE * deaf * math.hypot(cx - d.area_x, cy - d.area_y)
-            way = math.hypot(cx - x, cy - y)
-            turn = 1.0 - ((cx - x) * math.cos(theta) + (cy - y) * math.sin(theta)) / max(way, 1e-6)
+            bonus -= _TO_THE_MIDDLE * deaf * length(cx - d.area_x, cy - d.area_y)
+            way = length(cx - x, cy - y)
+            turn = 1.0 - ((cx - x) * heading_c + (cy - y) * heading_s) / max(way, 1e-6)
             value = _AGE_WEIGHT * min(age, _STALE) + bonus - way - 0.8 * turn
             if value <= best:
                 continue  # team-mates can only make it less
@@ -145,7 +148,7 @@ def choose_goal(
                 if m != own and is_there(f, s, d, mates[m], len(mates)):
                     mx, my = mate_now(f, s, d, mates[m])
                     # Where it heads counts more than where it is.
-                    other = math.hypot(
+                    other = length(
                         cx - mx - 2.0 * mates[m].speed_x, cy - my - 2.0 * mates[m].speed_y
                     )
                     if other < way:

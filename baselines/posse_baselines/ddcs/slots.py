@@ -15,6 +15,7 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.assignment import assign
 from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.guidance import length
 from posse_baselines.steering import intercept_time
 
 _IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
@@ -29,7 +30,7 @@ _RESERVED = 1e4  # s; what a slot costs that belongs to another
 @compiled
 def slot_place(d: Record, slot: Record) -> tuple[float, float, float, float]:
     """Return a slot's place now (x, y) and its arm from the target (x, y), common frame, m."""
-    c, s = math.cos(d.now_psi), math.sin(d.now_psi)
+    c, s = d.frame_cos, d.frame_sin
     arm_x, arm_y = slot.x * c - slot.y * s, slot.x * s + slot.y * c
     return d.now_x + arm_x, d.now_y + arm_y, arm_x, arm_y
 
@@ -44,7 +45,8 @@ def choose_slot(
     own: int,
     x: float,
     y: float,
-    theta: float,
+    heading_c: float,
+    heading_s: float,
     max_speed: float,
     max_omega: float,
     cost: FloatArray,
@@ -56,20 +58,21 @@ def choose_slot(
         d.slot = own  # nobody to ask
         return
     rows, mine = 0, 0
-    c, sn = math.cos(d.now_psi), math.sin(d.now_psi)
-    vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
+    c, sn, vx, vy = d.frame_cos, d.frame_sin, d.speed_x, d.speed_y
     for j in range(n):
         if j == own:
             mine = rows
-            held, at_x, at_y, heading = d.slot, x, y, theta
+            held, at_x, at_y = d.slot, x, y
+            ahead_x, ahead_y = heading_c, heading_s
         elif is_there(f, s, d, mates[j], n):
-            held, heading = mates[j].slot, float(mates[j].theta)
+            held = mates[j].slot
+            ahead_x, ahead_y = float(mates[j].heading_cos), float(mates[j].heading_sin)
             at_x, at_y = mate_now(f, s, d, mates[j])
         elif f.neighbours < n - 1 and mates[j].slot >= 0:
             # No place for it in the observation, but it said which slot is its own. Were it there
             # still, and near, it would have a place.
             slot_x, slot_y, _, _ = slot_place(d, slots[mates[j].slot])
-            if math.hypot(slot_x - x, slot_y - y) < d.horizon - _IN_PLACE:
+            if length(slot_x - x, slot_y - y) < d.horizon - _IN_PLACE:
                 mates[j].slot = -1
                 continue
             for k in range(n):
@@ -78,7 +81,6 @@ def choose_slot(
             continue
         else:
             continue
-        ahead_x, ahead_y = math.cos(heading), math.sin(heading)
         for k in range(n):
             slot = slots[k]
             dx = d.now_x + slot.x * c - slot.y * sn - at_x
@@ -87,7 +89,7 @@ def choose_slot(
             if time > s.weave_time:
                 time = intercept_time(dx, dy, d.mean_x, d.mean_y, max_speed)
             # Turning towards it takes time, too; up to half a turn where it lies behind.
-            facing = (dx * ahead_x + dy * ahead_y) / max(math.hypot(dx, dy), 1e-6)
+            facing = (dx * ahead_x + dy * ahead_y) / max(length(dx, dy), 1e-6)
             time += _HALF_TURN * (1.0 - facing) / max_omega * min(1.0, time)
             if held == k:
                 time -= s.loyalty
@@ -126,11 +128,11 @@ def loses_slot(
     answer, though each may know of others that the other does not.
     """
     slot_x, slot_y, _, _ = slot_place(d, slots[slot])
-    mine = math.hypot(slot_x - x, slot_y - y)
+    mine = length(slot_x - x, slot_y - y)
     for j in range(len(mates)):
         if j != own and mates[j].slot == slot and is_there(f, s, d, mates[j], len(mates)):
             at_x, at_y = mate_now(f, s, d, mates[j])
-            other = math.hypot(slot_x - at_x, slot_y - at_y)
+            other = length(slot_x - at_x, slot_y - at_y)
             if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < own):
                 return bool(d.slot == slot)
     return False

@@ -10,56 +10,72 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse_baselines.ddcs.monitoring import mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
+from posse_baselines.guidance import length
 from posse_baselines.safeguard import put_disc, put_wall
 
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
 _SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
 _NEAR = 3.0  # m; farther things are no danger yet
-_NOTHING = 1e-3  # m; a reading this near to the sonar's reach means that nothing is there
 _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
 _MOST_AGE = 0.7  # s; a team-mate is not made wider for an older message
 _FORGOTTEN = 30.0  # s; where a team-mate that long silent stands is anybody's guess
 
 
 @compiled
-def expect_disc(
-    f: Record, beams: FloatArray, ahead: float, left: float, radius: float, echo: FloatArray
-) -> None:
-    """Lower the expected sonar readings (S,) by a disc that lies (ahead, left) of the tracker."""
-    distance = math.hypot(ahead, left)
-    gap = distance - radius - f.radius
-    if gap > f.sonar_range + 0.2:
-        return
-    # A little wider than the beam and the disc, since the place is not known exactly.
-    in_width = f.wide_beam * distance
-    for k in range(f.sonar_beams):
-        along = ahead * beams[0, k] + left * beams[1, k]
-        across = left * beams[0, k] - ahead * beams[1, k]
-        if along >= in_width or (along > 0.0 and abs(across) < radius + 0.1):
-            echo[k] = min(echo[k], gap)
-
-
-@compiled
-def expect_wall(
-    f: Record, beams: FloatArray, ahead: float, left: float, distance: float, echo: FloatArray
-) -> None:
-    """Lower the expected readings (S,) by a wall whose outward normal points (ahead, left)."""
-    for k in range(f.sonar_beams):
-        towards = ahead * beams[0, k] + left * beams[1, k]
-        if towards >= f.wide_beam:
-            echo[k] = min(echo[k], distance - f.radius)
-        elif towards > 0.0:
-            echo[k] = min(echo[k], distance / towards - f.radius)
-
-
-@compiled
-def hears_echo(f: Record, o: FloatArray) -> bool:
-    """Say whether any sonar beam finds anything."""
-    for k in range(f.sonar_beams):  # noqa: SIM110 (numba compiles no generator)
-        if o[f.sonar + k] < f.sonar_range - _NOTHING:
+def wall_explains(
+    f: Record, x: float, y: float, beam_x: float, beam_y: float, reading: float
+) -> bool:
+    """Say whether a wall gives a sonar reading (m) as short as this one."""
+    for k in range(4):
+        nx, ny = wall_normal(k)
+        away = f.extent - nx * x - ny * y
+        towards = nx * beam_x + ny * beam_y
+        if away >= _NEAR or towards <= 0.0:
+            continue
+        if towards < f.wide_beam:
+            away /= towards
+        if reading >= away - f.radius - _EXPLAINED:
             return True
     return False
+
+
+@compiled
+def is_explained(
+    f: Record,
+    discs: Records,
+    robots: int,
+    x: float,
+    y: float,
+    beam_x: float,
+    beam_y: float,
+    reading: float,
+) -> bool:
+    """Say whether something that is known of gives a sonar reading (m) as short as this one.
+
+    One of the ``robots`` that head the list, or a wall. (beam_x, beam_y) is the beam's direction.
+    """
+    radius, wide_beam = float(f.radius), float(f.wide_beam)
+    reach = reading + 2.0 * radius + _EXPLAINED
+    for j in range(robots):
+        dx, dy = discs[j].x, discs[j].y
+        square = dx * dx + dy * dy
+        if square > reach * reach:
+            continue
+        # A little wider than the beam and the disc, since the place is not known exactly.
+        along, across = dx * beam_x + dy * beam_y, dy * beam_x - dx * beam_y
+        if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(across) < radius + 0.1):
+            return True
+    return bool(f.walled) and wall_explains(f, x, y, beam_x, beam_y, reading)
+
+
+@compiled
+def wall_normal(k: int) -> tuple[float, float]:
+    """Return the outward normal of one of the four walls."""
+    return (
+        1.0 if k == 0 else (-1.0 if k == 1 else 0.0),
+        1.0 if k == 2 else (-1.0 if k == 3 else 0.0),
+    )
 
 
 @compiled
@@ -69,9 +85,8 @@ def slot_in_beam(
     slots: Records,
     x: float,
     y: float,
-    theta: float,
-    beam_c: float,
-    beam_s: float,
+    beam_x: float,
+    beam_y: float,
     reading: float,
 ) -> int:
     """Return the slot whose occupant would give this echo, or -1.
@@ -79,14 +94,12 @@ def slot_in_beam(
     Where not all team-mates have a place in the observation, an echo from a slot is taken for one
     of them, who moves with the formation.
     """
-    c, s = math.cos(theta), math.sin(theta)
-    ux, uy = beam_c * c - beam_s * s, beam_s * c + beam_c * s
     for k in range(len(slots)):
         place_x, place_y, _, _ = slot_place(d, slots[k])
         dx, dy = place_x - x, place_y - y
-        distance = math.hypot(dx, dy)
+        distance = length(dx, dy)
         fits = abs(distance - 2.0 * f.radius - reading) < _SLOT_ECHO
-        if fits and dx * ux + dy * uy >= f.wide_beam * distance:
+        if fits and dx * beam_x + dy * beam_y >= f.wide_beam * distance:
             return k
     return -1
 
@@ -101,25 +114,18 @@ def surround(
     own: int,
     x: float,
     y: float,
-    theta: float,
+    heading_c: float,
+    heading_s: float,
     o: FloatArray,
     beams: FloatArray,
-    echo: FloatArray,
     discs: Records,
 ) -> int:
-    """List what is near the tracker; return how many things. ``echo`` (S,) is work space."""
-    c, sn = math.cos(theta), math.sin(theta)
-    listening = hears_echo(f, o)
-    for k in range(f.sonar_beams):
-        echo[k] = f.sonar_range
+    """List what is near the tracker; return how many things."""
     count, two, radius = 0, 2.0 * f.radius, float(f.radius)
     if d.known:
         dx, dy = d.now_x - x, d.now_y - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
-            vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
-            count = put_disc(discs, count, dx, dy, vx, vy, two, s.target_margin)
-            if listening:
-                expect_disc(f, beams, dx * c + dy * sn, dy * c - dx * sn, radius, echo)
+            count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, two, s.target_margin)
     for j in range(len(mates)):
         mate = mates[j]
         if j == own or mate.step < 0 or (d.step - mate.step) * f.dt > _FORGOTTEN:
@@ -133,39 +139,36 @@ def surround(
                 vx, vy = 0.0, 0.0
             margin = s.margin + s.age_margin * min(age, _MOST_AGE)
             count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
-            if listening:
-                expect_disc(f, beams, dx * c + dy * sn, dy * c - dx * sn, radius, echo)
+    robots = count
     if f.walled:
-        half = float(f.extent)
         for k in range(4):
-            nx = 1.0 if k == 0 else (-1.0 if k == 1 else 0.0)
-            ny = 1.0 if k == 2 else (-1.0 if k == 3 else 0.0)
-            away = half - nx * x - ny * y
+            nx, ny = wall_normal(k)
+            away = f.extent - nx * x - ny * y
             if away < _NEAR:
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
-                if listening:
-                    expect_wall(f, beams, nx * c + ny * sn, ny * c - nx * sn, away, echo)
     d.taken = _NO_BITS
-    if not listening:
-        return count
     strangers = d.known != 0 and f.neighbours < len(mates) - 1
+    farthest = f.sonar_range - _EXPLAINED
     for k in range(f.sonar_beams):
         reading = float(o[f.sonar + k])
-        if reading < f.sonar_range - _NOTHING and reading < echo[k] - _EXPLAINED:
-            if strangers:
-                k_slot = slot_in_beam(f, d, slots, x, y, theta, beams[0, k], beams[1, k], reading)
-                if k_slot >= 0:
-                    d.taken |= _BIT << np.uint64(k_slot)
-                    place_x, place_y, arm_x, arm_y = slot_place(d, slots[k_slot])
-                    vx = d.speed * math.cos(d.now_theta) - d.psi_rate * arm_y
-                    vy = d.speed * math.sin(d.now_theta) + d.psi_rate * arm_x
-                    count = put_disc(discs, count, place_x - x, place_y - y, vx, vy, two, s.margin)
-                    continue
-            # It may lie anywhere in the beam's width: a disc that fills most of it.
-            wide = min(0.5, 0.4 * (reading + radius))
-            away = reading + radius + wide
-            bx, by = beams[0, k] * c - beams[1, k] * sn, beams[1, k] * c + beams[0, k] * sn
-            count = put_disc(
-                discs, count, away * bx, away * by, 0.0, 0.0, wide + radius, s.echo_margin
-            )
+        if reading >= farthest:
+            continue
+        beam_x = beams[0, k] * heading_c - beams[1, k] * heading_s
+        beam_y = beams[1, k] * heading_c + beams[0, k] * heading_s
+        if is_explained(f, discs, robots, x, y, beam_x, beam_y, reading):
+            continue
+        if strangers:
+            k_slot = slot_in_beam(f, d, slots, x, y, beam_x, beam_y, reading)
+            if k_slot >= 0:
+                d.taken |= _BIT << np.uint64(k_slot)
+                place_x, place_y, arm_x, arm_y = slot_place(d, slots[k_slot])
+                vx, vy = d.speed_x - d.psi_rate * arm_y, d.speed_y + d.psi_rate * arm_x
+                count = put_disc(discs, count, place_x - x, place_y - y, vx, vy, two, s.margin)
+                continue
+        # It may lie anywhere in the beam's width: a disc that fills most of it.
+        wide = min(0.5, 0.4 * (reading + radius))
+        away = reading + radius + wide
+        count = put_disc(
+            discs, count, away * beam_x, away * beam_y, 0.0, 0.0, wide + radius, s.echo_margin
+        )
     return count

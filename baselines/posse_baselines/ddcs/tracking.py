@@ -14,6 +14,7 @@ from posse_baselines.formation_control import l_phi_demand, polar_slot_velocity,
 from posse_baselines.guidance import (
     deviation,
     lawful_heading,
+    length,
     line_of_sight,
     next_stage,
     pursuit_speed,
@@ -62,7 +63,7 @@ def hunt(s: Record, d: Record, n: int, x: float, y: float, body: Record) -> tupl
     away = s.hunt_growth * d.age
     dx = d.now_x + away * math.cos(angle) - x
     dy = d.now_y + away * math.sin(angle) - y
-    distance = math.hypot(dx, dy)
+    distance = length(dx, dy)
     speed = min(body.max_speed, s.gain * distance)
     return speed * dx / max(distance, 1e-6), speed * dy / max(distance, 1e-6)
 
@@ -73,14 +74,14 @@ def on_target(
 ) -> tuple[float, float]:
     """Return the velocity (m/s) that takes up the slot on the target; note how far it is."""
     place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
-    d.error = math.hypot(place_x - x, place_y - y)
+    d.error = length(place_x - x, place_y - y)
     round_x, round_y = way_round(x - d.now_x, y - d.now_y, arm_x, arm_y, s.clearance)
     dx, dy = d.now_x + round_x - x, d.now_y + round_y - y
-    vx, vy = d.speed * math.cos(d.now_theta), d.speed * math.sin(d.now_theta)
+    vx, vy = d.speed_x, d.speed_y
     if s.guidance == POLAR:
         r, sigma = line_of_sight(x, y, d.now_x, d.now_y)
         speed, delta = polar_slot_velocity(
-            r, sigma, d.speed, d.now_theta, math.hypot(arm_x, arm_y),
+            r, sigma, d.speed, d.now_theta, length(arm_x, arm_y),
             wrap(math.atan2(arm_y, arm_x) + math.pi), d.psi_rate,
             s.range_gain, s.bearing_gain, body.max_speed,
         )  # fmt: skip
@@ -92,8 +93,7 @@ def on_target(
         ahead = s.weave_time * (1.0 - math.exp(-time / s.weave_time)) / time
     sx = ahead * (vx - d.psi_rate * arm_y) + (1.0 - ahead) * d.mean_x
     sy = ahead * (vy + d.psi_rate * arm_x) + (1.0 - ahead) * d.mean_y
-    speed, heading = approach_velocity(dx, dy, sx, sy, s.gain, body.max_speed, body.acceleration)
-    return speed * math.cos(heading), speed * math.sin(heading)
+    return approach_velocity(dx, dy, sx, sy, s.gain, body.max_speed, body.acceleration)
 
 
 @compiled
@@ -133,21 +133,19 @@ def on_leader(
     """
     lx, ly = mate_now(f, s, d, leader)
     silent = (d.step - leader.step) * f.dt > patience(s, d)
-    leader_speed = 0.0 if silent else math.hypot(leader.speed_x, leader.speed_y)
-    theta = float(leader.theta)
+    leader_speed = 0.0 if silent else length(leader.speed_x, leader.speed_y)
+    lead_c, lead_s = float(leader.heading_cos), float(leader.heading_sin)
     own, first = slots[d.slot], slots[0]
     along, left = own.x - first.x, own.y - first.y
-    c, sn = math.cos(d.now_psi), math.sin(d.now_psi)
+    c, sn = d.frame_cos, d.frame_sin
     place_x, place_y = lx + along * c - left * sn, ly + along * sn + left * c
     dx, dy = place_x - x, place_y - y
-    d.error = math.hypot(dx, dy)
-    vx, vy = leader_speed * math.cos(theta), leader_speed * math.sin(theta)
+    d.error = length(dx, dy)
     if d.error > s.far:
-        speed, heading = approach_velocity(
-            dx, dy, vx, vy, s.gain, body.max_speed, body.acceleration
-        )
-        return speed * math.cos(heading), speed * math.sin(heading)
-    ahead_x, ahead_y = s.point_offset * math.cos(body.theta), s.point_offset * math.sin(body.theta)
+        vx, vy = leader_speed * lead_c, leader_speed * lead_s
+        return approach_velocity(dx, dy, vx, vy, s.gain, body.max_speed, body.acceleration)
+    theta = math.atan2(lead_s, lead_c)
+    ahead_x, ahead_y = s.point_offset * body.heading_cos, s.point_offset * body.heading_sin
     l_now, phi = separation(lx, ly, theta, x + ahead_x, y + ahead_y)
     l_d, phi_d = separation(lx, ly, theta, place_x + ahead_x, place_y + ahead_y)
     # The wanted φ keeps to the slot frame: to the leader's frame it turns back as the leader turns.
@@ -177,13 +175,13 @@ def wanted_velocity(
         return in_pursuit(s, d, constant, wanted_range, x, y, body)
     if d.age > d.usual_age + s.close_in_after and f.sight < _FAR_SIGHT:
         place_x, place_y, _, _ = slot_place(d, slots[d.slot])
-        d.error = math.hypot(place_x - x, place_y - y)
+        d.error = length(place_x - x, place_y - y)
         return hunt(s, d, n, x, y, body)
     if s.model == CENTRALIZED and d.leader >= 0:
         if d.leader == own:
             if s.leader_law == BY_SLOT:
                 return on_target(s, d, slots, x, y, body)
-            wanted_range = math.hypot(slots[0].x, slots[0].y)
+            wanted_range = length(slots[0].x, slots[0].y)
             return in_pursuit(s, d, 1.0, wanted_range, x, y, body)
         leader = mates[d.leader]
         if is_there(f, s, d, leader, n) or (s.exchange == 0 and leader.step >= 0):
