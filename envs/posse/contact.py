@@ -15,6 +15,7 @@ import numpy as np
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.survey import EXCESS, FAR, GAP, TOUCHING_GAP, find_gaps
+from posse.target_motion import AGENT
 
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
@@ -134,7 +135,8 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
         if meet_closely(c, w, trackers, obstacles, i):
             target_touching |= _BIT << np.uint64(i)
     w.touching = target_touching
-    w.near = target_near or c.num_obstacles > 0 or c.walled != 0
+    # A scripted target keeps clear of obstacles and walls by itself (target_motion.safe_turn).
+    w.near = target_near or (c.motion == AGENT and c.walled != 0)
     w.least_gap = least
 
 
