@@ -71,6 +71,7 @@ def _mendable() -> tuple[type[Exception], ...]:
     for module, names in (
         ("posse.scenario", ("ScenarioError",)),
         ("posse_baselines.policy", ("PolicyError",)),
+        ("posse_training.evaluation", ("TrainedSplitError",)),
         ("posse_training.settings", ("SettingsError",)),
         ("posse_training.checkpoint", ("RunFolderError", "CheckpointError")),
     ):
