@@ -33,7 +33,12 @@ torch.manual_seed(args.seed)
 torch.set_num_threads(1)
 
 # --- the environments: each has N agents, so a rollout has envs x N columns -----------------------
-envs = [posse.parallel_env(args.scenario, first_world=k) for k in range(args.envs)]
+# Small rewards for being there, large ones for getting there: returns stay near 1.
+weights = {"slot": 0.1, "progress": 0.5, "contact": -0.2}
+envs = [
+    posse.parallel_env(args.scenario, first_world=k, reward_weights=weights)
+    for k in range(args.envs)
+]
 agents = envs[0].possible_agents
 inputs = envs[0].observation_space(agents[0]).shape[0]
 outputs = envs[0].action_space(agents[0]).shape[0]
@@ -92,7 +97,6 @@ observation = stacked([env.reset(seed=args.seed)[0] for env in envs])
 scores, done, started = [], 0, time.time()
 
 while done < args.steps:
-    agent.see(observation)  # between rollouts, and not within one
     for t in range(args.rollout):
         with torch.no_grad():
             choice = agent.choose(observation)
@@ -141,8 +145,12 @@ while done < args.steps:
             value_loss = (agent.value(flat_seen[rows]) - returns[rows]).square().mean()
             optimizer.zero_grad()
             (policy_loss + 0.5 * value_loss).backward()
-            nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
+            # Apart, or large errors of the critic would leave nothing to the policy.
+            nn.utils.clip_grad_norm_([*agent.policy.parameters(), agent.log_deviation], 0.5)
+            nn.utils.clip_grad_norm_(agent.critic.parameters(), 0.5)
             optimizer.step()
+    agent.see(flat_seen)  # between rollouts: within one, the policy stays the same
+
     recent = f"{np.mean(scores[-20:]):.3f}" if scores else "-"
     rate = done / (time.time() - started)
     print(f"{done:>9,} steps  score {recent}  reward {rewards.mean():.4f}  {rate:,.0f} steps/s")
