@@ -50,6 +50,7 @@ bench-peers: $(FULL) ## Measure the speed beside other simulators
 
 results: $(FULL) ## Score every shipped policy on every scenario (long)
 	$(BIN)/python benchmarks/results.py
+	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
 
 reproduce: $(FULL) ## Redo the paper's experiments
 	$(BIN)/posse reproduce

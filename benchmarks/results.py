@@ -1,11 +1,10 @@
-"""``make results``: the scripted teams on every scenario, 1,000 worlds of the test split each.
+"""Part of ``make results``: the scripted teams on every scenario, 1,000 test worlds each.
 
 Writes docs/results.md, with seed and commit, and the rows behind it. Nothing was tuned on them.
 """
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import tyro
 
 import posse
 from posse_training.evaluation import Results, evaluate
+from posse_training.export import commit
 from posse_training.statistics import Estimate, mean, share
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
@@ -139,15 +139,6 @@ def percent(estimate: Estimate) -> str:
     """Return a share with its interval, in per cent."""
     value, low, high = (100 * x for x in (estimate.value, estimate.low, estimate.high))
     return f"{value:.1f} % [{low:.1f}, {high:.1f}]"
-
-
-def commit() -> str:
-    """Return the commit that the sources are at, marked if they were changed since."""
-    described = subprocess.run(
-        ["git", "describe", "--always", "--dirty", "--exclude", "*"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    return described.stdout.strip() or "unknown"
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ depends on what else is in the batch (a matrix library's rounding does).
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import math
@@ -223,9 +224,7 @@ class LearnedPolicy(BasePolicy):
             )
         self.network = network
         self.encoding = encoding
-        self.card = dict(card)
-        self.name = str(self.card.get("name", "learned"))
-        self.trained_splits = tuple(self.card.get("trained_splits", ("train",)))
+        self._describe(card)
         self.message_size = max(network.sizes[-1] - 2, encoding.message_size)
         self.adviser = adviser
         if adviser is not None:
@@ -243,6 +242,17 @@ class LearnedPolicy(BasePolicy):
             int(network.activation == "tanh"),
             int(network.output == "tanh"),
         )
+
+    def _describe(self, card: Mapping[str, Any]) -> None:
+        self.card = dict(card)
+        self.name = str(self.card.get("name", "learned"))
+        self.trained_splits = tuple(self.card.get("trained_splits", ("train",)))
+
+    def with_card(self, card: Mapping[str, Any]) -> LearnedPolicy:
+        """Return the same policy with another card."""
+        other = copy.copy(self)
+        other._describe(card)
+        return other
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` worlds: where in the layout the inputs lie.

@@ -14,11 +14,21 @@ from posse_baselines.scripted import SCRIPTED
 
 _FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file}
 """Readers of policy files, by suffix: whoever brings a kind of file adds its reader here."""
+SHIPPED: Final = Path(__file__).parent / "shipped"
+"""The folder of the learned policies that come with the package."""
+LEARNED: Final = "learned-"
+"""What the names of learned policies begin with."""
 
 
 def policy_names() -> tuple[str, ...]:
-    """Return the names of all policies that come with the package."""
-    return tuple(SCRIPTED)
+    """Return the names of all policies that come with the package, learned ones last."""
+    return (*SCRIPTED, *shipped())
+
+
+def shipped() -> dict[str, Path]:
+    """Return the files of the learned policies that come with the package, by name."""
+    found = (path for path in SHIPPED.glob(f"{LEARNED}*") if path.suffix in _FILES)
+    return {path.stem: path for path in sorted(found)}
 
 
 def load(policy: str | Path) -> Policy:
@@ -33,15 +43,23 @@ def load(policy: str | Path) -> Policy:
     text = str(policy)
     if text in SCRIPTED:
         return SCRIPTED[text]()
+    learned = shipped()
+    if text in learned:
+        return _from_file(learned[text])
     path = Path(text)
     if path.suffix in _FILES or path.is_file():
         return _from_file(path)
     if ":" in text:
         return _from_module(text)
-    near = difflib.get_close_matches(text, SCRIPTED, n=3, cutoff=0.5)
+    if text.startswith(LEARNED):
+        raise PolicyError(
+            f"no policy {text!r} is shipped; shipped learned ones are: "
+            f"{', '.join(learned) or 'none yet'}. Train one with posse train, and name its file"
+        )
+    near = difflib.get_close_matches(text, policy_names(), n=3, cutoff=0.5)
     hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
     raise PolicyError(
-        f"unknown policy {text!r}{hint}; policies are: {', '.join(SCRIPTED)}, a file, or "
+        f"unknown policy {text!r}{hint}; policies are: {', '.join(policy_names())}, a file, or "
         '"package.module:Class"'
     )
 

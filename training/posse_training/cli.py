@@ -1,4 +1,4 @@
-"""The command line: ``posse train | compare | watch | reproduce | scenarios``.
+"""The command line: ``posse train | compare | watch | ship | reproduce | scenarios``.
 
 Each command imports what it needs when it is called: listing the scenarios does not wait for torch.
 """
@@ -28,6 +28,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "train": _Command("train a team", __name__, "train"),
     "compare": _Command("score policies on the same worlds", "posse_training.compare", "main"),
     "watch": _Command("see a policy at work, or film it", __name__, "watch"),
+    "ship": _Command("make runs a policy that comes along", "posse_training.ship", "main"),
     "reproduce": _Command("redo the paper's experiments", "posse_training.reproduce", "main"),
     "scenarios": _Command("list the scenarios", __name__, "scenarios"),
 }
@@ -70,6 +71,7 @@ def _mendable() -> tuple[type[Exception], ...]:
     for module, names in (
         ("posse.scenario", ("ScenarioError",)),
         ("posse_baselines.policy", ("PolicyError",)),
+        ("posse_training.evaluation", ("TrainedSplitError",)),
         ("posse_training.settings", ("SettingsError",)),
         ("posse_training.checkpoint", ("RunFolderError", "CheckpointError")),
     ):

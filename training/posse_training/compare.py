@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import tyro
 from rich.console import Console
 from rich.table import Table
 
-from posse import scenario_names
-from posse_baselines import load
-from posse_training.evaluation import Results, evaluate
-from posse_training.statistics import (
-    Estimate,
-    interquartile_mean,
-    mean,
-    paired_difference,
-    probability_of_improvement,
-    share,
-)
+from posse import get_scenario, scenario_names
+from posse_baselines import PolicyError
+from posse_training.contenders import Contender, Plays, play, read_contenders
+from posse_training.statistics import Estimate
+from posse_training.sweeps import LEADER_LOSS, Point, play_leader_loss, play_sweeps, write_points
+
+ORACLE: Final = "oracle"
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,8 @@ class Settings:
     """What ``posse compare`` takes."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Names, files or package.module:Class; differences are to the first."""
+    """Names, files, package.module:Class, or LABEL=FILE,FILE,... for the training seeds of one;
+    differences are to the first."""
     scenarios: tuple[str, ...] = ("all",)
     """Names of scenarios, or "all"."""
     episodes: int = 1000
@@ -40,71 +37,150 @@ class Settings:
     split: str = "test"
     """Of the worlds: train, validation or test."""
     out: Path = Path("runs/compare")
-    """Folder for the rows (CSV) and the summary (JSON)."""
+    """Folder for the rows (CSV), the summary (JSON) and the figures (PNG and SVG)."""
+    figures: bool = True
+    """Draw figures; the oracle plays, too, as a reference."""
+    sweep_episodes: int = 200
+    """Worlds at each point of the figures that vary a setting; 0: none of these figures."""
 
 
-def compare(settings: Settings) -> list[dict[str, Any]]:
-    """Play everything, write rows and summary, and return a dictionary for each pair.
+@dataclass
+class Comparison:
+    """Everything that was played, and who could not play what."""
+
+    plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
+    """By scenario and policy."""
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    """The estimates of each, as the table shows them."""
+    left_out: list[dict[str, str]] = field(default_factory=list)
+    """Policy, what it cannot play, and why."""
+    points: list[Point] = field(default_factory=list)
+    """Of the sweeps."""
+    losses: list[Plays] = field(default_factory=list)
+    """Of the scenario in which the leader breaks."""
+    figures: list[Path] = field(default_factory=list)
+    """The files that were drawn."""
+
+    def leave_out(self, policy: str, what: str, why: str) -> None:
+        """Note that a policy cannot play something."""
+        self.left_out.append({"policy": policy, "what": what, "why": why})
+
+
+def compare(settings: Settings) -> Comparison:
+    """Play everything; write rows, summary and figures.
 
     Raises:
         PolicyError: An unknown policy; nothing is played.
-        ScenarioError: An unknown scenario.
-        ValueError: A split that a policy was trained on.
+        ScenarioError: An unknown scenario; nothing is played.
+        TrainedSplitError: A split that a policy was trained on.
     """
-    policies = {name: load(name) for name in settings.policies}
-    wanted = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
-    rows = []
-    for scenario in wanted:
-        reference: Results | None = None
-        for name, policy in policies.items():
-            results = evaluate(
-                policy, scenario, settings.episodes, settings.seed, split=settings.split
-            )
-            file = name.replace("/", "_").replace(":", "_")
-            results.write(settings.out / f"{scenario}-{file}.csv")
-            rows.append({"scenario": scenario, "policy": name, **summary(results, reference)})
-            reference = reference or results
-    stated = {"seed": settings.seed, "split": settings.split, "episodes": settings.episodes}
-    plain = [
-        {k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in rows
-    ]
-    text = json.dumps({**stated, "comparison": plain}, indent=2)
-    (settings.out / "summary.json").write_text(text + "\n")
-    return rows
+    contenders = read_contenders(settings.policies)
+    named = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
+    for name in named:
+        get_scenario(name)
+    if settings.figures and ORACLE not in settings.policies:
+        contenders += read_contenders((ORACLE,))
+    settings.out.mkdir(parents=True, exist_ok=True)
+    found = Comparison()
+    for scenario in named:
+        play_scenario(found, scenario, contenders, settings)
+    if settings.figures:
+        draw(found, contenders, settings)
+    write_summary(found, settings)
+    return found
 
 
-def summary(results: Results, reference: Results | None) -> dict[str, Estimate | None]:
+def play_scenario(
+    found: Comparison, scenario: str, contenders: Sequence[Contender], settings: Settings
+) -> None:
+    """Play one scenario with everybody who can."""
+    reference: Plays | None = None
+    for contender in contenders:
+        try:
+            plays = play(contender, scenario, settings.episodes, settings.seed, settings.split)
+        except PolicyError as error:
+            found.leave_out(contender.label, scenario, str(error))
+            continue
+        for k, results in enumerate(plays.results):
+            member = f"-{k + 1}" if len(plays.results) > 1 else ""
+            label = contender.label.replace("/", "_").replace(":", "_")
+            results.write(settings.out / f"{scenario}-{label}{member}.csv")
+        found.plays[scenario, contender.label] = plays
+        found.rows.append(
+            {"scenario": scenario, "policy": contender.label, **summary(plays, reference)}
+        )
+        if contender is contenders[0]:
+            reference = plays
+
+
+def draw(found: Comparison, contenders: Sequence[Contender], settings: Settings) -> None:
+    """Play what the figures need beside the scenarios, and draw them."""
+    from posse_training import figures  # matplotlib takes a while, and only this needs it
+
+    found.losses = [plays for (name, _), plays in found.plays.items() if name == LEADER_LOSS]
+    if settings.sweep_episodes > 0:
+        worlds = (settings.sweep_episodes, settings.seed, settings.split)
+        ordered = sorted(contenders, key=lambda contender: contender.label == ORACLE)
+        found.points = play_sweeps(ordered, *worlds, found.leave_out)
+        write_points(settings.out / "sweeps.csv", found.points)
+        if not found.losses:
+            found.losses = play_leader_loss(contenders, *worlds, found.leave_out)
+    found.figures = figures.draw(settings.out, found.plays, found.points, found.losses)
+
+
+def summary(plays: Plays, reference: Plays | None) -> dict[str, Estimate | int | None]:
     """Return the estimates of one policy on one scenario; differences are to the reference."""
-    score = results["score"]
     return {
-        "score": mean(score),
-        "interquartile_mean": interquartile_mean(score),
-        "bound": mean(results["bound"]),
-        "settled": share(results.settled),
-        "no_contact": share(results.contacts == 0),
-        "difference": None if reference is None else paired_difference(score, reference["score"]),
-        "improvement": None
-        if reference is None
-        else probability_of_improvement(score, reference["score"]),
+        "seeds": len(plays.results),
+        "score": plays.mean("score"),
+        "interquartile_mean": plays.interquartile_mean("score"),
+        "bound": plays.mean("bound"),
+        "settled": plays.share([result.settled for result in plays.results]),
+        "no_contact": plays.share([result.contacts == 0 for result in plays.results]),
+        "difference": None if reference is None else plays.difference(reference),
+        "improvement": None if reference is None else plays.improvement(reference),
     }
+
+
+def write_summary(found: Comparison, settings: Settings) -> None:
+    """Write all estimates as JSON."""
+    rows = [
+        {k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()}
+        for row in found.rows
+    ]
+    stated = {"seed": settings.seed, "split": settings.split, "episodes": settings.episodes}
+    text = json.dumps({**stated, "comparison": rows, "left_out": found.left_out}, indent=2)
+    (settings.out / "summary.json").write_text(text + "\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compare policies and print the table."""
     settings = tyro.cli(Settings, prog="posse compare", args=arguments)
-    rows = compare(settings)
-    table = Table(
+    found = compare(settings)
+    console = Console()
+    console.print(table(found, settings))
+    for row in found.left_out:
+        console.print(f"left out: {row['policy']} on {row['what']}: {row['why']}")
+    console.print(f"rows and summary: {settings.out}")
+    if found.figures:
+        names = ", ".join(path.stem for path in found.figures if path.suffix == ".png")
+        console.print(f"figures (PNG and SVG) beside them: {names}")
+
+
+def table(found: Comparison, settings: Settings) -> Table:
+    """Return the estimates as a table."""
+    first = settings.policies[0].partition("=")[0]
+    shown = Table(
         title=f"{settings.episodes:,} worlds each, split {settings.split}, seed {settings.seed}; "
-        f"95 % intervals; differences are to {settings.policies[0]}, world by world"
+        f"95 % intervals; differences are to {first}, world by world"
     )
     columns = ("score", "settled", "no_contact", "difference", "improvement")
     for column in ("scenario", "policy"):
-        table.add_column(column, overflow="fold", min_width=len(column) + 2)
+        shown.add_column(column, overflow="fold", min_width=len(column) + 2)
     for column in columns:
-        table.add_column(column.replace("_", " "))
-    for row in rows:
+        shown.add_column(column.replace("_", " "))
+    for row in found.rows:
         cells = [str(row[column]) if row[column] is not None else "" for column in columns]
-        table.add_row(row["scenario"], row["policy"], *cells)
-    console = Console()
-    console.print(table)
-    console.print(f"rows and summary: {settings.out}")
+        many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
+        shown.add_row(row["scenario"], row["policy"] + many, *cells)
+    return shown

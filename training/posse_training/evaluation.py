@@ -25,6 +25,10 @@ WORLDS_AT_ONCE: Final = 500
 Column = npt.NDArray[np.float64]
 
 
+class TrainedSplitError(ValueError):
+    """Worlds that a policy has learned from: a score there would flatter it."""
+
+
 @dataclass(frozen=True)
 class Results:
     """What a policy did in a number of episodes of one scenario.
@@ -127,7 +131,8 @@ def evaluate(
         **overrides: Settings of the scenario.
 
     Raises:
-        ValueError: ``episodes`` below 1, or a split that the policy was trained on.
+        ValueError: ``episodes`` below 1.
+        TrainedSplitError: A split that the policy was trained on.
         ScenarioError: An unknown scenario or an impossible setting.
     """
     if isinstance(policy, str):
@@ -166,7 +171,7 @@ def refuse_trained_split(policy: Policy, split: str) -> None:
     """Raise if a policy says that it was trained on this split."""
     trained = tuple(getattr(policy, "trained_splits", ()))
     if split in trained:
-        raise ValueError(
+        raise TrainedSplitError(
             f"{policy.name!r} was trained on the split {split!r}, a score there would flatter it: "
             f"choose another of 'train', 'validation', 'test' than {', '.join(map(repr, trained))}"
         )

@@ -5,6 +5,7 @@ All from ``scipy.stats``; the bootstrap is seeded, so that a table is the same e
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -16,6 +17,7 @@ RESAMPLES: Final = 2000
 LEVEL: Final = 0.95
 
 Values = npt.NDArray[np.float64]
+Statistic = Callable[[Values], Any]
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,12 @@ def mean(values: npt.ArrayLike) -> Estimate:
 
 def interquartile_mean(values: npt.ArrayLike) -> Estimate:
     """Return the mean of the middle half of the values, with a bootstrap interval."""
+    return _bootstrap(_finite(values), middle_mean)
 
-    def trimmed(sample: Values, axis: int = -1) -> Any:
-        return stats.trim_mean(sample, 0.25, axis=axis)
 
-    return _bootstrap(_finite(values), trimmed)
+def middle_mean(sample: Values, axis: int = -1) -> Any:
+    """Return the mean of the middle half."""
+    return stats.trim_mean(sample, 0.25, axis=axis)
 
 
 def paired_difference(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
@@ -102,3 +105,62 @@ def share(happened: npt.ArrayLike) -> Estimate:
         confidence_level=LEVEL, method="wilson"
     )
     return Estimate(float(events.mean()), float(interval.low), float(interval.high), len(events))
+
+
+# --- several training seeds ----------------------------------------------------------------------
+
+
+def over_seeds(values: npt.ArrayLike, statistic: Statistic = np.mean) -> Estimate:
+    """Return a statistic of what S training seeds scored on the same W worlds, (S, W).
+
+    The interval is for another training on other worlds: seeds and worlds are resampled, each as a
+    whole. S seeds scatter about their own mean by (S - 1) / S of their variance, and are first
+    spread by as much. With few seeds the interval is still too narrow, as every bootstrap of few
+    values is: where seeds are all of the uncertainty, with 3 of them it holds the truth in some
+    80 % of the cases, with 5 in 88 %, with 10 in 91 %.
+
+    Raises:
+        ValueError: Not (S, W) numbers, at least one of each.
+    """
+    array = _seeds_by_worlds(values)
+    return _resample((array,), lambda sample: float(statistic(sample.reshape(-1))))
+
+
+def difference_over_seeds(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
+    """Return the mean of first - second, with seeds and worlds resampled as in :func:`over_seeds`.
+
+    Each is of one policy, (W,), or of several training seeds, (S, W); the worlds are the same.
+
+    Raises:
+        ValueError: The two do not have as many worlds.
+    """
+    mine, theirs = _seeds_by_worlds(first), _seeds_by_worlds(second)
+    if mine.shape[1] != theirs.shape[1]:
+        raise ValueError(f"paired values need the same worlds, got {mine.shape} and {theirs.shape}")
+    return _resample((mine, theirs), lambda a, b: float(a.mean() - b.mean()))
+
+
+def _seeds_by_worlds(values: npt.ArrayLike) -> Values:
+    array = np.atleast_2d(np.asarray(values, np.float64))
+    if array.ndim != 2 or array.size == 0 or not np.isfinite(array).all():
+        raise ValueError(f"what seeds scored on worlds must be (S, W) numbers, got {array.shape}")
+    return array
+
+
+def _resample(parts: Sequence[Values], statistic: Callable[..., float]) -> Estimate:
+    """Return a statistic of parts (S, W), each with seeds of its own, all on the same worlds."""
+    worlds = parts[0].shape[1]
+    spread = []
+    for part in parts:
+        means, seeds = part.mean(axis=1, keepdims=True), len(part)
+        wider = np.sqrt(seeds / (seeds - 1)) if seeds > 1 else 1.0
+        spread.append(part + (wider - 1) * (means - means.mean()))
+    rng = np.random.default_rng(0)
+    drawn = np.empty(RESAMPLES)
+    for k in range(RESAMPLES):
+        chosen = rng.integers(worlds, size=worlds)
+        drawn[k] = statistic(
+            *(part[np.ix_(rng.integers(len(part), size=len(part)), chosen)] for part in spread)
+        )
+    low, high = np.percentile(drawn, (50 * (1 - LEVEL), 50 * (1 + LEVEL)))
+    return Estimate(statistic(*parts), float(low), float(high), parts[0].size)

@@ -1,0 +1,193 @@
+"""Part of ``make results``: the shipped learned teams beside the scripted ones, on every scenario.
+
+Fills docs/comparison.md below its mark, and draws the figures into docs/media. With nothing
+shipped it leaves the page alone.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+import posse
+from posse_baselines import load
+from posse_baselines.registry import shipped
+from posse_training.compare import Comparison, compare
+from posse_training.compare import Settings as CompareSettings
+from posse_training.contenders import Plays, play, read_contenders
+from posse_training.export import commit
+from posse_training.statistics import Estimate
+
+SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
+SCRIPTED = ("ddcs-distributed", "ddcs-centralized")
+MARK = "<!-- `make results` writes what follows -->"
+FIGURES = {
+    "scenarios": "Mean score of every team on every scenario.",
+    "profile": "Share of worlds with at least a score.",
+    "team-size": "Score against the size of the team.",
+    "radio-loss": "Score against the share of messages lost.",
+    "target-speed": "Score against the speed of the target.",
+    "recovery": "Share of teams that have settled anew, by the time since their leader broke.",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the comparison takes."""
+
+    groups: tuple[str, ...] = ()
+    """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals over seeds, too."""
+    scenarios: tuple[str, ...] = SCENARIOS
+    """What to play."""
+    episodes: int = 1000
+    """Worlds for each policy and scenario."""
+    sweep_episodes: int = 200
+    """Worlds at each point of the figures that vary a setting."""
+    seed: int = 2026
+    """Of the worlds."""
+    split: str = "test"
+    """Of the worlds."""
+    page: Path = Path("docs/comparison.md")
+    """The page to fill."""
+    rows: Path = Path("runs/comparison")
+    """Folder for the rows and figures."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Play everything, fill the page and put the figures beside it."""
+    settings = tyro.cli(Settings, args=arguments)
+    learned = tuple(shipped())
+    if not learned:
+        print(f"no learned policy is shipped: {settings.page} stays as it is")
+        return
+    found = compare(
+        CompareSettings(
+            (*SCRIPTED, *learned), settings.scenarios, settings.episodes, settings.seed,
+            settings.split, settings.rows, figures=True, sweep_episodes=settings.sweep_episodes,
+        )
+    )  # fmt: skip
+    media = settings.page.parent / "media"
+    media.mkdir(exist_ok=True)
+    drawn = [path for path in found.figures if path.suffix == ".svg"]
+    for path in drawn:
+        shutil.copyfile(path, media / f"comparison-{path.name}")
+    block = report(settings, found, learned, [path.stem for path in drawn])
+    fill(settings.page, block)
+
+
+def fill(page: Path, block: str) -> None:
+    """Replace what follows the mark of a page."""
+    text = page.read_text(encoding="utf-8")
+    if text.count(MARK) != 1:
+        raise ValueError(f"{page} needs the line {MARK!r}, once")
+    page.write_text(f"{text.partition(MARK)[0]}{MARK}\n\n{block}", encoding="utf-8")
+
+
+def report(
+    settings: Settings, found: Comparison, learned: Sequence[str], figures: Sequence[str]
+) -> str:
+    """Return what is written below the mark."""
+    cards: dict[str, Mapping[str, Any]] = {name: load(name).card for name in learned}  # type: ignore[attr-defined]
+    worlds = f"{settings.episodes:,} worlds of the `{settings.split}` split for each row"
+    lines = [
+        f"Made at commit `{commit()}`: {worlds}, seed {settings.seed}.",
+        "",
+        "## Learned teams and the better DDCS model",
+        "",
+        row(
+            "scenario", "learned", "trained on it", "score", "better DDCS model", "its score",
+            "difference", "better in", "bound",
+        ),
+        "|---|---|---|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for scenario in settings.scenarios:
+        best = better_ddcs(found, scenario)
+        for name in learned:
+            mine = found.plays.get((scenario, name))
+            if mine is None:
+                continue
+            trained = {part["name"] for part in cards[name]["scenarios"]}
+            lines.append(
+                row(
+                    scenario, f"`{name}`", "yes" if scenario in trained else "no",
+                    mine.mean("score"), f"`{best.label}`", best.mean("score"),
+                    mine.difference(best), percent(mine.improvement(best)),
+                    f"{mine.mean('bound').value:.3f}",
+                )
+            )  # fmt: skip
+    if found.left_out:
+        lines += ["", "Left out, because they cannot play there:", ""]
+        lines += [f"- `{out['policy']}` on {out['what']}: {out['why']}" for out in found.left_out]
+    lines += ["", *training_seeds(cards)]
+    if settings.groups:
+        lines += ["", *over_training_seeds(settings, found)]
+    lines += ["", "## Figures", ""]
+    for name in figures:
+        lines += [f"![{FIGURES[name]}](media/comparison-{name}.svg)", "", f"*{FIGURES[name]}*", ""]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def better_ddcs(found: Comparison, scenario: str) -> Plays:
+    """Return the plays of the DDCS model with the higher mean score on the very worlds played."""
+    plays = [found.plays[scenario, name] for name in SCRIPTED]
+    return max(plays, key=lambda play: play["score"].mean())
+
+
+def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return how every training seed did on validation worlds, from the cards."""
+    lines = [
+        "## Training seeds",
+        "",
+        "Of each policy, the seed that did best on validation worlds is shipped.",
+        "",
+        "| policy | training seed | score on validation worlds | steps |",
+        "|---|---|---|---|",
+    ]
+    for name, card in cards.items():
+        for seed in card["training_seeds"]:
+            mark = " (shipped)" if seed["seed"] == card["seed"] else ""
+            score = Estimate(**seed["score"])
+            lines.append(row(f"`{name}`", f"{seed['seed']}{mark}", score, f"{seed['steps']:,}"))
+    lines += ["", "Those that are shipped come from:", "", "```"]
+    lines += [f"{card['command']}  # {name}" for name, card in cards.items()]
+    return [*lines, "```"]
+
+
+def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
+    """Return the differences with training seeds resampled as well as worlds."""
+    lines = [
+        "## Another training, other worlds",
+        "",
+        "The difference to the better DDCS model, with training seeds and worlds resampled.",
+        "",
+        "| scenario | policy | training seeds | difference |",
+        "|---|---|---|---|",
+    ]
+    for group in read_contenders(settings.groups):
+        card: Mapping[str, Any] = group.policies[0].card  # type: ignore[attr-defined]
+        trained = {part["name"] for part in card["scenarios"]}
+        for scenario in (name for name in settings.scenarios if name in trained):
+            mine = play(group, scenario, settings.episodes, settings.seed, settings.split)
+            difference = mine.difference(better_ddcs(found, scenario))
+            lines.append(row(scenario, f"`{group.label}`", str(len(mine.results)), difference))
+    return lines
+
+
+def row(*cells: str | Estimate) -> str:
+    """Return a row of a table."""
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def percent(estimate: Estimate) -> str:
+    """Return a share of worlds with its interval, in per cent."""
+    value, low, high = (100 * x for x in (estimate.value, estimate.low, estimate.high))
+    return f"{value:.0f} % [{low:.0f}, {high:.0f}]"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,160 @@
+"""PPO in one file, after the manner of CleanRL: torch and the PettingZoo environment, no more.
+
+All trackers share one policy. Reads top to bottom: python docs/tutorials/cleanrl_ppo.py
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import save_file
+from torch import nn
+from torch.distributions import Normal
+
+import posse
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--scenario", default="constant")
+parser.add_argument("--steps", type=int, default=1_000_000, help="steps of a tracker")
+parser.add_argument("--envs", type=int, default=8)
+parser.add_argument("--rollout", type=int, default=128, help="control steps between two updates")
+parser.add_argument("--epochs", type=int, default=4)
+parser.add_argument("--minibatches", type=int, default=4)
+parser.add_argument("--learning-rate", type=float, default=3e-4)
+parser.add_argument("--discount", type=float, default=0.98)
+parser.add_argument("--gae-lambda", type=float, default=0.95)
+parser.add_argument("--clip", type=float, default=0.2)
+parser.add_argument("--seed", type=int, default=1)
+parser.add_argument("--file", type=Path, default=Path("runs/tutorials/cleanrl_ppo.safetensors"))
+args = parser.parse_args()
+torch.manual_seed(args.seed)
+torch.set_num_threads(1)
+
+# --- the environments: each has N agents, so a rollout has envs x N columns -----------------------
+# Small rewards for being there, large ones for getting there: returns stay near 1.
+weights = {"slot": 0.1, "progress": 0.5, "contact": -0.2}
+envs = [
+    posse.parallel_env(args.scenario, first_world=k, reward_weights=weights)
+    for k in range(args.envs)
+]
+agents = envs[0].possible_agents
+inputs = envs[0].observation_space(agents[0]).shape[0]
+outputs = envs[0].action_space(agents[0]).shape[0]
+columns = len(envs) * len(agents)
+
+
+def stacked(rows):
+    """Rows of every agent of every environment, as one array."""
+    return torch.as_tensor(np.stack([row[a] for row in rows for a in agents]), dtype=torch.float32)
+
+
+# --- policy and value function --------------------------------------------------------------------
+def network(out, gain):
+    last = nn.Linear(64, out)
+    nn.init.orthogonal_(last.weight, gain)
+    nn.init.zeros_(last.bias)
+    return nn.Sequential(nn.Linear(inputs, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), last)
+
+
+class Agent(nn.Module):
+    def __init__(self):
+        super().__init__()
+        self.policy, self.critic = network(outputs, 0.01), network(1, 1.0)
+        self.log_deviation = nn.Parameter(torch.full((outputs,), -0.5))
+        # Statistics of the observations: a part of the agent, saved with it.
+        self.register_buffer("mean", torch.zeros(inputs))
+        self.register_buffer("square", torch.ones(inputs))
+        self.register_buffer("count", torch.tensor(1e-4))
+
+    def see(self, x):
+        """Update the statistics with observations."""
+        self.count += len(x)
+        self.mean += (x - self.mean).sum(0) / self.count
+        self.square += (x**2 - self.square).sum(0) / self.count
+
+    def normal(self, x):
+        deviation = (self.square - self.mean**2).clamp_min(1e-4).sqrt()
+        return ((x - self.mean) / deviation).clamp(-5, 5)
+
+    def choose(self, x):
+        return Normal(self.policy(self.normal(x)), self.log_deviation.exp())
+
+    def value(self, x):
+        return self.critic(self.normal(x)).squeeze(-1)
+
+
+agent = Agent()
+optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+
+# --- learning -------------------------------------------------------------------------------------
+shape = (args.rollout, columns)
+seen, acted = torch.zeros((*shape, inputs)), torch.zeros((*shape, outputs))
+log_probabilities, rewards, values = torch.zeros(shape), torch.zeros(shape), torch.zeros(shape)
+nexts, ends = torch.zeros(shape), torch.zeros(shape)  # value of what follows; last of an episode
+observation = stacked([env.reset(seed=args.seed)[0] for env in envs])
+scores, done, started = [], 0, time.time()
+
+while done < args.steps:
+    for t in range(args.rollout):
+        with torch.no_grad():
+            choice = agent.choose(observation)
+            action = choice.sample()
+            values[t] = agent.value(observation)
+        seen[t], acted[t] = observation, action
+        log_probabilities[t] = choice.log_prob(action).sum(-1)
+        rows, bounded = [], action.clamp(-1, 1).numpy().reshape(len(envs), len(agents), outputs)
+        for k, env in enumerate(envs):
+            row, reward, terminated, truncated, infos = env.step(
+                dict(zip(agents, bounded[k], strict=True))
+            )
+            mine = slice(k * len(agents), (k + 1) * len(agents))
+            rewards[t, mine] = torch.tensor([reward[a] for a in agents])
+            # A truncated episode would have gone on: its last observation still has a value.
+            with torch.no_grad():
+                alive = 1.0 - float(terminated[agents[0]])
+                nexts[t, mine] = alive * agent.value(stacked([row]))
+            over = terminated[agents[0]] or truncated[agents[0]]
+            ends[t, mine] = float(over)
+            if over:
+                scores.append(infos[agents[0]]["metrics"]["score"])
+                row, _ = env.reset()
+            rows.append(row)
+        observation = stacked(rows)
+        done += columns
+
+    # Generalized advantage estimation: nothing flows back over the end of an episode.
+    advantages, advantage = torch.zeros(shape), torch.zeros(columns)
+    for t in reversed(range(args.rollout)):
+        error = rewards[t] + args.discount * nexts[t] - values[t]
+        advantage = error + args.discount * args.gae_lambda * (1 - ends[t]) * advantage
+        advantages[t] = advantage
+    returns = (advantages + values).flatten()
+    flat_seen, flat_acted = seen.flatten(0, 1), acted.flatten(0, 1)
+    flat_log, flat_advantages = log_probabilities.flatten(), advantages.flatten()
+
+    for _ in range(args.epochs):
+        for rows in torch.randperm(len(returns)).chunk(args.minibatches):
+            choice = agent.choose(flat_seen[rows])
+            ratio = (choice.log_prob(flat_acted[rows]).sum(-1) - flat_log[rows]).exp()
+            weight = flat_advantages[rows]
+            weight = (weight - weight.mean()) / (weight.std() + 1e-8)
+            clipped = ratio.clamp(1 - args.clip, 1 + args.clip)
+            policy_loss = -torch.min(ratio * weight, clipped * weight).mean()
+            value_loss = (agent.value(flat_seen[rows]) - returns[rows]).square().mean()
+            optimizer.zero_grad()
+            (policy_loss + 0.5 * value_loss).backward()
+            # Apart, or large errors of the critic would leave nothing to the policy.
+            nn.utils.clip_grad_norm_([*agent.policy.parameters(), agent.log_deviation], 0.5)
+            nn.utils.clip_grad_norm_(agent.critic.parameters(), 0.5)
+            optimizer.step()
+    agent.see(flat_seen)  # between rollouts: within one, the policy stays the same
+
+    recent = f"{np.mean(scores[-20:]):.3f}" if scores else "-"
+    rate = done / (time.time() - started)
+    print(f"{done:>9,} steps  score {recent}  reward {rewards.mean():.4f}  {rate:,.0f} steps/s")
+
+args.file.parent.mkdir(parents=True, exist_ok=True)
+save_file(agent.state_dict(), args.file)
+print(f"{args.file}")

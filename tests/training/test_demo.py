@@ -1,0 +1,58 @@
+"""The demo, with a learned team and without."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import posse
+from posse_baselines.encoding import Encoding
+from posse_baselines.learned import LearnedPolicy, Network
+from posse_training import demo
+
+
+def ship(folder: Path) -> None:
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "slots")
+    network = Network(
+        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
+        (np.zeros((2, encoding.size), np.float32),), (np.ones(2, np.float32),), "tanh", "clip",
+    )  # fmt: skip
+    LearnedPolicy(network, encoding, {"name": demo.LEARNED}).save(
+        folder / f"{demo.LEARNED}.safetensors"
+    )
+
+
+@pytest.mark.parametrize("learned", [False, True])
+def test_it_ends_with_scripted_beside_learned_where_one_is_shipped(
+    learned: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shipped = tmp_path / "shipped"
+    shipped.mkdir()
+    monkeypatch.setattr("posse_baselines.registry.SHIPPED", shipped)
+    monkeypatch.setattr(demo, "FOLDER", tmp_path)
+    monkeypatch.setattr(demo, "SCENARIOS", ("constant", "smart"))
+    monkeypatch.setattr(demo, "POLICIES", ("idle", "pursuit"))
+    if learned:
+        ship(shipped)
+    demo.main(episodes=2, seconds=0.5)
+    shown = capsys.readouterr().out
+    assert (demo.LEARNED in shown) == learned
+    assert shown.index("constant.gif") < shown.index("smart.gif")
+    with Image.open(tmp_path / "constant.gif") as film:
+        assert film.width == film.height
+    with Image.open(tmp_path / "smart.gif") as film:
+        assert (film.width > 2 * film.height) == learned  # two panels and a seam
+
+
+def test_it_needs_no_torch() -> None:
+    code = "import sys, posse_training.demo; print('torch' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "False", done.stderr

@@ -1,0 +1,147 @@
+"""The tutorials of the manual, run as they stand with few steps."""
+
+from __future__ import annotations
+
+import os
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors.numpy import load_file
+
+import posse
+from posse_baselines import load
+from posse_training import evaluate
+
+ROOT = Path(__file__).parents[2]
+TUTORIALS = ROOT / "docs" / "tutorials"
+NUMBER = r"(\d\.\d+)"
+
+
+@pytest.fixture(autouse=True)
+def threads() -> Iterator[None]:
+    """A tutorial may set torch's threads; what follows has those that it had."""
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+def run(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> dict[str, Any]:
+    monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
+    return runpy.run_path(str(TUTORIALS / name), run_name="__main__")
+
+
+def test_first_policy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "run"
+    left = run(
+        "first_policy.py", monkeypatch,
+        "--steps", 1000, "--folder", folder, "--episodes", 2,
+    )  # fmt: skip
+    policy = load(folder / "best.safetensors")
+    assert policy.name == "smart-ppo-1"
+    assert left["file"] == folder / "best.safetensors"
+    shown = re.findall(rf"^(\S+) +{NUMBER} \[", capsys.readouterr().out, re.MULTILINE)
+    assert [name for name, _ in shown] == ["pursuit", "ddcs-distributed", "smart-ppo-1"]
+    mine = evaluate(policy, "smart", episodes=2, progress=False)["score"].mean()
+    assert float(shown[2][1]) == pytest.approx(mine, abs=1e-3)
+
+
+def test_own_policy(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run("own_policy.py", monkeypatch, "--episodes", 30)
+    shown = dict(re.findall(rf"^(\S+) +score {NUMBER}", capsys.readouterr().out, re.MULTILINE))
+    assert float(shown["pursuit"]) < float(shown["own-slot"]) < float(shown["ddcs-distributed"])
+    # As the tutorial says, a class is loaded by where it is, and it plays where messages are sent.
+    monkeypatch.syspath_prepend(str(TUTORIALS))
+    policy = load("own_policy:OwnSlot")
+    results = evaluate(policy, "search", 2, message_size=3, horizon=50, progress=False)
+    assert np.isfinite(results["score"]).all()
+
+
+def test_add_scenario(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    left = run("add_scenario.py", monkeypatch, "--episodes", 3)
+    assert left["night"].name == "night"
+    shown = capsys.readouterr().out
+    assert "4 trackers, " in shown
+    scores = dict(re.findall(rf"^(\S+) +score {NUMBER}", shown, re.MULTILINE))
+    assert set(scores) == {"pursuit", "ddcs-distributed", "oracle"}
+    assert float(scores["pursuit"]) < float(scores["oracle"])
+
+
+def test_reward_term(tmp_path: Path) -> None:
+    """The term is put where the tutorial says, in a copy of the package, and nowhere else."""
+    shutil.copytree(ROOT / "envs" / "posse", tmp_path / "posse")
+    file = tmp_path / "posse" / "reward.py"
+    source, end = file.read_text(), "\n\nREWARD_TERMS: Final"
+    assert source.count(end) == 1
+    term = (TUTORIALS / "steady_term.txt").read_text()
+    file.write_text(source.replace(end, f"\n\n{term}{end}"))
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(TUTORIALS / "reward_term.py"), "--steps", "5"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    lines = re.findall(rf"(\w+): steady (\d), reward {NUMBER} = {NUMBER}", done.stdout)
+    assert [steady for _, steady, *_ in lines] == ["1", "0", "0", "0", "0"]
+    assert all(reward == expected for *_, reward, expected in lines)
+    assert float(lines[0][2]) == pytest.approx(0.1, abs=0.005)
+
+
+def test_one_tracker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "one.zip"
+    left = run(
+        "one_tracker.py", monkeypatch,
+        "--steps", 64, "--rollout", 64, "--episodes", 1, "--file", file,
+    )  # fmt: skip
+    assert file.is_file()
+    weights = [model.policy.state_dict() for model in (left["model"], left["learned"])]
+    assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
+    found = re.search(rf"score of the team {NUMBER} in 1 worlds", capsys.readouterr().out)
+    assert found is not None
+    # The four others are scripted: whatever the learner does, they find most of their places.
+    assert float(found[1]) > 0.4
+
+
+def test_cleanrl_ppo(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "deep" / "ppo.safetensors"
+    left = run(
+        "cleanrl_ppo.py", monkeypatch,
+        "--steps", 6200, "--envs", 2, "--rollout", 620, "--file", file,
+    )  # fmt: skip
+    shown = capsys.readouterr().out
+    assert re.search(rf"6,200 steps  score {NUMBER}  reward", shown)  # an episode has ended
+    numbers = load_file(file)
+    assert all(np.isfinite(array).all() for array in numbers.values())
+    assert not np.array_equal(numbers["mean"], np.zeros_like(numbers["mean"]))
+    # Where an episode was cut, what follows still has a value, and nothing flows back over it.
+    assert left["ends"].sum() == 10  # two worlds of five trackers, once each
+    at = left["ends"].nonzero()[0, 0]
+    assert (left["nexts"][at] != 0).all()
+    step = left["rewards"] + left["args"].discount * left["nexts"] - left["values"]
+    torch.testing.assert_close(left["advantages"][at], step[at])
+    assert (left["advantages"][at - 1] != step[at - 1]).all()
+
+
+def test_every_tutorial_is_tried_and_has_its_place_in_the_manual() -> None:
+    tests = Path(__file__).read_text()
+    page = (ROOT / "docs" / "tutorials" / "index.md").read_text()
+    files = sorted(path.name for path in TUTORIALS.iterdir() if path.suffix != ".md")
+    assert len(files) == 7
+    for name in files:
+        assert f'"{name}"' in tests
+        assert f'--8<-- "docs/tutorials/{name}"' in page
+    assert "steady" not in {term.name for term in posse.REWARD_TERMS}  # or its tutorial is out
