@@ -25,20 +25,31 @@ from posse.scenario import Scenario
 from posse.sensing import ping
 from posse.state import NEVER
 from posse.survey import (
+    AHEAD,
     BEARING_COS,
     BEARING_SIN,
+    COS,
     DISTANCE,
     HEADING_COS,
     HEADING_SIN,
+    LEFT,
+    MATE_AHEAD,
+    MATE_COS,
+    MATE_DISTANCE,
+    MATE_LEFT,
+    MATE_SIN,
     NEAREST,
     NUMBER,
+    SIN,
     TASK,
+    choose_nearest,
+    find_directions,
+    keep_team,
     natural,
     place_of,
     survey,
-    survey_team,
     within_one,
-)
+)  # fmt: skip
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -295,16 +306,22 @@ def _write_neighbour(
 
 @compiled
 def _write_surveyed(
-    other: Record, j: int, age: np.float32, s: FloatArray, o: FloatArray, k: int
+    other: Record,
+    number: int,
+    distance: np.float32,
+    place: int,
+    s: FloatArray,
+    o: FloatArray,
+    k: int,
 ) -> None:
-    """Write the same from a survey."""
-    o[k] = np.float32(j)
-    o[k + 1] = age
-    o[k + 2] = s[DISTANCE + j]
-    o[k + 3] = s[BEARING_COS + j]
-    o[k + 4] = s[BEARING_SIN + j]
-    o[k + 5] = s[HEADING_COS + j]
-    o[k + 6] = s[HEADING_SIN + j]
+    """Write the same of one that is heard now, from directions at ``place`` in their rows."""
+    o[k] = np.float32(number)
+    o[k + 1] = _ZERO
+    o[k + 2] = distance
+    o[k + 3] = s[BEARING_COS + place]
+    o[k + 4] = s[BEARING_SIN + place]
+    o[k + 5] = s[HEADING_COS + place]
+    o[k + 6] = s[HEADING_SIN + place]
     o[k + 7] = other.speed
     o[k + 8] = other.turn_rate
 
@@ -336,10 +353,12 @@ def _write_whole_team(
     beats sorting for small teams.
     """
     n, size = c.num_trackers, 9 + c.message_size
+    find_directions(trackers[i], n, AHEAD, LEFT, DISTANCE, COS, SIN, s)
+    keep_team(n, s)
     for j in range(n):
         if j != i:
-            start = natural(k + place_of(j, n, s) * size)
-            _write_surveyed(trackers[j], j, _ZERO, s, o, start)
+            start = natural(k + place_of(j, n, MATE_DISTANCE, s) * size)
+            _write_surveyed(trackers[j], j, s[DISTANCE + j], j, s, o, start)
             _write_message(c, said, j, o, start)
 
 
@@ -363,31 +382,21 @@ def _keep_nearest(
 
 
 @compiled(seldom=True)
-def _write_reached(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    i: int,
-    said: FloatArray,
-    s: FloatArray,
-    o: FloatArray,
-    k: int,
+def _write_nearest(
+    c: Record, trackers: Records, i: int, said: FloatArray, s: FloatArray, o: FloatArray, k: int
 ) -> None:
-    """Write the nearest team-mates where the radio is perfect.
-
-    Nothing is lost, so what was last heard of a team-mate is where it is; one that broke stays
-    where it was when it was last heard.
-    """
-    filled = 0
-    deaf = trackers[i].broken_at != NEVER
-    for j in range(c.num_trackers if c.neighbours > 0 and not deaf else 0):
-        if j != i and w.step - trackers[j].broken_at <= c.forget_steps:
-            filled = _keep_nearest(c.neighbours, filled, j, s[DISTANCE + j], s)
+    """Write the nearest team-mates, where all are heard."""
+    keep_team(c.num_trackers, s)
+    filled = choose_nearest(c.num_trackers, c.neighbours, s)
+    for p in range(filled):
+        j = int(s[NUMBER + p])
+        s[MATE_AHEAD + p], s[MATE_LEFT + p] = s[AHEAD + j], s[LEFT + j]
+        s[MATE_COS + p], s[MATE_SIN + p] = s[COS + j], s[SIN + j]
+    find_directions(trackers[i], filled, MATE_AHEAD, MATE_LEFT, NEAREST, MATE_COS, MATE_SIN, s)
     for p in range(c.neighbours):
         if p < filled:
             j = int(s[NUMBER + p])
-            age = max(_ZERO, np.float32(w.step - trackers[j].broken_at)) * c.dt
-            _write_surveyed(trackers[j], j, age, s, o, k)
+            _write_surveyed(trackers[j], j, s[NEAREST + p], p, s, o, k)
             _write_message(c, said, j, o, k)
         else:
             _write_no_neighbour(c, o, k)
@@ -447,11 +456,10 @@ def observe_tracker(
     if c.perfect_radio == 0:
         _write_heard(c, w, t, i, heard, heard_message, s, o, k)
         return
-    survey_team(t, n, s)
-    if n <= _COUNTED and w.working == n == c.neighbours + 1:
+    if n <= _COUNTED and n == c.neighbours + 1:
         _write_whole_team(c, trackers, i, message[0], s, o, k)
     else:
-        _write_reached(c, w, trackers, i, message[0], s, o, k)
+        _write_nearest(c, trackers, i, message[0], s, o, k)
 
 
 @compiled(seldom=True)

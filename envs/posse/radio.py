@@ -31,18 +31,15 @@ def radio_works(c: Record, w: Record, t: Record) -> bool:
 
 @compiled
 def share_fixes(c: Record, trackers: Records) -> None:
-    """A radio with no limits: everyone takes the newest fix that anyone has."""
-    best = -1
-    for i in range(c.num_trackers):
-        t = trackers[i]
-        if t.broken_at == NEVER and (best < 0 or t.fix_step > trackers[best].fix_step):
+    """A radio without limits, where nobody breaks: everyone takes the newest fix there is."""
+    best = 0
+    for i in range(1, c.num_trackers):
+        if trackers[i].fix_step > trackers[best].fix_step:
             best = i
-    if best < 0 or trackers[best].fix_step < 0:
-        return
     b = trackers[best]
     for i in range(c.num_trackers):
         t = trackers[i]
-        if t.broken_at == NEVER and t.fix_step < b.fix_step:
+        if t.fix_step < b.fix_step:
             take_fix(
                 c, t, b.fix_step, b.fix_x, b.fix_y,
                 b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin,

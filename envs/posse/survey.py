@@ -48,7 +48,14 @@ ROOM_AHEAD: Final = 22 * _ROW  # of each direction, for a target that flees
 ROOM_ASTERN: Final = 23 * _ROW
 INDEX: Final = 24 * _ROW  # 0, 1, 2, …
 TASK: Final = 25 * _ROW  # what every tracker is told of its task
-SIZE: Final = 26 * _ROW
+MATE_AHEAD: Final = 26 * _ROW  # of team-mates by place
+MATE_LEFT: Final = 27 * _ROW
+MATE_COS: Final = 28 * _ROW
+MATE_SIN: Final = 29 * _ROW
+CANDIDATE: Final = 30 * _ROW  # how far those are that may be among the nearest,
+CANDIDATE_NUMBER: Final = 31 * _ROW  # and who they are
+LANE: Final = 32 * _ROW
+SIZE: Final = 33 * _ROW
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -146,22 +153,33 @@ def survey(c: Record, robot: Record, number: int, s: FloatArray) -> None:
 
 
 @compiled
-def survey_team(robot: Record, n: int, s: FloatArray) -> None:
-    """Write the ego directions of the n trackers and of their headings, after :func:`survey`."""
-    hc, hs, count = robot.heading_cos, robot.heading_sin, np.float32(n)
-    for block in range(blocks(n)):
+def find_directions(
+    robot: Record,
+    count: int,
+    ahead: int,
+    left: int,
+    distance: int,
+    cosine: int,
+    sine: int,
+    s: FloatArray,
+) -> None:
+    """Write the ego directions of ``count`` team-mates and of their headings.
+
+    From the rows that hold where they are (``ahead``, ``left``, ``distance``) and their headings in
+    the common frame (``cosine``, ``sine``).
+    """
+    hc, hs = robot.heading_cos, robot.heading_sin
+    for block in range(blocks(count)):
         for k in range(BLOCK):
             j = BLOCK * block + k
-            distance = s[DISTANCE + j]
-            per_metre = _ONE / max(distance, _TINY)
-            s[MATE_DISTANCE + j] = distance if s[INDEX + j] < count else FAR
-            s[BEARING_COS + j] = within_one(s[AHEAD + j] * per_metre)
-            s[BEARING_SIN + j] = within_one(s[LEFT + j] * per_metre)
+            per_metre = _ONE / max(s[distance + j], _TINY)
+            s[BEARING_COS + j] = within_one(s[ahead + j] * per_metre)
+            s[BEARING_SIN + j] = within_one(s[left + j] * per_metre)
         for k in range(BLOCK):
             j = BLOCK * block + k
-            cosine, sine = s[COS + j], s[SIN + j]
-            s[HEADING_COS + j] = within_one(cosine * hc + sine * hs)
-            s[HEADING_SIN + j] = within_one(sine * hc - cosine * hs)
+            c, n = s[cosine + j], s[sine + j]
+            s[HEADING_COS + j] = within_one(c * hc + n * hs)
+            s[HEADING_SIN + j] = within_one(n * hc - c * hs)
 
 
 @compiled
@@ -171,16 +189,63 @@ def within_one(value: np.float32) -> np.float32:
 
 
 @compiled
-def place_of(j: int, n: int, s: FloatArray) -> int:
-    """Return tracker j's place by distance: how many are nearer; of two equals, the first is."""
-    mine, number = s[MATE_DISTANCE + j], np.float32(j)
+def keep_team(n: int, s: FloatArray) -> None:
+    """Write the distances of trackers alone, everything else being far."""
+    count = np.float32(n)
+    for block in range(blocks(n)):
+        for k in range(BLOCK):
+            j = BLOCK * block + k
+            distance = s[DISTANCE + j]
+            s[MATE_DISTANCE + j] = distance if s[INDEX + j] < count else FAR
+
+
+@compiled
+def place_of(j: int, n: int, distances: int, s: FloatArray) -> int:
+    """Return the place by distance of j, in a row of n: how many are nearer, or as near and first.
+
+    What fills the row's last block has to be far.
+    """
+    mine, number = s[distances + j], np.float32(j)
     nearer = np.int32(0)
     for block in range(blocks(n)):
         for k in range(BLOCK):
             i = BLOCK * block + k
-            d = s[MATE_DISTANCE + i]
+            d = s[distances + i]
             nearer += np.int32((d < mine) | ((d == mine) & (s[INDEX + i] < number)))
     return int(nearer)
+
+
+@compiled
+def choose_nearest(n: int, places: int, s: FloatArray) -> int:
+    """List the nearest of n team-mates, NEAREST first; return how many, at most ``places``.
+
+    MATE_DISTANCE says how far each is, FAR for those that do not count.
+    """
+    most = FAR
+    if places <= BLOCK:
+        # The nearest of each lane are eight team-mates, so none of the eight nearest is farther
+        # than the farthest of these.
+        for k in range(BLOCK):
+            s[LANE + k] = s[MATE_DISTANCE + k]
+        for block in range(1, blocks(n)):
+            for k in range(BLOCK):
+                s[LANE + k] = lesser(s[LANE + k], s[MATE_DISTANCE + BLOCK * block + k])
+        most = s[LANE]
+        for k in range(1, BLOCK):
+            most = max(most, s[LANE + k])
+    count = 0
+    for j in range(natural(n)):  # without a branch, which could not be predicted
+        distance = s[MATE_DISTANCE + j]
+        s[CANDIDATE + count], s[CANDIDATE_NUMBER + count] = distance, np.float32(j)
+        count = natural(count + int((distance <= most) & (distance < FAR)))
+    for k in range(count, BLOCK * blocks(count)):
+        s[CANDIDATE + k] = FAR
+    for q in range(count):
+        place = natural(place_of(q, count, CANDIDATE, s))
+        if place < places:
+            s[NEAREST + place] = s[CANDIDATE + q]
+            s[NUMBER + place] = s[CANDIDATE_NUMBER + q]
+    return min(count, places)
 
 
 @compiled

@@ -630,6 +630,15 @@ CASES: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = (
     ),  # a ring so tight that trackers run into the target
     ("constant", (("num_trackers", 3), ("num_neighbours", 8), ("message_size", 1))),
     ("constant", (("num_trackers", 1),)),
+    (
+        "constant",
+        (
+            ("num_trackers", 26),
+            ("num_neighbours", 5),
+            ("formation", "ring"),
+            ("message_size", 1),
+        ),
+    ),
     ("constant", (("breaks", 2), ("formation", "ring"), ("break_window", (0.2, 0.4)))),
     ("field", (("num_trackers", 9), ("num_neighbours", 3), ("message_size", 2))),
     ("field", (("breaks", 3), ("field_of_view", 2.0), ("forget_after", 0.35))),

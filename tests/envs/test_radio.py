@@ -146,15 +146,15 @@ def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
 
 @pytest.mark.parametrize("name", ["constant", "accelerating", "smart", "search", "leader-loss"])
 def test_a_radio_without_limits_is_one_with_a_huge_range(name: str) -> None:
-    """The engine has a shorter way for a perfect radio; nobody may be able to tell."""
+    """The engine has a shorter way for a perfect radio; it makes no difference but rounding."""
     without = posse.batch(name, 6, message_size=2, horizon=120, range_noise=0.02)
     huge = posse.batch(name, 6, message_size=2, horizon=120, range_noise=0.02, radio_range=1e5)
-    np.testing.assert_array_equal(without.reset(seed=3), huge.reset(seed=3))
+    np.testing.assert_allclose(without.reset(seed=3), huge.reset(seed=3), rtol=1e-5, atol=2e-5)
     rng = np.random.default_rng(3)
     for _ in range(120):
         actions = rng.uniform(-1, 1, without.action_shape)
         for mine, theirs in zip(without.step(actions)[:4], huge.step(actions)[:4], strict=True):
-            np.testing.assert_array_equal(mine, theirs)
+            np.testing.assert_allclose(mine, theirs, rtol=1e-5, atol=2e-5)
 
 
 @pytest.mark.parametrize("name", ["field", "smart"])
