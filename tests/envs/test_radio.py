@@ -154,7 +154,9 @@ def test_a_radio_without_limits_is_one_with_a_huge_range(name: str) -> None:
     for _ in range(120):
         actions = rng.uniform(-1, 1, without.action_shape)
         for mine, theirs in zip(without.step(actions)[:4], huge.step(actions)[:4], strict=True):
-            np.testing.assert_allclose(mine, theirs, rtol=1e-5, atol=2e-5)
+            np.testing.assert_allclose(
+                np.asarray(mine, np.float32), np.asarray(theirs, np.float32), rtol=1e-5, atol=2e-5
+            )
 
 
 @pytest.mark.parametrize("name", ["field", "smart"])

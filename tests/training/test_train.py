@@ -21,11 +21,12 @@ from safetensors.numpy import load_file
 from stable_baselines3 import PPO
 
 import posse
-from posse_baselines import BasePolicy, PolicyError
+from posse_baselines import BasePolicy, PolicyError, load
 from posse_baselines.learned import LearnedPolicy
 from posse_training import checkpoint
 from posse_training import train as module
 from posse_training.checkpoint import CheckpointError, RunFolderError, locked, read_checkpoint
+from posse_training.evaluation import evaluate
 from posse_training.export import export
 from posse_training.imitation import imitate
 from posse_training.normalisation import Normaliser, RunningStatistics
@@ -94,11 +95,20 @@ def test_two_trainings_from_one_seed_agree_exactly(tmp_path: Path, algorithm: st
     assert not np.array_equal(mine["layers.0.weight"], other["layers.0.weight"])
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+ADVISED: dict[str, Any] = {
+    "scenario": "field",
+    "advise": "ddcs-distributed",
+    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "changes"), [*((name, {}) for name in ALGORITHMS), ("mappo", ADVISED)]
+)
 def test_a_training_that_was_cut_ends_where_it_would_have(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str, changes: dict[str, Any]
 ) -> None:
-    train(small(tmp_path / "whole", algorithm), console=quiet())
+    train(small(tmp_path / "whole", algorithm, **changes), console=quiet())
     write, count = checkpoint.write_checkpoint, 0
 
     def cut(*arguments: Any) -> None:
@@ -110,7 +120,7 @@ def test_a_training_that_was_cut_ends_where_it_would_have(
 
     monkeypatch.setattr(module, "write_checkpoint", cut)
     with pytest.raises(KeyboardInterrupt):
-        train(small(tmp_path / "cut", algorithm), console=quiet())
+        train(small(tmp_path / "cut", algorithm, **changes), console=quiet())
     monkeypatch.undo()
     steps = read_checkpoint(tmp_path / "cut")[1]["model"]["num_timesteps"]
     assert 0 < steps < 1280
@@ -163,6 +173,18 @@ def test_kill_9_loses_at_most_one_interval(tmp_path: Path) -> None:
     assert kills >= 1
     assert running.wait() == 0
     assert_equal(numbers(whole), numbers(killed))
+
+
+def test_an_advised_training_exports_what_it_played(tmp_path: Path) -> None:
+    file = train(small(tmp_path / "run", **ADVISED), console=quiet())
+    policy = load(file)
+    assert isinstance(policy, LearnedPolicy)
+    assert policy.adviser is not None
+    scenario = small(tmp_path, **ADVISED).scenarios[0]
+    again = evaluate(policy, scenario, 3, 0, split="validation", progress=False)["score"].mean()
+    assert again == pytest.approx(policy.card["validation_score"], abs=1e-12)
+    with pytest.raises(SettingsError, match="neither imitate nor message_size"):
+        small(tmp_path, advise="ddcs-distributed", message_size=1)
 
 
 def test_killed_before_the_first_checkpoint_it_starts_anew(
