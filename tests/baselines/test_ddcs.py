@@ -269,6 +269,16 @@ def test_trackers_end_in_slots_of_their_own(settings: dict[str, Any]) -> None:
     assert metrics["score"].mean() >= 0.85 * metrics["bound"].mean()
 
 
+def test_a_large_team_of_which_each_knows_eight_settles() -> None:
+    # Team-mates that are no longer in the observation must not stay as obstacles where they were.
+    batch = posse.batch(
+        "constant", 20, split="validation", message_size=5, autoreset="disabled",
+        num_trackers=40, num_neighbours=8, formation="rows",
+    )  # fmt: skip
+    metrics = play(batch, DDCS())
+    assert np.isfinite(metrics["settling_time"]).mean() >= 0.9
+
+
 @pytest.mark.parametrize("guidance", ["cartesian", "polar"])
 @pytest.mark.parametrize("model", ["distributed", "centralized"])
 def test_every_law_settles_on_a_straight_target(guidance: str, model: str) -> None:

@@ -126,6 +126,7 @@ def surround(
         dx, dy = d.now_x - x, d.now_y - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
             count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, two, s.target_margin)
+    few = f.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
         if j == own or mate.step < 0 or (d.step - mate.step) * f.dt > _FORGOTTEN:
@@ -136,6 +137,8 @@ def surround(
             vx, vy = float(mate.speed_x), float(mate.speed_y)
             age = (d.step - mate.step) * f.dt
             if age > patience(s, d):
+                if few and length(dx, dy) < d.horizon:
+                    continue  # there still, it would have a place in the observation
                 vx, vy = 0.0, 0.0
             margin = s.margin + s.age_margin * min(age, _MOST_AGE)
             count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
@@ -147,7 +150,7 @@ def surround(
             if away < _NEAR:
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
     d.taken = _NO_BITS
-    strangers = d.known != 0 and f.neighbours < len(mates) - 1
+    strangers = d.known != 0 and few
     farthest = f.sonar_range - _EXPLAINED
     for k in range(f.sonar_beams):
         reading = float(o[f.sonar + k])
