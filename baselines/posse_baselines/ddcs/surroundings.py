@@ -16,6 +16,7 @@ from posse_baselines.safeguard import put_disc, put_wall
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
 _SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
+_TAKEN_MEMORY = 3.0  # s; the longest that a slot counts as taken after an echo from it
 _NEAR = 3.0  # m; farther things are no danger yet
 _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
 _MOST_AGE = 0.7  # s; a team-mate is not made wider for an older message
@@ -149,8 +150,9 @@ def surround(
             away = f.extent - nx * x - ny * y
             if away < _NEAR:
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
-    d.taken = _NO_BITS
     strangers = d.known != 0 and few
+    if not strangers or d.step % max(1, round(_TAKEN_MEMORY / f.dt)) == 0:
+        d.taken = _NO_BITS
     farthest = f.sonar_range - _EXPLAINED
     for k in range(f.sonar_beams):
         reading = float(o[f.sonar + k])
