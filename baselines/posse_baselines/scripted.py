@@ -17,6 +17,9 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "pursuit": Pursuit,
     "ddcs-distributed": DDCS,
     "ddcs-centralized": lambda: DDCS(Settings(model="centralized")),
+    "ddcs-centralized-l-l": lambda: DDCS(
+        Settings(model="centralized", follower_law="l-l"), "ddcs-centralized-l-l"
+    ),
     "ddcs-centralized-no-exchange": lambda: DDCS(
         Settings(model="centralized", exchange=False), "ddcs-centralized-no-exchange"
     ),

@@ -61,6 +61,7 @@ STYLES: Final[dict[str, Style]] = {
     "oracle": Style(_BLACK, "D", (0, (5, 2))),
     "ddcs-distributed": Style(_BLUE, "o"),
     "ddcs-centralized": Style(_SKY, "s"),
+    "ddcs-centralized-l-l": Style(_SKY, "8"),
     "ddcs-centralized-no-exchange": Style(_SKY, "p", (0, (3, 1.5))),
     "ddcs-no-radio": Style(_BLUE, "h", (0, (3, 1.5))),
     "pngl": Style(_PINK, "d", (0, (3, 1.5))),

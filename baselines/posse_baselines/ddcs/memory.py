@@ -41,7 +41,7 @@ MIND: Final = _record(
     # tracking
     ("task", _I),
     ("slot", _I),  # -1: none
-    ("taken", np.uint64),  # slots in which the sonar finds somebody not heard, a bit each
+    ("taken", np.uint64),  # slots in which the sonar found somebody not heard, a bit each
     ("stage", _I),  # of a pursuit: chase or maintenance
     ("error", _F),  # distance from its place, m; -1: it has none
     # leadership

@@ -13,6 +13,7 @@ from posse.arrays import Records
 MODELS: Final = ("distributed", "centralized")
 GUIDANCE_LAWS: Final = ("cartesian", "polar", "pngl")
 LEADER_LAWS: Final = ("pursuit", "slot")
+FOLLOWER_LAWS: Final = ("l-phi", "l-l")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,13 +26,17 @@ class Settings:
 
     model: str = "distributed"
     """``"distributed"``: everyone keeps its own slot on the target; ``"centralized"``: the leader
-    keeps its place behind the target, the others theirs on the leader (l-φ)."""
+    keeps its place behind the target, the others theirs on the leader (``follower_law``)."""
     guidance: str = "cartesian"
     """How a slot on the target is approached: ``"cartesian"`` or ``"polar"``; ``"pngl"``: no slots,
     but the paper's own spread, by one navigation constant K a tracker."""
     leader_law: str = "slot"
     """Of the centralized model's leader: ``"pursuit"`` (velocity pursuit, K = 1, as in the paper,
     which is off its bearing while the target turns) or ``"slot"`` (it keeps the first slot)."""
+    follower_law: str = "l-phi"
+    """Of the centralized model's followers: ``"l-phi"`` (distance and direction from the leader) or
+    ``"l-l"`` (from the third robot on, the distances from the leader and from a follower before it
+    in the order of the slots)."""
     exchange: bool = True
     """Whether the lead ever passes on; without, the first leader stays leader, even broken."""
     radio: bool = True
@@ -91,7 +96,11 @@ class Settings:
     alpha_2: float = 2.0
     """α_2 of the l-φ law."""
     point_offset: float = 0.15
-    """How far ahead of its axle the point lies that a follower controls by l-φ."""
+    """How far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
+    least_crossing: float = 0.15
+    """Sine of the angle, seen from a follower under l-l, between the two robots that it keeps its
+    distances from, below which it keeps its place on the nearer one instead, (0, 0.5). In its place
+    the sine has to be twice that."""
     spread: float = 0.1
     """η of the paper's spread: K from 1 - η to 1 + η over the team (pngl)."""
     enter_margin: float = 0.2
@@ -116,6 +125,7 @@ class Settings:
     def __post_init__(self) -> None:
         for name, allowed in (
             ("model", MODELS), ("guidance", GUIDANCE_LAWS), ("leader_law", LEADER_LAWS),
+            ("follower_law", FOLLOWER_LAWS),
         ):  # fmt: skip
             value = getattr(self, name)
             if value not in allowed:
@@ -137,13 +147,18 @@ class Settings:
             raise ValueError(f"spread={self.spread!r} must lie in [0, 0.1] (paper, section 3.3)")
         if self.point_offset <= 0.0:
             raise ValueError(f"point_offset={self.point_offset!r} must be above 0")
+        if not 0.0 < self.least_crossing < 0.5:
+            raise ValueError(f"least_crossing={self.least_crossing!r} must lie in (0, 0.5)")
 
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""
         return dataclasses.replace(self, **overrides)
 
 
-_CHOICES: Final = {"model": MODELS, "guidance": GUIDANCE_LAWS, "leader_law": LEADER_LAWS}
+_CHOICES: Final = {
+    "model": MODELS, "guidance": GUIDANCE_LAWS, "leader_law": LEADER_LAWS,
+    "follower_law": FOLLOWER_LAWS,
+}  # fmt: skip
 SETTINGS: Final[np.dtype[Any]] = np.dtype(
     (
         np.record,

@@ -16,6 +16,7 @@ from posse_baselines.safeguard import put_disc, put_wall
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
 _SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
+_TAKEN_MEMORY = 3.0  # s; the longest that a slot counts as taken after an echo from it
 _NEAR = 3.0  # m; farther things are no danger yet
 _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
 _MOST_AGE = 0.7  # s; a team-mate is not made wider for an older message
@@ -126,6 +127,7 @@ def surround(
         dx, dy = d.now_x - x, d.now_y - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
             count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, two, s.target_margin)
+    few = f.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
         if j == own or mate.step < 0 or (d.step - mate.step) * f.dt > _FORGOTTEN:
@@ -136,6 +138,8 @@ def surround(
             vx, vy = float(mate.speed_x), float(mate.speed_y)
             age = (d.step - mate.step) * f.dt
             if age > patience(s, d):
+                if few and length(dx, dy) < d.horizon:
+                    continue  # there still, it would have a place in the observation
                 vx, vy = 0.0, 0.0
             margin = s.margin + s.age_margin * min(age, _MOST_AGE)
             count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
@@ -146,8 +150,9 @@ def surround(
             away = f.extent - nx * x - ny * y
             if away < _NEAR:
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
-    d.taken = _NO_BITS
-    strangers = d.known != 0 and f.neighbours < len(mates) - 1
+    strangers = d.known != 0 and few
+    if not strangers or d.step % max(1, round(_TAKEN_MEMORY / f.dt)) == 0:
+        d.taken = _NO_BITS
     farthest = f.sonar_range - _EXPLAINED
     for k in range(f.sonar_beams):
         reading = float(o[f.sonar + k])

@@ -10,7 +10,12 @@ from posse.compiled import compiled
 from posse_baselines.ddcs.memory import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
-from posse_baselines.formation_control import l_phi_demand, polar_slot_velocity, separation
+from posse_baselines.formation_control import (
+    l_l_control,
+    l_phi_demand,
+    polar_slot_velocity,
+    separation,
+)  # fmt: skip
 from posse_baselines.guidance import (
     deviation,
     lawful_heading,
@@ -26,6 +31,7 @@ CENTRALIZED: Final = 1
 POLAR: Final = 1
 PNGL: Final = 2
 BY_SLOT: Final = 1
+L_L: Final = 1
 
 _FAR_SIGHT: Final = 8.0  # m; a sensor that reaches farther finds the target without being moved
 
@@ -116,43 +122,108 @@ def in_pursuit(
 
 
 @compiled
+def place_on(
+    f: Record, s: Record, d: Record, mate: Record, own: Record, theirs: Record
+) -> tuple[float, float, float, float, float]:
+    """Return where a place in the formation is by a team-mate that is in its own.
+
+    The team-mate's place (x, y) now, the wanted place (x, y), and the team-mate's speed (m/s). The
+    formation's heading is that of the slot frame.
+    """
+    mate_x, mate_y = mate_now(f, s, d, mate)
+    silent = (d.step - mate.step) * f.dt > patience(s, d)
+    speed = 0.0 if silent else length(mate.speed_x, mate.speed_y)
+    along, left = own.x - theirs.x, own.y - theirs.y
+    c, sn = d.frame_cos, d.frame_sin
+    return mate_x, mate_y, mate_x + along * c - left * sn, mate_y + along * sn + left * c, speed
+
+
+@compiled
+def demand_on(
+    f: Record,
+    s: Record,
+    d: Record,
+    mate: Record,
+    own: Record,
+    theirs: Record,
+    x: float,
+    y: float,
+    body: Record,
+) -> tuple[float, float, float, float, float]:
+    """Return what l-φ on a team-mate wants of the control point, and where that is.
+
+    (l, A, B, direction now, wanted direction): the directions of l in the common frame. The wanted
+    φ turns as the slot frame does, less the team-mate's own turning.
+    """
+    mate_x, mate_y, place_x, place_y, speed = place_on(f, s, d, mate, own, theirs)
+    theta = math.atan2(float(mate.heading_sin), float(mate.heading_cos))
+    ahead_x, ahead_y = s.point_offset * body.heading_cos, s.point_offset * body.heading_sin
+    l_now, phi = separation(mate_x, mate_y, theta, x + ahead_x, y + ahead_y)
+    l_d, phi_d = separation(mate_x, mate_y, theta, place_x + ahead_x, place_y + ahead_y)
+    # The wanted φ keeps to the slot frame: to the leader's frame it turns back as the leader turns.
+    across_rate = d.psi_rate
+    a, b = l_phi_demand(l_now, phi, l_d, phi_d, speed, across_rate, s.alpha_1, s.alpha_2)
+    return l_now, a, b, theta + phi, theta + phi_d
+
+
+@compiled
+def second_of(f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int) -> int:
+    """Return the team-mate that a follower under l-l keeps its distance from beside the leader.
+
+    Of those whose slots come between the leader's and its own, and who are in their places: the one
+    of the last slot from which the lines to both cross widely enough in the follower's place. -1 if
+    there is none.
+    """
+    found, n = -1, len(slots)
+    place, first = slots[d.slot], slots[0]
+    lead_x, lead_y = place.x - first.x, place.y - first.y
+    for j in range(n):
+        mate = mates[j]
+        if j == own or j == d.leader or mate.task != FLOCKING or not 0 < mate.slot < d.slot:
+            continue
+        if (found >= 0 and mate.slot < mates[found].slot) or not is_there(f, s, d, mate, n):
+            continue
+        dx, dy = place.x - slots[mate.slot].x, place.y - slots[mate.slot].y
+        widest = length(lead_x, lead_y) * length(dx, dy)
+        if abs(lead_x * dy - lead_y * dx) >= 2.0 * s.least_crossing * widest:
+            found = j
+    return found
+
+
+@compiled
 def on_leader(
     f: Record,
     s: Record,
     d: Record,
-    leader: Record,
+    mates: Records,
     slots: Records,
+    own: int,
     x: float,
     y: float,
     body: Record,
 ) -> tuple[float, float]:
     """Return the velocity (m/s) wanted of a follower's control point, by l-φ on the leader.
 
-    The formation's heading is that of the slot frame, so the wanted φ turns as the frame does, less
-    the leader's own turning.
+    Or by l-l on the leader and one more, where that is the law and there is such a one.
     """
-    lx, ly = mate_now(f, s, d, leader)
-    silent = (d.step - leader.step) * f.dt > patience(s, d)
-    leader_speed = 0.0 if silent else length(leader.speed_x, leader.speed_y)
-    lead_c, lead_s = float(leader.heading_cos), float(leader.heading_sin)
-    own, first = slots[d.slot], slots[0]
-    along, left = own.x - first.x, own.y - first.y
-    c, sn = d.frame_cos, d.frame_sin
-    place_x, place_y = lx + along * c - left * sn, ly + along * sn + left * c
+    leader, place = mates[d.leader], slots[d.slot]
+    _, _, place_x, place_y, speed = place_on(f, s, d, leader, place, slots[0])
     dx, dy = place_x - x, place_y - y
     d.error = length(dx, dy)
     if d.error > s.far:
-        vx, vy = leader_speed * lead_c, leader_speed * lead_s
+        vx, vy = speed * float(leader.heading_cos), speed * float(leader.heading_sin)
         return approach_velocity(dx, dy, vx, vy, s.gain, body.max_speed, body.acceleration)
-    theta = math.atan2(lead_s, lead_c)
-    ahead_x, ahead_y = s.point_offset * body.heading_cos, s.point_offset * body.heading_sin
-    l_now, phi = separation(lx, ly, theta, x + ahead_x, y + ahead_y)
-    l_d, phi_d = separation(lx, ly, theta, place_x + ahead_x, place_y + ahead_y)
-    # The wanted φ keeps to the slot frame: to the leader's frame it turns back as the leader turns.
-    across_rate = d.psi_rate
-    a, b = l_phi_demand(l_now, phi, l_d, phi_d, leader_speed, across_rate, s.alpha_1, s.alpha_2)
-    angle = theta + phi
-    return a * math.cos(angle) - b * math.sin(angle), a * math.sin(angle) + b * math.cos(angle)
+    l_i, a, b, angle, wanted = demand_on(f, s, d, leader, place, slots[0], x, y, body)
+    second = second_of(f, s, d, mates, slots, own) if s.follower_law == L_L else -1
+    if second < 0:
+        c, sn = math.cos(angle), math.sin(angle)
+        return a * c - b * sn, a * sn + b * c
+    mate = mates[second]
+    l_k, a_k, b_k, angle_k, wanted_k = demand_on(f, s, d, mate, place, slots[mate.slot], x, y, body)
+    # With directions of the common frame for γ, and d = 1, it gives the control point's velocity.
+    return l_l_control(
+        l_i, a, b, angle, l_k, a_k, b_k, angle_k, wanted_k - wanted, s.least_crossing, 1.0
+    )
 
 
 @compiled
@@ -185,5 +256,5 @@ def wanted_velocity(
             return in_pursuit(s, d, 1.0, wanted_range, x, y, body)
         leader = mates[d.leader]
         if is_there(f, s, d, leader, n) or (s.exchange == 0 and leader.step >= 0):
-            return on_leader(f, s, d, leader, slots, x, y, body)
+            return on_leader(f, s, d, mates, slots, own, x, y, body)
     return on_target(s, d, slots, x, y, body)
