@@ -169,13 +169,13 @@ def report_gpu(settings: Settings) -> None:
 
 def interfaces(settings: Settings) -> dict[str, list[float]]:
     """Measure environment steps a second of one world, dictionaries and checks included."""
-    parallel = posse.parallel_env(settings.scenario, horizon=100_000)
+    parallel = posse.parallel_env(settings.scenario, horizon=1_000_000)
     parallel.reset(seed=0)
     rng = np.random.default_rng(0)
     actions = {
         agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents
     }
-    team: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=100_000).unwrapped
+    team: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=1_000_000).unwrapped
     team.reset(seed=0)
     action = np.stack(list(actions.values()))
     return {

@@ -180,27 +180,19 @@ def observe(
 @compiled(seldom=True)
 def begin(
     c: Record,
-    slots: Records,
     w: Record,
     trackers: Records,
-    obstacles: Records,
     heard: Records,
     broadcast: Records,
     heard_message: FloatArray,
     message: FloatArray,
-    scratch: FloatArray,
 ) -> None:
-    """Bring a world whose poses are set to the start of an episode, first sensing included."""
+    """Bring a world whose poses are set to the start of an episode, but for what is sensed."""
     rest(c, w, trackers)
     heard["step"][:] = -1
     heard_message[:] = _ZERO
     message[:] = _ZERO
     broadcast["sent"][:] = 0
-    lay_out(c, w, trackers, obstacles, scratch)
-    meet(c, w, trackers, obstacles, scratch)
-    sense(c, w, trackers, obstacles, heard, broadcast, heard_message, message)
-    occupy(c, w, trackers, slots, scratch)
-    w.held, w.score = 0, _ZERO
 
 
 @compiled
@@ -224,32 +216,29 @@ def reward(
 
 
 @compiled
-def step(
+def act(
     c: Record,
-    slots: Records,
     w: Record,
     trackers: Records,
     obstacles: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
     message: FloatArray,
     actions: FloatArray,
     scratch: FloatArray,
 ) -> None:
-    """Advance one world by one control step."""
+    """Move everything by a control step, and say what the actions say."""
     apply_faults(c, w, trackers)
     motion(c, w, trackers, obstacles, actions, scratch)
-    lay_out(c, w, trackers, obstacles, scratch)
-    meet(c, w, trackers, obstacles, scratch)
     w.step += 1
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
         works = trackers[i].broken_at == NEVER
         for k in range(c.message_size):
             message[slot, i, k] = actions[i, 2 + k] if works else _ZERO
-    sense(c, w, trackers, obstacles, heard, broadcast, heard_message, message)
-    occupy(c, w, trackers, slots, scratch)
+
+
+@compiled
+def end_step(c: Record, w: Record, trackers: Records, slots: Records) -> None:
+    """Add the step to the episode's sums, and see whether the episode is over."""
     add_up(c, w, trackers, slots)
     if c.terminate_on_contact:
         for i in range(c.num_trackers):
@@ -303,21 +292,22 @@ def advance_world(
         w.episode += 1
         order = START
     if order == STEP:
-        step(
-            c, slots, w, trackers, obstacles,
-            heard[e], broadcast[e], heard_message[e], message[e], actions[e], scratch,
-        )  # fmt: skip
-        reward(c, w, trackers, weights, rewards[e], terms[e])
-    else:
+        act(c, w, trackers, obstacles, message[e], actions[e], scratch)
+    elif order != LOOK:
         if order == START:
             draw_start(c, w, trackers, obstacles)
+        begin(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e])
+    lay_out(c, w, trackers, obstacles, scratch)
+    if order != LOOK:
+        meet(c, w, trackers, obstacles, scratch)
+        sense(c, w, trackers, obstacles, heard[e], broadcast[e], heard_message[e], message[e])
+        occupy(c, w, trackers, slots, scratch)
+    if order == STEP:
+        end_step(c, w, trackers, slots)
+        reward(c, w, trackers, weights, rewards[e], terms[e])
+    else:
         if order != LOOK:
-            begin(
-                c, slots, w, trackers, obstacles,
-                heard[e], broadcast[e], heard_message[e], message[e], scratch,
-            )  # fmt: skip
-        else:
-            lay_out(c, w, trackers, obstacles, scratch)
+            w.held, w.score = 0, _ZERO
         rewards[e, :] = _ZERO
         terms[e, :, :] = _ZERO
     flags[0, e] = w.terminated != 0
