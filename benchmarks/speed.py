@@ -184,6 +184,26 @@ def interfaces(settings: Settings) -> dict[str, list[float]]:
     }
 
 
+def beside_others(settings: Settings) -> dict[str, float]:
+    """Return a single world's speed beside busy processes, as a share of its speed alone."""
+    env: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=1_000_000).unwrapped
+    env.reset(seed=0)
+    action = np.zeros(env.action_space.shape, np.float32)
+    alone = per_second(lambda: env.step(action), settings.seconds)[0]
+    shares = {}
+    cores = os.cpu_count() or 1
+    for count in sorted({1, cores}):
+        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+        try:
+            rate = per_second(lambda: env.step(action), settings.seconds)[0]
+        finally:
+            for process in busy:
+                process.kill()
+                process.wait()
+        shares[str(count)] = rate / alone
+    return shares
+
+
 def first_steps() -> dict[str, float]:
     """Return seconds from a fresh process to its first step, cold and with kernels on disk."""
     seconds = {}
@@ -215,6 +235,7 @@ def main() -> None:
         "one_world": single,
         "cores_busy_with_other_work": disturbed,
     }
+    figures["beside_busy_processes"] = beside_others(settings)
     if settings.cold:
         figures["first_step_seconds"] = first_steps()
     console = Console()
@@ -235,6 +256,12 @@ def main() -> None:
     console.print(table)
     for name, (median, low, high) in single.items():
         console.print(f"{name}: {median:,.0f} steps/s [{low:,.0f}, {high:,.0f}], one world")
+    for count, share in figures["beside_busy_processes"].items():
+        fair = min(1.0, (os.cpu_count() or 1) / (int(count) + 1))
+        console.print(
+            f"one world beside {count} busy processes: {share:.2f} of its speed alone "
+            f"(its share of the cores: {fair:.2f})"
+        )
     for name, seconds in figures.get("first_step_seconds", {}).items():
         console.print(f"first step of a fresh process, {name}: {seconds:.1f} s")
     console.print(f"cores busy with other work meanwhile: {disturbed:.2f}")

@@ -65,6 +65,7 @@ class ActionReader:
         self._discrete = discrete
         rows = len(self._agents)
         self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
+        self._buffer = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
 
     def by_agent(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return the actions of a dictionary by agent.
@@ -73,13 +74,19 @@ class ActionReader:
             ValueError: An agent is missing or unknown, or its action is of a wrong type or shape,
                 not finite, or outside the space; the message names agent and value.
         """
-        try:
-            array = np.array([actions[agent] for agent in self._agents])
-        except (KeyError, IndexError, TypeError, ValueError):  # told apart below
+        if type(actions) is not dict or self._discrete or len(actions) != len(self._agents):
             return self._by_agent_slowly(actions)
-        if len(actions) != len(self._agents) or array.shape != self._shape:
+        # The usual case, an array of float32 for each agent, without a new array for each step.
+        for agent, row in zip(self._agents, self._buffer[0]):  # noqa: B905 (the hot path)
+            action = actions.get(agent)
+            if type(action) is not np.ndarray or action.dtype is not _FLOAT32:
+                return self._by_agent_slowly(actions)
+            if action.shape != row.shape:
+                return self._by_agent_slowly(actions)
+            row[...] = action
+        if bad_action(self._buffer) >= 0:
             return self._by_agent_slowly(actions)
-        return self._checked(array, actions)
+        return self._buffer
 
     def by_row(self, actions: npt.ArrayLike) -> FloatArray:
         """Return the actions of an array (rows, 2 + m), or (rows,) of discrete ones.
@@ -90,7 +97,7 @@ class ActionReader:
         array = _as_array(actions, "action")
         if array.shape != self._shape:
             raise ValueError(f"action has shape {array.shape}, wanted {self._shape}")
-        return self._checked(array, array)
+        return self._checked(array)
 
     def one(self, agent: str, action: npt.ArrayLike) -> FloatArray:
         """Return the action of one agent, checked, (2 + m,).
@@ -102,7 +109,7 @@ class ActionReader:
         checked: FloatArray = self._in_space(array[None], (agent,))[0, 0]
         return checked
 
-    def _checked(self, array: npt.NDArray[Any], given: Any) -> FloatArray:
+    def _checked(self, array: npt.NDArray[Any]) -> FloatArray:
         if self._discrete:
             if array.dtype.kind in "iu":
                 return self._in_space(array, self._agents)
@@ -110,8 +117,6 @@ class ActionReader:
             kernel = np.ascontiguousarray(array)[None]
             if bad_action(kernel) < 0:
                 return kernel
-        if isinstance(given, Mapping):
-            return self._by_agent_slowly(given)
         for agent, row in zip(self._agents, array, strict=True):
             self._row(agent, row)
         return self._in_space(array, self._agents)

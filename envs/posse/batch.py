@@ -20,6 +20,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.arrays import BoolArray, FloatArray, Records
+from posse.compiled import direct
 from posse.metrics import episode_metrics
 from posse.observation import ObservationLayout
 from posse.reward import REWARD_TERMS
@@ -44,7 +45,7 @@ _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
 _UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
 _TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
-_kernel: Final[Callable[..., int]] = advance
+_untyped: Final[Callable[..., int]] = advance
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
 
@@ -154,6 +155,7 @@ class Batch:
         self._observations = _Recycler((num_worlds, rows, size))
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
         self._flags = np.zeros((2, num_worlds), np.bool_)
+        self._kernel = direct(_untyped)
         # What every call of the kernel begins with.
         self._fixed = (*self._tables, self._weights, *self._arrays.all())
         self._orders = np.full(num_worlds, STEP, np.uint8)
@@ -170,7 +172,7 @@ class Batch:
     def __getstate__(self) -> dict[str, Any]:
         derived = (
             "_config", "_tables", "_weights", "_fixed",
-            "_observations", "_terms", "_flags", "_scratch", "_orders",
+            "_observations", "_terms", "_flags", "_scratch", "_orders", "_kernel",
         )  # fmt: skip
         threads = ("_threads", "_process", "_parts")
         return {k: v for k, v in self.__dict__.items() if k not in derived + threads}
@@ -421,17 +423,18 @@ class Batch:
         )  # fmt: skip
         if _UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
-                return int(_kernel(*arguments, self._scratch[0], 0, self.num_worlds))
+                return int(_untyped(*arguments, self._scratch[0], 0, self.num_worlds))
+        kernel = self._kernel
         mine, *others = self._scratch
         if not others:
-            return _kernel(*arguments, mine, 0, self.num_worlds)
+            return kernel(*arguments, mine, 0, self.num_worlds)
         if self._threads is None or self._process != os.getpid():
             self._threads = ThreadPoolExecutor(len(others), "posse")
             self._process = os.getpid()  # threads do not survive a fork
         parts = iter(self._parts)  # each thread takes the next one: none waits for a slower one
 
         def work(scratch: FloatArray) -> int:
-            return sum(_kernel(*arguments, scratch, *part) for part in parts)
+            return sum(kernel(*arguments, scratch, *part) for part in parts)
 
         waiting = [self._threads.submit(work, scratch) for scratch in others]
         return work(mine) + sum(thread.result() for thread in waiting)
@@ -443,6 +446,7 @@ class Batch:
         rewards = np.empty(self.observation_shape[:2], np.float32)
         actions = np.empty(self.action_shape, np.float32)  # not read
         self._run(orders, actions, observations, rewards, self._terms.take())
+        self._kernel = direct(_untyped)  # by now there is one
         return observations
 
     def _check_mask(self, mask: npt.ArrayLike | None) -> BoolArray:

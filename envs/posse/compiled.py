@@ -208,6 +208,17 @@ def kernel(function: F | None = None, *, short_loops: bool = False) -> F | Calla
     return decorate if function is None else decorate(function)
 
 
+def direct(function: F) -> F:
+    """Return a kernel's compiled form, which takes its arguments for what they were the first time.
+
+    numba's own call looks up the type of every argument, which takes longer than a world's step.
+    Whoever calls the compiled form has to pass arguments of just those types. Where a kernel has
+    not been called yet, or has been with several types, it is returned as it is.
+    """
+    forms = list(getattr(function, "overloads", {}).values())
+    return cast("F", forms[0].entry_point) if len(forms) == 1 else function
+
+
 def _package_directory(function: Callable[..., Any]) -> Path | None:
     """The directory of a function's top-level package, or None for a module of no package."""
     package = sys.modules.get(function.__module__.partition(".")[0])
