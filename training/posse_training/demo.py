@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from posse_baselines import load, policy_names
+from posse import ObservationLayout, get_scenario
+from posse_baselines import Policy, load, policy_names
 from posse_training.evaluation import Results, evaluate, progress_bar
 from posse_training.film import film
 from posse_training.statistics import Estimate, mean, share
@@ -19,6 +25,8 @@ SCENARIOS: Final = ("constant", "accelerating", "smart")
 POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed")
 LEARNED: Final = "learned-smart"
 """Plays on the target that it was trained on, if it is shipped."""
+UNCOMPILED: Final = ("random", "idle")
+"""Policies that have next to nothing to compile."""
 EPISODES: Final = 500
 SEED: Final = 7
 FOLDER: Final = Path("runs/demo")
@@ -26,6 +34,9 @@ FOLDER: Final = Path("runs/demo")
 
 def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
     """Play every policy in every scenario, print the table, and film the best.
+
+    A second process compiles the policies while this one compiles the worlds, and films what has
+    been played while this one plays on.
 
     Args:
         episodes: Worlds for each policy and scenario.
@@ -36,48 +47,70 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
     plays = [(scenario, policy) for scenario in SCENARIOS for policy in POLICIES]
     if LEARNED in policy_names():
         plays.append(("smart", LEARNED))
+    policies = {name: load(name) for _, name in plays}
     results: dict[tuple[str, str], Results] = {}
-    with progress_bar() as bar:
+    films: dict[str, Future[Path]] = {}
+    with (
+        ProcessPoolExecutor(1, get_context("spawn"), initializer=_mute) as helper,
+        progress_bar() as bar,
+    ):
+        compiled = helper.submit(compile_policies, list(policies.values()))
         task = bar.add_task("compiling, then playing", total=len(plays))
-        for scenario, name in plays:
+        for k, (scenario, name) in enumerate(plays):
+            if name not in UNCOMPILED:
+                compiled.result()
             bar.update(task, description=f"{name} on {scenario}")
-            results[scenario, name] = evaluate(name, scenario, episodes, SEED, progress=False)
+            results[scenario, name] = evaluate(
+                policies[name], scenario, episodes, SEED, progress=False
+            )
             bar.advance(task)
+            if k + 1 == len(plays) or plays[k + 1][0] != scenario:
+                names = shown(scenario, results)
+                films[f"{' beside '.join(names)} on {scenario}"] = helper.submit(
+                    film, [(n, policies[n]) for n in names], scenario, seed=SEED, world=0,
+                    path=FOLDER / f"{scenario}.gif", split="test", seconds=seconds,
+                )  # fmt: skip
+        bar.update(task, description="filming")
+        paths = {title: made.result() for title, made in films.items()}
     console.print(table(results))
-
-    def show(scenario: str, names: Sequence[str], file: str) -> None:
-        path = FOLDER / file
-        with console.status(f"filming {' and '.join(names)} on {scenario}"):
-            film(
-                [(name, load(name)) for name in names],
-                scenario, seed=SEED, world=0, path=path, split="test", seconds=seconds,
-            )  # fmt: skip
-        console.print(f"{' beside '.join(names)} on {scenario}: {path}")
-
-    best = {
-        scenario: max(POLICIES, key=lambda name: results[scenario, name]["score"].mean())
-        for scenario in SCENARIOS
-    }
-    for scenario, name in best.items():
-        beside = [LEARNED] if (scenario, LEARNED) in results else []
-        show(scenario, [name, *beside], f"{scenario}.gif")
+    for title, path in paths.items():
+        console.print(f"{title}: {path}")
     console.print(f"{time.perf_counter() - started:.0f} s in all")
+
+
+def _mute() -> None:
+    """Have the second process say nothing; what goes wrong there is raised here."""
+    sys.stderr = Path(os.devnull).open("w")  # for as long as the process lives
+
+
+def compile_policies(policies: Sequence[Policy]) -> None:
+    """Have each policy act once, so that what it is compiled to is on disk."""
+    for policy in policies:
+        layout = ObservationLayout(get_scenario("smart", message_size=policy.message_size))
+        observations = np.zeros((1, layout.scenario.num_trackers, layout.size), np.float32)
+        policy.act(observations, policy.begin(layout, 1))
+
+
+def shown(scenario: str, results: Mapping[tuple[str, str], Results]) -> list[str]:
+    """Return who is filmed: the best scripted team, beside it the learned one if it played."""
+    best = max(POLICIES, key=lambda name: results[scenario, name]["score"].mean())
+    return [best, LEARNED] if (scenario, LEARNED) in results else [best]
 
 
 def table(results: dict[tuple[str, str], Results]) -> Table:
     """Return the table of scores, with 95 % intervals."""
     episodes = next(iter(results.values())).episodes
-    shown = Table(title=f"{episodes} worlds each, split test, seed {SEED}; 95 % intervals")
-    shown.add_column("target", no_wrap=True)
-    shown.add_column("policy", no_wrap=True)
+    made = Table(title=f"{episodes} worlds each, split test, seed {SEED}; 95 % intervals")
+    made.add_column("target", no_wrap=True)
+    made.add_column("policy", no_wrap=True)
     for column in ("score", "tracking error, m", "settled", "settling time, s"):
-        shown.add_column(column)
-    shown.add_column("worlds with a contact")
+        made.add_column(column)
+    made.add_column("worlds with a contact")
     keys = list(results)
     for k, ((scenario, name), result) in enumerate(results.items()):
         follows = k > 0 and keys[k - 1][0] == scenario
         ends = k + 1 == len(keys) or keys[k + 1][0] != scenario
-        shown.add_row(
+        made.add_row(
             "" if follows else scenario,
             name,
             *(
@@ -92,7 +125,7 @@ def table(results: dict[tuple[str, str], Results]) -> Table:
             ),
             end_section=ends,
         )
-    return shown
+    return made
 
 
 def _cell(estimate: Estimate) -> str:
