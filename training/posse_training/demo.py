@@ -80,7 +80,7 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
 
 def _mute() -> None:
     """Have the second process say nothing; what goes wrong there is raised here."""
-    sys.stderr = Path(os.devnull).open("w")  # for as long as the process lives
+    sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (for as long as the process lives)
 
 
 def compile_policies(policies: Sequence[Policy]) -> None:
