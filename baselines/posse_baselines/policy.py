@@ -99,6 +99,10 @@ class BasePolicy:
         """Return what the trackers have in mind."""
         return {}
 
+    def leaders(self, memory: Memory) -> npt.NDArray[Any] | None:
+        """Return whom each tracker follows, (E, N), -1 for nobody; ``None``: there is no lead."""
+        return self.annotations(memory).get("leader")
+
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return what the policy remembers, as arrays (E, ...) by name that share its memory."""
         return {}

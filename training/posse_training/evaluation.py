@@ -18,7 +18,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import posse
 from posse import Scenario, get_scenario
-from posse_baselines import Policy, load, rollout
+from posse_baselines import BasePolicy, Policy, load, rollout
+from posse_baselines.policy import Memory
 from posse_training.statistics import Estimate, mean
 
 WORLDS_AT_ONCE: Final = 500
@@ -208,7 +209,7 @@ def play_episode(
     running = np.ones(batch.num_worlds, np.bool_)
     exchanges = ExchangeCounter(batch.num_worlds)
     for step in rollout(batch, policy):
-        exchanges.count(policy.annotations(step.memory).get("leader"), running)
+        exchanges.count(leaders_of(policy, step.memory), running)
         ended = running & (step.terminated | step.truncated)
         if ended.any():
             for name, values in step.infos["metrics"].items():
@@ -222,17 +223,26 @@ def play_episode(
     return columns
 
 
+def leaders_of(policy: Policy, memory: Memory) -> npt.NDArray[Any] | None:
+    """Return whom each tracker follows, (E, N); ``None`` for policies that do not tell."""
+    if isinstance(policy, BasePolicy):
+        return policy.leaders(memory)
+    return policy.annotations(memory).get("leader")
+
+
 class ExchangeCounter:
     """Counts how often the leader that most of a team follows changes, world by world."""
 
     def __init__(self, num_worlds: int) -> None:
         self.total: Column = np.full(num_worlds, np.nan)
         self._leader = np.full(num_worlds, -1)
+        self._seen: npt.NDArray[Any] = np.empty(0)
 
     def count(self, leaders: npt.NDArray[Any] | None, running: npt.NDArray[np.bool_]) -> None:
         """Look at whom the trackers follow now, (E, N) numbers; ``None``: they do not tell."""
-        if leaders is None:
+        if leaders is None or np.array_equal(leaders, self._seen):
             return
+        self._seen = leaders.copy()
         # Whom more than half follow stands in the middle of the row, sorted.
         n = leaders.shape[1]
         middle = np.sort(leaders, axis=1)[:, n // 2]

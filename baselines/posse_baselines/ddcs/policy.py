@@ -137,6 +137,11 @@ class DDCS(BasePolicy):
         notes["estimate_age"] = np.where(minds["known"] != 0, minds["age"], np.float32(-1.0))
         return notes
 
+    def leaders(self, memory: Memory) -> npt.NDArray[Any]:
+        """Return whom each tracker follows, (E, N), -1 for nobody, as a view."""
+        leaders: npt.NDArray[Any] = memory.minds["leader"]
+        return leaders
+
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the minds of the trackers, field by field, as arrays that share their memory."""
         m: _Minds = memory

@@ -41,7 +41,7 @@ def mark_seen(
             seen[k] = step + 1
 
 
-@compiled
+@compiled(seldom=True)
 def begin_search(f: Record, d: Record, seen: npt.NDArray[np.uint16]) -> None:
     """Note that the target is lost; on the open plane, search about where it should be."""
     d.lost_step, d.goal_step = d.step, -1
@@ -70,7 +70,7 @@ def look_around(
             mark_seen(f, d, seen, mates[j].x, mates[j].y, d.step)
 
 
-@compiled
+@compiled(seldom=True)
 def wander(
     f: Record,
     s: Record,

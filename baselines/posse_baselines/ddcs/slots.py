@@ -35,7 +35,7 @@ def slot_place(d: Record, slot: Record) -> tuple[float, float, float, float]:
     return d.now_x + arm_x, d.now_y + arm_y, arm_x, arm_y
 
 
-@compiled
+@compiled(seldom=True)
 def choose_slot(
     f: Record,
     s: Record,
