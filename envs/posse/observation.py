@@ -43,6 +43,7 @@ from posse.survey import (
     SIN,
     TASK,
     choose_nearest,
+    copy_block,
     find_directions,
     keep_team,
     natural,
@@ -178,8 +179,9 @@ def lay_out_task(c: Record, s: FloatArray) -> None:
 
 @compiled
 def _write_task(c: Record, w: Record, number: int, s: FloatArray, o: FloatArray, k: int) -> int:
-    for q in range(_TOLD):
-        o[k + q] = s[TASK + q]
+    copy_block(s, TASK, o, k)
+    copy_block(s, TASK + 8, o, k + 8)
+    o[k + 16] = s[TASK + 16]
     o[k + 3] = np.float32(number)
     o[k + _TOLD] = np.float32(c.horizon - w.step) * c.dt
     return k + _TOLD + 1
@@ -224,7 +226,8 @@ def _write_place(
     distance = np.float32(math.sqrt(dx * dx + dy * dy))
     o[k] = distance
     if distance > _ZERO:
-        return int(_write_direction(hc, hs, dx / distance, dy / distance, o, k + 1))
+        per_metre = _ONE / distance
+        return int(_write_direction(hc, hs, dx * per_metre, dy * per_metre, o, k + 1))
     o[k + 1] = _ONE
     o[k + 2] = _ZERO
     return k + 3

@@ -98,7 +98,7 @@ def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
             t.could_arrive = could_arrive(c, w, t, slots)
         bound += t.could_arrive
         error += t.slot_distance
-        v, turn = t.speed / c.tracker_speed, t.turn_rate / c.tracker_turn_rate
+        v, turn = t.speed * c.per_speed, t.turn_rate * c.per_turn_rate
         effort += v * v + turn * turn
         sight += np.float32(t.sees)
     w.error_sum += error

@@ -22,6 +22,7 @@ from posse.survey import (
     RADIUS,
     READING,
     blocks,
+    copy_block,
     lesser,
     natural,
     num_discs,
@@ -209,7 +210,6 @@ def ping(c: Record, robot: Record, s: FloatArray, o: FloatArray, first: int) -> 
     beams = natural(c.sonar_beams)
     whole = beams // BLOCK
     for block in range(whole):
-        for q in range(BLOCK):
-            o[first + BLOCK * block + q] = s[READING + BLOCK * block + q]
+        copy_block(s, READING + BLOCK * block, o, first + BLOCK * block)
     for k in range(BLOCK * whole, beams):
         o[first + k] = s[READING + k]

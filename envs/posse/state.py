@@ -50,6 +50,7 @@ CONFIG: Final = _record(
     ("radio_range", _F), ("radio_loss", _F), ("sensor_outages", _F), ("radio_outages", _F),
     ("formation_distance", _F), ("formation_spacing", _F),
     ("acceleration_time", _F), ("turn_acceleration_time", _F),
+    ("per_speed", _F), ("per_turn_rate", _F),  # 1 / tracker_speed, 1 / tracker_turn_rate
     ("told_sensing_range", _F), ("told_arena", _F),  # -1: boundless
 )  # fmt: skip
 """A scenario as the kernels read it."""
@@ -276,6 +277,7 @@ def config_record(scenario: Scenario) -> Records:
     c.formation_distance, c.formation_spacing = s.formation_distance, s.formation_spacing
     c.acceleration_time = s.tracker_speed / s.tracker_acceleration
     c.turn_acceleration_time = s.tracker_turn_rate / s.tracker_turn_acceleration
+    c.per_speed, c.per_turn_rate = 1 / s.tracker_speed, 1 / s.tracker_turn_rate
     c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
     c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
     return config

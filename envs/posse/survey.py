@@ -101,6 +101,18 @@ def blocks(count: int) -> int:
 
 
 @compiled
+def copy_block(s: FloatArray, source: int, o: FloatArray, target: int) -> None:
+    """Copy eight numbers of scratch memory.
+
+    All are read before one is written, so that the compiler need not ask whether the two overlap.
+    """
+    a, b, c, d = s[source], s[source + 1], s[source + 2], s[source + 3]
+    e, f, g, h = s[source + 4], s[source + 5], s[source + 6], s[source + 7]
+    o[target], o[target + 1], o[target + 2], o[target + 3] = a, b, c, d
+    o[target + 4], o[target + 5], o[target + 6], o[target + 7] = e, f, g, h
+
+
+@compiled
 def lay_out_beams(beams: FloatArray, s: FloatArray) -> None:
     """Write the directions of the sonar's beams (2, S), and what counts the places of a row.
 

@@ -163,6 +163,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     """
     v, most = c.target_speed, c.tracker_speed
     a = most * most - v * v
+    per_a = _ONE / a
     clear = c.radius + c.radius + _CLEARANCE
     # What it heads for at the start was not its choice, and one that ended in contact was bad.
     loyalty = _LOYALTY if w.step > 0 and w.touching == _NO_BITS else _ZERO
@@ -188,9 +189,9 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         same_way = loyalty * (ux * old_cos + uy * old_sin)
         for side in range(2):
-            value = s[ROOM_AHEAD + k] / a + same_way
+            value = s[ROOM_AHEAD + k] * per_a + same_way
             if side == 1:
-                value = s[ROOM_ASTERN + k] / a - same_way
+                value = s[ROOM_ASTERN + k] * per_a - same_way
             if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
