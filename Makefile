@@ -15,7 +15,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format docs bench bench-costs bench-peers results reproduce clean
+.PHONY: help demo test lint format docs bench bench-costs bench-training bench-peers results reproduce clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ bench: $(FULL) ## Measure the speed of the worlds on this machine
 
 bench-costs: $(FULL) ## Measure where the time of a step goes, and how it grows
 	$(BIN)/python benchmarks/costs.py
+
+bench-training: $(FULL) ## Measure how fast PPO learns, and whose the time is
+	$(BIN)/python benchmarks/training.py
 
 bench-peers: $(FULL) ## Measure the speed beside other simulators
 	$(BIN)/python benchmarks/peers.py

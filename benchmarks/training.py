@@ -1,0 +1,109 @@
+"""``make bench-training``: how fast PPO learns on ``smart``, and whose the time is."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import machine
+import tyro
+from rich.console import Console
+from rich.table import Table
+from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
+
+from posse_training.sb3_vec_env import TeamVecEnv
+from posse_training.settings import TrainSettings
+from posse_training.train import train
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What ``make bench-training`` takes."""
+
+    steps: int = 1_000_000
+    """Agent-steps to train for."""
+    threads: int = 2
+    """Threads for torch."""
+
+
+PARTS: dict[str, tuple[type, str]] = {
+    "torch: updates": (PPO, "train"),
+    "torch: actions and values": (ActorCriticPolicy, "forward"),
+    "worlds and their encoding": (TeamVecEnv, "step_wait"),
+}
+
+
+@contextmanager
+def timed(seconds: dict[str, float]) -> Iterator[None]:
+    """Add up, meanwhile, the time that each part takes."""
+
+    def wrap(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def call(*arguments: Any, **settings: Any) -> Any:
+            started = time.perf_counter()
+            try:
+                return function(*arguments, **settings)
+            finally:
+                seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - started
+
+        return call
+
+    before = {name: getattr(owner, method) for name, (owner, method) in PARTS.items()}
+    for name, (owner, method) in PARTS.items():
+        setattr(owner, method, wrap(name, before[name]))
+    try:
+        yield
+    finally:
+        for name, (owner, method) in PARTS.items():
+            setattr(owner, method, before[name])
+
+
+def main() -> None:
+    """Train, and print the speed and each part's share."""
+    s = tyro.cli(Settings)
+    others, own = machine.OtherWork(), time.process_time()
+    seconds: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder, timed(seconds):
+        settings = TrainSettings(
+            scenario="smart", algorithm="ppo", steps=s.steps, threads=s.threads, beside=None,
+            folder=Path(folder, "run"), evaluate_every=10 * s.steps, tensorboard=False,
+            checkpoint_every=10 * s.steps, evaluate_worlds=1,
+        )  # fmt: skip
+        learn = PPO.learn
+        whole: list[float] = []
+
+        def learn_timed(*arguments: Any, **options: Any) -> Any:
+            started = time.perf_counter()
+            result = learn(*arguments, **options)
+            whole.append(time.perf_counter() - started)
+            return result
+
+        PPO.learn = learn_timed  # type: ignore[method-assign]
+        try:
+            train(settings, console=Console(file=StringIO()))
+        finally:
+            PPO.learn = learn  # type: ignore[method-assign]
+    total = whole[0]
+    table = Table(title=f"PPO on smart: {s.steps / total:,.0f} agent-steps/s, {s.threads} threads")
+    table.add_column("part")
+    table.add_column("share", justify="right")
+    for name, part in seconds.items():
+        table.add_row(name, f"{100 * part / total:.1f} %")
+    rest = total - sum(seconds.values())
+    table.add_row("stable-baselines3's rollout and buffer", f"{100 * rest / total:.1f} %")
+    console = Console()
+    console.print(table)
+    busy = others.cores(time.process_time() - own)
+    console.print(f"cores busy with other work meanwhile: {busy:.2f}")
+
+
+if __name__ == "__main__":
+    main()
