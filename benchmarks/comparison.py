@@ -44,9 +44,9 @@ class Settings:
     """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals over seeds, too."""
     scenarios: tuple[str, ...] = SCENARIOS
     """What to play."""
-    episodes: int = 1000
+    episodes: int = 500
     """Worlds for each policy and scenario."""
-    sweep_episodes: int = 200
+    sweep_episodes: int = 100
     """Worlds at each point of the figures that vary a setting."""
     seed: int = 2026
     """Of the worlds."""

@@ -30,8 +30,8 @@ class Settings:
 
     steps: int = 1_000_000
     """Agent-steps to train for."""
-    threads: int = 2
-    """Threads for torch."""
+    threads: int = 1
+    """Threads for torch; 1 is what ``posse train`` takes unless told otherwise."""
 
 
 PARTS: dict[str, tuple[type, str]] = {
