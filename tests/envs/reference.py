@@ -101,10 +101,11 @@ def on_arc(
 ) -> tuple[complex, complex]:
     """Return place and heading after a time on the circle of (V, ω)."""
     turned = heading * np.exp(1j * turn_rate * time)
-    if abs(turn_rate) < 1e-12:
+    if turn_rate == 0.0:
         return place + speed * time * heading, turned
-    centre = place + 1j * heading * speed / turn_rate
-    return centre - 1j * turned * speed / turn_rate, turned
+    # The circle's centre would be so far away, for a small turn, that the difference of two points
+    # seen from there is all rounding.
+    return place + heading * speed * np.expm1(1j * turn_rate * time) / (1j * turn_rate), turned
 
 
 def free_motion(
