@@ -17,7 +17,6 @@ from posse.compiled import compiled
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
 _THREE_HALVES: Final = np.float32(1.5)
-_TWO: Final = np.float32(2.0)
 _C6: Final = np.float32(1 / 6)
 _C20: Final = np.float32(1 / 20)
 _C42: Final = np.float32(1 / 42)

@@ -23,8 +23,7 @@ _TWO_PI: Final = np.float32(2 * math.pi)
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _CLEARANCE: Final = np.float32(START_CLEARANCE)
-_TARGET_DRAWS: Final = 0  # draws 0 to 3 x tries of the stream START
-_TRACKER_DRAWS: Final = 3 * _TRIES
+_TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come first
 
 
 @compiled
