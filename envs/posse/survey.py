@@ -154,14 +154,15 @@ def num_discs(c: Record) -> int:
 def survey(c: Record, robot: Record, number: int, s: FloatArray) -> None:
     """Write where every disc is as the robot sees it; its own, ``number``, is too far to count."""
     x, y, hc, hs = robot.x, robot.y, robot.heading_cos, robot.heading_sin
+    own = np.float32(number)
     for block in range(blocks(num_discs(c))):
         for k in range(BLOCK):
             j = BLOCK * block + k
             dx, dy = s[X + j] - x, s[Y + j] - y
             ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
             s[AHEAD + j], s[LEFT + j] = ahead, left
-            s[DISTANCE + j] = np.float32(math.sqrt(ahead * ahead + left * left))
-    s[DISTANCE + number] = FAR
+            distance = np.float32(math.sqrt(ahead * ahead + left * left))
+            s[DISTANCE + j] = FAR if s[INDEX + j] == own else distance
 
 
 @compiled

@@ -1,0 +1,132 @@
+"""How numba's compiler is driven: what it leaves out, and what it tells LLVM.
+
+numba's front end, not LLVM, is most of what a kernel takes to compile, so functions that kernels
+link skip what would be thrown away or finds nothing in plain scalar code.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+
+_NO_RUNTIME_UNROLL: Final = "llvm.loop.unroll.runtime.disable"
+
+_NEEDLESS: Final = frozenset(
+    {
+        # For code that ours is not: with-blocks, inner functions, inlined Python, literals, raises.
+        "WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction", "InlineInlinables",
+        "InlineOverloads", "FindLiterallyCalls", "LiteralUnroll",
+        "LiteralPropagationSubPipelinePass", "RewriteDynamicRaises",
+        # For people to read.
+        "AnnotateTypes", "DumpParforDiagnostics", "NoPythonSupportedFeatureValidation",
+    }
+)  # fmt: skip
+"""Passes of numba's that a plain scalar function does without."""
+
+
+class LinkedForm(CompilerBase):
+    """numba's compiler for a function that kernels link: fewer passes, no machine code."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+        self.state.flags = _PlainFlags(self.state.flags)  # type: ignore[no-untyped-call]
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes (numba's name for it)."""
+        pipeline = _pipeline(self.state, _LinkedLibrary)
+        pipeline.passes = [p for p in pipeline.passes if p[0].__name__ not in _NEEDLESS]
+        return [pipeline]
+
+
+class ShortLoops(CompilerBase):
+    """numba's compiler for a kernel whose inner loops are short."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes (numba's name for it)."""
+        pipeline = _pipeline(self.state, _ShortLoopsLibrary)
+        self.state.library.enable_object_caching()
+        return [pipeline]
+
+
+def _pipeline(state: Any, library: type[JITCodeLibrary]) -> Any:
+    codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
+    state.library = library(codegen, name)
+    return DefaultPassBuilder.define_nopython_pipeline(state)  # type: ignore[no-untyped-call]
+
+
+class _PlainFlags(Flags):
+    """numba's flags, compared by what is set alone.
+
+    They are part of a key that is looked up for every operator of every function, where numba
+    lists and sorts all its defaults each time: a sixth of the time to compile.
+    """
+
+    def __hash__(self) -> int:
+        return len(self._values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Flags) and bool(self._values == other._values)
+
+
+class _LoopsAsWritten(JITCodeLibrary):
+    """LLVM code in which no loop of unknown length is unrolled.
+
+    Loops over blocks and trackers run once or a few times: copies of their bodies for long runs
+    would only be jumped over, and take time to compile. A loop of known length is unrolled.
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        for function in ir_module.functions:
+            _mark_loops(ir_module, function)
+        super().add_ir_module(ir_module)  # type: ignore[no-untyped-call]
+
+
+def _mark_loops(module: Any, function: Any) -> None:
+    """Forbid LLVM to unroll at run time what any jump backwards in a function repeats."""
+    place = {id(block): k for k, block in enumerate(function.blocks)}
+    wish = module.add_metadata([_NO_RUNTIME_UNROLL])
+    loops: dict[int, Any] = {}
+    for k, block in enumerate(function.blocks):
+        jump = block.terminator
+        for target in jump.operands if jump is not None and jump.opname == "br" else ():
+            if place.get(id(target), len(place)) > k:
+                continue
+            if id(target) not in loops:
+                # A loop is known by a node whose first part is the node itself.
+                node = module.add_metadata([f"{function.name} {target.name}"])
+                node.operands = (node, wish)
+                loops[id(target)] = node
+            jump.set_metadata("llvm.loop", loops[id(target)])
+
+
+class _LinkedLibrary(_LoopsAsWritten):
+    """LLVM code that waits for a kernel to link, optimise and run it."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True  # and not handed to the engine, which would make machine code
+
+    @property
+    def codegen(self) -> Any:
+        """What numba gives the function's Python environment to: there is none."""
+        return _NoEnvironment
+
+
+class _NoEnvironment:
+    @staticmethod
+    def set_env(name: str, environment: Any) -> None:
+        pass
+
+
+class _ShortLoopsLibrary(_LoopsAsWritten):
+    """LLVM code whose vectors come from what stands side by side, not from turns of a loop."""
+
+    def _optimize_final_module(self) -> None:
+        # Once, not twice: numba's first round serves its reference counts, of which there are none.
+        codegen: Any = self._codegen
+        passes, builder = codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=True)
+        passes.run(self._final_module, builder)
