@@ -10,20 +10,8 @@ from pathlib import Path
 
 import pytest
 
-ENVS = Path(__file__).parents[2] / "envs"
-
-# Loads the one file rather than the package: nothing else of posse matters here, and it is quick.
-COMPILED = """
-import importlib.util, sys
-spec = importlib.util.spec_from_file_location("posse_compiled", {path!r})
-module = importlib.util.module_from_spec(spec)
-sys.modules["posse_compiled"] = module
-spec.loader.exec_module(module)
-compiled, kernel = module.compiled, module.kernel
-"""
-
 HELPER = """
-from herd.decorators import compiled
+from posse.compiled import compiled
 
 @compiled
 def helper(x):
@@ -31,7 +19,7 @@ def helper(x):
 """
 
 KERNEL = """
-from herd.decorators import kernel
+from posse.compiled import kernel
 from herd.helpers import helper
 
 @kernel
@@ -47,7 +35,7 @@ def doubled(x):
 """
 
 SHORT_KERNEL = """
-from herd.decorators import kernel
+from posse.compiled import kernel
 from herd.helpers import helper
 
 @kernel(short_loops=True)
@@ -64,6 +52,16 @@ out = np.zeros(3)
 fill(out)
 stats = fill.stats
 print(out.sum(), sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+LOOPS_MAIN = """
+import numpy as np
+from herd.kernels import fill
+
+out = np.zeros(3)
+fill(out)
+(code,) = fill.inspect_llvm().values()
+print(out.sum(), code.count("sitofp"), 0)
 """
 
 MAIN = """
@@ -116,8 +114,6 @@ def herd(tmp_path: Path) -> Herd:
     package = tmp_path / "sources" / "herd"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("")
-    path = str(ENVS / "posse" / "compiled.py")
-    (package / "decorators.py").write_text(COMPILED.format(path=path))
     (package / "kernels.py").write_text(KERNEL)
     herd = Herd(package.parent)
     herd.write_helper(step=1)
@@ -153,6 +149,14 @@ def test_a_kernel_of_short_loops_is_kept_too(herd: Herd, tmp_path: Path) -> None
     assert parallel.run(tmp_path / "cache").answer == 6.0
     again = parallel.run(tmp_path / "cache")
     assert (again.answer, again.hits, again.misses) == (6.0, 1, 0)
+
+
+def test_a_short_loop_is_not_unrolled_for_long_runs(herd: Herd, tmp_path: Path) -> None:
+    (herd.root / "herd" / "kernels.py").write_text(SHORT_KERNEL)
+    run = Herd(herd.root, LOOPS_MAIN).run(tmp_path / "cache")
+    assert run.answer == 6.0
+    copies_of_the_body = run.hits
+    assert copies_of_the_body == 1
 
 
 def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_stamp(
