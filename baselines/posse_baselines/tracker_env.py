@@ -12,13 +12,8 @@ from gymnasium import spaces
 from posse import ObservationLayout, Scenario, ScenarioError
 from posse.actions import ActionReader, single_action_space
 from posse.arrays import FloatArray
-from posse.single_world import (
-    RENDER_MODES,
-    TERM_NAMES,
-    SingleWorld,
-    frames_per_second,
-    shortened,
-)
+from posse.reward import TERM_NAMES
+from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
@@ -129,11 +124,13 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
         actions = np.array(actions, np.float32)
         actions[0, self.number] = 0
         actions[0, self.number, : len(own)] = own
-        observations, rewards, terms, over = world.advance(actions)
+        observations, over = world.advance(actions)
         self._observations = observations
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": dict(zip(TERM_NAMES, terms[0, self.number].tolist(), strict=True)),
+            "reward_terms": dict(
+                zip(TERM_NAMES, world.terms[0, self.number].tolist(), strict=True)
+            ),
             "working": bool(world.working()[self.number]),
         }
         terminated = bool(over) and world.terminated
@@ -141,7 +138,7 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
             info["metrics"] = world.metrics()
         if self.render_mode == "human":
             self.render()
-        reward = float(rewards[0, self.number])
+        reward = float(world.rewards[0, self.number])
         return self._own(observations), reward, terminated, bool(over) and not terminated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:

@@ -61,11 +61,17 @@ class ActionReader:
     """
 
     def __init__(self, scenario: Scenario, discrete: bool) -> None:
+        self._scenario = scenario
         self._agents = agent_names(scenario)
         self._discrete = discrete
         rows = len(self._agents)
         self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
         self._buffer = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
+        self._flat = self._buffer.reshape(-1)
+        self._row_shape = self._buffer.shape[2:]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ActionReader, (self._scenario, self._discrete)  # copies must not part the buffer
 
     def by_agent(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return the actions of a dictionary by agent.
@@ -77,13 +83,15 @@ class ActionReader:
         if type(actions) is not dict or self._discrete or len(actions) != len(self._agents):
             return self._by_agent_slowly(actions)
         # The usual case, an array of float32 for each agent, without a new array for each step.
-        for agent, row in zip(self._agents, self._buffer[0]):  # noqa: B905 (the hot path)
-            action = actions.get(agent)
-            if type(action) is not np.ndarray or action.dtype is not _FLOAT32:
+        rows = []
+        for agent in self._agents:
+            row = actions.get(agent)
+            if type(row) is not np.ndarray or row.dtype is not _FLOAT32:
                 return self._by_agent_slowly(actions)
-            if action.shape != row.shape:
+            if row.shape != self._row_shape:
                 return self._by_agent_slowly(actions)
-            row[...] = action
+            rows.append(row)
+        np.concatenate(rows, out=self._flat)
         if bad_action(self._buffer) >= 0:
             return self._by_agent_slowly(actions)
         return self._buffer

@@ -23,7 +23,7 @@ from posse.arrays import BoolArray, FloatArray, Records
 from posse.compiled import direct
 from posse.metrics import episode_metrics
 from posse.observation import ObservationLayout
-from posse.reward import REWARD_TERMS
+from posse.reward import REWARD_TERMS, TermsByName
 from posse.scenario import Scenario
 from posse.state import (
     SPLITS,
@@ -44,7 +44,7 @@ _PARTS: Final = 4
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
 _UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
-_TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
+_FLOAT32: Final = np.dtype(np.float32)
 _untyped: Final[Callable[..., int]] = advance
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
@@ -72,7 +72,7 @@ class _Recycler:
 
     def take(self) -> FloatArray:
         if not self._recycle:
-            return np.empty(self._shape, np.float32)
+            return np.empty(self._shape, _FLOAT32)
         for k in range(len(self._arrays)):
             # Two references: this list's, and the argument's of the call itself.
             if sys.getrefcount(self._arrays[k]) == 2:
@@ -156,6 +156,7 @@ class Batch:
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
         self._flags = np.zeros((2, num_worlds), np.bool_)
         self._kernel = direct(_untyped)
+        self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         # What every call of the kernel begins with.
         self._fixed = (*self._tables, self._weights, *self._arrays.all())
         self._orders = np.full(num_worlds, STEP, np.uint8)
@@ -172,7 +173,7 @@ class Batch:
     def __getstate__(self) -> dict[str, Any]:
         derived = (
             "_config", "_tables", "_weights", "_fixed",
-            "_observations", "_terms", "_flags", "_scratch", "_orders", "_kernel",
+            "_observations", "_terms", "_flags", "_scratch", "_orders", "_kernel", "_score",
         )  # fmt: skip
         threads = ("_threads", "_process", "_parts")
         return {k: v for k, v in self.__dict__.items() if k not in derived + threads}
@@ -201,8 +202,7 @@ class Batch:
     @property
     def score(self) -> FloatArray:
         """(E,) the score of the present step; 0 at the start."""
-        scores: FloatArray = self._arrays.world["score"].copy()
-        return scores
+        return self._score.copy()
 
     @property
     def terminated(self) -> BoolArray:
@@ -327,38 +327,42 @@ class Batch:
                 changed.
         """
         self._check_running()
-        observations, rewards, terms, over = self._advance(self.check_actions(actions))
+        checked = self.check_actions(actions)
+        observations, terms = self._observations.take(), self._terms.take()
+        rewards = np.empty(self.observation_shape[:2], _FLOAT32)
+        over = self._run(self._orders, checked, observations, rewards, terms)
         terminated, truncated = self._flags.copy()
         infos: dict[str, Any] = {
-            "score": self._arrays.world["score"].copy(),
-            "reward_terms": dict(zip(_TERM_NAMES, terms.transpose(2, 0, 1), strict=True)),
+            "score": self._score.copy(),
+            "reward_terms": TermsByName(terms),
         }
         if over:
             observations = self._end(observations, terminated | truncated, infos)
         return observations, rewards, terminated, truncated, infos
 
-    def advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    def advance(
+        self, actions: FloatArray, rewards: FloatArray, terms: FloatArray
+    ) -> tuple[FloatArray, int]:
         """Advance every world by one control step as :meth:`step` does, but pack up nothing.
 
         For the environments of one world, where the packing would take longer than the step. The
         actions are taken as they are: they must have been through :meth:`check_actions`, or
         through as good a check. No episode is started in the mode "same_step".
 
+        Args:
+            actions: (E, rows, 2 + message_size).
+            rewards: Where to write the rewards, (E, rows).
+            terms: Where to write the reward terms, (E, rows, K) in the order of ``REWARD_TERMS``.
+
         Returns:
-            observations (E, rows, F), rewards (E, rows), reward terms (E, rows, K) in the order of
-            ``REWARD_TERMS``, and how many worlds' episodes are over.
+            observations (E, rows, F), and how many worlds' episodes are over.
 
         Raises:
             ResetNeeded: As :meth:`step`.
         """
         self._check_running()
-        return self._advance(actions)
-
-    def _advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-        observations, terms = self._observations.take(), self._terms.take()
-        rewards = np.empty(self.observation_shape[:2], np.float32)
-        over = self._run(self._orders, actions, observations, rewards, terms)
-        return observations, rewards, terms, over
+        observations = self._observations.take()
+        return observations, self._run(self._orders, actions, observations, rewards, terms)
 
     def _check_running(self) -> None:
         """Raise if a step is not possible now."""

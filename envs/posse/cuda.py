@@ -333,7 +333,7 @@ class CudaBatch(Batch):
                 observations = self._begin(done.over, anew=False)
         return observations, done.rewards, done.terminated, done.truncated, infos
 
-    def advance(self, actions: FloatArray) -> Any:
+    def advance(self, actions: FloatArray, rewards: FloatArray, terms: FloatArray) -> Any:
         """Not offered: it is for environments of one world, which a GPU would only slow down."""
         raise NotImplementedError("a batch on the GPU has no advance(): call step()")
 

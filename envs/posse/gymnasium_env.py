@@ -12,14 +12,9 @@ from gymnasium import spaces
 from posse.actions import MOTIONS, ActionReader, single_action_space
 from posse.arrays import FloatArray
 from posse.observation import ObservationLayout
+from posse.reward import TERM_NAMES
 from posse.scenario import Scenario, ScenarioError
-from posse.single_world import (
-    RENDER_MODES,
-    TERM_NAMES,
-    SingleWorld,
-    frames_per_second,
-    shortened,
-)
+from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
 
 
@@ -152,10 +147,10 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         world = self._world
         if not world.running:
             world.check_running()
-        observations, rewards, terms, over = world.advance(self._reader.by_row(action))
+        observations, over = world.advance(self._reader.by_row(action))
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": dict(zip(TERM_NAMES, terms[0].T, strict=True)),
+            "reward_terms": dict(zip(TERM_NAMES, world.terms[0].T.copy(), strict=True)),
         }
         if self._breakable:
             info["working"] = world.working()
@@ -166,7 +161,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
             info["metrics"] = world.metrics()
         if self.render_mode == "human":
             self.render()
-        row = rewards[0].tolist()
+        row = world.rewards.tolist()[0]
         return observations[0], sum(row) / len(row), terminated, truncated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
@@ -230,10 +225,10 @@ class SoloEnv(TeamEnv):
         if not world.running:
             world.check_running()
         actions = self._reader.by_agent({"tracker_0": action})
-        observations, rewards, terms, over = world.advance(actions)
+        observations, over = world.advance(actions)
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": dict(zip(TERM_NAMES, terms[0, 0].tolist(), strict=True)),
+            "reward_terms": dict(zip(TERM_NAMES, world.terms[0, 0].tolist(), strict=True)),
         }
         terminated = truncated = False
         if over:
@@ -242,7 +237,7 @@ class SoloEnv(TeamEnv):
             info["metrics"] = world.metrics()
         if self.render_mode == "human":
             self.render()
-        return observations[0, 0], rewards.item(), terminated, truncated, info
+        return observations[0, 0], world.rewards.item(), terminated, truncated, info
 
 
 def solo_options(options: dict[str, Any] | None) -> dict[str, Any] | None:

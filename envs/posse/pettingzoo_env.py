@@ -16,14 +16,9 @@ from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 from posse.actions import ActionReader, agent_names, single_action_space
 from posse.arrays import FloatArray
 from posse.observation import ObservationLayout
+from posse.reward import TERM_NAMES
 from posse.scenario import Scenario, ScenarioError
-from posse.single_world import (
-    RENDER_MODES,
-    TERM_NAMES,
-    SingleWorld,
-    frames_per_second,
-    shortened,
-)
+from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
 
 _Infos = dict[str, dict[str, Any]]
@@ -184,12 +179,12 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         world, agents = self._world, self.agents
         if not world.running:
             world.check_running()
-        observations, rewards, terms, over = world.advance(self._reader.by_agent(actions))
+        observations, over = world.advance(self._reader.by_agent(actions))
         score = world.score
         infos: _Infos = {
             # zip's default is right: as many of each, and this is the hot path.
             agent: {"score": score, "reward_terms": dict(zip(TERM_NAMES, values))}  # noqa: B905
-            for agent, values in zip(agents, terms[0].tolist())  # noqa: B905
+            for agent, values in zip(agents, world.terms.tolist()[0])  # noqa: B905
         }
         if self._breakable:
             self._tell_who_works(infos)
@@ -205,7 +200,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             self.render()
         return (
             dict(zip(agents, observations[0])),  # noqa: B905
-            dict(zip(agents, rewards[0].tolist())),  # noqa: B905
+            dict(zip(agents, world.rewards.tolist()[0])),  # noqa: B905
             dict.fromkeys(agents, terminated),
             dict.fromkeys(agents, truncated),
             infos,

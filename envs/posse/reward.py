@@ -6,7 +6,7 @@ computed by the kernels and reported, with nothing else to touch.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -92,6 +92,34 @@ def team(c: Record, w: Record, t: Record) -> np.float32:
 
 REWARD_TERMS: Final = tuple(_terms)
 """Every term, in the order in which they are reported."""
+TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
+
+
+class TermsByName(Mapping[str, FloatArray]):
+    """The terms (E, rows, K) of a step by name, (E, rows) each.
+
+    A view is made when it is asked for: to make all of them takes a third of a world's step.
+    """
+
+    __slots__ = ("_terms",)
+
+    def __init__(self, terms: FloatArray) -> None:
+        self._terms = terms
+
+    def __getitem__(self, name: str) -> FloatArray:
+        if name not in TERM_NAMES:
+            raise KeyError(name)
+        term: FloatArray = self._terms[..., TERM_NAMES.index(name)]
+        return term
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(TERM_NAMES)
+
+    def __len__(self) -> int:
+        return len(TERM_NAMES)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
 
 
 def _chain(position: int) -> Any:

@@ -20,7 +20,6 @@ from posse.scenarios import get_scenario
 from posse.state import NEVER
 
 RENDER_MODES: Final = ("human", "rgb_array")
-TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
 _OPTIONS: Final = ("tracker_pose", "target_pose")
 
 
@@ -36,6 +35,8 @@ class SingleWorld:
 
     Attributes:
         running: Whether a step is possible: after a reset, and before the end.
+        rewards: (1, rows) of the last step; the next one overwrites them.
+        terms: (1, rows, K) reward terms of the last step, likewise.
 
     Raises:
         ValueError: An unknown split or render mode, a negative seed or number of the world.
@@ -70,8 +71,10 @@ class SingleWorld:
         self._prepare()
 
     def _prepare(self) -> None:
-        # Views made once: making one takes longer than reading it.
+        # Made once: making a view or an array takes longer than reading it.
         self._score = self.batch.worlds["score"]
+        self.rewards: FloatArray = np.zeros((1, self.scenario.num_agents), np.float32)
+        self.terms: FloatArray = np.zeros((*self.rewards.shape, len(REWARD_TERMS)), np.float32)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None, "_score": None, "_state_layout": None}
@@ -112,15 +115,14 @@ class SingleWorld:
         first: FloatArray = observations[0]
         return first
 
-    def advance(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    def advance(self, actions: FloatArray) -> tuple[FloatArray, int]:
         """Make a control step; actions (1, rows, 2 + m) that were checked.
 
         Returns:
-            observations (1, rows, F), rewards (1, rows), reward terms (1, rows, K), and 1 where
-            the episode is over.
+            observations (1, rows, F), and 1 where the episode is over.
         """
-        result = self.batch.advance(actions)
-        if result[3]:
+        result = self.batch.advance(actions, self.rewards, self.terms)
+        if result[1]:
             self.running = False
         return result
 

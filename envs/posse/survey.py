@@ -55,12 +55,15 @@ MATE_SIN: Final = 29 * _ROW
 CANDIDATE: Final = 30 * _ROW  # how far those are that may be among the nearest,
 CANDIDATE_NUMBER: Final = 31 * _ROW  # and who they are
 LANE: Final = 32 * _ROW
-SIZE: Final = 33 * _ROW
+RANK: Final = 33 * _ROW
+SIZE: Final = 34 * _ROW
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
 
 FAR: Final = np.float32(1e9)
+_NEARER_THAN_FAR: Final = np.float32(0.9e9)
+_PLACES: Final = np.float32(BLOCK)
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
@@ -229,28 +232,49 @@ def place_of(j: int, n: int, distances: int, s: FloatArray) -> int:
 
 
 @compiled
+def bound_nearest(n: int, s: FloatArray) -> np.float32:
+    """Return a distance within which the eight nearest of n team-mates are, and few others.
+
+    The team is dealt out to sixteen lanes. The nearest of each lane are sixteen team-mates, so none
+    of the eight nearest is farther than the eighth of these.
+    """
+    for k in range(BLOCK):
+        s[LANE + k] = FAR
+        s[LANE + BLOCK + k] = FAR
+        s[RANK + k] = _ZERO
+        s[RANK + BLOCK + k] = _ZERO
+    for block in range(blocks(n)):
+        lane = LANE + BLOCK * (block & 1)
+        for k in range(BLOCK):
+            s[lane + k] = lesser(s[lane + k], s[MATE_DISTANCE + BLOCK * block + k])
+    for i in range(2 * BLOCK):
+        nearer = s[LANE + i]
+        for k in range(BLOCK):
+            s[RANK + k] += _ONE if nearer < s[LANE + k] else _ZERO
+        for k in range(BLOCK):
+            s[RANK + BLOCK + k] += _ONE if nearer < s[LANE + BLOCK + k] else _ZERO
+    for k in range(BLOCK):
+        first, second = s[LANE + k], s[LANE + BLOCK + k]
+        first = first if s[RANK + k] < _PLACES else _ZERO
+        second = second if s[RANK + BLOCK + k] < _PLACES else _ZERO
+        s[LANE + k] = max(first, second)
+    left = max(max(s[LANE], s[LANE + 1]), max(s[LANE + 2], s[LANE + 3]))
+    right = max(max(s[LANE + 4], s[LANE + 5]), max(s[LANE + 6], s[LANE + 7]))
+    return min(max(left, right), _NEARER_THAN_FAR)
+
+
+@compiled
 def choose_nearest(n: int, places: int, s: FloatArray) -> int:
     """List the nearest of n team-mates, NEAREST first; return how many, at most ``places``.
 
     MATE_DISTANCE says how far each is, FAR for those that do not count.
     """
-    most = FAR
-    if places <= BLOCK:
-        # The nearest of each lane are eight team-mates, so none of the eight nearest is farther
-        # than the farthest of these.
-        for k in range(BLOCK):
-            s[LANE + k] = s[MATE_DISTANCE + k]
-        for block in range(1, blocks(n)):
-            for k in range(BLOCK):
-                s[LANE + k] = lesser(s[LANE + k], s[MATE_DISTANCE + BLOCK * block + k])
-        most = s[LANE]
-        for k in range(1, BLOCK):
-            most = max(most, s[LANE + k])
+    most = bound_nearest(n, s) if places <= BLOCK else _NEARER_THAN_FAR
     count = 0
     for j in range(natural(n)):  # without a branch, which could not be predicted
         distance = s[MATE_DISTANCE + j]
-        s[CANDIDATE + count], s[CANDIDATE_NUMBER + count] = distance, np.float32(j)
-        count = natural(count + int((distance <= most) & (distance < FAR)))
+        s[CANDIDATE + count], s[CANDIDATE_NUMBER + count] = distance, s[INDEX + j]
+        count = natural(count + int(distance <= most))
     for k in range(count, BLOCK * blocks(count)):
         s[CANDIDATE + k] = FAR
     for q in range(count):

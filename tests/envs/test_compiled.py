@@ -61,7 +61,7 @@ from herd.kernels import fill
 out = np.zeros(3)
 fill(out)
 (code,) = fill.inspect_llvm().values()
-print(out.sum(), code.count("sitofp"), 0)
+print(out.sum(), code.count("store double"), 0)
 """
 
 MAIN = """
