@@ -19,7 +19,7 @@ from numba.core import types
 from numba.core.registry import CPUDispatcher
 
 from posse.kernel_cache import KernelCache, cache_directory, package_directory, package_stamp
-from posse.pipeline import LinkedForm, ShortLoops
+from posse.pipeline import Kernel, LinkedForm, ShortLoops
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -115,8 +115,8 @@ def kernel(function: F | None = None, *, short_loops: bool = False) -> F | Calla
             return function
         package = package_directory(function)
         package_stamp(package)
-        options = {**_OPTIONS, "pipeline_class": ShortLoops} if short_loops else _OPTIONS
-        dispatcher = numba.njit(**options)(function)
+        form = ShortLoops if short_loops else Kernel
+        dispatcher = numba.njit(**_OPTIONS, pipeline_class=form)(function)
         if package is not None and cache_directory() is not None:
             dispatcher._cache = KernelCache(function)  # type: ignore[no-untyped-call]
         return cast("F", dispatcher)
