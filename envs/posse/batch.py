@@ -153,6 +153,7 @@ class Batch:
         self._tables = (self._config, slot_records(scenario), beam_directions(scenario))
         self._weights = reward_weights(scenario)
         self._observations = _Recycler((num_worlds, rows, size))
+        self._rewards = _Recycler((num_worlds, rows))
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
         self._flags = np.zeros((2, num_worlds), np.bool_)
         self._kernel = direct(_untyped)
@@ -173,7 +174,8 @@ class Batch:
     def __getstate__(self) -> dict[str, Any]:
         derived = (
             "_config", "_tables", "_weights", "_fixed",
-            "_observations", "_terms", "_flags", "_scratch", "_orders", "_kernel", "_score",
+            "_observations", "_rewards", "_terms", "_flags", "_score",
+            "_scratch", "_orders", "_kernel",
         )  # fmt: skip
         threads = ("_threads", "_process", "_parts")
         return {k: v for k, v in self.__dict__.items() if k not in derived + threads}
@@ -328,8 +330,8 @@ class Batch:
         """
         self._check_running()
         checked = self.check_actions(actions)
-        observations, terms = self._observations.take(), self._terms.take()
-        rewards = np.empty(self.observation_shape[:2], _FLOAT32)
+        observations = self._observations.take()
+        rewards, terms = self._rewards.take(), self._terms.take()
         over = self._run(self._orders, checked, observations, rewards, terms)
         terminated, truncated = self._flags.copy()
         infos: dict[str, Any] = {
@@ -447,9 +449,8 @@ class Batch:
         """Start an episode in the chosen worlds; return every world's observations."""
         observations = self._observations.take()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
-        rewards = np.empty(self.observation_shape[:2], np.float32)
         actions = np.empty(self.action_shape, np.float32)  # not read
-        self._run(orders, actions, observations, rewards, self._terms.take())
+        self._run(orders, actions, observations, self._rewards.take(), self._terms.take())
         self._kernel = direct(_untyped)  # by now there is one
         return observations
 

@@ -103,7 +103,9 @@ def kernel(function: F | None = None, *, short_loops: bool = False) -> F | Calla
     Written as ``@kernel``, or as ``@kernel(short_loops=True)`` where the inner loops are short
     (over trackers, beams, places). Those are not vectorised as loops, since to find out at run
     time whether one is long enough takes longer than the loop; a loop of fixed length (over a
-    block of eight, say) is unrolled instead, and its turns are done at once.
+    block of eight, say) is unrolled instead, and its turns are done at once. The arrays that such a
+    kernel is given must not overlap: what it reads from one it then need not read again after it
+    has written to another.
 
     The directory is ``$POSSE_CACHE_DIR``, or ``posse`` in the user's cache directory. Where it
     cannot be written, and for functions outside a package (a script, a notebook), every process

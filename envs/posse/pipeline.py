@@ -64,7 +64,11 @@ class Kernel(CompilerBase):
 
 
 class ShortLoops(Kernel):
-    """numba's compiler for a kernel whose inner loops are short."""
+    """numba's compiler for a kernel whose inner loops are short, and whose arrays are apart."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+        self.state.flags.noalias = True
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes (numba's name for it)."""
