@@ -20,7 +20,7 @@ from posse_baselines.registry import shipped
 from posse_training.compare import Comparison, compare
 from posse_training.compare import Settings as CompareSettings
 from posse_training.contenders import Plays, play, read_contenders
-from posse_training.export import commit
+from posse_training.provenance import commit
 from posse_training.statistics import Estimate
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))

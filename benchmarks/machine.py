@@ -9,13 +9,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+from posse_training.provenance import commit
+
 STAT = Path("/proc/stat")
 IDLE, IO_WAIT = 3, 4
 """Places of the times without work in the first line of STAT."""
 
 
 def describe() -> dict[str, Any]:
-    """Return what a reader needs to compare figures: processor, cores, memory, system, date."""
+    """Return what a reader needs to compare figures: the machine, the date, the commit."""
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -23,6 +25,7 @@ def describe() -> dict[str, Any]:
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
         "date": dt.date.today().isoformat(),
+        "commit": commit(),
         "load_average": os.getloadavg()[0],
     }
 

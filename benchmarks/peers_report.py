@@ -106,7 +106,7 @@ def _machine(machine: dict[str, Any]) -> str:
     return (
         f"Made by `make bench-peers`, from one run on one machine: {machine['processor']}, "
         f"{machine['cores']} cores, {machine['memory_gib']} GiB, {machine['system']}, "
-        f"Python {machine['python']}, {machine['date']}."
+        f"Python {machine['python']}, {machine['date']}, commit `{machine['commit']}`."
     )
 
 
@@ -115,7 +115,7 @@ def _disturbance(rows: list[Row]) -> str:
     taken = sum(len(row["samples"]) for row in rows)
     dropped = sum(row["dropped"] for row in rows)
     if not spoilt:
-        return f"Nothing else kept the machine busy; {dropped} disturbed samples were repeated."
+        return f"Nothing else kept the machine busy; disturbed samples that were repeated: {dropped}."
     return DISTURBED.format(spoilt=spoilt, taken=taken, dropped=dropped)
 
 

@@ -13,7 +13,7 @@ import tyro
 
 import posse
 from posse_training.evaluation import Results, evaluate
-from posse_training.export import commit
+from posse_training.provenance import commit
 from posse_training.statistics import Estimate, mean, share
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import platform
-import subprocess
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,7 @@ from posse_baselines.advice import MOTION, Adviser
 from posse_baselines.encoding import Encoding
 from posse_baselines.learned import LearnedPolicy, Network
 from posse_training.normalisation import LIMIT, Normaliser
+from posse_training.provenance import commit
 from posse_training.settings import TrainSettings
 
 
@@ -117,22 +116,3 @@ def make_card(
             "stable-baselines3": stable_baselines3.__version__,
         },
     }
-
-
-def commit() -> str | None:
-    """Return the commit of the sources, with ``+`` where they were changed; ``None``: unknown."""
-    here = Path(__file__).parent
-
-    def git(*arguments: str) -> str:
-        done = subprocess.run(
-            ["git", *arguments], cwd=here, capture_output=True, text=True, check=True, timeout=10
-        )
-        return done.stdout.strip()
-
-    try:
-        # Pages and results that are being made do not count.
-        sources = [f":/{root}" for root in ("envs", "baselines", "training")]
-        changed = git("status", "--porcelain", "--", *sources, ":(exclude,top)**/shipped/*")
-        return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
-    except (OSError, subprocess.SubprocessError):
-        return None
