@@ -31,6 +31,7 @@ lint: $(FULL) ## Style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py
 
 format: $(FULL) ## Rewrite the sources in the project's style
 	$(BIN)/ruff check --fix

@@ -10,6 +10,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,19 +45,20 @@ class Settings:
 
 
 @kernel(short_loops=True)
-def one_part(
+def one_part(  # type: ignore[no-untyped-def]
     part, config, slots, beams, weights, worlds, trackers, obstacles, heard, broadcast,
     heard_message, message, actions, observations, rewards, terms, scratch,
-):  # type: ignore[no-untyped-def] # fmt: skip
+):  # fmt: skip
     """Do one part of a step in every world."""
+    world.prepare(config, beams, scratch)
     c = config[0]
     for e in range(len(worlds)):
         w, t, o = worlds[e], trackers[e], obstacles[e]
         if part == 0:
             world.motion(c, w, t, o, actions[e], scratch)
-        elif part == 1:
-            survey.lay_out(c, w, t, o, scratch)
-        elif part == 2:
+            continue
+        survey.lay_out(c, w, t, o, scratch)  # what the other parts start from
+        if part == 2:
             contact.meet(c, w, t, o, scratch)
         elif part == 3:
             w.step += 1
@@ -67,7 +69,7 @@ def one_part(
             score.add_up(c, w, t, slots)
         elif part == 6:
             world.reward(c, w, t, weights, rewards[e], terms[e])
-        else:
+        elif part == 7:
             world.observe(
                 c, w, t, o, heard[e], heard_message[e], message[e], scratch, observations[e]
             )
@@ -99,15 +101,19 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     """Return what each part of a step costs for a tracker, ns; ``"step"`` is the whole."""
     batch, actions = moving(scenario, 256)
     agents = batch.num_worlds * batch.scenario.num_trackers
-    observations, rewards, terms, _ = batch.advance(actions)
+    rewards = np.empty(batch.observation_shape[:2], np.float32)
+    terms = np.empty((*rewards.shape, len(posse.REWARD_TERMS)), np.float32)
+    observations, _ = batch.advance(actions, rewards, terms)
     scratch = survey.new_scratch()
     arguments = (*batch._fixed, actions, observations, rewards, terms, scratch)
-    costs = {"step": best(lambda: batch.advance(actions), seconds) / agents * 1e9}
+    costs = {"step": best(lambda: batch.advance(actions, rewards, terms), seconds) / agents * 1e9}
     snapshot = batch.save()
     for number, name in enumerate(PARTS):
         batch.restore(snapshot)
-        took = best(lambda n=number: one_part(n, *arguments), seconds)  # type: ignore[misc]
+        took = best(partial(one_part, number, *arguments), seconds)
         costs[name] = took / agents * 1e9
+        if number > 1:
+            costs[name] -= costs[PARTS[1]]
     return costs
 
 

@@ -115,7 +115,7 @@ def _disturbance(rows: list[Row]) -> str:
     taken = sum(len(row["samples"]) for row in rows)
     dropped = sum(row["dropped"] for row in rows)
     if not spoilt:
-        return f"Nothing else kept the machine busy; disturbed samples that were repeated: {dropped}."
+        return f"Nothing else kept the machine busy. Disturbed samples, repeated: {dropped}."
     return DISTURBED.format(spoilt=spoilt, taken=taken, dropped=dropped)
 
 
@@ -133,7 +133,7 @@ def _number(value: float) -> str:
 
 def _ratio(row: Row) -> float:
     pairs = zip(row["samples"], row["yardstick"], strict=True)
-    return statistics.median(ours / theirs for ours, theirs in pairs)
+    return float(statistics.median(ours / theirs for ours, theirs in pairs))
 
 
 def _lines(header: list[str], rule: list[str], body: list[list[str]]) -> str:

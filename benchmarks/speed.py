@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -75,8 +76,8 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
             actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
             copy = np.empty_like(observations)
             agents = observations.shape[0] * observations.shape[1]
-            rate = per_second(lambda b=batch, a=actions: b.step(a), settings.seconds)
-            plain = per_second(lambda c=copy, o=observations: np.copyto(c, o), settings.seconds)
+            rate = per_second(partial(batch.step, actions), settings.seconds)
+            plain = per_second(partial(np.copyto, copy, observations), settings.seconds)
             rows.append(
                 {
                     "worlds": count,
@@ -95,14 +96,14 @@ def finished(step: Callable[[], object], times: int) -> None:
     """Call a function of the GPU some times, and wait until it is done."""
     for _ in range(times):
         step()
-    numba.cuda.synchronize()
+    numba.cuda.synchronize()  # type: ignore[no-untyped-call]
 
 
 def bandwidth(seconds: float) -> float:
     """Return bytes a second, read and written, of a plain copy in the GPU's memory."""
     source, target = (numba.cuda.device_array(1 << 28, np.float32) for _ in range(2))
     copies = per_second(lambda: finished(lambda: target.copy_to_device(source), 10), seconds)
-    return copies[0] * 10 * 2 * source.nbytes
+    return float(copies[0] * 10 * 2 * source.nbytes)
 
 
 def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
@@ -114,9 +115,9 @@ def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
         batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
-        once = lambda b=batch, a=actions: b.step(a, check=False)  # noqa: E731
-        rate = [10 * r for r in per_second(lambda o=once: finished(o, 10), settings.seconds)]
-        checked = per_second(lambda b=batch, a=actions: b.step(a), settings.seconds)
+        once = partial(batch.step, actions, check=False)
+        rate = [10 * r for r in per_second(partial(finished, once, 10), settings.seconds)]
+        checked = per_second(partial(batch.step, actions), settings.seconds)
         agents = count * batch.observation_shape[1]
         # State read and written, actions read, results written.
         outputs = agents * (batch.observation_shape[2] + 1 + len(posse.REWARD_TERMS)) * 4
@@ -140,7 +141,7 @@ def report_gpu(settings: Settings) -> None:
 
     check_device()
     rows = gpu_batches(settings)
-    name = numba.cuda.get_current_device().name
+    name = numba.cuda.get_current_device().name  # type: ignore[no-untyped-call]
     figures = {
         "device": name.decode() if isinstance(name, bytes) else str(name),
         "machine": machine.describe(),
