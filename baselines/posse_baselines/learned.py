@@ -30,7 +30,7 @@ from posse.compiled import compiled, kernel
 from posse_baselines.advice import MOTION, Adviser, advised, check_adviser
 from posse_baselines.encoding import Encoder, Encoding, encode_row
 from posse_baselines.features import SCRATCH
-from posse_baselines.parallel import most_threads, over_worlds
+from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (
     Annotations,
     BasePolicy,
@@ -262,7 +262,7 @@ class LearnedPolicy(BasePolicy):
         """
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)
-        scratch = np.empty((most_threads(), SCRATCH + 2 * max(self.network.sizes)), np.float32)
+        scratch = np.empty((MOST_THREADS, SCRATCH + 2 * max(self.network.sizes)), np.float32)
         thoughts = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
         return layout, num_worlds, encoder, scratch, thoughts
 

@@ -18,7 +18,7 @@ from posse.compiled import compiled, kernel
 from posse.state import NEVER, config_record, slot_records
 from posse_baselines.assignment import WORK_ROWS, assign
 from posse_baselines.guidance import wrap
-from posse_baselines.parallel import most_threads, over_worlds
+from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (
     BasePolicy,
     Memory,
@@ -135,7 +135,7 @@ class Oracle(BasePolicy):
         n = layout.scenario.num_trackers
         plans = np.zeros((num_worlds, n), PLAN)
         plans["slot"] = -1
-        parts = most_threads()
+        parts = MOST_THREADS
         return _OracleMemory(
             batch, config_record(layout.scenario), slot_records(layout.scenario), plans,
             np.zeros((parts, n, n), np.float32), np.zeros((parts, WORK_ROWS, n + 1), np.float32),

@@ -5,12 +5,10 @@ Everything else (PettingZoo, Gymnasium, training, evaluation) stands on :class:`
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 import sys
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -34,13 +32,10 @@ from posse.state import (
     slot_records,
 )
 from posse.survey import new_scratch
+from posse.turns import by_turns, threads_for
 from posse.world import LOOK, START, START_FROM_POSES, STEP, advance, bad_action, first_over
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
-_SERIAL_BELOW: Final = 2048
-"""Agents in a batch below which waking other threads costs more than it saves."""
-_PARTS: Final = 4
-"""Parts of a batch for each thread."""
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
 _UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
@@ -161,15 +156,8 @@ class Batch:
         # What every call of the kernel begins with.
         self._fixed = (*self._tables, self._weights, *self._arrays.all())
         self._orders = np.full(num_worlds, STEP, np.uint8)
-        self._threads: ThreadPoolExecutor | None = None
-        self._process = -1
-        threads = min(self.num_threads, num_worlds)
-        if num_worlds * rows < _SERIAL_BELOW:
-            threads = 1
+        threads = threads_for(num_worlds, rows, self.num_threads)
         self._scratch = [new_scratch() for _ in range(threads)]
-        count = min(num_worlds, threads * _PARTS)
-        edges = [num_worlds * k // count for k in range(count + 1)]
-        self._parts = list(itertools.pairwise(edges))
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (
@@ -177,8 +165,7 @@ class Batch:
             "_observations", "_rewards", "_terms", "_flags", "_score",
             "_scratch", "_orders", "_kernel",
         )  # fmt: skip
-        threads = ("_threads", "_process", "_parts")
-        return {k: v for k, v in self.__dict__.items() if k not in derived + threads}
+        return {k: v for k, v in self.__dict__.items() if k not in derived}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -430,20 +417,14 @@ class Batch:
         if _UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
                 return int(_untyped(*arguments, self._scratch[0], 0, self.num_worlds))
-        kernel = self._kernel
-        mine, *others = self._scratch
-        if not others:
-            return kernel(*arguments, mine, 0, self.num_worlds)
-        if self._threads is None or self._process != os.getpid():
-            self._threads = ThreadPoolExecutor(len(others), "posse")
-            self._process = os.getpid()  # threads do not survive a fork
-        parts = iter(self._parts)  # each thread takes the next one: none waits for a slower one
+        kernel, scratch = self._kernel, self._scratch
+        if len(scratch) == 1:
+            return kernel(*arguments, scratch[0], 0, self.num_worlds)
 
-        def work(scratch: FloatArray) -> int:
-            return sum(kernel(*arguments, scratch, *part) for part in parts)
+        def work(thread: int, first: int, last: int) -> int:
+            return kernel(*arguments, scratch[thread], first, last)
 
-        waiting = [self._threads.submit(work, scratch) for scratch in others]
-        return work(mine) + sum(thread.result() for thread in waiting)
+        return sum(by_turns(work, self.num_worlds, len(scratch)))
 
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
         """Start an episode in the chosen worlds; return every world's observations."""

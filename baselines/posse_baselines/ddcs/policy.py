@@ -19,7 +19,7 @@ from posse_baselines.ddcs.memory import GRID, MATE, MIND
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.offsets import offsets_of
-from posse_baselines.parallel import most_threads, over_worlds
+from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (
     Annotations,
     BasePolicy,
@@ -102,7 +102,7 @@ class DDCS(BasePolicy):
         num_worlds, n = m.minds.shape
         observations = check_observations(self, observations, num_worlds, m.layout)
         actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
-        parts = most_threads()
+        parts = MOST_THREADS
         work = (
             np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)), m.beams,
             np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
