@@ -67,11 +67,11 @@ class ActionReader:
         rows = len(self._agents)
         self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
         self._buffer = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
-        self._flat = self._buffer.reshape(-1)
+        self._rows = list(zip(self._agents, self._buffer[0], strict=True))
         self._row_shape = self._buffer.shape[2:]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return ActionReader, (self._scenario, self._discrete)  # copies must not part the buffer
+        return ActionReader, (self._scenario, self._discrete)  # rows must stay the buffer's
 
     def by_agent(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return the actions of a dictionary by agent.
@@ -83,15 +83,13 @@ class ActionReader:
         if type(actions) is not dict or self._discrete or len(actions) != len(self._agents):
             return self._by_agent_slowly(actions)
         # The usual case, an array of float32 for each agent, without a new array for each step.
-        rows = []
-        for agent in self._agents:
-            row = actions.get(agent)
-            if type(row) is not np.ndarray or row.dtype is not _FLOAT32:
+        for agent, row in self._rows:
+            action = actions.get(agent)
+            if type(action) is not np.ndarray or action.dtype is not _FLOAT32:
                 return self._by_agent_slowly(actions)
-            if row.shape != self._row_shape:
+            if action.shape != self._row_shape:
                 return self._by_agent_slowly(actions)
-            rows.append(row)
-        np.concatenate(rows, out=self._flat)
+            row[...] = action
         if bad_action(self._buffer) >= 0:
             return self._by_agent_slowly(actions)
         return self._buffer

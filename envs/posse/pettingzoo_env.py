@@ -109,6 +109,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         }
         self._reader = ActionReader(self.scenario, discrete_actions)
         self._breakable = self.scenario.breaks > 0
+        self._nobody = dict.fromkeys(self.possible_agents, False)
         self._state_space: spaces.Box | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -188,10 +189,10 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         }
         if self._breakable:
             self._tell_who_works(infos)
-        terminated = truncated = False
+        terminated, truncated = self._nobody.copy(), self._nobody.copy()
         if over:
-            terminated = world.terminated
-            truncated = not terminated
+            ended = terminated if world.terminated else truncated
+            ended.update(dict.fromkeys(agents, True))
             metrics = world.metrics()
             for info in infos.values():
                 info["metrics"] = metrics.copy()
@@ -201,8 +202,8 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         return (
             dict(zip(agents, observations[0])),  # noqa: B905
             dict(zip(agents, world.rewards.tolist()[0])),  # noqa: B905
-            dict.fromkeys(agents, terminated),
-            dict.fromkeys(agents, truncated),
+            terminated,
+            truncated,
             infos,
         )
 
