@@ -106,9 +106,10 @@ def hear(
 
 @compiled(seldom=True)
 def connected(c: Record, w: Record, trackers: Records) -> bool:
-    """Say whether the working trackers are one radio graph, over any number of hops."""
-    if c.perfect_radio:
-        return True
+    """Say whether the working trackers are one radio graph, over any number of hops.
+
+    A perfect radio makes one of them without a look.
+    """
     n = c.num_trackers
     reach2 = c.radio_range * c.radio_range
     waiting = _NO_BITS  # still to be reached

@@ -107,7 +107,7 @@ def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
     w.tracker_steps += np.float32(w.working)
     if w.working > 0:
         w.bound_sum += np.float32(bound) / np.float32(w.working)
-    if connected(c, w, trackers):
+    if c.perfect_radio or connected(c, w, trackers):
         w.connected_sum += _ONE
     if w.held >= c.settle_steps:
         begun = w.step - w.held + 1

@@ -149,10 +149,13 @@ def sense(
     message: FloatArray,
 ) -> None:
     """Let every tracker look for the target, then tell and hear."""
+    seeing = 0
     for i in range(c.num_trackers):
         look(c, w, trackers[i], obstacles, i)
+        seeing += trackers[i].sees
     if c.perfect_radio:
-        share_fixes(c, trackers)
+        if seeing < c.num_trackers:  # else nobody has anything to hear
+            share_fixes(c, trackers)
     else:
         send(c, w, trackers, broadcast)
         hear(c, w, trackers, heard, broadcast, heard_message, message)
