@@ -87,7 +87,7 @@ class _PlainFlags(Flags):
     """numba's flags, compared by what is set alone.
 
     They are part of a key that is looked up for every operator of every function, where numba
-    lists and sorts all its defaults each time: a sixth of the time to compile.
+    lists and sorts all its defaults each time, for a sixth of the time to compile.
     """
 
     def __hash__(self) -> int:

@@ -95,6 +95,21 @@ REWARD_TERMS: Final = tuple(_terms)
 TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
 
 
+def _naming() -> Callable[..., dict[str, float]]:
+    values = ", ".join(TERM_NAMES)
+    literal = ", ".join(f"{name!r}: {name}" for name in TERM_NAMES)
+    naming: Callable[..., dict[str, float]] = eval(f"lambda {values}: {{{literal}}}")
+    return naming
+
+
+terms_by_name = _naming()
+"""(a tracker's terms, in order) -> them by name.
+
+Written out as a literal, which is made in half the time of ``dict(zip(...))``: to name the terms is
+a third of a step of one world.
+"""
+
+
 class TermsByName(Mapping[str, FloatArray]):
     """The terms (E, rows, K) of a step by name, (E, rows) each.
 
