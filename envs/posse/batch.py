@@ -349,7 +349,8 @@ class Batch:
         Raises:
             ResetNeeded: As :meth:`step`.
         """
-        self._check_running()
+        if not self._started or self.autoreset == "disabled":
+            self._check_running()
         observations = self._observations.take()
         return observations, self._run(self._orders, actions, observations, rewards, terms)
 
@@ -417,9 +418,12 @@ class Batch:
         if _UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
                 return int(_untyped(*arguments, self._scratch[0], 0, self.num_worlds))
+        if len(self._scratch) == 1:
+            return self._kernel(*arguments, self._scratch[0], 0, self.num_worlds)
+        return self._spread(arguments)
+
+    def _spread(self, arguments: tuple[Any, ...]) -> int:
         kernel, scratch = self._kernel, self._scratch
-        if len(scratch) == 1:
-            return kernel(*arguments, scratch[0], 0, self.num_worlds)
 
         def work(thread: int, first: int, last: int) -> int:
             return kernel(*arguments, scratch[thread], first, last)

@@ -86,7 +86,8 @@ class SingleWorld:
     @property
     def score(self) -> float:
         """The present step's score."""
-        return float(self._score.item())
+        score: float = self._score.item()
+        return score
 
     @property
     def state_layout(self) -> StateLayout:
