@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -100,7 +101,12 @@ def shown(scenario: str, results: Mapping[tuple[str, str], Results]) -> list[str
 def table(results: dict[tuple[str, str], Results]) -> Table:
     """Return the table of scores, with 95 % intervals."""
     episodes = next(iter(results.values())).episodes
-    made = Table(title=f"{episodes} worlds each, split test, seed {SEED}; 95 % intervals")
+    made = Table(
+        title=f"{episodes} worlds each, split test, seed {SEED}; 95 % intervals",
+        box=box.HORIZONTALS,  # no bars: they would cut off figures where a line has 80 characters
+        collapse_padding=True,
+        pad_edge=False,
+    )
     made.add_column("target", no_wrap=True)
     made.add_column("policy", no_wrap=True)
     for column in ("score", "tracking error, m", "settled", "settling time, s"):
@@ -131,7 +137,7 @@ def table(results: dict[tuple[str, str], Results]) -> Table:
 def _cell(estimate: Estimate) -> str:
     if estimate.count == 0:
         return "never"
-    return f"{estimate.value:.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
+    return f"{estimate.value:.2f}\n[{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
 if __name__ == "__main__":
