@@ -12,7 +12,7 @@ from gymnasium import spaces
 from posse import ObservationLayout, Scenario, ScenarioError
 from posse.actions import ActionReader, single_action_space
 from posse.arrays import FloatArray
-from posse.reward import terms_by_name
+from posse.reward import name_terms
 from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
 from posse_baselines.policy import Policy, begin
@@ -128,7 +128,7 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
         self._observations = observations
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": terms_by_name(*world.terms[0, self.number].tolist()),
+            "reward_terms": name_terms(*world.terms[0, self.number].tolist()),
             "working": bool(world.working()[self.number]),
         }
         terminated = bool(over) and world.terminated

@@ -12,13 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.arrays import BoolArray, FloatArray, Records
-from posse.compiled import direct
+from posse.compiled import UNCOMPILED, direct
 from posse.metrics import episode_metrics
 from posse.observation import ObservationLayout
 from posse.reward import REWARD_TERMS, TermsByName
@@ -38,7 +37,6 @@ from posse.world import LOOK, START, START_FROM_POSES, STEP, advance, bad_action
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
-_UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
 _FLOAT32: Final = np.dtype(np.float32)
 _untyped: Final[Callable[..., int]] = advance
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
@@ -349,8 +347,7 @@ class Batch:
         Raises:
             ResetNeeded: As :meth:`step`.
         """
-        if not self._started or self.autoreset == "disabled":
-            self._check_running()
+        self._check_running()
         observations = self._observations.take()
         return observations, self._run(self._orders, actions, observations, rewards, terms)
 
@@ -415,7 +412,7 @@ class Batch:
         arguments = (
             *self._fixed, actions, observations, rewards, terms, self._flags, orders,
         )  # fmt: skip
-        if _UNCOMPILED:
+        if UNCOMPILED:
             with np.errstate(over="ignore", under="ignore"):
                 return int(_untyped(*arguments, self._scratch[0], 0, self.num_worlds))
         if len(self._scratch) == 1:

@@ -35,7 +35,8 @@ _OPTIONS: Final[dict[str, Any]] = {
 # How a compiled function is compiled for the kernels that link it.
 _LINKED: Final = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-_DISABLED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
+UNCOMPILED: Final = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
+"""Whether everything runs as plain Python."""
 
 
 @overload
@@ -55,7 +56,7 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
     """
 
     def decorate(function: F) -> F:
-        if _DISABLED:
+        if UNCOMPILED:
             return function
         package_stamp(package_directory(function))
         return cast("F", _Function(function, inline=not seldom))
@@ -113,7 +114,7 @@ def kernel(function: F | None = None, *, short_loops: bool = False) -> F | Calla
     """
 
     def decorate(function: F) -> F:
-        if _DISABLED:
+        if UNCOMPILED:
             return function
         package = package_directory(function)
         package_stamp(package)

@@ -12,7 +12,7 @@ from gymnasium import spaces
 from posse.actions import MOTIONS, ActionReader, single_action_space
 from posse.arrays import FloatArray
 from posse.observation import ObservationLayout
-from posse.reward import terms_by_name
+from posse.reward import name_terms
 from posse.scenario import Scenario, ScenarioError
 from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
@@ -150,7 +150,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         observations, over = world.advance(self._reader.by_row(action))
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": terms_by_name(*world.terms[0].T.copy()),
+            "reward_terms": name_terms(*world.terms[0].T.copy()),
         }
         if self._breakable:
             info["working"] = world.working()
@@ -228,7 +228,7 @@ class SoloEnv(TeamEnv):
         observations, over = world.advance(actions)
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": terms_by_name(*world.terms[0, 0].tolist()),
+            "reward_terms": name_terms(*world.terms[0, 0].tolist()),
         }
         terminated = truncated = False
         if over:

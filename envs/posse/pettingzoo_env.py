@@ -16,7 +16,7 @@ from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 from posse.actions import ActionReader, agent_names, single_action_space
 from posse.arrays import FloatArray
 from posse.observation import ObservationLayout
-from posse.reward import terms_by_name
+from posse.reward import name_terms
 from posse.scenario import Scenario, ScenarioError
 from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
@@ -183,7 +183,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         observations, over = world.advance(self._reader.by_agent(actions))
         score = world.score
         infos: _Infos = {
-            agent: {"score": score, "reward_terms": terms_by_name(*values)}
+            agent: {"score": score, "reward_terms": name_terms(*values)}
             # zip's default is right: as many of each, and this is the hot path.
             for agent, values in zip(agents, world.terms.tolist()[0])  # noqa: B905
         }

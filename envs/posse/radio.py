@@ -108,7 +108,7 @@ def hear(
 def connected(c: Record, w: Record, trackers: Records) -> bool:
     """Say whether the working trackers are one radio graph, over any number of hops.
 
-    A perfect radio makes one of them without a look.
+    Not for a perfect radio, which always makes them one.
     """
     n = c.num_trackers
     reach2 = c.radio_range * c.radio_range

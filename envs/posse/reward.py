@@ -102,7 +102,7 @@ def _naming() -> Callable[..., dict[str, float]]:
     return naming
 
 
-terms_by_name = _naming()
+name_terms = _naming()
 """(a tracker's terms, in order) -> them by name.
 
 Written out as a literal, which is made in half the time of ``dict(zip(...))``: to name the terms is
