@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from posse.compiled import compiled
+from posse.lanes import greater, lesser
 
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
@@ -61,7 +62,7 @@ def arc(
 @compiled
 def approach(value: np.float32, wanted: np.float32, most: np.float32) -> np.float32:
     """Return ``value`` moved towards ``wanted`` by at most ``most``."""
-    return min(max(wanted, value - most), value + most)
+    return lesser(greater(wanted, value - most), value + most)
 
 
 @compiled

@@ -21,33 +21,43 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
+from posse.lanes import choose, greater, load, root, store
 from posse.scenario import Scenario
 from posse.sensing import ping
-from posse.state import NEVER
+from posse.state import FIX, NEVER
 from posse.survey import (
     AHEAD,
-    BEARING_COS,
-    BEARING_SIN,
+    BLOCK,
     COS,
     DISTANCE,
-    HEADING_COS,
-    HEADING_SIN,
+    GROUP,
+    INDEX,
     LEFT,
+    MATE,
     MATE_AHEAD,
     MATE_COS,
-    MATE_DISTANCE,
     MATE_LEFT,
     MATE_SIN,
+    MATE_SPEED,
     NEAREST,
     NUMBER,
+    OWN,
+    PLACE,
+    ROW,
     SIN,
+    SPEED,
     TASK,
+    TURN_RATE,
+    X,
+    Y,
+    blocks,
     choose_nearest,
-    copy_block,
-    find_directions,
+    columns,
+    describe_mates,
+    find_places,
     keep_team,
     natural,
-    place_of,
+    store_rows,
     survey,
     within_one,
 )  # fmt: skip
@@ -55,8 +65,14 @@ from posse.survey import (
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
+_TINY: Final = np.float32(1e-9)
 _COUNTED: Final = 16  # up to this team size, places are found by counting
 _TOLD: Final = 17  # numbers of the task that are the same for all of an episode
+# Rows of scratch memory, of each tracker: when its fix was, whether it sees the target, and what it
+# is told of it, sixteen numbers each.
+_FIXED_AT: Final = OWN
+_SEES: Final = OWN + 1 * ROW
+_TARGET: Final = OWN + 2 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 
 
@@ -179,8 +195,8 @@ def lay_out_task(c: Record, s: FloatArray) -> None:
 
 @compiled
 def _write_task(c: Record, w: Record, number: int, s: FloatArray, o: FloatArray, k: int) -> int:
-    copy_block(s, TASK, o, k)
-    copy_block(s, TASK + 8, o, k + 8)
+    store(o, k, load(s, TASK))
+    store(o, k + 8, load(s, TASK + 8))
     o[k + 16] = s[TASK + 16]
     o[k + 3] = np.float32(number)
     o[k + _TOLD] = np.float32(c.horizon - w.step) * c.dt
@@ -234,19 +250,50 @@ def _write_place(
 
 
 @compiled
-def _write_target(c: Record, w: Record, t: Record, o: FloatArray, k: int) -> int:
-    if t.fix_step < 0:
-        return int(_write_no_target(o, k))
-    hc, hs = t.heading_cos, t.heading_sin
-    o[k] = _ONE
-    o[k + 1] = np.float32(t.sees)
-    o[k + 2] = np.float32(w.step - t.fix_step) * c.dt
-    k = _write_place(hc, hs, t.fix_x - t.x, t.fix_y - t.y, o, k + 3)
-    k = _write_direction(hc, hs, t.fix_cos, t.fix_sin, o, k)
-    k = _write_direction(hc, hs, t.fix_frame_cos, t.fix_frame_sin, o, k)
-    o[k] = t.fix_vx * hc + t.fix_vy * hs
-    o[k + 1] = t.fix_vy * hc - t.fix_vx * hs
-    return k + 2
+def lay_out_fixes(c: Record, w: Record, trackers: Records, s: FloatArray) -> None:
+    """Write what each tracker observes of the target to scratch memory, sixteen numbers each.
+
+    Fields 0 to 7 come first, then 4 to 11, so that both are stored and copied at once.
+    """
+    n = natural(c.num_trackers)
+    for i in range(n):
+        t = trackers[i]
+        s[_FIXED_AT + i], s[_SEES + i] = np.float32(t.fix_step), np.float32(t.sees)
+    for block in range(blocks(n)):
+        i = BLOCK * block
+        hc, hs = load(s, COS + i), load(s, SIN + i)
+        x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = columns(trackers, i, n, FIX)
+        dx, dy = x - load(s, X + i), y - load(s, Y + i)
+        distance = root(dx * dx + dy * dy)
+        per_metre = _ONE / greater(distance, _TINY)
+        ux, uy = dx * per_metre, dy * per_metre
+        fixed_at = load(s, _FIXED_AT + i)
+        known = fixed_at >= _ZERO
+        age = choose(known, (np.float32(w.step) - fixed_at) * c.dt, _MINUS_ONE)
+        ahead = choose(distance > _ZERO, within_one(ux * hc + uy * hs), _ONE)
+        ahead = choose(known, ahead, _ZERO)
+        left = choose(known, within_one(uy * hc - ux * hs), _ZERO)
+        heading_cos = choose(known, within_one(heading_x * hc + heading_y * hs), _ZERO)
+        heading_sin = choose(known, within_one(heading_y * hc - heading_x * hs), _ZERO)
+        frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
+        frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
+        store_rows(
+            choose(known, _ONE, _ZERO), load(s, _SEES + i), age,
+            choose(known, distance, _MINUS_ONE), ahead, left, heading_cos, heading_sin,
+            _TARGET + 2 * BLOCK * i, 2 * BLOCK, s,
+        )  # fmt: skip
+        store_rows(
+            ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
+            choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
+            _TARGET + 2 * BLOCK * i + BLOCK, 2 * BLOCK, s,
+        )  # fmt: skip
+
+
+@compiled
+def _write_target(i: int, s: FloatArray, o: FloatArray, k: int) -> int:
+    store(o, k, load(s, _TARGET + 2 * BLOCK * i))
+    store(o, k + 4, load(s, _TARGET + 2 * BLOCK * i + BLOCK))
+    return k + 12
 
 
 @compiled
@@ -308,28 +355,6 @@ def _write_neighbour(
 
 
 @compiled
-def _write_surveyed(
-    other: Record,
-    number: int,
-    distance: np.float32,
-    place: int,
-    s: FloatArray,
-    o: FloatArray,
-    k: int,
-) -> None:
-    """Write the same of one that is heard now, from directions at ``place`` in their rows."""
-    o[k] = np.float32(number)
-    o[k + 1] = _ZERO
-    o[k + 2] = distance
-    o[k + 3] = s[BEARING_COS + place]
-    o[k + 4] = s[BEARING_SIN + place]
-    o[k + 5] = s[HEADING_COS + place]
-    o[k + 6] = s[HEADING_SIN + place]
-    o[k + 7] = other.speed
-    o[k + 8] = other.turn_rate
-
-
-@compiled
 def _write_no_neighbour(c: Record, o: FloatArray, k: int) -> None:
     """Write a place that is not filled, from k on."""
     for q in range(k + 3, k + 9 + c.message_size):
@@ -339,7 +364,7 @@ def _write_no_neighbour(c: Record, o: FloatArray, k: int) -> None:
     o[k + 2] = _MINUS_ONE
 
 
-@compiled
+@compiled(seldom=True)
 def _write_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
     """Write what team-mate j said, a row of (N, m), into its place, which begins at k."""
     for q in range(c.message_size):
@@ -348,21 +373,23 @@ def _write_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -
 
 @compiled
 def _write_whole_team(
-    c: Record, trackers: Records, i: int, said: FloatArray, s: FloatArray, o: FloatArray, k: int
+    c: Record,
+    i: int,
+    said: FloatArray,
+    at: int,
+    s: FloatArray,
+    o: FloatArray,
+    k: int,
 ) -> None:
-    """Write every team-mate, nearest first, where all are heard and each has a place.
-
-    Its place is the number of team-mates that are nearer: counted without branches, which
-    beats sorting for small teams.
-    """
-    n, size = c.num_trackers, 9 + c.message_size
-    find_directions(trackers[i], n, AHEAD, LEFT, DISTANCE, COS, SIN, s)
-    keep_team(n, s)
-    for j in range(n):
-        if j != i:
-            start = natural(k + place_of(j, n, MATE_DISTANCE, s) * size)
-            _write_surveyed(trackers[j], j, s[DISTANCE + j], j, s, o, start)
-            _write_message(c, said, j, o, start)
+    """Write every team-mate, nearest first, where all are heard and each has a place."""
+    size = 9 + c.message_size
+    for j in range(natural(c.num_trackers)):
+        if j != i:  # its own disc is far, and thereby last
+            start = natural(k + int(s[PLACE + at + j]) * size)
+            store(o, start, load(s, MATE + at + BLOCK * j))
+            o[start + 8] = s[TURN_RATE + j]
+            if c.message_size > 0:
+                _write_message(c, said, j, o, start)
 
 
 @compiled
@@ -390,20 +417,32 @@ def _keep_nearest(
 
 @compiled(seldom=True)
 def _write_nearest(
-    c: Record, trackers: Records, i: int, said: FloatArray, s: FloatArray, o: FloatArray, k: int
+    c: Record,
+    trackers: Records,
+    i: int,
+    said: FloatArray,
+    at: int,
+    s: FloatArray,
+    o: FloatArray,
+    k: int,
 ) -> None:
     """Write the nearest team-mates, where all are heard."""
-    keep_team(c.num_trackers, s)
-    filled = choose_nearest(c.num_trackers, c.neighbours, s)
+    keep_team(c.num_trackers, at, s)
+    filled = natural(choose_nearest(c.num_trackers, c.neighbours, s))
     for p in range(filled):
-        j = int(s[NUMBER + p])
-        s[MATE_AHEAD + p], s[MATE_LEFT + p] = s[AHEAD + j], s[LEFT + j]
+        j = natural(int(s[NUMBER + p]))
+        s[MATE_AHEAD + p], s[MATE_LEFT + p] = s[AHEAD + at + j], s[LEFT + at + j]
         s[MATE_COS + p], s[MATE_SIN + p] = s[COS + j], s[SIN + j]
-    find_directions(trackers[i], filled, MATE_AHEAD, MATE_LEFT, NEAREST, MATE_COS, MATE_SIN, s)
-    for p in range(c.neighbours):
+        s[MATE_SPEED + p] = s[SPEED + j]
+    describe_mates(
+        trackers[i], filled, NUMBER, MATE_AHEAD, MATE_LEFT, NEAREST, MATE_COS, MATE_SIN, MATE_SPEED,
+        MATE, s,
+    )  # fmt: skip
+    for p in range(natural(c.neighbours)):
         if p < filled:
-            j = int(s[NUMBER + p])
-            _write_surveyed(trackers[j], j, s[NEAREST + p], p, s, o, k)
+            j = natural(int(s[NUMBER + p]))
+            store(o, k, load(s, MATE + BLOCK * p))
+            o[k + 8] = s[TURN_RATE + j]
             _write_message(c, said, j, o, k)
         else:
             _write_no_neighbour(c, o, k)
@@ -441,32 +480,52 @@ def _write_heard(
 
 
 @compiled
-def observe_tracker(
+def observe_trackers(
     c: Record,
     w: Record,
     trackers: Records,
-    i: int,
     heard: Records,
     heard_message: FloatArray,
     message: FloatArray,
     s: FloatArray,
-    o: FloatArray,
+    observations: FloatArray,
 ) -> None:
-    """Write what tracker i is given, (F,); ``s`` holds where every disc is."""
-    t, n = trackers[i], c.num_trackers
-    survey(c, t, i, s)
+    """Write what each tracker is given, (rows, F); ``s`` holds where every disc is."""
+    n = natural(c.num_trackers)
+    whole_team = c.perfect_radio != 0 and n <= _COUNTED and n == c.neighbours + 1
+    lay_out_fixes(c, w, trackers, s)
+    for first in range(0, n, GROUP):
+        last = min(first + GROUP, n)
+        for i in range(first, last):
+            survey(c, trackers[i], i, natural((i - first) * ROW), s)
+        for i in range(first, last if whole_team else first):
+            at = natural((i - first) * ROW)
+            describe_mates(
+                trackers[i], n, INDEX, AHEAD + at, LEFT + at, DISTANCE + at, COS, SIN, SPEED,
+                MATE + at, s,
+            )  # fmt: skip
+            find_places(n, DISTANCE + at, PLACE + at, s)
+        for i in range(first, last):
+            at, o = natural((i - first) * ROW), observations[i]
+            k = _write_alone(c, w, trackers[i], i, at, s, o)
+            if whole_team:
+                _write_whole_team(c, i, message[0], at, s, o, k)
+            elif c.perfect_radio:
+                _write_nearest(c, trackers, i, message[0], at, s, o, k)
+            else:
+                _write_heard(c, w, trackers[i], i, heard, heard_message, s, o, k)
+
+
+@compiled
+def _write_alone(
+    c: Record, w: Record, t: Record, i: int, at: int, s: FloatArray, o: FloatArray
+) -> int:
+    """Write what tracker i knows without its team; return where the team-mates' part begins."""
     k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
     k = _write_task(c, w, i, s, o, k)
-    k = _write_target(c, w, t, o, k)
-    ping(c, t, s, o, k)
-    k += natural(c.sonar_beams)
-    if c.perfect_radio == 0:
-        _write_heard(c, w, t, i, heard, heard_message, s, o, k)
-        return
-    if n <= _COUNTED and n == c.neighbours + 1:
-        _write_whole_team(c, trackers, i, message[0], s, o, k)
-    else:
-        _write_nearest(c, trackers, i, message[0], s, o, k)
+    k = _write_target(i, s, o, k)
+    ping(c, t, at, s, o, k)
+    return k + natural(c.sonar_beams)
 
 
 @compiled(seldom=True)
@@ -479,7 +538,7 @@ def observe_target(
     o: FloatArray,
 ) -> None:
     """Write what a target that is an agent is given, (F,): it knows where trackers are."""
-    survey(c, w, c.num_trackers, s)
+    survey(c, w, c.num_trackers, 0, s)
     touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
     k = _write_own(c, w, touching, 1, o, 0)
     own = k
@@ -487,7 +546,7 @@ def observe_target(
     o[own + 7], o[own + 8] = c.target_speed, c.target_turn_rate
     o[own + 9], o[own + 10] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
     k = _write_no_target(o, k)
-    ping(c, w, s, o, k)
+    ping(c, w, 0, s, o, k)
     k += natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):

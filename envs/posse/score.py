@@ -6,7 +6,6 @@ a working tracker that touches nothing is within tolerance of it; who stands whe
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
@@ -15,7 +14,7 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.radio import connected
 from posse.state import NEVER
-from posse.survey import SLOT, SLOT_DISTANCE2, find_slots
+from posse.survey import SLOT, SLOT_DISTANCE, SLOT_DISTANCE2, find_slots
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -43,11 +42,10 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot = -1
-        least = s[SLOT_DISTANCE2 + i]
         # Until all slots taken are known, the distance to the nearest one of all.
         t.slot_progress = t.slot_distance
-        t.slot_distance = np.float32(math.sqrt(least))
-        if least <= near2 and t.broken_at == NEVER and t.touching == 0:
+        t.slot_distance = s[SLOT_DISTANCE + i]
+        if s[SLOT_DISTANCE2 + i] <= near2 and t.broken_at == NEVER and t.touching == 0:
             best = int(s[SLOT + i])
             bit = _BIT << np.uint64(best)
             if taken & bit == _NO_BITS:
@@ -59,7 +57,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
         for i in range(c.num_trackers):
             t = trackers[i]
             if t.slot < 0 and s[SLOT + i] >= _ZERO:
-                t.slot_distance = np.float32(math.sqrt(s[SLOT_DISTANCE2 + i]))
+                t.slot_distance = s[SLOT_DISTANCE + i]
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot_progress -= t.slot_distance

@@ -9,8 +9,20 @@ import numpy as np
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
+from posse.lanes import (
+    Lanes,
+    anywhere,
+    choose,
+    eight,
+    greater,
+    lesser,
+    load,
+    root,
+    store,
+    store_fields,
+)
 from posse.randomness import SENSOR_NOISE, normal_pair
-from posse.state import NEVER
+from posse.state import FIX, NEVER
 from posse.survey import (
     AHEAD,
     BEAM_COS,
@@ -19,14 +31,25 @@ from posse.survey import (
     DISTANCE,
     FAR,
     LEFT,
+    OWN,
     RADIUS,
     READING,
+    ROW,
+    X,
+    Y,
     blocks,
-    copy_block,
-    lesser,
+    columns,
     natural,
     num_discs,
+    store_rows,
 )
+
+# Rows of scratch memory, of each tracker: when its last fix was, where it sees the target now, and
+# the fix that this makes, eight numbers each.
+_FIXED_AT: Final = OWN
+_SEEN_DX: Final = OWN + 1 * ROW
+_SEEN_DY: Final = OWN + 2 * ROW
+_NEW_FIX: Final = OWN + 3 * ROW
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -63,6 +86,30 @@ def in_sight(
 
 
 @compiled
+def fix_velocity(
+    c: Record,
+    since: Lanes,
+    dx: Lanes,
+    dy: Lanes,
+    old_vx: Lanes,
+    old_vy: Lanes,
+) -> tuple[Lanes, Lanes]:
+    """Return the target's velocity from a fix that lies (dx, dy) from the one before.
+
+    ``since`` counts the control steps between them, ``old_vx`` and ``old_vy`` are the velocity that
+    was known. All are plain numbers, or lanes.
+    """
+    rate = _ONE / (since * c.dt)
+    vx, vy, keep = dx * rate, dy * rate, lesser(_ONE, c.smoothing * since)
+    vx, vy = old_vx + keep * (vx - old_vx), old_vy + keep * (vy - old_vy)
+    # No target is faster than a tracker (assumption ii), so noise that says so is cut.
+    speed2 = vx * vx + vy * vy
+    too_fast = speed2 > c.tracker_speed * c.tracker_speed
+    cut = choose(too_fast, c.tracker_speed / root(greater(speed2, _TINY)), _ONE)
+    return vx * cut, vy * cut
+
+
+@compiled
 def take_fix(
     c: Record,
     t: Record,
@@ -75,18 +122,9 @@ def take_fix(
     frame_sin: np.float32,
 ) -> None:
     """Give a tracker a newer fix of the target, and a velocity from this and the one before."""
-    steps = step - t.fix_step
-    if t.fix_step >= 0 and np.float32(steps) * c.dt <= _VELOCITY_MEMORY:
-        rate = _ONE / (np.float32(steps) * c.dt)
-        vx, vy = (x - t.fix_x) * rate, (y - t.fix_y) * rate
-        keep = min(_ONE, c.smoothing * np.float32(steps))
-        vx, vy = t.fix_vx + keep * (vx - t.fix_vx), t.fix_vy + keep * (vy - t.fix_vy)
-        # No target is faster than a tracker (assumption ii), so noise that says so is cut.
-        speed2 = vx * vx + vy * vy
-        if speed2 > c.tracker_speed * c.tracker_speed:
-            cut = c.tracker_speed / np.float32(math.sqrt(speed2))
-            vx, vy = vx * cut, vy * cut
-        t.fix_vx, t.fix_vy = vx, vy
+    since = np.float32(step - t.fix_step)
+    if t.fix_step >= 0 and since * c.dt <= _VELOCITY_MEMORY:
+        t.fix_vx, t.fix_vy = fix_velocity(c, since, x - t.fix_x, y - t.fix_y, t.fix_vx, t.fix_vy)
     else:
         t.fix_vx, t.fix_vy = _ZERO, _ZERO
     t.fix_step = step
@@ -96,24 +134,59 @@ def take_fix(
 
 
 @compiled
-def look(c: Record, w: Record, t: Record, obstacles: Records, number: int) -> None:
-    """Let a tracker look for the target, and note the fix if it has it."""
-    dx, dy = w.x - t.x, w.y - t.y
-    t.sees = t.broken_at == NEVER and in_sight(c, w, t, obstacles, dx, dy)
-    if not t.sees:
-        return
+def look(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> int:
+    """Let every tracker look for the target, and note the fix if it has it; return how many do.
+
+    Where the trackers are stands in ``s`` (:func:`posse.survey.lay_out`).
+    """
+    n = natural(c.num_trackers)
+    noisy = c.range_noise > _ZERO or c.bearing_noise > _ZERO
+    seeing = 0
+    for i in range(n):
+        t = trackers[i]
+        dx, dy = w.x - t.x, w.y - t.y
+        t.sees = t.broken_at == NEVER and in_sight(c, w, t, obstacles, dx, dy)
+        seeing += t.sees
+        s[_FIXED_AT + i] = np.float32(t.fix_step)
+        if noisy:
+            s[_SEEN_DX + i], s[_SEEN_DY + i] = measure(c, w, i, dx, dy)
+    if seeing == 0:
+        return 0
     if w.detected_at < 0:
         w.detected_at = w.step
-    if c.range_noise > _ZERO or c.bearing_noise > _ZERO:
-        first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
-        scale = _ONE + c.range_noise * first
-        turn = c.bearing_noise * second
-        cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
-        dx, dy = scale * (dx * cosine - dy * sine), scale * (dx * sine + dy * cosine)
-    take_fix(
-        c, t, w.step, t.x + dx, t.y + dy,
-        w.heading_cos, w.heading_sin, w.frame_cos, w.frame_sin,
-    )  # fmt: skip
+    for block in range(blocks(n)):
+        i = BLOCK * block
+        own_x, own_y, before = load(s, X + i), load(s, Y + i), load(s, _FIXED_AT + i)
+        dx, dy = w.x - own_x, w.y - own_y
+        if noisy:
+            dx, dy = load(s, _SEEN_DX + i), load(s, _SEEN_DY + i)
+        x, y = own_x + dx, own_y + dy
+        old_x, old_y, _, _, _, _, old_vx, old_vy = columns(trackers, i, n, FIX)
+        since = greater(np.float32(w.step) - before, _ONE)
+        vx, vy = fix_velocity(c, since, x - old_x, y - old_y, old_vx, old_vy)
+        fresh = (before >= _ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
+        store_rows(
+            x, y, eight(w.heading_cos), eight(w.heading_sin), eight(w.frame_cos), eight(w.frame_sin),
+            choose(fresh, vx, _ZERO), choose(fresh, vy, _ZERO), _NEW_FIX + BLOCK * i, BLOCK, s,
+        )  # fmt: skip
+    for i in range(n):
+        t = trackers[i]
+        if t.sees:
+            t.fix_step = w.step
+            store_fields(t, FIX, load(s, _NEW_FIX + BLOCK * i))
+    return seeing
+
+
+@compiled
+def measure(
+    c: Record, w: Record, number: int, dx: np.float32, dy: np.float32
+) -> tuple[np.float32, np.float32]:
+    """Return where a tracker's sensor, which is not exact, has the target that is (dx, dy) away."""
+    first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
+    scale = _ONE + c.range_noise * first
+    turn = c.bearing_noise * second
+    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
+    return scale * (dx * cosine - dy * sine), scale * (dx * sine + dy * cosine)
 
 
 @compiled
@@ -128,31 +201,25 @@ def listen_to_disc(
     """Shorten the sonar readings by a disc whose centre lies (ahead, left) of the robot's.
 
     The disc's nearest point counts for the beam in whose width it lies; for any other beam, where
-    its axis meets the disc. Without branches for a beam, so that several are done at once.
+    its axis meets the disc.
     """
     in_width = c.beam_cosine * distance
     nearest = max(distance - radius - c.radius, _ZERO)
-    radius2, own = radius * radius, c.radius
-    if radius2 < (_ONE - c.beam_cosine * c.beam_cosine) * distance * distance:
-        # The disc looks narrower than a beam is wide, as it nearly always does: no axis meets it
-        # but that of the beam in whose width it lies.
-        for block in range(blocks(c.sonar_beams)):
-            for q in range(BLOCK):
-                k = BLOCK * block + q
-                along = ahead * s[BEAM_COS + k] + left * s[BEAM_SIN + k]
-                found = nearest if along >= in_width else FAR
-                s[READING + k] = lesser(s[READING + k], found)
-        return
+    radius2 = radius * radius
+    # Does the disc look narrower than a beam is wide, as it nearly always does? Then no axis meets
+    # it but that of the beam in whose width it lies.
+    narrow = radius2 < (_ONE - c.beam_cosine * c.beam_cosine) * distance * distance
     for block in range(blocks(c.sonar_beams)):
-        for q in range(BLOCK):
-            k = BLOCK * block + q
-            along = ahead * s[BEAM_COS + k] + left * s[BEAM_SIN + k]
-            across = left * s[BEAM_COS + k] - ahead * s[BEAM_SIN + k]
+        k = BLOCK * block
+        cosine, sine = load(s, BEAM_COS + k), load(s, BEAM_SIN + k)
+        along, found = ahead * cosine + left * sine, eight(FAR)
+        if not narrow:
+            across = left * cosine - ahead * sine
             under_root = radius2 - across * across
-            axis = max(along - np.float32(math.sqrt(max(under_root, _ZERO))) - own, _ZERO)
-            axis = axis if (under_root > _ZERO) & (along > _ZERO) else FAR
-            found = nearest if along >= in_width else axis
-            s[READING + k] = lesser(s[READING + k], found)
+            axis = greater(along - root(greater(under_root, _ZERO)) - c.radius, _ZERO)
+            found = choose((under_root > _ZERO) & (along > _ZERO), axis, FAR)
+        found = choose(along >= in_width, nearest, found)
+        store(s, READING + k, lesser(load(s, READING + k), found))
 
 
 @compiled(seldom=True)
@@ -167,40 +234,35 @@ def listen_to_wall(
     """Shorten the sonar readings by a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
         return
-    nearest, own, in_width = max(distance - c.radius, _ZERO), c.radius, c.beam_cosine
+    nearest, in_width = max(distance - c.radius, _ZERO), c.beam_cosine
     ahead = normal_x * robot.heading_cos + normal_y * robot.heading_sin
     left = normal_y * robot.heading_cos - normal_x * robot.heading_sin
     for block in range(blocks(c.sonar_beams)):
-        for q in range(BLOCK):
-            k = BLOCK * block + q
-            towards = ahead * s[BEAM_COS + k] + left * s[BEAM_SIN + k]
-            axis = max(distance / max(towards, _TINY) - own, _ZERO)
-            axis = axis if towards > _ZERO else FAR
-            found = nearest if towards >= in_width else axis
-            s[READING + k] = lesser(s[READING + k], found)
+        k = BLOCK * block
+        towards = ahead * load(s, BEAM_COS + k) + left * load(s, BEAM_SIN + k)
+        axis = greater(distance / greater(towards, _TINY) - c.radius, _ZERO)
+        found = choose(towards >= in_width, nearest, choose(towards > _ZERO, axis, FAR))
+        store(s, READING + k, lesser(load(s, READING + k), found))
 
 
 @compiled
-def ping(c: Record, robot: Record, s: FloatArray, o: FloatArray, first: int) -> None:
+def ping(c: Record, robot: Record, at: int, s: FloatArray, o: FloatArray, first: int) -> None:
     """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
 
-    It stands on the :func:`~posse.survey.survey` of the discs around the robot.
+    It stands on the :func:`~posse.survey.survey` of the discs around the robot, in the rows that
+    begin ``at`` further on.
     """
-    nothing = c.sonar_range
     for block in range(blocks(c.sonar_beams)):
-        for q in range(BLOCK):
-            s[READING + BLOCK * block + q] = nothing
+        store(s, READING + BLOCK * block, eight(c.sonar_range))
     reach = c.sonar_range + c.radius
     for block in range(blocks(num_discs(c))):
-        heard = np.int32(0)
-        for q in range(BLOCK):
-            j = BLOCK * block + q
-            heard += np.int32(s[DISTANCE + j] - s[RADIUS + j] < reach)
-        for q in range(BLOCK if heard != 0 else 0):
-            j = BLOCK * block + q
-            distance = s[DISTANCE + j]
-            if distance - s[RADIUS + j] < reach:
-                listen_to_disc(c, s[AHEAD + j], s[LEFT + j], distance, s[RADIUS + j], s)
+        j = BLOCK * block
+        if anywhere(load(s, DISTANCE + at + j) - load(s, RADIUS + j) < reach):
+            for k in range(BLOCK):
+                q = at + j + k
+                distance, radius = s[DISTANCE + q], s[RADIUS + j + k]
+                if distance - radius < reach:
+                    listen_to_disc(c, s[AHEAD + q], s[LEFT + q], distance, radius, s)
     if c.walled:
         half, x, y = c.half_arena, robot.x, robot.y
         listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
@@ -210,6 +272,6 @@ def ping(c: Record, robot: Record, s: FloatArray, o: FloatArray, first: int) -> 
     beams = natural(c.sonar_beams)
     whole = beams // BLOCK
     for block in range(whole):
-        copy_block(s, READING + BLOCK * block, o, first + BLOCK * block)
+        store(o, first + BLOCK * block, load(s, READING + BLOCK * block))
     for k in range(BLOCK * whole, beams):
         o[first + k] = s[READING + k]

@@ -29,6 +29,11 @@ def _record(*fields: tuple[str, type]) -> np.dtype[Any]:
     return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
+def _offset(record: np.dtype[Any], name: str) -> int:
+    """Return how many bytes into a record a field begins."""
+    return next(at for field, (_, at, *_) in (record.fields or {}).items() if field == name)
+
+
 _F, _I, _U = np.float32, np.int32, np.uint64
 
 CONFIG: Final = _record(
@@ -111,6 +116,11 @@ TRACKER: Final = _record(
     ("could_arrive", _I),  # 1: it could stand in a slot by now, straight on at full speed
 )  # fmt: skip
 """One tracker."""
+
+# Kernels read and write these of a tracker's fields eight at a time; what they do not change, they
+# write as they read it. From x on: pose, speed, turn rate, and two more. From fix_x on: the fix.
+POSE: Final = _offset(TRACKER, "x")
+FIX: Final = _offset(TRACKER, "fix_x")
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 

@@ -1,62 +1,83 @@
 """Where every disc of a world is, laid out so that the processor works on eight of them at once.
 
 Discs (trackers, the target, obstacles) lie side by side in rows of a thread's scratch memory.
-Contact, score, sonar and the view of team-mates all start from these rows. A loop over a row goes
-by blocks of :data:`BLOCK`, a fixed length, which the compiler turns into vector instructions if the
-loop is short, free of branches, and reads nothing but rows and plain numbers; what fills the last
-block is too far away to count.
+Motion, contact, score, sonar and the view of team-mates all start from these rows, and go over them
+by blocks of eight (:mod:`posse.lanes`); what fills the last block is too far away to count.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
+from posse.lanes import (
+    WIDTH,
+    Lanes,
+    choose,
+    eight,
+    greater,
+    lesser,
+    load,
+    load_fields,
+    root,
+    store,
+    transpose,
+)
+from posse.state import POSE
 
-BLOCK: Final = 8
+BLOCK: Final = WIDTH
+
+GROUP: Final = 8
+"""Trackers that are looked after together.
+
+A part of the work is done for all of them before the next begins: while the processor waits for
+one's square roots, it goes on with another's.
+"""
 
 # Rows of scratch memory: where each begins. 64 trackers, the target and 60 obstacles fit a row, and
 # a length that is no power of two keeps rows apart in the processor's cache.
-_ROW: Final = 136
+ROW: Final = 136
 X: Final = 0  # common frame, m
-Y: Final = 1 * _ROW
-RADIUS: Final = 2 * _ROW
-COS: Final = 3 * _ROW  # heading, common frame; trackers only
-SIN: Final = 4 * _ROW
-AHEAD: Final = 5 * _ROW  # ego, m
-LEFT: Final = 6 * _ROW
-DISTANCE: Final = 7 * _ROW  # of the centres, m
-BEARING_COS: Final = 8 * _ROW  # ego
-BEARING_SIN: Final = 9 * _ROW
-HEADING_COS: Final = 10 * _ROW  # ego; trackers only
-HEADING_SIN: Final = 11 * _ROW
-BEAM_COS: Final = 12 * _ROW
-BEAM_SIN: Final = 13 * _ROW
-READING: Final = 14 * _ROW
-NEAREST: Final = 15 * _ROW  # a list of team-mates by distance: how far,
-NUMBER: Final = 16 * _ROW  # and who
-MATE_DISTANCE: Final = 17 * _ROW  # as DISTANCE; what is no tracker is far
-GAP: Final = 18 * _ROW  # of each tracker: free width to the nearest disc, m
-EXCESS: Final = 19 * _ROW  # of each tracker: not above 0 if anything is near
-SLOT: Final = 20 * _ROW  # of each tracker: the nearest slot
-SLOT_DISTANCE2: Final = 21 * _ROW  # and its distance squared, m²
-ROOM_AHEAD: Final = 22 * _ROW  # of each direction, for a target that flees
-ROOM_ASTERN: Final = 23 * _ROW
-INDEX: Final = 24 * _ROW  # 0, 1, 2, …
-TASK: Final = 25 * _ROW  # what every tracker is told of its task
-MATE_AHEAD: Final = 26 * _ROW  # of team-mates by place
-MATE_LEFT: Final = 27 * _ROW
-MATE_COS: Final = 28 * _ROW
-MATE_SIN: Final = 29 * _ROW
-CANDIDATE: Final = 30 * _ROW  # how far those are that may be among the nearest,
-CANDIDATE_NUMBER: Final = 31 * _ROW  # and who they are
-LANE: Final = 32 * _ROW
-RANK: Final = 33 * _ROW
-SIZE: Final = 34 * _ROW
+Y: Final = 1 * ROW
+COS: Final = 2 * ROW  # heading, common frame; trackers only
+SIN: Final = 3 * ROW
+SPEED: Final = 4 * ROW  # trackers only
+TURN_RATE: Final = 5 * ROW
+RADIUS: Final = 6 * ROW
+INDEX: Final = 7 * ROW  # 0, 1, 2, …
+BEAM_COS: Final = 8 * ROW
+BEAM_SIN: Final = 9 * ROW
+READING: Final = 10 * ROW
+TASK: Final = 11 * ROW  # what every tracker is told of its task
+GAP: Final = 12 * ROW  # of each tracker: free width to the nearest disc, m
+EXCESS: Final = 13 * ROW  # of each tracker: not above 0 if anything is near
+SLOT: Final = 14 * ROW  # of each tracker: the nearest slot
+SLOT_DISTANCE: Final = 15 * ROW  # and how far it is, m
+SLOT_DISTANCE2: Final = 16 * ROW  # the same squared, m²
+MATE_DISTANCE: Final = 17 * ROW  # as DISTANCE; what is no tracker is far
+CANDIDATE: Final = 18 * ROW  # how far those are that may be among the nearest,
+CANDIDATE_NUMBER: Final = 19 * ROW  # and who they are
+LANE: Final = 20 * ROW
+NEAREST: Final = 21 * ROW  # of team-mates by place: how far,
+NUMBER: Final = 22 * ROW  # who,
+MATE_AHEAD: Final = 23 * ROW  # where, ego,
+MATE_LEFT: Final = 24 * ROW
+MATE_COS: Final = 25 * ROW  # heading, common frame,
+MATE_SIN: Final = 26 * ROW
+MATE_SPEED: Final = 27 * ROW  # and how fast
+OWN: Final = 28 * ROW  # rows whose meaning is their module's own
+_PAIRS: Final = 38 * ROW
+
+# What a tracker sees of every disc: a row for each tracker of a group, one after the other.
+AHEAD: Final = _PAIRS  # ego, m
+LEFT: Final = AHEAD + GROUP * ROW
+DISTANCE: Final = LEFT + GROUP * ROW  # of the centres, m
+PLACE: Final = DISTANCE + GROUP * ROW  # of each team-mate by distance, the nearest 0
+MATE: Final = PLACE + GROUP * ROW  # what is observed of each team-mate: eight numbers each
+SIZE: Final = MATE + GROUP * ROW
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -88,41 +109,21 @@ def natural(count: int) -> int:
 
 
 @compiled
-def lesser(kept: np.float32, value: np.float32) -> np.float32:
-    """Return the lesser of two numbers, where the first was read from where it is to be kept.
-
-    Adding nothing to it stops the compiler from storing only where it changes: processors that
-    have such a masked store may take a hundred times as long over it as over a plain one.
-    """
-    return min(kept + _ZERO, value)
-
-
-@compiled
 def blocks(count: int) -> int:
     """Return how many blocks hold ``count`` discs or beams."""
     return (natural(count) + (BLOCK - 1)) >> 3
 
 
 @compiled
-def copy_block(s: FloatArray, source: int, o: FloatArray, target: int) -> None:
-    """Copy eight numbers of scratch memory.
+def lay_out_constants(c: Record, beams: FloatArray, s: FloatArray) -> None:
+    """Write what is the same for all worlds.
 
-    All are read before one is written, so that the compiler need not ask whether the two overlap.
+    The directions of the sonar's beams (2, S), of which those that fill a block point nowhere, what
+    counts the places of a row, and the robots' radius.
     """
-    a, b, c, d = s[source], s[source + 1], s[source + 2], s[source + 3]
-    e, f, g, h = s[source + 4], s[source + 5], s[source + 6], s[source + 7]
-    o[target], o[target + 1], o[target + 2], o[target + 3] = a, b, c, d
-    o[target + 4], o[target + 5], o[target + 6], o[target + 7] = e, f, g, h
-
-
-@compiled
-def lay_out_beams(beams: FloatArray, s: FloatArray) -> None:
-    """Write the directions of the sonar's beams (2, S), and what counts the places of a row.
-
-    Beams that fill a block point nowhere.
-    """
-    for k in range(_ROW):
+    for k in range(ROW):
         s[INDEX + k] = np.float32(k)
+        s[RADIUS + k] = c.radius
     count = beams.shape[1]
     for k in range(BLOCK * blocks(count)):
         s[BEAM_COS + k] = beams[0, k] if k < count else _ZERO
@@ -130,21 +131,65 @@ def lay_out_beams(beams: FloatArray, s: FloatArray) -> None:
 
 
 @compiled
+def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lanes, ...]:
+    """Return eight fields that follow on each other, of eight of ``count`` records, field by field.
+
+    From record ``first`` on, beginning ``offset`` bytes into each; the last record stands in for
+    those that there are not.
+    """
+    last = count - 1
+    return transpose(
+        load_fields(records[natural(min(first, last))], offset),
+        load_fields(records[natural(min(first + 1, last))], offset),
+        load_fields(records[natural(min(first + 2, last))], offset),
+        load_fields(records[natural(min(first + 3, last))], offset),
+        load_fields(records[natural(min(first + 4, last))], offset),
+        load_fields(records[natural(min(first + 5, last))], offset),
+        load_fields(records[natural(min(first + 6, last))], offset),
+        load_fields(records[natural(min(first + 7, last))], offset),
+    )
+
+
+@compiled
+def store_rows(
+    a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes,
+    at: int, stride: int, s: FloatArray,
+) -> None:
+    """Write what :func:`columns` gives back as it stands in records, ``stride`` apart."""
+    a, b, c, d, e, f, g, h = transpose(a, b, c, d, e, f, g, h)
+    store(s, at, a)
+    store(s, at + stride, b)
+    store(s, at + 2 * stride, c)
+    store(s, at + 3 * stride, d)
+    store(s, at + 4 * stride, e)
+    store(s, at + 5 * stride, f)
+    store(s, at + 6 * stride, g)
+    store(s, at + 7 * stride, h)
+
+
+@compiled
 def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
     """Write where every disc is: trackers, then the target, then obstacles."""
     n = natural(c.num_trackers)
-    for j in range(n):
-        t = trackers[j]
-        s[X + j], s[Y + j], s[RADIUS + j] = t.x, t.y, c.radius
-        s[COS + j], s[SIN + j] = t.heading_cos, t.heading_sin
-    s[X + n], s[Y + n], s[RADIUS + n] = w.x, w.y, c.radius
-    for k in range(natural(c.num_obstacles)):
-        o = obstacles[k]
-        j = n + 1 + k
-        s[X + j], s[Y + j], s[RADIUS + j] = o.x, o.y, o.radius
+    for block in range(blocks(n + 1)):
+        j = BLOCK * block
+        x, y, cosine, sine, speed, turn_rate, _, _ = columns(trackers, j, n, POSE)
+        number = load(s, INDEX + j)
+        tracker, target = number < np.float32(n), number == np.float32(n)
+        store(s, X + j, choose(tracker, x, choose(target, w.x, FAR)))
+        store(s, Y + j, choose(tracker, y, choose(target, w.y, FAR)))
+        store(s, COS + j, cosine)
+        store(s, SIN + j, sine)
+        store(s, SPEED + j, speed)
+        store(s, TURN_RATE + j, turn_rate)
     count = num_discs(c)
-    for j in range(count, BLOCK * blocks(count)):
-        s[X + j], s[Y + j], s[RADIUS + j] = FAR, FAR, _ZERO
+    if count > n + 1:
+        for k in range(natural(c.num_obstacles)):
+            o = obstacles[k]
+            j = n + 1 + k
+            s[X + j], s[Y + j], s[RADIUS + j] = o.x, o.y, o.radius
+        store(s, X + count, eight(FAR))
+        store(s, Y + count, eight(FAR))
 
 
 @compiled
@@ -154,81 +199,83 @@ def num_discs(c: Record) -> int:
 
 
 @compiled
-def survey(c: Record, robot: Record, number: int, s: FloatArray) -> None:
-    """Write where every disc is as the robot sees it; its own, ``number``, is too far to count."""
+def survey(c: Record, robot: Record, number: int, at: int, s: FloatArray) -> None:
+    """Write where every disc is as the robot sees it; its own, ``number``, is too far to count.
+
+    To the rows that begin ``at`` further on than the first of a group.
+    """
     x, y, hc, hs = robot.x, robot.y, robot.heading_cos, robot.heading_sin
     own = np.float32(number)
     for block in range(blocks(num_discs(c))):
-        for k in range(BLOCK):
-            j = BLOCK * block + k
-            dx, dy = s[X + j] - x, s[Y + j] - y
-            ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-            s[AHEAD + j], s[LEFT + j] = ahead, left
-            distance = np.float32(math.sqrt(ahead * ahead + left * left))
-            s[DISTANCE + j] = FAR if s[INDEX + j] == own else distance
+        j = BLOCK * block
+        dx, dy = load(s, X + j) - x, load(s, Y + j) - y
+        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        distance = root(ahead * ahead + left * left)
+        store(s, AHEAD + at + j, ahead)
+        store(s, LEFT + at + j, left)
+        store(s, DISTANCE + at + j, choose(load(s, INDEX + j) == own, FAR, distance))
 
 
 @compiled
-def find_directions(
+def describe_mates(
     robot: Record,
     count: int,
+    number: int,
     ahead: int,
     left: int,
     distance: int,
     cosine: int,
     sine: int,
+    speed: int,
+    to: int,
     s: FloatArray,
 ) -> None:
-    """Write the ego directions of ``count`` team-mates and of their headings.
+    """Write what a robot observes of each of ``count`` team-mates, eight numbers each, from ``to``.
 
-    From the rows that hold where they are (``ahead``, ``left``, ``distance``) and their headings in
-    the common frame (``cosine``, ``sine``).
+    Number, age (0), range, bearing and heading (cosine and sine, ego), speed: as they follow on
+    each other in an observation. From the rows that hold who they are, where they are as the robot
+    sees it, and their headings in the common frame.
     """
     hc, hs = robot.heading_cos, robot.heading_sin
     for block in range(blocks(count)):
-        for k in range(BLOCK):
-            j = BLOCK * block + k
-            per_metre = _ONE / max(s[distance + j], _TINY)
-            s[BEARING_COS + j] = within_one(s[ahead + j] * per_metre)
-            s[BEARING_SIN + j] = within_one(s[left + j] * per_metre)
-        for k in range(BLOCK):
-            j = BLOCK * block + k
-            c, n = s[cosine + j], s[sine + j]
-            s[HEADING_COS + j] = within_one(c * hc + n * hs)
-            s[HEADING_SIN + j] = within_one(n * hc - c * hs)
+        j = BLOCK * block
+        metres = load(s, distance + j)
+        per_metre = _ONE / greater(metres, _TINY)
+        x, y = load(s, cosine + j), load(s, sine + j)
+        store_rows(
+            load(s, number + j), eight(_ZERO), metres,
+            within_one(load(s, ahead + j) * per_metre), within_one(load(s, left + j) * per_metre),
+            within_one(x * hc + y * hs), within_one(y * hc - x * hs),
+            load(s, speed + j), to + BLOCK * j, BLOCK, s,
+        )  # fmt: skip
 
 
 @compiled
-def within_one(value: np.float32) -> np.float32:
+def within_one(value: Lanes) -> Lanes:
     """Return a cosine or sine that rounding may have carried past 1, brought back."""
-    return min(max(value, _MINUS_ONE), _ONE)
+    return lesser(greater(value, _MINUS_ONE), _ONE)
 
 
 @compiled
-def keep_team(n: int, s: FloatArray) -> None:
+def find_places(count: int, distances: int, to: int, s: FloatArray) -> None:
+    """Write the place of each in a row of distances: how many are nearer, or as near and first."""
+    for block in range(blocks(count)):
+        j = BLOCK * block
+        distance, number, place = load(s, distances + j), load(s, INDEX + j), eight(_ZERO)
+        for i in range(natural(count)):
+            other = s[distances + i]
+            nearer = (distance > other) | ((distance == other) & (number > np.float32(i)))
+            place = place + choose(nearer, _ONE, _ZERO)
+        store(s, to + j, place)
+
+
+@compiled
+def keep_team(n: int, at: int, s: FloatArray) -> None:
     """Write the distances of trackers alone, everything else being far."""
-    count = np.float32(n)
     for block in range(blocks(n)):
-        for k in range(BLOCK):
-            j = BLOCK * block + k
-            distance = s[DISTANCE + j]
-            s[MATE_DISTANCE + j] = distance if s[INDEX + j] < count else FAR
-
-
-@compiled
-def place_of(j: int, n: int, distances: int, s: FloatArray) -> int:
-    """Return the place by distance of j, in a row of n: how many are nearer, or as near and first.
-
-    What fills the row's last block has to be far.
-    """
-    mine, number = s[distances + j], np.float32(j)
-    nearer = np.int32(0)
-    for block in range(blocks(n)):
-        for k in range(BLOCK):
-            i = BLOCK * block + k
-            d = s[distances + i]
-            nearer += np.int32((d < mine) | ((d == mine) & (s[INDEX + i] < number)))
-    return int(nearer)
+        j = BLOCK * block
+        mate = load(s, INDEX + j) < np.float32(n)
+        store(s, MATE_DISTANCE + j, choose(mate, load(s, DISTANCE + at + j), FAR))
 
 
 @compiled
@@ -238,26 +285,23 @@ def bound_nearest(n: int, s: FloatArray) -> np.float32:
     The team is dealt out to sixteen lanes. The nearest of each lane are sixteen team-mates, so none
     of the eight nearest is farther than the eighth of these.
     """
-    for k in range(BLOCK):
-        s[LANE + k] = FAR
-        s[LANE + BLOCK + k] = FAR
-        s[RANK + k] = _ZERO
-        s[RANK + BLOCK + k] = _ZERO
+    first, second = eight(FAR), eight(FAR)
     for block in range(blocks(n)):
-        lane = LANE + BLOCK * (block & 1)
-        for k in range(BLOCK):
-            s[lane + k] = lesser(s[lane + k], s[MATE_DISTANCE + BLOCK * block + k])
+        distance = load(s, MATE_DISTANCE + BLOCK * block)
+        if block & 1:
+            second = lesser(second, distance)
+        else:
+            first = lesser(first, distance)
+    store(s, LANE, first)
+    store(s, LANE + BLOCK, second)
+    first_rank, second_rank = eight(_ZERO), eight(_ZERO)
     for i in range(2 * BLOCK):
         nearer = s[LANE + i]
-        for k in range(BLOCK):
-            s[RANK + k] += _ONE if nearer < s[LANE + k] else _ZERO
-        for k in range(BLOCK):
-            s[RANK + BLOCK + k] += _ONE if nearer < s[LANE + BLOCK + k] else _ZERO
-    for k in range(BLOCK):
-        first, second = s[LANE + k], s[LANE + BLOCK + k]
-        first = first if s[RANK + k] < _PLACES else _ZERO
-        second = second if s[RANK + BLOCK + k] < _PLACES else _ZERO
-        s[LANE + k] = max(first, second)
+        first_rank = first_rank + choose(first > nearer, _ONE, _ZERO)
+        second_rank = second_rank + choose(second > nearer, _ONE, _ZERO)
+    first = choose(first_rank < _PLACES, first, _ZERO)
+    second = choose(second_rank < _PLACES, second, _ZERO)
+    store(s, LANE, greater(first, second))
     left = max(max(s[LANE], s[LANE + 1]), max(s[LANE + 2], s[LANE + 3]))
     right = max(max(s[LANE + 4], s[LANE + 5]), max(s[LANE + 6], s[LANE + 7]))
     return min(max(left, right), _NEARER_THAN_FAR)
@@ -275,10 +319,9 @@ def choose_nearest(n: int, places: int, s: FloatArray) -> int:
         distance = s[MATE_DISTANCE + j]
         s[CANDIDATE + count], s[CANDIDATE_NUMBER + count] = distance, s[INDEX + j]
         count = natural(count + int(distance <= most))
-    for k in range(count, BLOCK * blocks(count)):
-        s[CANDIDATE + k] = FAR
+    find_places(count, CANDIDATE, PLACE, s)
     for q in range(count):
-        place = natural(place_of(q, count, CANDIDATE, s))
+        place = natural(int(s[PLACE + q]))
         if place < places:
             s[NEAREST + place] = s[CANDIDATE + q]
             s[NUMBER + place] = s[CANDIDATE_NUMBER + q]
@@ -292,60 +335,46 @@ def find_gaps(c: Record, s: FloatArray) -> None:
     Near is what could be touched within the next control step.
     """
     n = natural(c.num_trackers)
-    for block in range(blocks(n)):
-        for k in range(BLOCK):
-            s[GAP + BLOCK * block + k] = FAR
-            s[EXCESS + BLOCK * block + k] = FAR
     robots = c.radius + c.radius
-    for j in range(n + 1):
-        # Robots are all of one size: what is nearest is so without a square root for each.
-        x, y, number = s[X + j], s[Y + j], np.float32(j)
-        speed = c.tracker_speed if j < n else c.target_speed
-        reach = robots + TOUCHING_GAP + (speed + c.tracker_speed) * c.dt
-        for block in range(blocks(n)):
-            for k in range(BLOCK):
-                i = BLOCK * block + k
-                dx, dy = s[X + i] - x, s[Y + i] - y
-                d2 = dx * dx + dy * dy
-                d2 = FAR if s[INDEX + i] == number else d2
-                s[GAP + i] = lesser(s[GAP + i], d2)
-                s[EXCESS + i] = lesser(s[EXCESS + i], d2 - reach * reach)
+    tracker_reach = robots + TOUCHING_GAP + (c.tracker_speed + c.tracker_speed) * c.dt
+    target_reach = robots + TOUCHING_GAP + (c.target_speed + c.tracker_speed) * c.dt
+    margin = TOUCHING_GAP + c.tracker_speed * c.dt
     for block in range(blocks(n)):
-        for k in range(BLOCK):
-            i = BLOCK * block + k
-            s[GAP + i] = np.float32(math.sqrt(s[GAP + i])) - robots
-    for j in range(n + 1, num_discs(c)):
-        x, y, both = s[X + j], s[Y + j], c.radius + s[RADIUS + j]
-        margin = TOUCHING_GAP + c.tracker_speed * c.dt
-        for block in range(blocks(n)):
-            for k in range(BLOCK):
-                i = BLOCK * block + k
-                dx, dy = s[X + i] - x, s[Y + i] - y
-                gap = np.float32(math.sqrt(dx * dx + dy * dy)) - both
-                s[GAP + i] = lesser(s[GAP + i], gap)
-                s[EXCESS + i] = lesser(s[EXCESS + i], gap - margin)
+        i = BLOCK * block
+        x, y, number = load(s, X + i), load(s, Y + i), load(s, INDEX + i)
+        # Robots are all of one size: what is nearest is so without a square root for each.
+        nearest2 = eight(FAR)
+        for j in range(n):
+            dx, dy = x - s[X + j], y - s[Y + j]
+            d2 = choose(number == np.float32(j), FAR, dx * dx + dy * dy)
+            nearest2 = lesser(nearest2, d2)
+        dx, dy = x - s[X + n], y - s[Y + n]
+        d2 = dx * dx + dy * dy
+        excess = lesser(nearest2 - tracker_reach * tracker_reach, d2 - target_reach * target_reach)
+        least = root(lesser(nearest2, d2)) - robots
+        for j in range(n + 1, num_discs(c)):
+            dx, dy = x - s[X + j], y - s[Y + j]
+            gap = root(dx * dx + dy * dy) - (c.radius + s[RADIUS + j])
+            least, excess = lesser(least, gap), lesser(excess, gap - margin)
+        store(s, GAP + i, least)
+        store(s, EXCESS + i, excess)
 
 
 @compiled
 def find_slots(c: Record, w: Record, slots: Records, taken: np.uint64, s: FloatArray) -> None:
     """Write each tracker's nearest slot that is not in the set ``taken``; -1: all are."""
-    n = c.num_trackers
+    n = natural(c.num_trackers)
     for block in range(blocks(n)):
-        for k in range(BLOCK):
-            i = BLOCK * block + k
-            dx, dy = s[X + i] - w.x, s[Y + i] - w.y
-            s[AHEAD + i] = dx * w.frame_cos + dy * w.frame_sin
-            s[LEFT + i] = dy * w.frame_cos - dx * w.frame_sin
-            s[SLOT + i] = _MINUS_ONE
-            s[SLOT_DISTANCE2 + i] = FAR
-    for slot in range(n):
-        if taken & (_BIT << np.uint64(slot)) != _NO_BITS:
-            continue
-        x, y, number = slots[slot].x, slots[slot].y, np.float32(slot)
-        for block in range(blocks(n)):
-            for k in range(BLOCK):
-                i = BLOCK * block + k
-                dx, dy = s[AHEAD + i] - x, s[LEFT + i] - y
-                d2, kept = dx * dx + dy * dy, s[SLOT + i] + _ZERO
-                s[SLOT + i] = number if d2 < s[SLOT_DISTANCE2 + i] else kept
-                s[SLOT_DISTANCE2 + i] = lesser(s[SLOT_DISTANCE2 + i], d2)
+        i = BLOCK * block
+        dx, dy = load(s, X + i) - w.x, load(s, Y + i) - w.y
+        ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+        nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
+        for slot in range(n):
+            if taken & (_BIT << np.uint64(slot)) == _NO_BITS:
+                dx, dy = ahead - slots[slot].x, left - slots[slot].y
+                d2 = dx * dx + dy * dy
+                nearest = choose(d2 < nearest2, np.float32(slot), nearest)
+                nearest2 = lesser(nearest2, d2)
+        store(s, SLOT + i, nearest)
+        store(s, SLOT_DISTANCE2 + i, nearest2)
+        store(s, SLOT_DISTANCE + i, root(nearest2))

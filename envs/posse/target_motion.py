@@ -17,9 +17,10 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.formation import follow_heading
 from posse.kinematics import arc, turn_towards
+from posse.lanes import WIDTH, choose, eight, lesser, load, root, store
 from posse.randomness import TARGET, between, uniform
 from posse.state import NEVER
-from posse.survey import ROOM_AHEAD, ROOM_ASTERN, lesser
+from posse.survey import OWN
 
 CONSTANT: Final = 0
 ACCELERATING: Final = 1
@@ -42,9 +43,10 @@ _WEAVE_LEAST: Final = 0.4  # least and greatest turn, as shares of the limit
 _WEAVE_MOST: Final = 0.9
 
 # The smart motion. It weighs these many directions, every so many control steps.
-SMART_DIRECTIONS: Final = 16
+SMART_DIRECTIONS: Final = 2 * WIDTH
 SMART_REPLAN: Final = 5
-_HALF_ROUND: Final = SMART_DIRECTIONS // 2
+_HALF_ROUND: Final = WIDTH
+_WORTH: Final = OWN  # a row of scratch memory: what each direction is worth
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
 _LOYALTY: Final = np.float32(0.5)  # s; going back on its choice has to be worth twice that
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
@@ -167,52 +169,39 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     clear = c.radius + c.radius + _CLEARANCE
     # What it heads for at the start was not its choice, and one that ended in contact was bad.
     loyalty = _LOYALTY if w.step > 0 and w.touching == _NO_BITS else _ZERO
-    # A direction and its opposite have the square root in common.
-    for k in range(_HALF_ROUND):
-        s[ROOM_AHEAD + k], s[ROOM_ASTERN + k] = _FAR, _FAR
+    # Half the directions and, astern, their opposites, which have the square root in common.
+    ux, uy = load(_DIRECTION_COS, 0), load(_DIRECTION_SIN, 0)
+    ahead, astern = eight(_FAR), eight(_FAR)
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.broken_at != NEVER:
-            stand_in_the_way(a / v, clear, t.x - w.x, t.y - w.y, s)
-            continue
-        px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
-        py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
-        far2 = a * (px * px + py * py)
-        for k in range(_HALF_ROUND):
-            b = v * (px * _DIRECTION_COS[k] + py * _DIRECTION_SIN[k])
-            root = np.float32(math.sqrt(b * b + far2))
-            s[ROOM_AHEAD + k] = lesser(s[ROOM_AHEAD + k], root - b)
-            s[ROOM_ASTERN + k] = lesser(s[ROOM_ASTERN + k], root + b)
+            # It goes nowhere, and is met only by running into it.
+            px, py = t.x - w.x, t.y - w.y
+            along, across = px * ux + py * uy, px * uy - py * ux
+            met = (across < clear) & (across > -clear)
+            along = along * (a / v)
+            ahead = lesser(ahead, choose(met & (along > _ZERO), along, _FAR))
+            astern = lesser(astern, choose(met & (along < _ZERO), _ZERO - along, _FAR))
+        else:
+            px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
+            py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
+            b = v * (px * ux + py * uy)
+            until = root(b * b + a * (px * px + py * py))
+            ahead, astern = lesser(ahead, until - b), lesser(astern, until + b)
+    same_way = loyalty * (ux * w.goal_cos + uy * w.goal_sin)
+    store(s, _WORTH, ahead * per_a + same_way)
+    store(s, _WORTH + _HALF_ROUND, astern * per_a - same_way)
     best = np.float32(-1e9)
-    old_cos, old_sin = w.goal_cos, w.goal_sin
     for k in range(_HALF_ROUND):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
-        same_way = loyalty * (ux * old_cos + uy * old_sin)
         for side in range(2):
-            value = s[ROOM_AHEAD + k] * per_a + same_way
-            if side == 1:
-                value = s[ROOM_ASTERN + k] * per_a - same_way
+            value = s[_WORTH + _HALF_ROUND * side + k]
             if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
                 best = value
                 w.goal_cos, w.goal_sin = ux, uy
             ux, uy = -ux, -uy
-
-
-@compiled(seldom=True)
-def stand_in_the_way(
-    scale: np.float32, clear: np.float32, px: np.float32, py: np.float32, s: FloatArray
-) -> None:
-    """Shorten the room by a tracker that goes nowhere, and is met only by running into it."""
-    for k in range(_HALF_ROUND):
-        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
-        if abs(px * uy - py * ux) < clear:
-            along = (px * ux + py * uy) * scale
-            if along > _ZERO:
-                s[ROOM_AHEAD + k] = min(s[ROOM_AHEAD + k], along)
-            if along < _ZERO:
-                s[ROOM_ASTERN + k] = min(s[ROOM_ASTERN + k], -along)
 
 
 @compiled(seldom=True)

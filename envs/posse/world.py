@@ -19,19 +19,36 @@ from posse.contact import free_move, meet
 from posse.faults import apply_faults
 from posse.formation import follow_heading
 from posse.kinematics import approach, arc
-from posse.observation import lay_out_task, observe_target, observe_tracker
+from posse.lanes import Lanes, load, store_fields
+from posse.observation import lay_out_task, observe_target, observe_trackers
 from posse.radio import hear, send, share_fixes
 from posse.reward import write_reward
 from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
-from posse.state import NEVER
-from posse.survey import lay_out, lay_out_beams
+from posse.state import NEVER, POSE
+from posse.survey import (
+    BLOCK,
+    OWN,
+    ROW,
+    blocks,
+    columns,
+    lay_out,
+    lay_out_constants,
+    natural,
+    store_rows,
+)
 from posse.target_motion import AGENT, target_turn_rate
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
+
+# Rows of scratch memory, of each tracker: what its action asks for, and, eight numbers each, where
+# it is after its move. What the target weighs up (posse.target_motion) lies before them.
+_WANTED_SPEED: Final = OWN + 1 * ROW
+_WANTED_TURN: Final = OWN + 2 * ROW
+_NEW_POSE: Final = OWN + 3 * ROW
 
 
 @compiled
@@ -73,16 +90,54 @@ def move_in_parts(
         for i in range(c.num_trackers):
             t = trackers[i]
             if t.broken_at == NEVER and (t.near != 0 or c.whole_arcs == 0):
-                command(c, t, actions[i])
+                t.speed, t.turn_rate = command(
+                    c, t.speed, t.turn_rate, actions[i, 0], actions[i, 1]
+                )
                 move_swept(c, w, trackers, obstacles, t, i)
 
 
 @compiled
-def command(c: Record, t: Record, action: FloatArray) -> None:
-    """Bring a tracker's speed and turn rate towards what the action asks for, within its limits."""
-    speed = _HALF * (action[0] + _ONE) * c.tracker_speed
-    t.speed = approach(t.speed, speed, c.speed_change)
-    t.turn_rate = approach(t.turn_rate, action[1] * c.tracker_turn_rate, c.turn_change)
+def command(
+    c: Record, speed: Lanes, turn_rate: Lanes, wanted_speed: Lanes, wanted_turn: Lanes
+) -> tuple[Lanes, Lanes]:
+    """Return speed and turn rate, brought towards what an action asks for within the limits."""
+    return (
+        approach(speed, _HALF * (wanted_speed + _ONE) * c.tracker_speed, c.speed_change),
+        approach(turn_rate, wanted_turn * c.tracker_turn_rate, c.turn_change),
+    )
+
+
+@compiled
+def lay_out_actions(c: Record, actions: FloatArray, s: FloatArray) -> None:
+    """Write the speeds and turn rates that actions (rows, 2 + m) ask for to rows of scratch memory."""
+    for i in range(natural(c.num_trackers)):
+        s[_WANTED_SPEED + i], s[_WANTED_TURN + i] = actions[i, 0], actions[i, 1]
+
+
+@compiled
+def move_freely(c: Record, trackers: Records, s: FloatArray) -> bool:
+    """Move the trackers that nothing is near to on their arcs; say whether there are others."""
+    n = natural(c.num_trackers)
+    for block in range(blocks(n)):
+        i = BLOCK * block
+        x, y, cosine, sine, speed, turn_rate, next_1, next_2 = columns(trackers, i, n, POSE)
+        speed, turn_rate = command(
+            c, speed, turn_rate, load(s, _WANTED_SPEED + i), load(s, _WANTED_TURN + i)
+        )
+        dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, c.dt)
+        store_rows(
+            x + dx, y + dy, cosine, sine, speed, turn_rate, next_1, next_2,
+            _NEW_POSE + BLOCK * i, BLOCK, s,
+        )  # fmt: skip
+    others = False
+    for i in range(n):
+        t = trackers[i]
+        if t.broken_at == NEVER:
+            if t.near == 0:
+                store_fields(t, POSE, load(s, _NEW_POSE + BLOCK * i))
+            else:
+                others = True
+    return others
 
 
 @compiled
@@ -118,19 +173,14 @@ def motion(
     A robot that nothing can touch within the step moves on one arc; one that something is near to
     moves by physics steps, each of them swept.
     """
+    lay_out_actions(c, actions, scratch)
     command_target(c, w, trackers, obstacles, actions, scratch)
-    any_near = w.near != 0 or c.whole_arcs == 0
-    if not any_near:
-        move(w, c.dt)
-    for i in range(c.num_trackers):
-        t = trackers[i]
-        if t.broken_at == NEVER:
-            if c.whole_arcs and t.near == 0:
-                command(c, t, actions[i])
-                move(t, c.dt)
-            else:
-                any_near = True
-    if any_near:
+    in_parts = True
+    if c.whole_arcs:
+        if w.near == 0:
+            move(w, c.dt)
+        in_parts = move_freely(c, trackers, scratch) or w.near != 0
+    if in_parts:
         move_in_parts(c, w, trackers, obstacles, actions)
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
@@ -147,12 +197,10 @@ def sense(
     broadcast: Records,
     heard_message: FloatArray,
     message: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Let every tracker look for the target, then tell and hear."""
-    seeing = 0
-    for i in range(c.num_trackers):
-        look(c, w, trackers[i], obstacles, i)
-        seeing += trackers[i].sees
+    seeing = look(c, w, trackers, obstacles, scratch)
     if c.perfect_radio:
         if seeing < c.num_trackers:  # else nobody has anything to hear
             share_fixes(c, trackers)
@@ -174,8 +222,7 @@ def observe(
     observations: FloatArray,
 ) -> None:
     """Write the observations of every agent of a world, (rows, F)."""
-    for i in range(c.num_trackers):
-        observe_tracker(c, w, trackers, i, heard, heard_message, message, scratch, observations[i])
+    observe_trackers(c, w, trackers, heard, heard_message, message, scratch, observations)
     if c.motion == AGENT:
         observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
 
@@ -303,7 +350,9 @@ def advance_world(
     lay_out(c, w, trackers, obstacles, scratch)
     if order != LOOK:
         meet(c, w, trackers, obstacles, scratch)
-        sense(c, w, trackers, obstacles, heard[e], broadcast[e], heard_message[e], message[e])
+        sense(
+            c, w, trackers, obstacles, heard[e], broadcast[e], heard_message[e], message[e], scratch
+        )
         occupy(c, w, trackers, slots, scratch)
     if order == STEP:
         end_step(c, w, trackers, slots)
@@ -325,7 +374,7 @@ def advance_world(
 @compiled
 def prepare(config: Records, beams: FloatArray, scratch: FloatArray) -> None:
     """Write what is the same for all worlds to a thread's scratch memory."""
-    lay_out_beams(beams, scratch)
+    lay_out_constants(config[0], beams, scratch)
     lay_out_task(config[0], scratch)
 
 
