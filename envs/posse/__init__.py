@@ -27,6 +27,7 @@ def batch(
     first_world: int = 0,
     autoreset: str = "next_step",
     num_threads: int | None = None,
+    own_kernel: bool = False,
     device: str = "cpu",
     **overrides: Any,
 ) -> Batch:
@@ -43,6 +44,7 @@ def batch(
         first_world=first_world,
         autoreset=autoreset,
         num_threads=num_threads,
+        own_kernel=own_kernel,
     )
 
 

@@ -18,6 +18,7 @@ import numba
 from numba.core import types
 from numba.core.registry import CPUDispatcher
 
+import posse.lane_code  # noqa: F401 (so that numba knows lanes)
 from posse.kernel_cache import KernelCache, cache_directory, package_directory, package_stamp
 from posse.pipeline import Kernel, LinkedForm, ShortLoops
 

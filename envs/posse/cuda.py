@@ -171,15 +171,16 @@ class CudaBatch(Batch):
     Raises:
         ImportError: numba-cuda is not installed.
         RuntimeError: There is no GPU that it can use.
-        ValueError: As :class:`posse.Batch`; ``num_threads`` given.
+        ValueError: As :class:`posse.Batch`; ``num_threads`` or ``own_kernel`` given.
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int, **settings: Any) -> None:
         check_device()
-        if settings.get("num_threads") is not None:
-            raise ValueError(
-                f"num_threads={settings['num_threads']!r} is for device='cpu' alone: leave it out"
-            )
+        for name, unset in (("num_threads", None), ("own_kernel", False)):
+            if settings.get(name, unset) != unset:
+                raise ValueError(
+                    f"{name}={settings[name]!r} is for device='cpu' alone: leave it out"
+                )
         super().__init__(scenario, num_worlds, **settings)
 
     def _prepare(self) -> None:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from posse.compiled import compiled
-from posse.lanes import greater, lesser
+from posse.lanes import Lanes, greater, lesser
 
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
@@ -60,8 +60,8 @@ def arc(
 
 
 @compiled
-def approach(value: np.float32, wanted: np.float32, most: np.float32) -> np.float32:
-    """Return ``value`` moved towards ``wanted`` by at most ``most``."""
+def approach(value: Lanes, wanted: Lanes, most: np.float32) -> Lanes:
+    """Return ``value`` moved towards ``wanted`` by at most ``most``; a number, or lanes."""
     return lesser(greater(wanted, value - most), value + most)
 
 

@@ -166,8 +166,9 @@ def look(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
         vx, vy = fix_velocity(c, since, x - old_x, y - old_y, old_vx, old_vy)
         fresh = (before >= _ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
         store_rows(
-            x, y, eight(w.heading_cos), eight(w.heading_sin), eight(w.frame_cos), eight(w.frame_sin),
-            choose(fresh, vx, _ZERO), choose(fresh, vy, _ZERO), _NEW_FIX + BLOCK * i, BLOCK, s,
+            x, y, eight(w.heading_cos), eight(w.heading_sin), eight(w.frame_cos),
+            eight(w.frame_sin), choose(fresh, vx, _ZERO), choose(fresh, vy, _ZERO),
+            _NEW_FIX + BLOCK * i, BLOCK, s,
         )  # fmt: skip
     for i in range(n):
         t = trackers[i]

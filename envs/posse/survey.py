@@ -152,8 +152,17 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 
 @compiled
 def store_rows(
-    a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes,
-    at: int, stride: int, s: FloatArray,
+    a: Lanes,
+    b: Lanes,
+    c: Lanes,
+    d: Lanes,
+    e: Lanes,
+    f: Lanes,
+    g: Lanes,
+    h: Lanes,
+    at: int,
+    stride: int,
+    s: FloatArray,
 ) -> None:
     """Write what :func:`columns` gives back as it stands in records, ``stride`` apart."""
     a, b, c, d, e, f, g, h = transpose(a, b, c, d, e, f, g, h)

@@ -55,6 +55,8 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the first world.
         num_threads: Threads that step the worlds; never changes a result.
+        own_kernel: Whether to compile a kernel for this scenario alone, which is about a third
+            faster; never changes a result.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
@@ -82,6 +84,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         split: str = "train",
         first_world: int = 0,
         num_threads: int | None = None,
+        own_kernel: bool = False,
         **overrides: Any,
     ) -> None:
         check_render_mode(render_mode)
@@ -98,6 +101,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             first_world=first_world,
             autoreset=_MODES[self.autoreset_mode],
             num_threads=num_threads,
+            own_kernel=own_kernel,
         )
         self._seeded = seed is not None
         self.num_envs = num_envs

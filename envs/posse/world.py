@@ -8,6 +8,8 @@ Only the kernels at the end loop over a batch; everything else is about one worl
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -23,10 +25,11 @@ from posse.lanes import Lanes, load, store_fields
 from posse.observation import lay_out_task, observe_target, observe_trackers
 from posse.radio import hear, send, share_fixes
 from posse.reward import write_reward
+from posse.scenario import Scenario
 from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
-from posse.state import NEVER, POSE
+from posse.state import NEVER, POSE, beam_directions, config_record, slot_records
 from posse.survey import (
     BLOCK,
     OWN,
@@ -109,7 +112,7 @@ def command(
 
 @compiled
 def lay_out_actions(c: Record, actions: FloatArray, s: FloatArray) -> None:
-    """Write the speeds and turn rates that actions (rows, 2 + m) ask for to rows of scratch memory."""
+    """Write which speeds and turn rates actions (rows, 2 + m) ask for to rows of scratch memory."""
     for i in range(natural(c.num_trackers)):
         s[_WANTED_SPEED + i], s[_WANTED_TURN + i] = actions[i, 0], actions[i, 1]
 
@@ -378,8 +381,8 @@ def prepare(config: Records, beams: FloatArray, scratch: FloatArray) -> None:
     lay_out_task(config[0], scratch)
 
 
-@kernel(short_loops=True)
-def advance(
+@compiled
+def advance_worlds(
     config: Records,
     slots: Records,
     beams: FloatArray,
@@ -415,6 +418,81 @@ def advance(
         ):  # fmt: skip
             over += 1
     return over
+
+
+@kernel(short_loops=True)
+def advance(
+    config: Records,
+    slots: Records,
+    beams: FloatArray,
+    weights: FloatArray,
+    world: Records,
+    tracker: Records,
+    obstacle: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    actions: FloatArray,
+    observations: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+    flags: BoolArray,
+    orders: npt.NDArray[np.uint8],
+    scratch: FloatArray,
+    first: int,
+    last: int,
+) -> int:
+    """Advance worlds of any scenario; see :func:`advance_worlds`."""
+    return advance_worlds(
+        config, slots, beams, weights, world, tracker, obstacle,
+        heard, broadcast, heard_message, message,
+        actions, observations, rewards, terms, flags, orders, scratch, first, last,
+    )  # fmt: skip
+
+
+@functools.lru_cache(maxsize=64)
+def own_kernel(scenario: Scenario) -> Callable[..., int]:
+    """Return :func:`advance` for one scenario alone.
+
+    The scenario is part of the code: loops over trackers, slots and beams have known lengths, and
+    what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
+    compiled by itself, and kept on disk as any other.
+    """
+    own_config, own_slots, own_beams = (
+        config_record(scenario), slot_records(scenario), beam_directions(scenario)
+    )  # fmt: skip
+
+    @kernel(short_loops=True)
+    def advance_own(
+        config: Records,
+        slots: Records,
+        beams: FloatArray,
+        weights: FloatArray,
+        world: Records,
+        tracker: Records,
+        obstacle: Records,
+        heard: Records,
+        broadcast: Records,
+        heard_message: FloatArray,
+        message: FloatArray,
+        actions: FloatArray,
+        observations: FloatArray,
+        rewards: FloatArray,
+        terms: FloatArray,
+        flags: BoolArray,
+        orders: npt.NDArray[np.uint8],
+        scratch: FloatArray,
+        first: int,
+        last: int,
+    ) -> int:
+        return advance_worlds(
+            own_config, own_slots, own_beams, weights, world, tracker, obstacle,
+            heard, broadcast, heard_message, message,
+            actions, observations, rewards, terms, flags, orders, scratch, first, last,
+        )  # fmt: skip
+
+    return advance_own
 
 
 @kernel
