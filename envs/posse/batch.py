@@ -163,7 +163,7 @@ class Batch:
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
         self._flags = np.zeros((2, num_worlds), np.bool_)
         self._untyped: Callable[..., int] = own_kernel(scenario) if self.own_kernel else advance
-        self._kernel = direct(self._untyped)
+        self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         # What every call of the kernel begins with.
         self._fixed = (*self._tables, self._weights, *self._arrays.all())
