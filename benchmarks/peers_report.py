@@ -15,6 +15,10 @@ CONTENTS = {
         "target sensor, sonar ring, what team-mates tell, score and every metric, automatic "
         "resets; open plane and a perfect radio, so nothing to occlude and nothing lost"
     ),
+    "posse, own kernel": (
+        "the same worlds, stepped by a kernel that is compiled for this scenario alone "
+        "(`own_kernel=True`), once, and kept on disk"
+    ),
     "posse, field": (
         "as `posse`, and 6 obstacles that occlude, walls, short and noisy sensing, a radio with "
         "range, delay and loss, faults and outages"
@@ -66,7 +70,7 @@ throughout."""
 OURS_OVER_THEIRS = """\
 ## Ours over theirs
 
-`posse`'s ratio to mpe2 over theirs, with the same number of threads."""
+Our ratio to mpe2 over theirs, with the same number of threads."""
 
 DISTURBED = """\
 !!! warning "Other work ran on the machine"
@@ -90,8 +94,7 @@ def write_page(results: dict[str, Any], path: Path) -> None:
         _table(rows, lambda row: f"{statistics.median(row['per_core']) / 1e6:.3g}"),
         TIMES_MPE2,
         _table(rows, lambda row: _number(_ratio(row))),
-        OURS_OVER_THEIRS,
-        _ours_over_theirs(rows),
+        *_ours_over_theirs(rows),
         "## What each computes",
         _contents(rows),
     ]
@@ -154,18 +157,21 @@ def _table(rows: list[Row], cell: Callable[[Row], str]) -> str:
     )
 
 
-def _ours_over_theirs(rows: list[Row]) -> str:
-    ours = {(row["threads"], row["batch"]): _ratio(row) for row in rows if row["name"] == "posse"}
+def _ours_over_theirs(rows: list[Row]) -> list[str]:
+    parts = [OURS_OVER_THEIRS]
+    theirs = [row for row in rows if not row["name"].startswith("posse")]
+    for name in ("posse", "posse, own kernel"):
+        ours = {(row["threads"], row["batch"]): _ratio(row) for row in rows if row["name"] == name}
+
+        def cell(row: Row, ours: dict[tuple[int, int], float] = ours) -> str:
+            mine = ours.get((row["threads"], row["batch"]))
+            return "" if mine is None else _number(mine / _ratio(row))
+
+        parts += [f"`{name}`:", _table(theirs, cell)]
     single = [_ratio(row) for row in rows if row["name"] == "posse, PettingZoo"]
-
-    def cell(row: Row) -> str:
-        mine = ours.get((row["threads"], row["batch"]))
-        return "" if mine is None else _number(mine / _ratio(row))
-
-    table = _table([row for row in rows if not row["name"].startswith("posse")], cell)
     if single:
-        table += f"\n\nThrough PettingZoo's own interface: {_number(single[0])} times mpe2."
-    return table
+        parts += [f"Through PettingZoo's own interface: {_number(single[0])} times mpe2."]
+    return parts
 
 
 def _contents(rows: list[Row]) -> str:

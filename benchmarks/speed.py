@@ -7,6 +7,7 @@ of one world through the interfaces, and what the first step of a fresh process 
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import statistics
@@ -66,29 +67,37 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
 
 
 def batches(settings: Settings) -> list[dict[str, Any]]:
-    """Measure batches with one thread and with all, and a plain copy of their observations."""
+    """Measure batches with one thread and with all, and a plain copy of their observations.
+
+    By the kernel for all scenarios, then by one compiled for this scenario alone.
+    """
     rows = []
-    for count in settings.worlds or (1, 32, 1024, 4096, 16384):
-        for threads in sorted({1, os.cpu_count() or 1}):
-            batch = posse.batch(settings.scenario, count, num_threads=threads)
-            observations = batch.reset(seed=0)
-            rng = np.random.default_rng(0)
-            actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-            copy = np.empty_like(observations)
-            agents = observations.shape[0] * observations.shape[1]
-            rate = per_second(partial(batch.step, actions), settings.seconds)
-            plain = per_second(partial(np.copyto, copy, observations), settings.seconds)
-            rows.append(
-                {
-                    "worlds": count,
-                    "threads": threads,
-                    "agent_steps": [r * agents for r in rate],
-                    "copies": [r * agents for r in plain],
-                    "times_a_copy": plain[0] / rate[0],
-                    "observation_length": observations.shape[2],
-                    "bytes_a_world": batch.bytes_per_world,
-                }
-            )
+    kinds = itertools.product(
+        (False, True),
+        settings.worlds or (1, 32, 1024, 4096, 16384),
+        sorted({1, os.cpu_count() or 1}),
+    )
+    for own_kernel, count, threads in kinds:
+        batch = posse.batch(settings.scenario, count, num_threads=threads, own_kernel=own_kernel)
+        observations = batch.reset(seed=0)
+        rng = np.random.default_rng(0)
+        actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+        copy = np.empty_like(observations)
+        agents = observations.shape[0] * observations.shape[1]
+        rate = per_second(partial(batch.step, actions), settings.seconds)
+        plain = per_second(partial(np.copyto, copy, observations), settings.seconds)
+        rows.append(
+            {
+                "kernel": "own" if own_kernel else "general",
+                "worlds": count,
+                "threads": threads,
+                "agent_steps": [r * agents for r in rate],
+                "copies": [r * agents for r in plain],
+                "times_a_copy": plain[0] / rate[0],
+                "observation_length": observations.shape[2],
+                "bytes_a_world": batch.bytes_per_world,
+            }
+        )
     return rows
 
 
@@ -244,11 +253,14 @@ def main() -> None:
     table = Table(
         title=f"{settings.scenario}: {length} floats an observation, {size} bytes a world"
     )
-    for column in ("worlds", "threads", "million agent-steps/s [range]", "times a plain copy"):
+    for column in (
+        "kernel", "worlds", "threads", "million agent-steps/s [range]", "times a plain copy"
+    ):  # fmt: skip
         table.add_column(column, justify="right")
     for row in rows:
         median, low, high = (x / 1e6 for x in row["agent_steps"])
         table.add_row(
+            row["kernel"],
             f"{row['worlds']:,}",
             str(row["threads"]),
             f"{median:.2f} [{low:.2f}, {high:.2f}]",

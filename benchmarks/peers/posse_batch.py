@@ -1,4 +1,7 @@
-"""Ours: the engine itself, worlds of 5 trackers; the variant is the scenario."""
+"""Ours: the engine itself, worlds of 5 trackers.
+
+The variant is the scenario, with ", own kernel" after it where it is to have one.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,11 @@ import posse
 
 def build(worlds: int, variant: str) -> Built:
     """Return a batch; as many threads as this process may use."""
-    batch = posse.batch(variant, worlds, seed=0, num_threads=len(os.sched_getaffinity(0)))
+    scenario, _, own_kernel = variant.partition(", ")
+    threads = len(os.sched_getaffinity(0))
+    batch = posse.batch(
+        scenario, worlds, seed=0, num_threads=threads, own_kernel=own_kernel == "own kernel"
+    )
     draws = np.random.default_rng(0).uniform(-1, 1, (ACTION_SETS, *batch.action_shape))
     actions = draws.astype(np.float32)
     batch.reset()

@@ -54,6 +54,31 @@ stats = fill.stats
 print(out.sum(), sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
 
+CLOSURE_KERNEL = """
+import numpy as np
+from posse.compiled import kernel
+from herd.helpers import helper
+
+def made_for(number):
+    table = np.full(1, number, np.dtype([("x", "f4")]))
+
+    @kernel(short_loops=True)
+    def fill(out):
+        out[0] = helper(table[0].x)
+
+    return fill
+"""
+
+CLOSURE_MAIN = """
+import numpy as np
+from herd.kernels import made_for
+
+out = np.zeros(1)
+fill = made_for({number})
+fill(out)
+print(out[0], sum(fill.stats.cache_hits.values()), sum(fill.stats.cache_misses.values()))
+"""
+
 LOOPS_MAIN = """
 import numpy as np
 from herd.kernels import fill
@@ -149,6 +174,16 @@ def test_a_kernel_of_short_loops_is_kept_too(herd: Herd, tmp_path: Path) -> None
     assert parallel.run(tmp_path / "cache").answer == 6.0
     again = parallel.run(tmp_path / "cache")
     assert (again.answer, again.hits, again.misses) == (6.0, 1, 0)
+
+
+def test_kernels_with_other_constants_are_not_taken_for_each_other(
+    herd: Herd, tmp_path: Path
+) -> None:
+    """As kernels of their own are made: one source, the scenario's numbers built in."""
+    (herd.root / "herd" / "kernels.py").write_text(CLOSURE_KERNEL)
+    for number, hits in ((2, 0), (5, 0), (2, 1), (5, 1)):
+        run = Herd(herd.root, CLOSURE_MAIN.format(number=number)).run(tmp_path / "cache")
+        assert (run.answer, run.hits) == (number + 1, hits)
 
 
 def test_a_short_loop_is_not_unrolled_for_long_runs(herd: Herd, tmp_path: Path) -> None:

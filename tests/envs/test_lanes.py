@@ -1,0 +1,193 @@
+"""Lanes: each is what a plain number would be, whatever stands beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from posse.compiled import kernel
+from posse.lanes import (
+    WIDTH,
+    anywhere,
+    choose,
+    eight,
+    greater,
+    lesser,
+    load,
+    load_fields,
+    root,
+    store,
+    store_fields,
+    transpose,
+)
+from posse.state import FIX, POSE, TRACKER
+
+Numbers = npt.NDArray[np.float32]
+
+_ONE = np.float32(1.0)
+_TWO = np.float32(2.0)
+
+
+@kernel
+def calculate(a: Numbers, b: Numbers, out: Numbers) -> None:
+    """Every operation, a block of eight results each."""
+    x, y = load(a, 0), load(b, 0)
+    store(out, 0, x + y)
+    store(out, 8, x - y)
+    store(out, 16, x * y)
+    store(out, 24, x / y)
+    store(out, 32, lesser(x, y))
+    store(out, 40, greater(x, y))
+    store(out, 48, root(x * x))
+    store(out, 56, choose(x < y, x, y))
+    store(out, 64, choose(x <= y, x, y))
+    store(out, 72, choose(x > y, x, y))
+    store(out, 80, choose(x >= y, x, y))
+    store(out, 88, choose(x == y, _ONE, _TWO))
+    store(out, 96, choose((x < y) & (x > _ONE), x, y))
+    store(out, 104, choose((x < y) | (x > _ONE), x, y))
+    store(out, 112, _ONE - x)
+    store(out, 120, eight(_TWO) * x + _ONE)
+    store(out, 128, choose(x > _TWO, _ONE, x))
+
+
+NUMBER_BY_NUMBER: tuple[Callable[[np.float32, np.float32], np.float32], ...] = (
+    lambda x, y: x + y,
+    lambda x, y: x - y,
+    lambda x, y: x * y,
+    lambda x, y: x / y,
+    lambda x, y: x if x <= y else y,
+    lambda x, y: x if x >= y else y,
+    lambda x, y: np.sqrt(x * x),
+    lambda x, y: x if x < y else y,
+    lambda x, y: x if x <= y else y,
+    lambda x, y: x if x > y else y,
+    lambda x, y: x if x >= y else y,
+    lambda x, y: _ONE if x == y else _TWO,
+    lambda x, y: x if x < y and x > _ONE else y,
+    lambda x, y: x if x < y or x > _ONE else y,
+    lambda x, y: _ONE - x,
+    lambda x, y: _TWO * x + _ONE,
+    lambda x, y: _ONE if x > _TWO else x,
+)
+
+plain_function: Callable[..., Any] = getattr(calculate, "py_func", calculate)
+sensible = st.floats(-1e6, 1e6, width=32).filter(lambda x: abs(x) > 1e-6)
+eight_numbers = st.lists(sensible, min_size=WIDTH, max_size=WIDTH)
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(eight_numbers, eight_numbers, st.permutations(range(WIDTH)))
+def test_a_lane_is_what_a_number_alone_would_be(
+    first: list[float], second: list[float], order: list[int]
+) -> None:
+    a, b = np.array(first, np.float32), np.array(second, np.float32)
+    b[:2] = a[:2]  # equal ones, too
+    size = WIDTH * len(NUMBER_BY_NUMBER)
+    compiled, plain, swapped = (np.zeros(size, np.float32) for _ in range(3))
+    calculate(a, b, compiled)
+    plain_function(a, b, plain)
+    calculate(a[order], b[order], swapped)
+    expected = [function(x, y) for function in NUMBER_BY_NUMBER for x, y in zip(a, b, strict=True)]
+    np.testing.assert_array_equal(compiled, np.array(expected, np.float32))
+    np.testing.assert_array_equal(plain, compiled)
+    np.testing.assert_array_equal(swapped.reshape(-1, WIDTH), compiled.reshape(-1, WIDTH)[:, order])
+
+
+@kernel
+def alone(x: np.float32, y: np.float32) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """The functions that take plain numbers, too."""
+    return lesser(x, y), greater(x, y), root(x * x), choose(x < y, x, y)
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(sensible, sensible)
+def test_functions_that_only_calculate_take_plain_numbers_too(first: float, second: float) -> None:
+    x, y = np.float32(first), np.float32(second)
+    expected = (min(x, y), max(x, y), abs(x), min(x, y))
+    assert alone(x, y) == expected
+    assert (lesser(x, y), greater(x, y), root(x * x), choose(x < y, x, y)) == expected
+
+
+@kernel
+def turn(rows: Numbers, out: Numbers) -> None:
+    """Swap rows and columns."""
+    a, b, c, d, e, f, g, h = transpose(
+        load(rows, 0), load(rows, 8), load(rows, 16), load(rows, 24),
+        load(rows, 32), load(rows, 40), load(rows, 48), load(rows, 56),
+    )  # fmt: skip
+    store(out, 0, a)
+    store(out, 8, b)
+    store(out, 16, c)
+    store(out, 24, d)
+    store(out, 32, e)
+    store(out, 40, f)
+    store(out, 48, g)
+    store(out, 56, h)
+
+
+@pytest.mark.parametrize("function", [turn, getattr(turn, "py_func", turn)])
+def test_rows_become_columns(function: Callable[..., None]) -> None:
+    rows, out = np.arange(64, dtype=np.float32), np.zeros(64, np.float32)
+    function(rows, out)
+    np.testing.assert_array_equal(out.reshape(8, 8), rows.reshape(8, 8).T)
+
+
+@kernel
+def is_anywhere(a: Numbers, limit: np.float32) -> bool:
+    """Whether any of eight numbers is above a limit."""
+    return anywhere(load(a, 1) > limit)
+
+
+@pytest.mark.parametrize("function", [is_anywhere, getattr(is_anywhere, "py_func", is_anywhere)])
+@pytest.mark.parametrize("place", range(WIDTH))
+def test_one_lane_is_enough_to_be_anywhere(function: Callable[..., bool], place: int) -> None:
+    numbers = np.zeros(WIDTH + 2, np.float32)
+    numbers[0] = numbers[-1] = 5.0  # beside the eight that are looked at
+    assert not function(numbers, np.float32(1.0))
+    numbers[1 + place] = 5.0
+    assert function(numbers, np.float32(1.0))
+
+
+@kernel
+def double_fix(trackers: Any) -> None:
+    """Double the eight fields of the second tracker's fix."""
+    store_fields(trackers[1], FIX, load_fields(trackers[1], FIX) * _TWO)
+
+
+@kernel
+def keep_pose(trackers: Any) -> None:
+    """Read and write eight fields from x on, of which the last two are whole numbers."""
+    store_fields(trackers[1], POSE, load_fields(trackers[1], POSE))
+
+
+@pytest.mark.parametrize("function", [double_fix, getattr(double_fix, "py_func", double_fix)])
+def test_records_are_read_and_written_where_their_fields_are(
+    function: Callable[..., None],
+) -> None:
+    names = ("fix_x", "fix_y", "fix_cos", "fix_sin",
+             "fix_frame_cos", "fix_frame_sin", "fix_vx", "fix_vy")  # fmt: skip
+    trackers = np.zeros(3, TRACKER)
+    for k, name in enumerate(TRACKER.names or ()):
+        trackers[name] = k + np.arange(3)
+    before = trackers.copy()
+    function(trackers)
+    for name in TRACKER.names or ():
+        factor = 2 if name in names else 1
+        np.testing.assert_array_equal(trackers[name], before[name] * [1, factor, 1], name)
+
+
+@pytest.mark.parametrize("function", [keep_pose, getattr(keep_pose, "py_func", keep_pose)])
+def test_whole_numbers_among_the_fields_keep_their_bits(function: Callable[..., None]) -> None:
+    """Whatever they are: as a float32, some would be no number at all."""
+    trackers = np.zeros(2, TRACKER)
+    trackers["broken_at"], trackers["breaks_at"] = 2**30, 0x7FA00001
+    before = trackers.copy()
+    function(trackers)
+    assert trackers.tolist() == before.tolist()
