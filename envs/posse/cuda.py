@@ -25,7 +25,7 @@ from posse.metrics import episode_metrics
 from posse.reward import REWARD_TERMS
 from posse.scenario import Scenario
 from posse.state import SPLITS, WorldArrays
-from posse.survey import SIZE
+from posse.survey import SIZE_FOR_ONE
 from posse.world import LOOK, START, STEP, advance_world, prepare
 
 _CONFIG: Final[Any] = numba.config
@@ -39,6 +39,7 @@ if not _CONFIG.ENABLE_CUDASIM and importlib.util.find_spec("numba_cuda") is None
 import numba.cuda  # noqa: E402 (only now: an older numba has one of its own)
 
 cuda: Final[Any] = numba.cuda
+_SIMULATED: Final = bool(_CONFIG.ENABLE_CUDASIM)
 
 DeviceArray = Any
 """numba's device array. It has ``__cuda_array_interface__``, so that torch, CuPy and JAX take it
@@ -97,7 +98,9 @@ def _advance(
     """Do what each world is ordered to; nothing at all where there is something to complain of."""
     e = cuda.grid(1)
     if e < len(world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
-        scratch = cuda.local.array(SIZE, numba.float32)
+        scratch = cuda.local.array(SIZE_FOR_ONE, numba.float32)
+        if _SIMULATED:
+            scratch[:] = 0.0  # numpy would warn of what lies in lanes that nobody looks at
         prepare(config, beams, scratch)
         over = advance_world(
             e, config, slots, weights, world, tracker, obstacle,

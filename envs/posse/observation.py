@@ -30,7 +30,6 @@ from posse.survey import (
     BLOCK,
     COS,
     DISTANCE,
-    GROUP,
     INDEX,
     LEFT,
     MATE,
@@ -40,6 +39,7 @@ from posse.survey import (
     MATE_SIN,
     MATE_SPEED,
     NEAREST,
+    NEAREST_MATE,
     NUMBER,
     OWN,
     PLACE,
@@ -48,6 +48,7 @@ from posse.survey import (
     SPEED,
     TASK,
     TURN_RATE,
+    VIEW,
     X,
     Y,
     blocks,
@@ -55,6 +56,7 @@ from posse.survey import (
     columns,
     describe_mates,
     find_places,
+    group_size,
     keep_team,
     natural,
     store_rows,
@@ -436,12 +438,12 @@ def _write_nearest(
         s[MATE_SPEED + p] = s[SPEED + j]
     describe_mates(
         trackers[i], filled, NUMBER, MATE_AHEAD, MATE_LEFT, NEAREST, MATE_COS, MATE_SIN, MATE_SPEED,
-        MATE, s,
+        NEAREST_MATE, s,
     )  # fmt: skip
     for p in range(natural(c.neighbours)):
         if p < filled:
             j = natural(int(s[NUMBER + p]))
-            store(o, k, load(s, MATE + BLOCK * p))
+            store(o, k, load(s, NEAREST_MATE + BLOCK * p))
             o[k + 8] = s[TURN_RATE + j]
             _write_message(c, said, j, o, k)
         else:
@@ -494,19 +496,20 @@ def observe_trackers(
     n = natural(c.num_trackers)
     whole_team = c.perfect_radio != 0 and n <= _COUNTED and n == c.neighbours + 1
     lay_out_fixes(c, w, trackers, s)
-    for first in range(0, n, GROUP):
-        last = min(first + GROUP, n)
+    together = group_size(s)
+    for first in range(0, n, together):
+        last = min(first + together, n)
         for i in range(first, last):
-            survey(c, trackers[i], i, natural((i - first) * ROW), s)
+            survey(c, trackers[i], i, natural((i - first) * VIEW), s)
         for i in range(first, last if whole_team else first):
-            at = natural((i - first) * ROW)
+            at = natural((i - first) * VIEW)
             describe_mates(
                 trackers[i], n, INDEX, AHEAD + at, LEFT + at, DISTANCE + at, COS, SIN, SPEED,
                 MATE + at, s,
             )  # fmt: skip
             find_places(n, DISTANCE + at, PLACE + at, s)
         for i in range(first, last):
-            at, o = natural((i - first) * ROW), observations[i]
+            at, o = natural((i - first) * VIEW), observations[i]
             k = _write_alone(c, w, trackers[i], i, at, s, o)
             if whole_team:
                 _write_whole_team(c, i, message[0], at, s, o, k)

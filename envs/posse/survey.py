@@ -69,15 +69,20 @@ MATE_COS: Final = 25 * ROW  # heading, common frame,
 MATE_SIN: Final = 26 * ROW
 MATE_SPEED: Final = 27 * ROW  # and how fast
 OWN: Final = 28 * ROW  # rows whose meaning is their module's own
-_PAIRS: Final = 38 * ROW
+NEAREST_MATE: Final = 38 * ROW  # what is observed of the nearest: eight numbers each
+_SHARED: Final = 42 * ROW
 
-# What a tracker sees of every disc: a row for each tracker of a group, one after the other.
-AHEAD: Final = _PAIRS  # ego, m
-LEFT: Final = AHEAD + GROUP * ROW
-DISTANCE: Final = LEFT + GROUP * ROW  # of the centres, m
-PLACE: Final = DISTANCE + GROUP * ROW  # of each team-mate by distance, the nearest 0
-MATE: Final = PLACE + GROUP * ROW  # what is observed of each team-mate: eight numbers each
-SIZE: Final = MATE + GROUP * ROW
+# Rows of each tracker of a group: another's begin so many times VIEW further on.
+AHEAD: Final = _SHARED  # where every disc is, ego, m
+LEFT: Final = _SHARED + 1 * ROW
+DISTANCE: Final = _SHARED + 2 * ROW  # of the centres, m
+PLACE: Final = _SHARED + 3 * ROW  # of each team-mate by distance, the nearest 0
+MATE: Final = _SHARED + 4 * ROW  # what is observed of each in a small team: eight numbers each
+VIEW: Final = 5 * ROW
+
+SIZE: Final = _SHARED + GROUP * VIEW
+SIZE_FOR_ONE: Final = _SHARED + VIEW
+"""Where memory is short: trackers are then looked after one by one."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -94,8 +99,14 @@ _NO_BITS: Final = np.uint64(0)
 
 
 def new_scratch() -> FloatArray:
-    """Return scratch memory for one thread."""
+    """Return scratch memory for one thread, SIZE numbers."""
     return np.zeros(SIZE, np.float32)
+
+
+@compiled
+def group_size(s: FloatArray) -> int:
+    """Return how many trackers can be looked after together."""
+    return natural((s.shape[0] - _SHARED) // VIEW)
 
 
 @compiled
