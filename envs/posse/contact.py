@@ -20,6 +20,8 @@ from posse.target_motion import AGENT
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
 
+_SURELY_APART: Final = np.float32(0.01)  # m; far more than a touch and all rounding
+
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _BIT: Final = np.uint64(1)
@@ -63,26 +65,20 @@ def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.floa
 
 
 @compiled
-def free_move(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    mover: int,
-    x: np.float32,
-    y: np.float32,
-    dx: np.float32,
-    dy: np.float32,
+def free_of_robot(
+    c: Record, other: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32
 ) -> np.float32:
-    """Return the share of a robot's move that nothing blocks; mover -1 is the target."""
-    share = _ONE
+    """Return the share of a robot's move that another robot does not block."""
     reach = c.radius + c.radius + BLOCKING_GAP
-    for j in range(c.num_trackers):
-        if j != mover:
-            other = trackers[j]
-            share = min(share, free_share(x, y, dx, dy, other.x, other.y, reach))
-    if mover >= 0:
-        share = min(share, free_share(x, y, dx, dy, w.x, w.y, reach))
+    return np.float32(free_share(x, y, dx, dy, other.x, other.y, reach))
+
+
+@compiled
+def free_of_surroundings(
+    c: Record, obstacles: Records, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32
+) -> np.float32:
+    """Return the share of a robot's move that neither obstacles nor walls block."""
+    share = _ONE
     for k in range(c.num_obstacles):
         o = obstacles[k]
         share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.radius + o.radius + BLOCKING_GAP))
@@ -132,7 +128,9 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
             continue
         t.near, t.onsets = 1, 0
         target_near = target_near or near_target(c, w, t)
-        if meet_closely(c, w, trackers, obstacles, i):
+        if min(s[GAP + i], wall) > _SURELY_APART:
+            t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
+        elif meet_closely(c, w, trackers, obstacles, i):
             target_touching |= _BIT << np.uint64(i)
     w.touching = target_touching
     # A scripted target keeps clear of obstacles and walls by itself (target_motion.safe_turn).

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from posse.arrays import BoolArray, FloatArray, Record, Records
 from posse.compiled import compiled, kernel
-from posse.contact import free_move, meet
+from posse.contact import free_of_robot, free_of_surroundings, meet
 from posse.faults import apply_faults
 from posse.formation import follow_heading
 from posse.kinematics import approach, arc
@@ -52,6 +52,7 @@ _HALF: Final = np.float32(0.5)
 _WANTED_SPEED: Final = OWN + 1 * ROW
 _WANTED_TURN: Final = OWN + 2 * ROW
 _NEW_POSE: Final = OWN + 3 * ROW
+_NEAR: Final = OWN + 7 * ROW  # the numbers of those that something is near to
 
 
 @compiled
@@ -66,14 +67,31 @@ def move(robot: Record, time: np.float32) -> None:
 
 @compiled
 def move_swept(
-    c: Record, w: Record, trackers: Records, obstacles: Records, robot: Record, number: int
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    robot: Record,
+    number: int,
+    near: int,
+    s: FloatArray,
 ) -> None:
-    """Move a tracker (number -1: the target) by a physics step, as far as nothing blocks."""
+    """Move a tracker (number -1: the target) by a physics step, as far as nothing blocks.
+
+    ``near`` trackers, whose numbers stand in scratch memory, are those that may be in the way.
+    """
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
     )
     if robot.near:
-        share = free_move(c, w, trackers, obstacles, number, robot.x, robot.y, dx, dy)
+        x, y, share = robot.x, robot.y, _ONE
+        for k in range(near):
+            j = natural(int(s[_NEAR + k]))
+            if j != number:
+                share = min(share, free_of_robot(c, trackers[j], x, y, dx, dy))
+        if number >= 0:
+            share = min(share, free_of_robot(c, w, x, y, dx, dy))
+        share = min(share, free_of_surroundings(c, obstacles, x, y, dx, dy))
         if share < _ONE:
             dx, dy = dx * share, dy * share
             robot.speed = _ZERO
@@ -83,20 +101,32 @@ def move_swept(
 
 @compiled(seldom=True)
 def move_in_parts(
-    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    s: FloatArray,
 ) -> None:
-    """Move those that something is near to, by physics steps, the target first."""
+    """Move those that something is near to, by physics steps, the target first.
+
+    Whom nothing is near to is in nobody's way.
+    """
+    near = 0
+    for j in range(natural(c.num_trackers)):
+        s[_NEAR + near] = np.float32(j)
+        near = natural(near + (trackers[j].near != 0))
     target_in_parts = w.near != 0 or c.whole_arcs == 0
     for _ in range(c.physics_steps):
         if target_in_parts:
-            move_swept(c, w, trackers, obstacles, w, -1)
+            move_swept(c, w, trackers, obstacles, w, -1, near, s)
         for i in range(c.num_trackers):
             t = trackers[i]
             if t.broken_at == NEVER and (t.near != 0 or c.whole_arcs == 0):
                 t.speed, t.turn_rate = command(
                     c, t.speed, t.turn_rate, actions[i, 0], actions[i, 1]
                 )
-                move_swept(c, w, trackers, obstacles, t, i)
+                move_swept(c, w, trackers, obstacles, t, i, near, s)
 
 
 @compiled
@@ -184,7 +214,7 @@ def motion(
             move(w, c.dt)
         in_parts = move_freely(c, trackers, scratch) or w.near != 0
     if in_parts:
-        move_in_parts(c, w, trackers, obstacles, actions)
+        move_in_parts(c, w, trackers, obstacles, actions, scratch)
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
     )
