@@ -342,9 +342,8 @@ def choose_nearest(n: int, places: int, s: FloatArray) -> int:
     find_places(count, CANDIDATE, PLACE, s)
     for q in range(count):
         place = natural(int(s[PLACE + q]))
-        if place < places:
-            s[NEAREST + place] = s[CANDIDATE + q]
-            s[NUMBER + place] = s[CANDIDATE_NUMBER + q]
+        s[NEAREST + place] = s[CANDIDATE + q]
+        s[NUMBER + place] = s[CANDIDATE_NUMBER + q]
     return min(count, places)
 
 
