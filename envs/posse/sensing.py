@@ -148,7 +148,7 @@ def look(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
         t.sees = t.broken_at == NEVER and in_sight(c, w, t, obstacles, dx, dy)
         seeing += t.sees
         s[_FIXED_AT + i] = np.float32(t.fix_step)
-        if noisy:
+        if noisy and t.sees:
             s[_SEEN_DX + i], s[_SEEN_DY + i] = measure(c, w, i, dx, dy)
     if seeing == 0:
         return 0
