@@ -111,7 +111,8 @@ class Batch:
         action_shape: (E, rows, 2 + message_size).
 
     Raises:
-        ValueError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode.
+        ValueError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode,
+            an ``own_kernel`` that is no truth value.
     """
 
     def __init__(
@@ -130,6 +131,8 @@ class Batch:
         _check_count("first_world", first_world, 0)
         if num_threads is not None:
             _check_count("num_threads", num_threads, 1)
+        if not isinstance(own_kernel, bool):
+            raise ValueError(f"own_kernel={own_kernel!r} is not possible: it is True or False")
         if split not in SPLITS:
             raise ValueError(f"unknown split {split!r}; splits are: {', '.join(SPLITS)}")
         if autoreset not in AUTORESET_MODES:

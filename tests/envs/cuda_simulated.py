@@ -194,3 +194,5 @@ def test_what_is_refused() -> None:
         batch.advance(actions_for(batch, 0), *rewards_and_terms)
     with pytest.raises(ValueError, match="num_threads=2 is for device='cpu'"):
         make("smart", "cuda", num_threads=2)
+    with pytest.raises(ValueError, match="own_kernel=True is for device='cpu'"):
+        make("smart", "cuda", own_kernel=True)

@@ -310,6 +310,7 @@ def test_a_refused_reset_leaves_the_seed() -> None:
         ({"first_world": -1}, "first_world"),
         ({"autoreset": "always"}, "autoreset"),
         ({"num_threads": 0}, "num_threads"),
+        ({"own_kernel": "yes"}, "own_kernel"),
     ],
     ids=str,
 )
