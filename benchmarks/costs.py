@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse import contact, score, survey, world
+from posse import contact, motion, score, survey, world
 from posse.compiled import kernel
 
 PARTS = (
@@ -55,7 +55,7 @@ def one_part(  # type: ignore[no-untyped-def]
     for e in range(len(worlds)):
         w, t, o = worlds[e], trackers[e], obstacles[e]
         if part == 0:
-            world.motion(c, w, t, o, actions[e], scratch)
+            motion.motion(c, w, t, o, actions[e], scratch)
             continue
         survey.lay_out(c, w, t, o, scratch)  # what the other parts start from
         if part == 2:
