@@ -68,7 +68,7 @@ _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _TINY: Final = np.float32(1e-9)
-_COUNTED: Final = 16  # up to this team size, places are found by counting
+_DESCRIBED: Final = 16  # up to this team size, what is observed of all fits a row of MATE
 _TOLD: Final = 17  # numbers of the task that are the same for all of an episode
 # Rows of scratch memory, of each tracker: when its fix was, whether it sees the target, and what it
 # is told of it, sixteen numbers each.
@@ -366,9 +366,15 @@ def _write_no_neighbour(c: Record, o: FloatArray, k: int) -> None:
     o[k + 2] = _MINUS_ONE
 
 
-@compiled(seldom=True)
+@compiled
 def _write_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
     """Write what team-mate j said, a row of (N, m), into its place, which begins at k."""
+    if c.message_size > 0:
+        _copy_message(c, said, j, o, k)
+
+
+@compiled(seldom=True)
+def _copy_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
     for q in range(c.message_size):
         o[k + 9 + q] = said[j, q]
 
@@ -390,8 +396,7 @@ def _write_whole_team(
             start = natural(k + int(s[PLACE + at + j]) * size)
             store(o, start, load(s, MATE + at + BLOCK * j))
             o[start + 8] = s[TURN_RATE + j]
-            if c.message_size > 0:
-                _write_message(c, said, j, o, start)
+            _write_message(c, said, j, o, start)
 
 
 @compiled
@@ -494,7 +499,7 @@ def observe_trackers(
 ) -> None:
     """Write what each tracker is given, (rows, F); ``s`` holds where every disc is."""
     n = natural(c.num_trackers)
-    whole_team = c.perfect_radio != 0 and n <= _COUNTED and n == c.neighbours + 1
+    whole_team = c.perfect_radio != 0 and n <= _DESCRIBED and n == c.neighbours + 1
     lay_out_fixes(c, w, trackers, s)
     together = group_size(s)
     for first in range(0, n, together):

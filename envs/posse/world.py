@@ -226,90 +226,15 @@ def prepare(config: Records, beams: FloatArray, scratch: FloatArray) -> None:
     lay_out_task(config[0], scratch)
 
 
-@compiled
-def advance_worlds(
-    config: Records,
-    slots: Records,
-    beams: FloatArray,
-    weights: FloatArray,
-    world: Records,
-    tracker: Records,
-    obstacle: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
-    actions: FloatArray,
-    observations: FloatArray,
-    rewards: FloatArray,
-    terms: FloatArray,
-    flags: BoolArray,
-    orders: npt.NDArray[np.uint8],
-    scratch: FloatArray,
-    first: int,
-    last: int,
-) -> int:
-    """Do what each world is ordered to, for worlds ``first`` to ``last``; the one loop over worlds.
+def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., int]:
+    """Return the kernel that steps worlds of any scenario, or of the one whose tables these are.
 
-    See :func:`advance_world`. Returns how many of these worlds' episodes are over.
+    The tables of one scenario (configuration, slots, beams) become constants in its code.
     """
-    prepare(config, beams, scratch)
-    over = 0
-    for e in range(first, last):
-        if advance_world(
-            e, config, slots, weights, world, tracker, obstacle,
-            heard, broadcast, heard_message, message,
-            actions, observations, rewards, terms, flags, orders, scratch,
-        ):  # fmt: skip
-            over += 1
-    return over
-
-
-@kernel(short_loops=True)
-def advance(
-    config: Records,
-    slots: Records,
-    beams: FloatArray,
-    weights: FloatArray,
-    world: Records,
-    tracker: Records,
-    obstacle: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
-    actions: FloatArray,
-    observations: FloatArray,
-    rewards: FloatArray,
-    terms: FloatArray,
-    flags: BoolArray,
-    orders: npt.NDArray[np.uint8],
-    scratch: FloatArray,
-    first: int,
-    last: int,
-) -> int:
-    """Advance worlds of any scenario; see :func:`advance_worlds`."""
-    return advance_worlds(
-        config, slots, beams, weights, world, tracker, obstacle,
-        heard, broadcast, heard_message, message,
-        actions, observations, rewards, terms, flags, orders, scratch, first, last,
-    )  # fmt: skip
-
-
-@functools.lru_cache(maxsize=64)
-def own_kernel(scenario: Scenario) -> Callable[..., int]:
-    """Return :func:`advance` for one scenario alone.
-
-    The scenario is part of the code: loops over trackers, slots and beams have known lengths, and
-    what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
-    compiled by itself, and kept on disk as any other.
-    """
-    own_config, own_slots, own_beams = (
-        config_record(scenario), slot_records(scenario), beam_directions(scenario)
-    )  # fmt: skip
+    own_config, own_slots, own_beams = own or (None, None, None)
 
     @kernel(short_loops=True)
-    def advance_own(
+    def advance(
         config: Records,
         slots: Records,
         beams: FloatArray,
@@ -331,13 +256,39 @@ def own_kernel(scenario: Scenario) -> Callable[..., int]:
         first: int,
         last: int,
     ) -> int:
-        return advance_worlds(
-            own_config, own_slots, own_beams, weights, world, tracker, obstacle,
-            heard, broadcast, heard_message, message,
-            actions, observations, rewards, terms, flags, orders, scratch, first, last,
-        )  # fmt: skip
+        c = config if own_config is None else own_config
+        offsets = slots if own_slots is None else own_slots
+        directions = beams if own_beams is None else own_beams
+        prepare(c, directions, scratch)
+        over = 0
+        for e in range(first, last):
+            if advance_world(
+                e, c, offsets, weights, world, tracker, obstacle,
+                heard, broadcast, heard_message, message,
+                actions, observations, rewards, terms, flags, orders, scratch,
+            ):  # fmt: skip
+                over += 1
+        return over
 
-    return advance_own
+    return advance
+
+
+advance: Final = _stepping(None)
+"""Do what each world is ordered to, for worlds ``first`` to ``last``; the one loop over worlds.
+
+See :func:`advance_world`. Returns how many of these worlds' episodes are over.
+"""
+
+
+@functools.lru_cache(maxsize=64)
+def own_kernel(scenario: Scenario) -> Callable[..., int]:
+    """Return :data:`advance` for one scenario alone.
+
+    The scenario is part of the code: loops over trackers, slots and beams have known lengths, and
+    what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
+    compiled by itself, and kept on disk as any other.
+    """
+    return _stepping((config_record(scenario), slot_records(scenario), beam_directions(scenario)))
 
 
 @kernel
