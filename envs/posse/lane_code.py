@@ -21,21 +21,25 @@ from numba.core.typing.templates import (
 from posse.lanes import (
     WIDTH,
     anywhere,
+    bits,
     choose,
     eight,
     greater,
     lesser,
     load,
     load_fields,
+    lowest_bit,
     root,
     store,
     store_fields,
+    tag,
+    tagged,
     transpose,
 )
 
 _FLOATS: Final = ir.VectorType(ir.FloatType(), WIDTH)
 _BITS: Final = ir.VectorType(ir.IntType(1), WIDTH)
-_INDICES: Final = ir.VectorType(ir.IntType(32), WIDTH)
+_INTEGERS: Final = ir.VectorType(ir.IntType(32), WIDTH)
 
 
 class _LanesType(types.Type):
@@ -69,9 +73,9 @@ _MASK: Final = _MaskType()
 
 
 def _spread(builder: Any, value: Any) -> Any:
-    nothing = ir.Constant(_FLOATS, ir.Undefined)
+    nothing = ir.Constant(ir.VectorType(value.type, WIDTH), ir.Undefined)
     first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, nothing, ir.Constant(_INDICES, [0] * WIDTH))
+    return builder.shuffle_vector(first, nothing, ir.Constant(_INTEGERS, [0] * WIDTH))
 
 
 @lower_cast(types.float32, _LanesType)
@@ -108,13 +112,32 @@ def _emit_root(builder: Any, value: Any) -> Any:
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [value])
 
 
+def _emit_tagged(builder: Any, value: Any, number: Any) -> Any:
+    kept = builder.and_(builder.bitcast(value, _INTEGERS), ir.Constant(_INTEGERS, [~63] * WIDTH))
+    put_in = _spread(builder, builder.trunc(number, ir.IntType(32)))
+    return builder.bitcast(builder.or_(kept, put_in), _FLOATS)
+
+
+def _emit_tag(builder: Any, value: Any) -> Any:
+    tags = builder.and_(builder.bitcast(value, _INTEGERS), ir.Constant(_INTEGERS, [63] * WIDTH))
+    return builder.sitofp(tags, _FLOATS)
+
+
 def _emit_anywhere(builder: Any, mask: Any) -> Any:
     bits = builder.bitcast(mask, ir.IntType(WIDTH))
     return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
+def _emit_bits(builder: Any, mask: Any) -> Any:
+    return builder.zext(builder.bitcast(mask, ir.IntType(WIDTH)), ir.IntType(64))
+
+
+def _emit_lowest_bit(builder: Any, number: Any) -> Any:
+    return builder.cttz(number, ir.Constant(ir.IntType(1), 1))  # undefined for 0
+
+
 def _shuffle(builder: Any, value: Any, other: Any, places: list[int]) -> Any:
-    return builder.shuffle_vector(value, other, ir.Constant(_INDICES, places))
+    return builder.shuffle_vector(value, other, ir.Constant(_INTEGERS, places))
 
 
 def _emit_transpose(builder: Any, *rows: Any) -> Any:
@@ -145,7 +168,11 @@ _declare(operator.and_, _MASK, (_MASK, _MASK), lambda builder, a, b: builder.and
 _declare(operator.or_, _MASK, (_MASK, _MASK), lambda builder, a, b: builder.or_(a, b))
 _declare(eight, _LANES, (types.float32,), _spread)
 _declare(transpose, types.UniTuple(_LANES, WIDTH), (_LANES,) * WIDTH, _emit_transpose)
+_declare(tagged, _LANES, (_LANES, types.intp), _emit_tagged)
+_declare(tag, _LANES, (_LANES,), _emit_tag)
 _declare(anywhere, types.boolean, (_MASK,), _emit_anywhere)
+_declare(bits, types.intp, (_MASK,), _emit_bits)
+_declare(lowest_bit, types.intp, (types.intp,), _emit_lowest_bit)
 for _number, _truth in ((types.float32, types.boolean), (_LANES, _MASK)):
     _both = (_number, _number)
     _declare(choose, _number, (_truth, *_both), lambda builder, m, a, b: builder.select(m, a, b))

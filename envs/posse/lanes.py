@@ -68,6 +68,32 @@ def anywhere(mask: Mask) -> bool:
     return bool(np.any(mask))
 
 
+def tagged(value: Lanes, number: int) -> Lanes:
+    """Return numbers that are not negative with a number below 64 in place of their last six bits.
+
+    They compare as before where they differ by more than a 65,536th, and say whose they are
+    (:func:`tag`).
+    """
+    whole = np.asarray(value, np.float32).view(np.uint32)
+    return (whole & np.uint32(0xFFFFFFC0) | np.uint32(number)).view(np.float32)
+
+
+def tag(value: Lanes) -> Lanes:
+    """Return the numbers that :func:`tagged` put in."""
+    return (np.asarray(value, np.float32).view(np.uint32) & np.uint32(63)).astype(np.float32)
+
+
+def bits(mask: Mask) -> int:
+    """Return the mask as a number: its lowest bit is the first lane, its eighth the last."""
+    return sum(1 << k for k, true in enumerate(np.broadcast_to(mask, WIDTH)) if true)
+
+
+def lowest_bit(number: int) -> int:
+    """Return the place of the lowest bit that is set in a number other than 0."""
+    whole = int(number)
+    return (whole & -whole).bit_length() - 1
+
+
 def load_fields(record: Record, offset: int) -> Lanes:
     """Return the eight float32 that begin ``offset`` bytes into a record."""
     return np.frombuffer(record.tobytes(), np.float32, WIDTH, offset)

@@ -22,9 +22,10 @@ from posse.compiled import compiled
 from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
 from posse.lanes import choose, greater, load, root, store
+from posse.nearest import list_nearest
 from posse.scenario import Scenario
-from posse.sensing import ping
-from posse.state import FIX, NEVER
+from posse.sonar import ping
+from posse.state import FIX, NEVER, POSE
 from posse.survey import (
     AHEAD,
     BLOCK,
@@ -32,18 +33,12 @@ from posse.survey import (
     DISTANCE,
     INDEX,
     LEFT,
+    LISTED,
     MATE,
-    MATE_AHEAD,
-    MATE_COS,
-    MATE_LEFT,
-    MATE_SIN,
-    MATE_SPEED,
-    NEAREST,
-    NEAREST_MATE,
-    NUMBER,
     OWN,
     PLACE,
     ROW,
+    SHORTLIST,
     SIN,
     SPEED,
     TASK,
@@ -52,17 +47,16 @@ from posse.survey import (
     X,
     Y,
     blocks,
-    choose_nearest,
     columns,
+    columns_of,
     describe_mates,
     find_places,
     group_size,
-    keep_team,
     natural,
     store_rows,
     survey,
     within_one,
-)  # fmt: skip
+)
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -75,6 +69,12 @@ _TOLD: Final = 17  # numbers of the task that are the same for all of an episode
 _FIXED_AT: Final = OWN
 _SEES: Final = OWN + 1 * ROW
 _TARGET: Final = OWN + 2 * ROW
+# Of one tracker: what is observed of eight of the nearest, eight numbers each, and how they turn;
+# or the nearest so far, how far and who.
+_NEAREST: Final = OWN
+_NEAREST_TURN_RATE: Final = OWN + 1 * ROW
+_SO_FAR: Final = SHORTLIST
+_WHO: Final = SHORTLIST + 1 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 
 
@@ -405,20 +405,19 @@ def _keep_nearest(
 ) -> int:
     """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far.
 
-    For distances that come one by one. To write them to a row first, for
-    :func:`~posse.survey.choose_nearest`, makes an observation of five half as long again.
+    For distances that come one by one; :mod:`posse.nearest` is for where all are known at once.
     """
     if filled == places:
-        if distance >= s[NEAREST + places - 1]:
+        if distance >= s[_SO_FAR + places - 1]:
             return filled
         filled -= 1
     spot = filled
-    while spot > 0 and s[NEAREST + spot - 1] > distance:
-        s[NEAREST + spot] = s[NEAREST + spot - 1]
-        s[NUMBER + spot] = s[NUMBER + spot - 1]
+    while spot > 0 and s[_SO_FAR + spot - 1] > distance:
+        s[_SO_FAR + spot] = s[_SO_FAR + spot - 1]
+        s[_WHO + spot] = s[_WHO + spot - 1]
         spot -= 1
-    s[NEAREST + spot] = distance
-    s[NUMBER + spot] = np.float32(number)
+    s[_SO_FAR + spot] = distance
+    s[_WHO + spot] = np.float32(number)
     return filled + 1
 
 
@@ -426,33 +425,36 @@ def _keep_nearest(
 def _write_nearest(
     c: Record,
     trackers: Records,
-    i: int,
+    t: Record,
+    listed: int,
     said: FloatArray,
-    at: int,
     s: FloatArray,
     o: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates, where all are heard."""
-    keep_team(c.num_trackers, at, s)
-    filled = natural(choose_nearest(c.num_trackers, c.neighbours, s))
-    for p in range(filled):
-        j = natural(int(s[NUMBER + p]))
-        s[MATE_AHEAD + p], s[MATE_LEFT + p] = s[AHEAD + at + j], s[LEFT + at + j]
-        s[MATE_COS + p], s[MATE_SIN + p] = s[COS + j], s[SIN + j]
-        s[MATE_SPEED + p] = s[SPEED + j]
-    describe_mates(
-        trackers[i], filled, NUMBER, MATE_AHEAD, MATE_LEFT, NEAREST, MATE_COS, MATE_SIN, MATE_SPEED,
-        NEAREST_MATE, s,
-    )  # fmt: skip
-    for p in range(natural(c.neighbours)):
-        if p < filled:
-            j = natural(int(s[NUMBER + p]))
-            store(o, k, load(s, NEAREST_MATE + BLOCK * p))
-            o[k + 8] = s[TURN_RATE + j]
-            _write_message(c, said, j, o, k)
-        else:
-            _write_no_neighbour(c, o, k)
+    """Write the nearest team-mates, where all are heard; the list begins at ``listed``."""
+    filled = natural(min(c.num_trackers - 1, c.neighbours))
+    hc, hs = t.heading_cos, t.heading_sin
+    for block in range(blocks(filled)):
+        p = listed + BLOCK * block
+        left_over = filled - BLOCK * block
+        x, y, heading_x, heading_y, speed, turn_rate, _, _ = columns_of(
+            trackers, p, left_over, POSE, s
+        )
+        dx, dy = x - t.x, y - t.y
+        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        metres = root(ahead * ahead + left * left)
+        describe_mates(
+            t, load(s, p), ahead, left, metres, heading_x, heading_y, speed, _NEAREST, s
+        )  # fmt: skip
+        store(s, _NEAREST_TURN_RATE, turn_rate)
+        for q in range(min(BLOCK, left_over)):
+            store(o, k, load(s, _NEAREST + BLOCK * q))
+            o[k + 8] = s[_NEAREST_TURN_RATE + q]
+            _write_message(c, said, natural(int(s[p + q])), o, k)
+            k += 9 + natural(c.message_size)
+    for _ in range(filled, c.neighbours):
+        _write_no_neighbour(c, o, k)
         k += 9 + natural(c.message_size)
 
 
@@ -477,7 +479,7 @@ def _write_heard(
             filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
     for p in range(c.neighbours):
         if p < filled:
-            j = int(s[NUMBER + p])
+            j = int(s[_WHO + p])
             age = np.float32(w.step - heard[i, j].step) * c.dt
             _write_neighbour(t, heard[i, j], j, age, o, k)
             _write_message(c, heard_message[i], j, o, k)
@@ -504,35 +506,43 @@ def observe_trackers(
     together = group_size(s)
     for first in range(0, n, together):
         last = min(first + together, n)
-        for i in range(first, last):
+        for i in range(first, last if whole_team else first):
             survey(c, trackers[i], i, natural((i - first) * VIEW), s)
         for i in range(first, last if whole_team else first):
-            at = natural((i - first) * VIEW)
-            describe_mates(
-                trackers[i], n, INDEX, AHEAD + at, LEFT + at, DISTANCE + at, COS, SIN, SPEED,
-                MATE + at, s,
-            )  # fmt: skip
-            find_places(n, DISTANCE + at, PLACE + at, s)
+            _describe_team(c, trackers[i], natural((i - first) * VIEW), s)
+        if not whole_team and c.perfect_radio:
+            list_nearest(c, trackers, first, last, s)
         for i in range(first, last):
             at, o = natural((i - first) * VIEW), observations[i]
-            k = _write_alone(c, w, trackers[i], i, at, s, o)
+            k = _write_alone(c, w, trackers[i], i, s, o)
             if whole_team:
                 _write_whole_team(c, i, message[0], at, s, o, k)
             elif c.perfect_radio:
-                _write_nearest(c, trackers, i, message[0], at, s, o, k)
+                _write_nearest(c, trackers, trackers[i], LISTED + at, message[0], s, o, k)
             else:
                 _write_heard(c, w, trackers[i], i, heard, heard_message, s, o, k)
 
 
 @compiled
-def _write_alone(
-    c: Record, w: Record, t: Record, i: int, at: int, s: FloatArray, o: FloatArray
-) -> int:
+def _describe_team(c: Record, t: Record, at: int, s: FloatArray) -> None:
+    """Write what a tracker observes of each in its team, itself included, and each one's place."""
+    for block in range(blocks(c.num_trackers)):
+        j = BLOCK * block
+        describe_mates(
+            t, load(s, INDEX + j), load(s, AHEAD + at + j), load(s, LEFT + at + j),
+            load(s, DISTANCE + at + j), load(s, COS + j), load(s, SIN + j), load(s, SPEED + j),
+            MATE + at + BLOCK * j, s,
+        )  # fmt: skip
+    find_places(c.num_trackers, DISTANCE + at, PLACE + at, s)
+
+
+@compiled
+def _write_alone(c: Record, w: Record, t: Record, i: int, s: FloatArray, o: FloatArray) -> int:
     """Write what tracker i knows without its team; return where the team-mates' part begins."""
     k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
     k = _write_task(c, w, i, s, o, k)
     k = _write_target(i, s, o, k)
-    ping(c, t, at, s, o, k)
+    ping(c, t, i, s, o, k)
     return k + natural(c.sonar_beams)
 
 
@@ -554,7 +564,7 @@ def observe_target(
     o[own + 7], o[own + 8] = c.target_speed, c.target_turn_rate
     o[own + 9], o[own + 10] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
     k = _write_no_target(o, k)
-    ping(c, w, 0, s, o, k)
+    ping(c, w, c.num_trackers, s, o, k)
     k += natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
@@ -562,7 +572,7 @@ def observe_target(
     for p in range(c.neighbours):
         _write_no_neighbour(c, o, k)
         if p < filled:
-            j = int(s[NUMBER + p])
+            j = int(s[_WHO + p])
             _write_neighbour(w, trackers[j], j, _ZERO, o, k)
         k += 9 + natural(c.message_size)
 

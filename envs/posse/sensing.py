@@ -11,36 +11,25 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.lanes import (
     Lanes,
-    anywhere,
     choose,
     eight,
     greater,
     lesser,
     load,
     root,
-    store,
     store_fields,
 )
 from posse.randomness import SENSOR_NOISE, normal_pair
 from posse.state import FIX, NEVER
 from posse.survey import (
-    AHEAD,
-    BEAM_COS,
-    BEAM_SIN,
     BLOCK,
-    DISTANCE,
-    FAR,
-    LEFT,
     OWN,
-    RADIUS,
-    READING,
     ROW,
     X,
     Y,
     blocks,
     columns,
     natural,
-    num_discs,
     store_rows,
 )
 
@@ -51,8 +40,11 @@ _SEEN_DX: Final = OWN + 1 * ROW
 _SEEN_DY: Final = OWN + 2 * ROW
 _NEW_FIX: Final = OWN + 3 * ROW
 
+_WORD: Final = 8  # blocks of eight discs, a bit each, that fill a number of 64 bits
+
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 _TINY: Final = np.float32(1e-9)
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of the velocity
 
@@ -188,91 +180,3 @@ def measure(
     turn = c.bearing_noise * second
     cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
     return scale * (dx * cosine - dy * sine), scale * (dx * sine + dy * cosine)
-
-
-@compiled
-def listen_to_disc(
-    c: Record,
-    ahead: np.float32,
-    left: np.float32,
-    distance: np.float32,
-    radius: np.float32,
-    s: FloatArray,
-) -> None:
-    """Shorten the sonar readings by a disc whose centre lies (ahead, left) of the robot's.
-
-    The disc's nearest point counts for the beam in whose width it lies; for any other beam, where
-    its axis meets the disc.
-    """
-    in_width = c.beam_cosine * distance
-    nearest = max(distance - radius - c.radius, _ZERO)
-    radius2 = radius * radius
-    # Does the disc look narrower than a beam is wide, as it nearly always does? Then no axis meets
-    # it but that of the beam in whose width it lies.
-    narrow = radius2 < (_ONE - c.beam_cosine * c.beam_cosine) * distance * distance
-    for block in range(blocks(c.sonar_beams)):
-        k = BLOCK * block
-        cosine, sine = load(s, BEAM_COS + k), load(s, BEAM_SIN + k)
-        along, found = ahead * cosine + left * sine, eight(FAR)
-        if not narrow:
-            across = left * cosine - ahead * sine
-            under_root = radius2 - across * across
-            axis = greater(along - root(greater(under_root, _ZERO)) - c.radius, _ZERO)
-            found = choose((under_root > _ZERO) & (along > _ZERO), axis, FAR)
-        found = choose(along >= in_width, nearest, found)
-        store(s, READING + k, lesser(load(s, READING + k), found))
-
-
-@compiled(seldom=True)
-def listen_to_wall(
-    c: Record,
-    robot: Record,
-    normal_x: np.float32,
-    normal_y: np.float32,
-    distance: np.float32,
-    s: FloatArray,
-) -> None:
-    """Shorten the sonar readings by a wall at a distance along its outward normal."""
-    if distance >= c.sonar_range + c.radius:
-        return
-    nearest, in_width = max(distance - c.radius, _ZERO), c.beam_cosine
-    ahead = normal_x * robot.heading_cos + normal_y * robot.heading_sin
-    left = normal_y * robot.heading_cos - normal_x * robot.heading_sin
-    for block in range(blocks(c.sonar_beams)):
-        k = BLOCK * block
-        towards = ahead * load(s, BEAM_COS + k) + left * load(s, BEAM_SIN + k)
-        axis = greater(distance / greater(towards, _TINY) - c.radius, _ZERO)
-        found = choose(towards >= in_width, nearest, choose(towards > _ZERO, axis, FAR))
-        store(s, READING + k, lesser(load(s, READING + k), found))
-
-
-@compiled
-def ping(c: Record, robot: Record, at: int, s: FloatArray, o: FloatArray, first: int) -> None:
-    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
-
-    It stands on the :func:`~posse.survey.survey` of the discs around the robot, in the rows that
-    begin ``at`` further on.
-    """
-    for block in range(blocks(c.sonar_beams)):
-        store(s, READING + BLOCK * block, eight(c.sonar_range))
-    reach = c.sonar_range + c.radius
-    for block in range(blocks(num_discs(c))):
-        j = BLOCK * block
-        if anywhere(load(s, DISTANCE + at + j) - load(s, RADIUS + j) < reach):
-            for k in range(BLOCK):
-                q = at + j + k
-                distance, radius = s[DISTANCE + q], s[RADIUS + j + k]
-                if distance - radius < reach:
-                    listen_to_disc(c, s[AHEAD + q], s[LEFT + q], distance, radius, s)
-    if c.walled:
-        half, x, y = c.half_arena, robot.x, robot.y
-        listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
-        listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
-        listen_to_wall(c, robot, _ZERO, _ONE, half - y, s)
-        listen_to_wall(c, robot, _ZERO, -_ONE, half + y, s)
-    beams = natural(c.sonar_beams)
-    whole = beams // BLOCK
-    for block in range(whole):
-        store(o, first + BLOCK * block, load(s, READING + BLOCK * block))
-    for k in range(BLOCK * whole, beams):
-        o[first + k] = s[READING + k]

@@ -57,20 +57,10 @@ EXCESS: Final = 13 * ROW  # of each tracker: not above 0 if anything is near
 SLOT: Final = 14 * ROW  # of each tracker: the nearest slot
 SLOT_DISTANCE: Final = 15 * ROW  # and how far it is, m
 SLOT_DISTANCE2: Final = 16 * ROW  # the same squared, m²
-MATE_DISTANCE: Final = 17 * ROW  # as DISTANCE; what is no tracker is far
-CANDIDATE: Final = 18 * ROW  # how far those are that may be among the nearest,
-CANDIDATE_NUMBER: Final = 19 * ROW  # and who they are
-LANE: Final = 20 * ROW
-NEAREST: Final = 21 * ROW  # of team-mates by place: how far,
-NUMBER: Final = 22 * ROW  # who,
-MATE_AHEAD: Final = 23 * ROW  # where, ego,
-MATE_LEFT: Final = 24 * ROW
-MATE_COS: Final = 25 * ROW  # heading, common frame,
-MATE_SIN: Final = 26 * ROW
-MATE_SPEED: Final = 27 * ROW  # and how fast
-OWN: Final = 28 * ROW  # rows whose meaning is their module's own
-NEAREST_MATE: Final = 38 * ROW  # what is observed of the nearest: eight numbers each
-_SHARED: Final = 42 * ROW
+HEARD2: Final = 17 * ROW  # within which the sonar has it, the square, and a little more, m²
+OWN: Final = 18 * ROW  # ten rows whose meaning is their module's own
+SHORTLIST: Final = 28 * ROW  # and six for making lists of the nearest
+_SHARED: Final = 34 * ROW
 
 # Rows of each tracker of a group: another's begin so many times VIEW further on.
 AHEAD: Final = _SHARED  # where every disc is, ego, m
@@ -78,6 +68,7 @@ LEFT: Final = _SHARED + 1 * ROW
 DISTANCE: Final = _SHARED + 2 * ROW  # of the centres, m
 PLACE: Final = _SHARED + 3 * ROW  # of each team-mate by distance, the nearest 0
 MATE: Final = _SHARED + 4 * ROW  # what is observed of each in a small team: eight numbers each
+LISTED: Final = _SHARED  # instead, in a large team: who is nearest, the nearest first
 VIEW: Final = 5 * ROW
 
 SIZE: Final = _SHARED + GROUP * VIEW
@@ -88,11 +79,10 @@ TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
 
 FAR: Final = np.float32(1e9)
-_NEARER_THAN_FAR: Final = np.float32(0.9e9)
-_PLACES: Final = np.float32(BLOCK)
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 _TINY: Final = np.float32(1e-9)
 _BIT: Final = np.uint64(1)
 _NO_BITS: Final = np.uint64(0)
@@ -135,10 +125,18 @@ def lay_out_constants(c: Record, beams: FloatArray, s: FloatArray) -> None:
     for k in range(ROW):
         s[INDEX + k] = np.float32(k)
         s[RADIUS + k] = c.radius
+        s[HEARD2 + k] = heard_within2(c, c.radius)
     count = beams.shape[1]
     for k in range(BLOCK * blocks(count)):
         s[BEAM_COS + k] = beams[0, k] if k < count else _ZERO
         s[BEAM_SIN + k] = beams[1, k] if k < count else _ZERO
+
+
+@compiled
+def heard_within2(c: Record, radius: np.float32) -> np.float32:
+    """Return a squared distance of the centres within which every disc is that the sonar has."""
+    within = (c.sonar_range + c.radius + radius) * _A_LITTLE_MORE
+    return np.float32(within * within)
 
 
 @compiled
@@ -158,6 +156,27 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
         load_fields(records[natural(min(first + 5, last))], offset),
         load_fields(records[natural(min(first + 6, last))], offset),
         load_fields(records[natural(min(first + 7, last))], offset),
+    )
+
+
+@compiled
+def columns_of(
+    records: Records, listed: int, count: int, offset: int, s: FloatArray
+) -> tuple[Lanes, ...]:
+    """Return :func:`columns` of eight of the ``count`` records whose numbers stand in a list.
+
+    It begins at ``listed``.
+    """
+    last = count - 1
+    return transpose(
+        load_fields(records[natural(int(s[listed]))], offset),
+        load_fields(records[natural(int(s[listed + min(1, last)]))], offset),
+        load_fields(records[natural(int(s[listed + min(2, last)]))], offset),
+        load_fields(records[natural(int(s[listed + min(3, last)]))], offset),
+        load_fields(records[natural(int(s[listed + min(4, last)]))], offset),
+        load_fields(records[natural(int(s[listed + min(5, last)]))], offset),
+        load_fields(records[natural(int(s[listed + min(6, last)]))], offset),
+        load_fields(records[natural(int(s[listed + min(7, last)]))], offset),
     )
 
 
@@ -208,6 +227,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Floa
             o = obstacles[k]
             j = n + 1 + k
             s[X + j], s[Y + j], s[RADIUS + j] = o.x, o.y, o.radius
+            s[HEARD2 + j] = heard_within2(c, o.radius)
         store(s, X + count, eight(FAR))
         store(s, Y + count, eight(FAR))
 
@@ -239,35 +259,30 @@ def survey(c: Record, robot: Record, number: int, at: int, s: FloatArray) -> Non
 @compiled
 def describe_mates(
     robot: Record,
-    count: int,
-    number: int,
-    ahead: int,
-    left: int,
-    distance: int,
-    cosine: int,
-    sine: int,
-    speed: int,
+    numbers: Lanes,
+    ahead: Lanes,
+    left: Lanes,
+    metres: Lanes,
+    heading_x: Lanes,
+    heading_y: Lanes,
+    speed: Lanes,
     to: int,
     s: FloatArray,
 ) -> None:
-    """Write what a robot observes of each of ``count`` team-mates, eight numbers each, from ``to``.
+    """Write what a robot observes of eight team-mates, eight numbers each, from ``to`` on.
 
     Number, age (0), range, bearing and heading (cosine and sine, ego), speed: as they follow on
-    each other in an observation. From the rows that hold who they are, where they are as the robot
-    sees it, and their headings in the common frame.
+    each other in an observation. From who they are, where they are as the robot sees it, and their
+    headings in the common frame.
     """
     hc, hs = robot.heading_cos, robot.heading_sin
-    for block in range(blocks(count)):
-        j = BLOCK * block
-        metres = load(s, distance + j)
-        per_metre = _ONE / greater(metres, _TINY)
-        x, y = load(s, cosine + j), load(s, sine + j)
-        store_rows(
-            load(s, number + j), eight(_ZERO), metres,
-            within_one(load(s, ahead + j) * per_metre), within_one(load(s, left + j) * per_metre),
-            within_one(x * hc + y * hs), within_one(y * hc - x * hs),
-            load(s, speed + j), to + BLOCK * j, BLOCK, s,
-        )  # fmt: skip
+    per_metre = _ONE / greater(metres, _TINY)
+    store_rows(
+        numbers, eight(_ZERO), metres,
+        within_one(ahead * per_metre), within_one(left * per_metre),
+        within_one(heading_x * hc + heading_y * hs), within_one(heading_y * hc - heading_x * hs),
+        speed, to, BLOCK, s,
+    )  # fmt: skip
 
 
 @compiled
@@ -287,64 +302,6 @@ def find_places(count: int, distances: int, to: int, s: FloatArray) -> None:
             nearer = (distance > other) | ((distance == other) & (number > np.float32(i)))
             place = place + choose(nearer, _ONE, _ZERO)
         store(s, to + j, place)
-
-
-@compiled
-def keep_team(n: int, at: int, s: FloatArray) -> None:
-    """Write the distances of trackers alone, everything else being far."""
-    for block in range(blocks(n)):
-        j = BLOCK * block
-        mate = load(s, INDEX + j) < np.float32(n)
-        store(s, MATE_DISTANCE + j, choose(mate, load(s, DISTANCE + at + j), FAR))
-
-
-@compiled
-def bound_nearest(n: int, s: FloatArray) -> np.float32:
-    """Return a distance within which the eight nearest of n team-mates are, and few others.
-
-    The team is dealt out to sixteen lanes. The nearest of each lane are sixteen team-mates, so none
-    of the eight nearest is farther than the eighth of these.
-    """
-    first, second = eight(FAR), eight(FAR)
-    for block in range(blocks(n)):
-        distance = load(s, MATE_DISTANCE + BLOCK * block)
-        if block & 1:
-            second = lesser(second, distance)
-        else:
-            first = lesser(first, distance)
-    store(s, LANE, first)
-    store(s, LANE + BLOCK, second)
-    first_rank, second_rank = eight(_ZERO), eight(_ZERO)
-    for i in range(2 * BLOCK):
-        nearer = s[LANE + i]
-        first_rank = first_rank + choose(first > nearer, _ONE, _ZERO)
-        second_rank = second_rank + choose(second > nearer, _ONE, _ZERO)
-    first = choose(first_rank < _PLACES, first, _ZERO)
-    second = choose(second_rank < _PLACES, second, _ZERO)
-    store(s, LANE, greater(first, second))
-    left = max(max(s[LANE], s[LANE + 1]), max(s[LANE + 2], s[LANE + 3]))
-    right = max(max(s[LANE + 4], s[LANE + 5]), max(s[LANE + 6], s[LANE + 7]))
-    return min(max(left, right), _NEARER_THAN_FAR)
-
-
-@compiled
-def choose_nearest(n: int, places: int, s: FloatArray) -> int:
-    """List the nearest of n team-mates, NEAREST first; return how many, at most ``places``.
-
-    MATE_DISTANCE says how far each is, FAR for those that do not count.
-    """
-    most = bound_nearest(n, s) if places <= BLOCK else _NEARER_THAN_FAR
-    count = 0
-    for j in range(natural(n)):  # without a branch, which could not be predicted
-        distance = s[MATE_DISTANCE + j]
-        s[CANDIDATE + count], s[CANDIDATE_NUMBER + count] = distance, s[INDEX + j]
-        count = natural(count + int(distance <= most))
-    find_places(count, CANDIDATE, PLACE, s)
-    for q in range(count):
-        place = natural(int(s[PLACE + q]))
-        s[NEAREST + place] = s[CANDIDATE + q]
-        s[NUMBER + place] = s[CANDIDATE_NUMBER + q]
-    return min(count, places)
 
 
 @compiled

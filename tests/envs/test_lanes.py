@@ -15,15 +15,19 @@ from posse.compiled import kernel
 from posse.lanes import (
     WIDTH,
     anywhere,
+    bits,
     choose,
     eight,
     greater,
     lesser,
     load,
     load_fields,
+    lowest_bit,
     root,
     store,
     store_fields,
+    tag,
+    tagged,
     transpose,
 )
 from posse.state import FIX, POSE, TRACKER
@@ -153,6 +157,52 @@ def test_one_lane_is_enough_to_be_anywhere(function: Callable[..., bool], place:
     assert not function(numbers, np.float32(1.0))
     numbers[1 + place] = 5.0
     assert function(numbers, np.float32(1.0))
+
+
+@kernel
+def places(a: Numbers, limit: np.float32, out: npt.NDArray[np.int64]) -> int:
+    """Write the places of those of eight numbers that are above a limit; return how many."""
+    left, count = bits(load(a, 0) > limit) << 56, 0
+    while left != 0:
+        out[count] = lowest_bit(left) - 56
+        left &= left - 1
+        count += 1
+    return count
+
+
+@pytest.mark.parametrize("function", [places, getattr(places, "py_func", places)])
+@pytest.mark.parametrize("mask", [0, 1, 0b10000000, 0b01101001, 0b11111111])
+def test_a_mask_has_a_bit_for_each_lane(function: Callable[..., int], mask: int) -> None:
+    chosen = [k for k in range(WIDTH) if mask >> k & 1]
+    numbers, out = np.zeros(WIDTH, np.float32), np.zeros(WIDTH, np.int64)
+    numbers[chosen] = 5.0
+    count = function(numbers, np.float32(1.0), out)
+    assert out[:count].tolist() == chosen
+
+
+@kernel
+def put_in_and_take_out(a: Numbers, number: int, out: Numbers) -> None:
+    """Tag eight numbers, and read the tags."""
+    both = tagged(load(a, 0), number)
+    store(out, 0, both)
+    store(out, 8, tag(both))
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(
+    st.lists(st.floats(2.0**-40, 1e9, width=32), min_size=WIDTH, max_size=WIDTH),
+    st.integers(0, 63),
+)
+def test_a_tag_is_kept_and_changes_its_number_by_a_131072nd_at_most(
+    values: list[float], number: int
+) -> None:
+    a = np.array(values, np.float32)
+    for function in (put_in_and_take_out, getattr(put_in_and_take_out, "py_func", None)):
+        if function is not None:
+            out = np.zeros(2 * WIDTH, np.float32)
+            function(a, number, out)
+            np.testing.assert_allclose(out[:WIDTH], a, rtol=2**-17)
+            assert out[WIDTH:].tolist() == [number] * WIDTH
 
 
 @kernel
