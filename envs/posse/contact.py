@@ -7,14 +7,14 @@ heads elsewhere. A contact is counted once, when it begins, and by kind.
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
-from posse.survey import EXCESS, FAR, GAP, TOUCHING_GAP, find_gaps
+from posse.lanes import Lanes, bits, choose, greater, least, lesser, load, root
+from posse.survey import BLOCK, EXCESS, FAR, GAP, INDEX, TOUCHING_GAP, X, Y, blocks, find_gaps
 from posse.target_motion import AGENT
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -22,6 +22,8 @@ BLOCKING_GAP: Final = np.float32(0.0005)
 
 _SURELY_APART: Final = np.float32(0.01)  # m; far more than a touch and all rounding
 
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
+_TINY: Final = np.float32(1e-30)  # m²; a move so short meets nothing
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _BIT: Final = np.uint64(1)
@@ -35,23 +37,22 @@ def free_share(
     y: np.float32,
     dx: np.float32,
     dy: np.float32,
-    other_x: np.float32,
-    other_y: np.float32,
-    reach: np.float32,
-) -> np.float32:
-    """Return which share of a straight move, 0 to 1, a point makes before it is ``reach`` away."""
+    other_x: Lanes,
+    other_y: Lanes,
+    reach: Lanes,
+) -> Lanes:
+    """Return which share of a straight move, 0 to 1, a point makes before it is ``reach`` away.
+
+    From one other point, or from eight.
+    """
     rx, ry = x - other_x, y - other_y
     closing = rx * dx + ry * dy
-    if closing >= _ZERO:
-        return _ONE
     gap = rx * rx + ry * ry - reach * reach
-    if gap <= _ZERO:
-        return _ZERO
     length = dx * dx + dy * dy
     under_root = closing * closing - length * gap
-    if under_root <= _ZERO:
-        return _ONE
-    return min(_ONE, (-closing - np.float32(math.sqrt(under_root))) / length)
+    until = (_ZERO - closing - root(greater(under_root, _ZERO))) / greater(length, _TINY)
+    share = choose(gap <= _ZERO, _ZERO, choose(under_root <= _ZERO, _ONE, lesser(_ONE, until)))
+    return choose(closing >= _ZERO, _ONE, share)
 
 
 @compiled
@@ -65,12 +66,31 @@ def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.floa
 
 
 @compiled
-def free_of_robot(
-    c: Record, other: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32
+def free_of_robots(
+    c: Record,
+    x: np.float32,
+    y: np.float32,
+    dx: np.float32,
+    dy: np.float32,
+    xs: int,
+    ys: int,
+    count: int,
+    s: FloatArray,
 ) -> np.float32:
-    """Return the share of a robot's move that another robot does not block."""
+    """Return the share of a robot's move that no other robot blocks.
+
+    Where ``count`` robots are stands in rows ``xs`` and ``ys`` of scratch memory. The robot may be
+    one of them: it does not close in on itself.
+    """
     reach = c.radius + c.radius + BLOCKING_GAP
-    return np.float32(free_share(x, y, dx, dy, other.x, other.y, reach))
+    within = (reach + abs(dx) + abs(dy)) * _A_LITTLE_MORE
+    share = _ONE
+    for block in range(blocks(count)):
+        other_x, other_y = load(s, xs + BLOCK * block), load(s, ys + BLOCK * block)
+        rx, ry = x - other_x, y - other_y
+        if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < _ZERO)) != 0:
+            share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
+    return np.float32(share)
 
 
 @compiled
@@ -111,14 +131,14 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
     """
     find_gaps(c, s)
     inner = c.half_arena - c.radius
-    least = w.least_gap
+    smallest = w.least_gap
     target_touching, target_near = _NO_BITS, False
     for i in range(c.num_trackers):
         t = trackers[i]
         wall = FAR
         if c.walled:
             wall = inner - max(abs(t.x), abs(t.y))
-        least = min(least, s[GAP + i], wall)
+        smallest = min(smallest, s[GAP + i], wall)
         wall_near = wall <= c.tracker_speed * c.dt + TOUCHING_GAP
         near = s[EXCESS + i] <= _ZERO or wall_near
         if not near:
@@ -130,20 +150,21 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
         target_near = target_near or near_target(c, w, t)
         if min(s[GAP + i], wall) > _SURELY_APART:
             t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
-        elif meet_closely(c, w, trackers, obstacles, i):
+        elif meet_closely(c, w, t, obstacles, i, s):
             target_touching |= _BIT << np.uint64(i)
     w.touching = target_touching
     # A scripted target keeps clear of obstacles and walls by itself (target_motion.safe_turn).
     w.near = target_near or (c.motion == AGENT and c.walled != 0)
-    w.least_gap = least
+    w.least_gap = smallest
 
 
 @compiled(seldom=True)
-def meet_closely(c: Record, w: Record, trackers: Records, obstacles: Records, i: int) -> bool:
+def meet_closely(
+    c: Record, w: Record, t: Record, obstacles: Records, i: int, s: FloatArray
+) -> bool:
     """Work out what a tracker that is near to something touches; say whether it is the target."""
-    t = trackers[i]
     touches_target = meet_target(c, w, t, i)
-    meet_trackers(c, w, trackers, i)
+    meet_trackers(c, w, t, i, s)
     meet_surroundings(c, w, t, obstacles)
     t.touching = touches_target or (t.touching_trackers | t.touching_obstacles) != _NO_BITS
     return bool(touches_target)
@@ -171,22 +192,24 @@ def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
 
 
 @compiled
-def meet_trackers(c: Record, w: Record, trackers: Records, i: int) -> None:
+def meet_trackers(c: Record, w: Record, t: Record, i: int, s: FloatArray) -> None:
     """Note which other trackers tracker i touches, and count the contacts that begin."""
-    t = trackers[i]
     touch = c.radius + c.radius + TOUCHING_GAP
-    touching = _NO_BITS
-    for j in range(c.num_trackers):
-        other = trackers[j]
-        dx, dy = other.x - t.x, other.y - t.y
-        if j != i and dx * dx + dy * dy <= touch * touch:
-            bit = _BIT << np.uint64(j)
-            touching |= bit
-            if t.touching_trackers & bit == _NO_BITS:
-                t.onsets += 1
-                if i < j:
-                    w.contacts_tracker += 1
-    t.touching_trackers = touching
+    touching = 0
+    for block in range(blocks(c.num_trackers)):
+        j = BLOCK * block
+        dx, dy = load(s, X + j) - t.x, load(s, Y + j) - t.y
+        other = load(s, INDEX + j) < np.float32(c.num_trackers)
+        touching |= bits((dx * dx + dy * dy <= touch * touch) & other) << j
+    now = np.uint64(touching) & ~(_BIT << np.uint64(i))
+    begun = now & ~t.touching_trackers
+    while begun != _NO_BITS:
+        first = begun & (~begun + _BIT)
+        begun ^= first
+        t.onsets += 1
+        if first > _BIT << np.uint64(i):
+            w.contacts_tracker += 1
+    t.touching_trackers = now
 
 
 @compiled

@@ -20,11 +20,11 @@ from numba.core.typing.templates import (
 
 from posse.lanes import (
     WIDTH,
-    anywhere,
     bits,
     choose,
     eight,
     greater,
+    least,
     lesser,
     load,
     load_fields,
@@ -123,9 +123,12 @@ def _emit_tag(builder: Any, value: Any) -> Any:
     return builder.sitofp(tags, _FLOATS)
 
 
-def _emit_anywhere(builder: Any, mask: Any) -> Any:
-    bits = builder.bitcast(mask, ir.IntType(WIDTH))
-    return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+def _emit_least(builder: Any, value: Any) -> Any:
+    lesser_of = _pick("<")
+    for size in (4, 2, 1):  # the upper half comes to lie over the lower
+        places = [(k + size) % WIDTH for k in range(WIDTH)]
+        value = lesser_of(builder, value, _shuffle(builder, value, value, places))
+    return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
 
 
 def _emit_bits(builder: Any, mask: Any) -> Any:
@@ -170,7 +173,7 @@ _declare(eight, _LANES, (types.float32,), _spread)
 _declare(transpose, types.UniTuple(_LANES, WIDTH), (_LANES,) * WIDTH, _emit_transpose)
 _declare(tagged, _LANES, (_LANES, types.intp), _emit_tagged)
 _declare(tag, _LANES, (_LANES,), _emit_tag)
-_declare(anywhere, types.boolean, (_MASK,), _emit_anywhere)
+_declare(least, types.float32, (_LANES,), _emit_least)
 _declare(bits, types.intp, (_MASK,), _emit_bits)
 _declare(lowest_bit, types.intp, (types.intp,), _emit_lowest_bit)
 for _number, _truth in ((types.float32, types.boolean), (_LANES, _MASK)):

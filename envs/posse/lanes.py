@@ -63,9 +63,9 @@ def root(value: Lanes) -> Lanes:
     return np.sqrt(value)
 
 
-def anywhere(mask: Mask) -> bool:
-    """Say whether the mask is true in any lane."""
-    return bool(np.any(mask))
+def least(value: Lanes) -> np.float32:
+    """Return the least of eight numbers."""
+    return np.float32(np.min(value))
 
 
 def tagged(value: Lanes, number: int) -> Lanes:

@@ -1,6 +1,6 @@
 """How actions become motion, for one world and one control step.
 
-Robots that nothing can touch within the step move on one arc each, eight of them at a time. The
+Robots that nothing can touch within the step move each for itself, eight trackers at a time. The
 others move by physics steps, target first, then trackers by number, each move swept.
 """
 
@@ -12,12 +12,12 @@ import numpy as np
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
-from posse.contact import free_of_robot, free_of_surroundings
+from posse.contact import free_of_robots, free_of_surroundings
 from posse.formation import follow_heading
 from posse.kinematics import approach, arc
-from posse.lanes import Lanes, load, store_fields
+from posse.lanes import Lanes, eight, lesser, load, store, store_fields
 from posse.state import NEVER, POSE
-from posse.survey import BLOCK, OWN, ROW, blocks, columns, natural, store_rows
+from posse.survey import BLOCK, FAR, OWN, ROW, blocks, columns, natural, store_rows
 from posse.target_motion import AGENT, target_turn_rate
 
 _ZERO: Final = np.float32(0.0)
@@ -29,7 +29,9 @@ _HALF: Final = np.float32(0.5)
 _WANTED_SPEED: Final = OWN + 1 * ROW
 _WANTED_TURN: Final = OWN + 2 * ROW
 _NEW_POSE: Final = OWN + 3 * ROW
-_NEAR: Final = OWN + 7 * ROW  # the numbers of those that something is near to
+_NEAR: Final = OWN + 7 * ROW  # those that something is near to: their numbers, and where they are
+_NEAR_X: Final = OWN + 8 * ROW
+_NEAR_Y: Final = OWN + 9 * ROW
 
 
 @compiled
@@ -44,36 +46,28 @@ def move(robot: Record, time: np.float32) -> None:
 
 @compiled
 def move_swept(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    robot: Record,
-    number: int,
-    near: int,
-    s: FloatArray,
+    c: Record, robot: Record, place: int, count: int, obstacles: Records, s: FloatArray
 ) -> None:
-    """Move a tracker (number -1: the target) by a physics step, as far as nothing blocks.
+    """Move a robot by a physics step, as far as nothing blocks.
 
-    ``near`` trackers, whose numbers stand in scratch memory, are those that may be in the way.
+    Where the ``count`` robots are that may be in the way, itself in ``place``, stands in scratch
+    memory, and is kept up to date there.
     """
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
     )
     if robot.near:
-        x, y, share = robot.x, robot.y, _ONE
-        for k in range(near):
-            j = natural(int(s[_NEAR + k]))
-            if j != number:
-                share = min(share, free_of_robot(c, trackers[j], x, y, dx, dy))
-        if number >= 0:
-            share = min(share, free_of_robot(c, w, x, y, dx, dy))
-        share = min(share, free_of_surroundings(c, obstacles, x, y, dx, dy))
+        x, y = robot.x, robot.y
+        share = lesser(
+            free_of_robots(c, x, y, dx, dy, _NEAR_X, _NEAR_Y, count, s),
+            free_of_surroundings(c, obstacles, x, y, dx, dy),
+        )
         if share < _ONE:
             dx, dy = dx * share, dy * share
             robot.speed = _ZERO
     robot.x += dx
     robot.y += dy
+    s[_NEAR_X + place], s[_NEAR_Y + place] = robot.x, robot.y
 
 
 @compiled(seldom=True)
@@ -90,20 +84,24 @@ def move_in_parts(
     Whom nothing is near to is in nobody's way.
     """
     near = 0
-    for j in range(natural(c.num_trackers)):
-        s[_NEAR + near] = np.float32(j)
-        near = natural(near + (trackers[j].near != 0))
-    target_in_parts = w.near != 0 or c.whole_arcs == 0
+    for i in range(natural(c.num_trackers)):
+        t = trackers[i]
+        s[_NEAR + near], s[_NEAR_X + near], s[_NEAR_Y + near] = np.float32(i), t.x, t.y
+        near = natural(near + (t.near != 0))
+    s[_NEAR_X + near], s[_NEAR_Y + near] = w.x, w.y
+    store(s, _NEAR_X + near + 1, eight(FAR))
+    store(s, _NEAR_Y + near + 1, eight(FAR))
     for _ in range(c.physics_steps):
-        if target_in_parts:
-            move_swept(c, w, trackers, obstacles, w, -1, near, s)
-        for i in range(c.num_trackers):
+        if w.near != 0:
+            move_swept(c, w, near, near + 1, obstacles, s)
+        for k in range(near):
+            i = natural(int(s[_NEAR + k]))
             t = trackers[i]
-            if t.broken_at == NEVER and (t.near != 0 or c.whole_arcs == 0):
+            if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
                     c, t.speed, t.turn_rate, actions[i, 0], actions[i, 1]
                 )
-                move_swept(c, w, trackers, obstacles, t, i, near, s)
+                move_swept(c, t, k, near + 1, obstacles, s)
 
 
 @compiled
@@ -125,20 +123,21 @@ def lay_out_actions(c: Record, actions: FloatArray, s: FloatArray) -> None:
 
 
 @compiled
-def move_freely(c: Record, trackers: Records, s: FloatArray) -> bool:
+def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: FloatArray) -> bool:
     """Move the trackers that nothing is near to on their arcs; say whether there are others."""
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
         i = BLOCK * block
         x, y, cosine, sine, speed, turn_rate, next_1, next_2 = columns(trackers, i, n, POSE)
-        speed, turn_rate = command(
-            c, speed, turn_rate, load(s, _WANTED_SPEED + i), load(s, _WANTED_TURN + i)
-        )
-        dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, c.dt)
+        for _ in range(parts):
+            speed, turn_rate = command(
+                c, speed, turn_rate, load(s, _WANTED_SPEED + i), load(s, _WANTED_TURN + i)
+            )
+            dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
+            x, y = x + dx, y + dy
         store_rows(
-            x + dx, y + dy, cosine, sine, speed, turn_rate, next_1, next_2,
-            _NEW_POSE + BLOCK * i, BLOCK, s,
-        )  # fmt: skip
+            x, y, cosine, sine, speed, turn_rate, next_1, next_2, _NEW_POSE + BLOCK * i, BLOCK, s
+        )
     others = False
     for i in range(n):
         t = trackers[i]
@@ -180,17 +179,19 @@ def motion(
 ) -> None:
     """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
 
-    A robot that nothing can touch within the step moves on one arc; one that something is near to
-    moves by physics steps, each of them swept.
+    A robot that nothing can touch within the step moves on one arc, or on one for each physics step
+    where its speed changes only little by little; one that something is near to moves by physics
+    steps, each of them swept.
     """
     lay_out_actions(c, actions, scratch)
     command_target(c, w, trackers, obstacles, actions, scratch)
-    in_parts = True
-    if c.whole_arcs:
-        if w.near == 0:
-            move(w, c.dt)
-        in_parts = move_freely(c, trackers, scratch) or w.near != 0
-    if in_parts:
+    parts, time = 1, c.dt
+    if c.whole_arcs == 0:
+        parts, time = int(c.physics_steps), c.physics_dt
+    if w.near == 0:
+        for _ in range(parts):
+            move(w, time)
+    if move_freely(c, trackers, parts, time, scratch) or w.near != 0:
         move_in_parts(c, w, trackers, obstacles, actions, scratch)
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s

@@ -51,7 +51,7 @@ _ONE: Final = np.float32(1.0)
 _Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 
 
-@compiled(seldom=True)
+@compiled
 def list_nearest(c: Record, trackers: Records, first: int, last: int, s: FloatArray) -> None:
     """List the nearest team-mates of trackers ``first`` to ``last``, a group, in LISTED rows."""
     together = group_size(s) == GROUP and c.neighbours <= BLOCK < c.num_trackers - 1
@@ -70,19 +70,18 @@ def rank_eight(n: int, first: int, s: FloatArray) -> None:
 
     There are at least nine team-mates.
     """
-    x, y, number = load(s, X + first), load(s, Y + first), load(s, INDEX + first)
+    x, y = load(s, X + first), load(s, Y + first)
     a = b = c = d = e = f = g = h = ninth = eight(FAR)
     for block in range(blocks(n)):
         j = BLOCK * block
-        a, b, c, d, e, f, g, h, least = merge(
-            (a, b, c, d, e, f, g, h),
-            sort(
-                apart(n, j, x, y, number, s), apart(n, j + 1, x, y, number, s),
-                apart(n, j + 2, x, y, number, s), apart(n, j + 3, x, y, number, s),
-                apart(n, j + 4, x, y, number, s), apart(n, j + 5, x, y, number, s),
-                apart(n, j + 6, x, y, number, s), apart(n, j + 7, x, y, number, s),
-            ),
+        others = (
+            apart(n, j, x, y, s), apart(n, j + 1, x, y, s), apart(n, j + 2, x, y, s),
+            apart(n, j + 3, x, y, s), apart(n, j + 4, x, y, s), apart(n, j + 5, x, y, s),
+            apart(n, j + 6, x, y, s), apart(n, j + 7, x, y, s),
         )  # fmt: skip
+        if j == first:
+            others = without_self(others, s)
+        a, b, c, d, e, f, g, h, least = merge((a, b, c, d, e, f, g, h), sort(others))
         ninth = lesser(ninth, least)
     doubtful = (
         (b * _CLOSER <= a) | (c * _CLOSER <= b) | (d * _CLOSER <= c) | (e * _CLOSER <= d)
@@ -93,15 +92,29 @@ def rank_eight(n: int, first: int, s: FloatArray) -> None:
 
 
 @compiled
-def apart(n: int, j: int, x: Lanes, y: Lanes, number: Lanes, s: FloatArray) -> Lanes:
+def apart(n: int, j: int, x: Lanes, y: Lanes, s: FloatArray) -> Lanes:
     """Return the squared distances of eight trackers to number j of a team of n, tagged with j."""
     dx, dy = choose(j < n, s[X + j], FAR) - x, s[Y + j] - y
-    return tagged(choose(number == np.float32(j), FAR, dx * dx + dy * dy), j)
+    return tagged(dx * dx + dy * dy, j)
 
 
 @compiled
-def sort(a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes) -> _Eight:
+def without_self(to: _Eight, s: FloatArray) -> _Eight:
+    """Return the distances of eight to themselves, with nobody near to itself."""
+    a, b, c, d, e, f, g, h = to
+    lane = load(s, INDEX)
+    return (
+        choose(lane == np.float32(0), FAR, a), choose(lane == np.float32(1), FAR, b),
+        choose(lane == np.float32(2), FAR, c), choose(lane == np.float32(3), FAR, d),
+        choose(lane == np.float32(4), FAR, e), choose(lane == np.float32(5), FAR, f),
+        choose(lane == np.float32(6), FAR, g), choose(lane == np.float32(7), FAR, h),
+    )  # fmt: skip
+
+
+@compiled
+def sort(eight_of: _Eight) -> _Eight:
     """Return eight in order, the least first, lane by lane (19 comparisons)."""
+    a, b, c, d, e, f, g, h = eight_of
     a, c, b, d = lesser(a, c), greater(a, c), lesser(b, d), greater(b, d)
     e, g, f, h = lesser(e, g), greater(e, g), lesser(f, h), greater(f, h)
     a, e, b, f = lesser(a, e), greater(a, e), lesser(b, f), greater(b, f)

@@ -71,8 +71,8 @@ _SEES: Final = OWN + 1 * ROW
 _TARGET: Final = OWN + 2 * ROW
 # Of one tracker: what is observed of eight of the nearest, eight numbers each, and how they turn;
 # or the nearest so far, how far and who.
-_NEAREST: Final = OWN
-_NEAREST_TURN_RATE: Final = OWN + 1 * ROW
+_MATES: Final = OWN
+_TURN_RATES: Final = OWN + 1 * ROW
 _SO_FAR: Final = SHORTLIST
 _WHO: Final = SHORTLIST + 1 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
@@ -422,6 +422,29 @@ def _keep_nearest(
 
 
 @compiled(seldom=True)
+def _observe_nearest(
+    c: Record,
+    trackers: Records,
+    first: int,
+    last: int,
+    said: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write the nearest team-mates of trackers ``first`` to ``last``, where all are heard.
+
+    They begin at ``k`` in each tracker's row of ``observations``.
+    """
+    list_nearest(c, trackers, first, last, s)
+    for i in range(first, last):
+        _write_nearest(
+            c, trackers, trackers[i], LISTED + natural((i - first) * VIEW), said, s,
+            observations[i], k,
+        )  # fmt: skip
+
+
+@compiled
 def _write_nearest(
     c: Record,
     trackers: Records,
@@ -432,57 +455,79 @@ def _write_nearest(
     o: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates, where all are heard; the list begins at ``listed``."""
+    """Write the team-mates in a tracker's list, which begins at ``listed``."""
     filled = natural(min(c.num_trackers - 1, c.neighbours))
+    size = 9 + natural(c.message_size)
     hc, hs = t.heading_cos, t.heading_sin
     for block in range(blocks(filled)):
-        p = listed + BLOCK * block
-        left_over = filled - BLOCK * block
+        p, left_over = listed + BLOCK * block, filled - BLOCK * block
         x, y, heading_x, heading_y, speed, turn_rate, _, _ = columns_of(
             trackers, p, left_over, POSE, s
         )
         dx, dy = x - t.x, y - t.y
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-        metres = root(ahead * ahead + left * left)
-        describe_mates(
-            t, load(s, p), ahead, left, metres, heading_x, heading_y, speed, _NEAREST, s
-        )  # fmt: skip
-        store(s, _NEAREST_TURN_RATE, turn_rate)
+        metres, numbers = root(ahead * ahead + left * left), load(s, p)
+        store(s, _TURN_RATES, turn_rate)
+        if left_over >= BLOCK:
+            describe_mates(t, numbers, ahead, left, metres, heading_x, heading_y, speed, o, k, size)
+        else:  # no room for eight
+            describe_mates(
+                t, numbers, ahead, left, metres, heading_x, heading_y, speed, s, _MATES, BLOCK
+            )
+            for q in range(left_over):
+                store(o, k + q * size, load(s, _MATES + BLOCK * q))
         for q in range(min(BLOCK, left_over)):
-            store(o, k, load(s, _NEAREST + BLOCK * q))
-            o[k + 8] = s[_NEAREST_TURN_RATE + q]
+            o[k + 8] = s[_TURN_RATES + q]
             _write_message(c, said, natural(int(s[p + q])), o, k)
-            k += 9 + natural(c.message_size)
+            k += size
     for _ in range(filled, c.neighbours):
         _write_no_neighbour(c, o, k)
-        k += 9 + natural(c.message_size)
+        k += size
 
 
 @compiled(seldom=True)
+def _observe_heard(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    heard: Records,
+    heard_message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write the nearest team-mates of all trackers from what each last heard, from ``k`` on."""
+    for i in range(c.num_trackers):
+        _write_heard(
+            c, w, trackers[i], i, heard[i], heard_message[i], s, observations[i], natural(k)
+        )
+
+
+@compiled
 def _write_heard(
     c: Record,
     w: Record,
     t: Record,
     i: int,
     heard: Records,
-    heard_message: FloatArray,
+    said: FloatArray,
     s: FloatArray,
     o: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates from what tracker i last heard of each."""
+    """Write the nearest team-mates from what tracker i last heard of each, and what they said."""
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
-        h = heard[i, j]
+        h = heard[j]
         if j != i and h.step >= 0 and w.step - h.step <= c.forget_steps:
             dx, dy = h.x - t.x, h.y - t.y
             filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
     for p in range(c.neighbours):
         if p < filled:
             j = int(s[_WHO + p])
-            age = np.float32(w.step - heard[i, j].step) * c.dt
-            _write_neighbour(t, heard[i, j], j, age, o, k)
-            _write_message(c, heard_message[i], j, o, k)
+            age = np.float32(w.step - heard[j].step) * c.dt
+            _write_neighbour(t, heard[j], j, age, o, k)
+            _write_message(c, said, j, o, k)
         else:
             _write_no_neighbour(c, o, k)
         k += 9 + natural(c.message_size)
@@ -503,24 +548,22 @@ def observe_trackers(
     n = natural(c.num_trackers)
     whole_team = c.perfect_radio != 0 and n <= _DESCRIBED and n == c.neighbours + 1
     lay_out_fixes(c, w, trackers, s)
-    together = group_size(s)
+    together, k = group_size(s), 0
     for first in range(0, n, together):
         last = min(first + together, n)
         for i in range(first, last if whole_team else first):
             survey(c, trackers[i], i, natural((i - first) * VIEW), s)
         for i in range(first, last if whole_team else first):
             _describe_team(c, trackers[i], natural((i - first) * VIEW), s)
-        if not whole_team and c.perfect_radio:
-            list_nearest(c, trackers, first, last, s)
         for i in range(first, last):
-            at, o = natural((i - first) * VIEW), observations[i]
-            k = _write_alone(c, w, trackers[i], i, s, o)
+            o = observations[i]
+            k = natural(_write_alone(c, w, trackers[i], i, s, o))
             if whole_team:
-                _write_whole_team(c, i, message[0], at, s, o, k)
-            elif c.perfect_radio:
-                _write_nearest(c, trackers, trackers[i], LISTED + at, message[0], s, o, k)
-            else:
-                _write_heard(c, w, trackers[i], i, heard, heard_message, s, o, k)
+                _write_whole_team(c, i, message[0], natural((i - first) * VIEW), s, o, k)
+        if c.perfect_radio and not whole_team:
+            _observe_nearest(c, trackers, first, last, message[0], s, observations, k)
+    if not c.perfect_radio:
+        _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
 
 
 @compiled
@@ -531,7 +574,7 @@ def _describe_team(c: Record, t: Record, at: int, s: FloatArray) -> None:
         describe_mates(
             t, load(s, INDEX + j), load(s, AHEAD + at + j), load(s, LEFT + at + j),
             load(s, DISTANCE + at + j), load(s, COS + j), load(s, SIN + j), load(s, SPEED + j),
-            MATE + at + BLOCK * j, s,
+            s, MATE + at + BLOCK * j, BLOCK,
         )  # fmt: skip
     find_places(c.num_trackers, DISTANCE + at, PLACE + at, s)
 

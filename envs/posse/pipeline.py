@@ -36,7 +36,8 @@ class LinkedForm(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes (numba's name for it)."""
-        pipeline = _pipeline(self.state, _LinkedLibrary)
+        inlined = self.state.flags.forceinline
+        pipeline = _pipeline(self.state, _LinkedLibrary if inlined else _ApartLibrary)
         pipeline.passes = [p for p in pipeline.passes if p[0].__name__ not in _NEEDLESS]
         return [pipeline]
 
@@ -141,6 +142,16 @@ class _LinkedLibrary(_LoopsAsWritten):
     def codegen(self) -> Any:
         """What numba gives the function's Python environment to: there is none."""
         return _NoEnvironment
+
+
+class _ApartLibrary(_LinkedLibrary):
+    """LLVM code of a function that is not to become part of the one place that calls it."""
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        for function in ir_module.functions:
+            if function.blocks and "alwaysinline" not in function.attributes:
+                function.attributes.add("noinline")
+        super().add_ir_module(ir_module)
 
 
 class _NoEnvironment:

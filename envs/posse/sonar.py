@@ -96,6 +96,16 @@ def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
 
 
 @compiled(seldom=True)
+def listen_to_walls(c: Record, robot: Record, s: FloatArray) -> None:
+    """Shorten the sonar readings by the walls of the arena."""
+    half, x, y = c.half_arena, robot.x, robot.y
+    listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
+    listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
+    listen_to_wall(c, robot, _ZERO, _ONE, half - y, s)
+    listen_to_wall(c, robot, _ZERO, -_ONE, half + y, s)
+
+
+@compiled
 def listen_to_wall(
     c: Record,
     robot: Record,
@@ -159,12 +169,8 @@ def ping(c: Record, robot: Record, number: int, s: FloatArray, o: FloatArray, fi
                 c, echo(c, robot, at + one, s), echo(c, robot, at + two, s),
                 echo(c, robot, at + three, s), echo(c, robot, at + four, s), s,
             )  # fmt: skip
-    if c.walled:
-        half = c.half_arena
-        listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
-        listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
-        listen_to_wall(c, robot, _ZERO, _ONE, half - y, s)
-        listen_to_wall(c, robot, _ZERO, -_ONE, half + y, s)
+    if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.radius:
+        listen_to_walls(c, robot, s)
     beams = natural(c.sonar_beams)
     whole = beams // BLOCK
     for block in range(whole):

@@ -266,14 +266,16 @@ def describe_mates(
     heading_x: Lanes,
     heading_y: Lanes,
     speed: Lanes,
+    out: FloatArray,
     to: int,
-    s: FloatArray,
+    stride: int,
 ) -> None:
-    """Write what a robot observes of eight team-mates, eight numbers each, from ``to`` on.
+    """Write what a robot observes of eight team-mates to ``out``, eight numbers each.
 
     Number, age (0), range, bearing and heading (cosine and sine, ego), speed: as they follow on
-    each other in an observation. From who they are, where they are as the robot sees it, and their
-    headings in the common frame.
+    each other in an observation. The first from ``to`` on, the next ``stride`` further on, and so
+    forth. From who they are, where they are as the robot sees it, and their headings in the common
+    frame.
     """
     hc, hs = robot.heading_cos, robot.heading_sin
     per_metre = _ONE / greater(metres, _TINY)
@@ -281,7 +283,7 @@ def describe_mates(
         numbers, eight(_ZERO), metres,
         within_one(ahead * per_metre), within_one(left * per_metre),
         within_one(heading_x * hc + heading_y * hs), within_one(heading_y * hc - heading_x * hs),
-        speed, to, BLOCK, s,
+        speed, to, stride, out,
     )  # fmt: skip
 
 

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from posse.compiled import kernel
 from posse.lanes import (
     WIDTH,
-    anywhere,
     bits,
     choose,
     eight,
     greater,
+    least,
     lesser,
     load,
     load_fields,
@@ -144,19 +144,18 @@ def test_rows_become_columns(function: Callable[..., None]) -> None:
 
 
 @kernel
-def is_anywhere(a: Numbers, limit: np.float32) -> bool:
-    """Whether any of eight numbers is above a limit."""
-    return anywhere(load(a, 1) > limit)
+def the_least(a: Numbers) -> np.float32:
+    """The least of eight numbers that stand between others."""
+    return least(load(a, 1))
 
 
-@pytest.mark.parametrize("function", [is_anywhere, getattr(is_anywhere, "py_func", is_anywhere)])
+@pytest.mark.parametrize("function", [the_least, getattr(the_least, "py_func", the_least)])
 @pytest.mark.parametrize("place", range(WIDTH))
-def test_one_lane_is_enough_to_be_anywhere(function: Callable[..., bool], place: int) -> None:
-    numbers = np.zeros(WIDTH + 2, np.float32)
-    numbers[0] = numbers[-1] = 5.0  # beside the eight that are looked at
-    assert not function(numbers, np.float32(1.0))
-    numbers[1 + place] = 5.0
-    assert function(numbers, np.float32(1.0))
+def test_the_least_may_be_in_any_lane(function: Callable[..., np.float32], place: int) -> None:
+    numbers = np.arange(3, 3 + WIDTH + 2, dtype=np.float32)
+    numbers[0] = numbers[-1] = -5.0  # beside the eight that are looked at
+    numbers[1 + place] = -2.0
+    assert function(numbers) == -2.0
 
 
 @kernel
