@@ -40,11 +40,8 @@ _SEEN_DX: Final = OWN + 1 * ROW
 _SEEN_DY: Final = OWN + 2 * ROW
 _NEW_FIX: Final = OWN + 3 * ROW
 
-_WORD: Final = 8  # blocks of eight discs, a bit each, that fill a number of 64 bits
-
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
-_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 _TINY: Final = np.float32(1e-9)
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of the velocity
 
