@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import os
+import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from posse.lookout import look_out
 
 T = TypeVar("T")
 
 _SERIAL_BELOW: Final = 2048
-"""Robots below which waking another thread costs more than it saves."""
+"""Robots below which a second thread costs more than it saves."""
 _PARTS: Final = 4
 """Parts of the worlds for each thread."""
-_MOST_THREADS: Final = 256
-
-_pool: ThreadPoolExecutor | None = None
-_process = -1
+_LOOKS: Final = 400_000
+"""How often who waits looks before it falls asleep: for some tenths of a millisecond. Where there
+are more threads than cores it falls asleep at once."""
+_PAUSE: Final = 10_000
+"""How often a helper looks once more after its bell: until the caller is in the kernel, and has let
+go of the interpreter's lock. To find it taken would send the helper to sleep after all."""
 
 
 def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
@@ -29,29 +36,133 @@ def by_turns(work: Callable[[int, int, int], T], num_worlds: int, threads: int) 
     """Call ``work(thread, first, last)`` for parts that together are all worlds, from 0 on.
 
     Threads take the next part by turns, so that none waits long for a slower one; the caller's is
-    thread 0. Returns what the calls returned, in no order.
+    thread 0. Returns what the calls returned, in no order. While another thread of the program is
+    here, the caller does everything by itself.
     """
     if threads == 1:
         return [work(0, 0, num_worlds)]
-    count = min(num_worlds, threads * _PARTS)
-    edges = [num_worlds * k // count for k in range(count + 1)]
-    parts = iter(list(itertools.pairwise(edges)))
-
-    def take(thread: int) -> list[T]:
-        return [work(thread, first, last) for first, last in parts]
-
-    pool = _threads()
-    waiting = [pool.submit(take, thread) for thread in range(1, threads)]
-    results = take(0)
-    for others in waiting:
-        results += others.result()
-    return results
+    crew = _crew()
+    if not crew.free.acquire(blocking=False):
+        return [work(0, 0, num_worlds)]
+    try:
+        return crew.share(work, num_worlds, threads)
+    except BaseException:
+        _leave(crew)  # its helpers may still be at work
+        raise
+    finally:
+        crew.free.release()
 
 
-def _threads() -> ThreadPoolExecutor:
-    """Return threads that wait asleep for work; each is started when it is first needed."""
-    global _pool, _process
-    if _pool is None or _process != os.getpid():
-        _pool = ThreadPoolExecutor(_MOST_THREADS, "posse")
-        _process = os.getpid()  # threads do not survive a fork
-    return _pool
+class _Bell:
+    """Rung by one thread and waited for by another.
+
+    To wake a thread that sleeps can take longer than a thousand worlds take for a step, so who
+    waits looks out for the bell for a moment before it falls asleep.
+    """
+
+    def __init__(self, looks: int) -> None:
+        self._looks = looks
+        self._rung = np.zeros(1, np.int64)
+        self._heard = 0
+        self._asleep = False
+        self._wake = threading.Semaphore(0)
+
+    def ring(self) -> None:
+        self._rung[0] += 1
+        if self._asleep:
+            self._asleep = False
+            self._wake.release()
+
+    def wait(self, pause: int = 0) -> None:
+        if not look_out(self._rung, self._heard, self._looks, pause):
+            while self._rung[0] == self._heard:
+                self._asleep = True
+                # Once more: it may have been rung before it could be seen that this one sleeps.
+                if self._rung[0] == self._heard:
+                    self._wake.acquire()
+        self._heard += 1
+
+
+class _Helper(threading.Thread):
+    """A thread that does what it is given, again and again."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(name=f"posse-{number}", daemon=True)
+        looks = _LOOKS if number < _cores() else 0
+        self.begin, self.done = _Bell(looks), _Bell(looks)
+        self.task: Callable[[], list[Any]] | None = None
+        self.results: list[Any] = []
+        self.error: BaseException | None = None
+        self.start()
+
+    def run(self) -> None:
+        while True:
+            self.begin.wait(_PAUSE)
+            task, self.task = self.task, None
+            if task is None:
+                return
+            try:
+                self.results = task()
+            except BaseException as error:  # for the caller to raise
+                self.error = error
+            del task  # it holds the step's arrays, whose memory is used again when nobody does
+            self.done.ring()
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class _Crew:
+    """The helpers of one process."""
+
+    def __init__(self) -> None:
+        self.process = os.getpid()
+        self.free = threading.Lock()
+        self.helpers: list[_Helper] = []
+
+    def share(self, work: Callable[[int, int, int], T], num_worlds: int, threads: int) -> list[T]:
+        count = min(num_worlds, threads * _PARTS)
+        edges = [num_worlds * k // count for k in range(count + 1)]
+        parts = iter(list(itertools.pairwise(edges)))
+
+        def take(thread: int) -> list[T]:
+            return [work(thread, first, last) for first, last in parts]
+
+        while len(self.helpers) < threads - 1:
+            self.helpers.append(_Helper(len(self.helpers) + 1))
+        helpers = self.helpers[: threads - 1]
+        for thread, helper in enumerate(helpers, 1):
+            helper.task = functools.partial(take, thread)
+            helper.begin.ring()
+        results = take(0)
+        for helper in helpers:
+            helper.done.wait()
+        for helper in helpers:
+            if helper.error is not None:
+                raise helper.error
+            results += helper.results
+            helper.results = []
+        return results
+
+
+_present: _Crew | None = None
+
+
+def _crew() -> _Crew:
+    global _present
+    if _present is None or _present.process != os.getpid():
+        _present = _Crew()  # threads do not survive a fork
+    return _present
+
+
+def _leave(crew: _Crew) -> None:
+    """Have the next work done by others; these helpers end when they have finished."""
+    global _present
+    if _present is crew:
+        _present = None
+    for helper in crew.helpers:
+        helper.begin.ring()
