@@ -6,9 +6,9 @@ beams, in the time of one. A float32 stands for eight of itself. Nothing is roun
 for a number alone: a lane does not depend on its neighbours.
 
 Lanes know ``+ - * /`` and ``< <= > >= ==``, which give masks; masks know ``&`` and ``|``. The
-functions below are what else there is; those that only calculate take plain numbers, too, so that a
-formula need not be written twice. The bodies here are for where nothing is compiled, and work on
-numpy arrays; :mod:`posse.lane_code` says what they compile to.
+functions below are what else there is; ``choose``, ``lesser``, ``greater`` and ``root`` take plain
+numbers, too, so that a formula need not be written twice. The bodies here are for where nothing is
+compiled, and work on numpy arrays; :mod:`posse.lane_code` says what they compile to.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ _CERTAIN: Final = SHORTLIST + 5 * ROW
 
 _PLACES: Final = np.float32(BLOCK)
 _NEARER_THAN_FAR: Final = np.float32(0.9e9)
-_CLOSER: Final = np.float32(1 - 2**-15)  # what tags and rounding change is a quarter of that
+_CLOSER: Final = np.float32(1 - 2**-15)  # two tags and rounding change half of that
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 

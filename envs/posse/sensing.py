@@ -1,4 +1,4 @@
-"""What a tracker senses by itself: the target, if in sight, and the sonar ring."""
+"""What a tracker senses of the target by itself, if it is in sight, and the fix that this makes."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Where every disc of a world is, laid out so that the processor works on eight of them at once.
 
 Discs (trackers, the target, obstacles) lie side by side in rows of a thread's scratch memory.
-Motion, contact, score, sonar and the view of team-mates all start from these rows, and go over them
-by blocks of eight (:mod:`posse.lanes`); what fills the last block is too far away to count.
+Contact, score, target sensor, sonar and the view of team-mates all start from these rows, and go
+over them by blocks of eight (:mod:`posse.lanes`); what fills the last block is too far away to
+count.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from posse.compiled import UNCOMPILED
 from posse.lookout import look_out
 
 T = TypeVar("T")
@@ -39,7 +40,7 @@ def by_turns(work: Callable[[int, int, int], T], num_worlds: int, threads: int) 
     thread 0. Returns what the calls returned, in no order. While another thread of the program is
     here, the caller does everything by itself.
     """
-    if threads == 1:
+    if threads == 1 or UNCOMPILED:
         return [work(0, 0, num_worlds)]
     crew = _crew()
     if not crew.free.acquire(blocking=False):
@@ -47,7 +48,7 @@ def by_turns(work: Callable[[int, int, int], T], num_worlds: int, threads: int) 
     try:
         return crew.share(work, num_worlds, threads)
     except BaseException:
-        _leave(crew)  # its helpers may still be at work
+        _leave(crew)
         raise
     finally:
         crew.free.release()
@@ -91,6 +92,7 @@ class _Helper(threading.Thread):
         looks = _LOOKS if number < _cores() else 0
         self.begin, self.done = _Bell(looks), _Bell(looks)
         self.task: Callable[[], list[Any]] | None = None
+        self.dismissed = False
         self.results: list[Any] = []
         self.error: BaseException | None = None
         self.start()
@@ -99,7 +101,7 @@ class _Helper(threading.Thread):
         while True:
             self.begin.wait(_PAUSE)
             task, self.task = self.task, None
-            if task is None:
+            if self.dismissed or task is None:
                 return
             try:
                 self.results = task()
@@ -135,12 +137,18 @@ class _Crew:
         while len(self.helpers) < threads - 1:
             self.helpers.append(_Helper(len(self.helpers) + 1))
         helpers = self.helpers[: threads - 1]
-        for thread, helper in enumerate(helpers, 1):
-            helper.task = functools.partial(take, thread)
-            helper.begin.ring()
-        results = take(0)
-        for helper in helpers:
-            helper.done.wait()
+        begun = []
+        try:
+            for thread, helper in enumerate(helpers, 1):
+                helper.task = functools.partial(take, thread)
+                helper.begin.ring()
+                begun.append(helper)
+            results = take(0)
+        finally:
+            for _ in parts:  # after an error: nobody begins another part, or is still at one
+                pass
+            for helper in begun:
+                helper.done.wait()
         for helper in helpers:
             if helper.error is not None:
                 raise helper.error
@@ -160,9 +168,10 @@ def _crew() -> _Crew:
 
 
 def _leave(crew: _Crew) -> None:
-    """Have the next work done by others; these helpers end when they have finished."""
+    """Have the next work done by others; these helpers end."""
     global _present
     if _present is crew:
         _present = None
     for helper in crew.helpers:
+        helper.dismissed = True
         helper.begin.ring()

@@ -60,6 +60,32 @@ def test_an_error_reaches_the_caller_and_the_next_work_is_done(thread_that_fails
     assert (ledger.times == 1).all()
 
 
+def test_nobody_is_still_at_work_after_an_error() -> None:
+    begun, ended = [], []
+
+    def work(thread: int, first: int, last: int) -> int:
+        begun.append(first)
+        if thread == 0:
+            raise KeyboardInterrupt
+        time.sleep(0.05)
+        ended.append(first)
+        return 0
+
+    with pytest.raises(KeyboardInterrupt):
+        by_turns(work, 100, 2)
+    count = len(begun)
+    assert len(ended) == count - 1, "the caller waited for the helper's part"
+    time.sleep(0.1)
+    assert len(begun) == count, "no part was begun afterwards"
+
+
+def test_without_a_compiler_the_caller_works_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(turns, "UNCOMPILED", True)
+    ledger = Ledger(100)
+    assert by_turns(ledger.work, 100, 3) == [100]
+    assert ledger.threads == {0}
+
+
 def test_helpers_that_an_error_left_behind_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(turns, "_present", None)
     by_turns(Ledger(10).work, 10, 3)
