@@ -48,7 +48,7 @@ def move(robot: Record, time: np.float32) -> None:
 def move_swept(
     c: Record, robot: Record, place: int, count: int, obstacles: Records, s: FloatArray
 ) -> None:
-    """Move a robot by a physics step, as far as nothing blocks.
+    """Move a robot that something is near to by a physics step, as far as nothing blocks.
 
     Where the ``count`` robots are that may be in the way, itself in ``place``, stands in scratch
     memory, and is kept up to date there.
@@ -56,15 +56,14 @@ def move_swept(
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
     )
-    if robot.near:
-        x, y = robot.x, robot.y
-        share = lesser(
-            free_of_robots(c, x, y, dx, dy, _NEAR_X, _NEAR_Y, count, s),
-            free_of_surroundings(c, obstacles, x, y, dx, dy),
-        )
-        if share < _ONE:
-            dx, dy = dx * share, dy * share
-            robot.speed = _ZERO
+    x, y = robot.x, robot.y
+    share = lesser(
+        free_of_robots(c, x, y, dx, dy, _NEAR_X, _NEAR_Y, count, s),
+        free_of_surroundings(c, obstacles, x, y, dx, dy),
+    )
+    if share < _ONE:
+        dx, dy = dx * share, dy * share
+        robot.speed = _ZERO
     robot.x += dx
     robot.y += dy
     s[_NEAR_X + place], s[_NEAR_Y + place] = robot.x, robot.y

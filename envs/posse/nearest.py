@@ -112,19 +112,25 @@ def without_self(to: _Eight, s: FloatArray) -> _Eight:
 
 
 @compiled
+def in_order(value: Lanes, other: Lanes) -> tuple[Lanes, Lanes]:
+    """Return the lesser and the greater, lane by lane."""
+    return lesser(value, other), greater(value, other)
+
+
+@compiled
 def sort(eight_of: _Eight) -> _Eight:
     """Return eight in order, the least first, lane by lane (19 comparisons)."""
     a, b, c, d, e, f, g, h = eight_of
-    a, c, b, d = lesser(a, c), greater(a, c), lesser(b, d), greater(b, d)
-    e, g, f, h = lesser(e, g), greater(e, g), lesser(f, h), greater(f, h)
-    a, e, b, f = lesser(a, e), greater(a, e), lesser(b, f), greater(b, f)
-    c, g, d, h = lesser(c, g), greater(c, g), lesser(d, h), greater(d, h)
-    a, b, c, d = lesser(a, b), greater(a, b), lesser(c, d), greater(c, d)
-    e, f, g, h = lesser(e, f), greater(e, f), lesser(g, h), greater(g, h)
-    c, e, d, f = lesser(c, e), greater(c, e), lesser(d, f), greater(d, f)
-    b, e, d, g = lesser(b, e), greater(b, e), lesser(d, g), greater(d, g)
-    b, c, d, e = lesser(b, c), greater(b, c), lesser(d, e), greater(d, e)
-    f, g = lesser(f, g), greater(f, g)
+    (a, c), (b, d) = in_order(a, c), in_order(b, d)
+    (e, g), (f, h) = in_order(e, g), in_order(f, h)
+    (a, e), (b, f) = in_order(a, e), in_order(b, f)
+    (c, g), (d, h) = in_order(c, g), in_order(d, h)
+    (a, b), (c, d) = in_order(a, b), in_order(c, d)
+    (e, f), (g, h) = in_order(e, f), in_order(g, h)
+    (c, e), (d, f) = in_order(c, e), in_order(d, f)
+    (b, e), (d, g) = in_order(b, e), in_order(d, g)
+    (b, c), (d, e) = in_order(b, c), in_order(d, e)
+    f, g = in_order(f, g)
     return a, b, c, d, e, f, g, h
 
 
@@ -140,12 +146,12 @@ def merge(one: _Eight, other: _Eight) -> tuple[Lanes, ...]:
     # First up, then down: three rounds of comparisons put that in order.
     a, b, c, d = lesser(a, p), lesser(b, o), lesser(c, n), lesser(d, m)
     e, f, g, h = lesser(e, l), lesser(f, k), lesser(g, j), lesser(h, i)
-    a, e, b, f = lesser(a, e), greater(a, e), lesser(b, f), greater(b, f)
-    c, g, d, h = lesser(c, g), greater(c, g), lesser(d, h), greater(d, h)
-    a, c, b, d = lesser(a, c), greater(a, c), lesser(b, d), greater(b, d)
-    e, g, f, h = lesser(e, g), greater(e, g), lesser(f, h), greater(f, h)
-    a, b, c, d = lesser(a, b), greater(a, b), lesser(c, d), greater(c, d)
-    e, f, g, h = lesser(e, f), greater(e, f), lesser(g, h), greater(g, h)
+    (a, e), (b, f) = in_order(a, e), in_order(b, f)
+    (c, g), (d, h) = in_order(c, g), in_order(d, h)
+    (a, c), (b, d) = in_order(a, c), in_order(b, d)
+    (e, g), (f, h) = in_order(e, g), in_order(f, h)
+    (a, b), (c, d) = in_order(a, b), in_order(c, d)
+    (e, f), (g, h) = in_order(e, f), in_order(g, h)
     return a, b, c, d, e, f, g, h, least
 
 

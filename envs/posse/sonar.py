@@ -117,14 +117,14 @@ def listen_to_wall(
     """Shorten the sonar readings by a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
         return
-    nearest, in_width = max(distance - c.radius, _ZERO), c.beam_cosine
+    nearest = max(distance - c.radius, _ZERO)
     ahead = normal_x * robot.heading_cos + normal_y * robot.heading_sin
     left = normal_y * robot.heading_cos - normal_x * robot.heading_sin
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
         towards = ahead * load(s, BEAM_COS + k) + left * load(s, BEAM_SIN + k)
         axis = greater(distance / greater(towards, _TINY) - c.radius, _ZERO)
-        found = choose(towards >= in_width, nearest, choose(towards > _ZERO, axis, FAR))
+        found = choose(towards >= c.beam_cosine, nearest, choose(towards > _ZERO, axis, FAR))
         store(s, READING + k, lesser(load(s, READING + k), found))
 
 
