@@ -103,10 +103,11 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     agents = batch.num_worlds * batch.scenario.num_trackers
     rewards = np.empty(batch.observation_shape[:2], np.float32)
     terms = np.empty((*rewards.shape, len(posse.REWARD_TERMS)), np.float32)
-    observations, _ = batch.advance(actions, rewards, terms)
+    advance = batch.stepper(actions, rewards, terms)
+    observations, _ = advance()
     scratch = survey.new_scratch()
     arguments = (*batch._fixed, actions, observations, rewards, terms, scratch)
-    costs = {"step": best(lambda: batch.advance(actions, rewards, terms), seconds) / agents * 1e9}
+    costs = {"step": best(advance, seconds) / agents * 1e9}
     snapshot = batch.save()
     for number, name in enumerate(PARTS):
         batch.restore(snapshot)

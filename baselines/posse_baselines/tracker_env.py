@@ -121,22 +121,23 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
         world.check_running()
         own = self._reader.one(f"tracker_{self.number}", action)
         actions, self._memory = self.teammates.act(self._observations, self._memory)
-        actions = np.array(actions, np.float32)
-        actions[0, self.number] = 0
-        actions[0, self.number, : len(own)] = own
-        observations, over = world.advance(actions)
+        team = world.actions.read
+        team[...] = actions
+        team[0, self.number] = 0
+        team[0, self.number, : len(own)] = own
+        observations, over = world.advance()
         self._observations = observations
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": name_terms(*world.terms[0, self.number].tolist()),
+            "reward_terms": name_terms(*world.terms[self.number].tolist()),
             "working": bool(world.working()[self.number]),
         }
-        terminated = bool(over) and world.terminated
+        terminated = False
         if over:
-            info["metrics"] = world.metrics()
+            terminated, info["metrics"] = world.end()
         if self.render_mode == "human":
             self.render()
-        reward = float(world.rewards[0, self.number])
+        reward = float(world.rewards[self.number])
         return self._own(observations), reward, terminated, bool(over) and not terminated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from posse.arrays import FloatArray
+from posse.compiled import direct
 from posse.scenario import Scenario, ScenarioError
 from posse.world import bad_action
 
@@ -53,11 +54,14 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
 
 
 class ActionReader:
-    """Turns what users pass as actions into what the kernels take, (1, rows, 2 + m) float32.
+    """Turns what users pass as actions into what the kernels take.
 
     Args:
         scenario: The worlds that the actions are for.
         discrete: Whether each action is the number of one of :data:`MOTIONS`.
+
+    Attributes:
+        read: The actions that were read last, (1, rows, 2 + m) float32; always the same array.
     """
 
     def __init__(self, scenario: Scenario, discrete: bool) -> None:
@@ -66,44 +70,53 @@ class ActionReader:
         self._discrete = discrete
         rows = len(self._agents)
         self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
-        self._buffer = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
-        self._rows = list(zip(self._agents, self._buffer[0], strict=True))
-        self._row_shape = self._buffer.shape[2:]
+        self.read: FloatArray = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
+        self._plane: FloatArray = self.read[0]
+        self._rows = [
+            (a, memoryview(row)) for a, row in zip(self._agents, self._plane, strict=True)
+        ]
+        self._first_bad = self._first_bad_of_all
 
     def __reduce__(self) -> tuple[Any, ...]:
         return ActionReader, (self._scenario, self._discrete)  # rows must stay the buffer's
 
-    def by_agent(self, actions: Mapping[str, Any]) -> FloatArray:
-        """Return the actions of a dictionary by agent.
+    def by_agent(self, actions: Mapping[str, Any]) -> None:
+        """Read the actions of a dictionary by agent.
 
         Raises:
             ValueError: An agent is missing or unknown, or its action is of a wrong type or shape,
                 not finite, or outside the space; the message names agent and value.
         """
-        if type(actions) is not dict or self._discrete or len(actions) != len(self._agents):
-            return self._by_agent_slowly(actions)
-        # The usual case, an array of float32 for each agent, without a new array for each step.
-        for agent, row in self._rows:
-            action = actions.get(agent)
-            if type(action) is not np.ndarray or action.dtype is not _FLOAT32:
-                return self._by_agent_slowly(actions)
-            if action.shape != self._row_shape:
-                return self._by_agent_slowly(actions)
-            row[...] = action
-        if bad_action(self._buffer) >= 0:
-            return self._by_agent_slowly(actions)
-        return self._buffer
+        if type(actions) is dict and len(actions) == len(self._rows) and not self._discrete:
+            # The usual case, an array of float32 for each agent. A memoryview takes nothing but
+            # what has its own type and shape, and says so in less time than it takes to ask.
+            try:
+                for agent, row in self._rows:
+                    row[:] = actions[agent]
+            except (KeyError, TypeError, ValueError, BufferError):
+                pass
+            else:
+                if self._first_bad(self.read) < 0:
+                    return
+        self._by_agent_slowly(actions)
 
-    def by_row(self, actions: npt.ArrayLike) -> FloatArray:
-        """Return the actions of an array (rows, 2 + m), or (rows,) of discrete ones.
+    def by_row(self, actions: npt.ArrayLike) -> None:
+        """Read the actions of an array (rows, 2 + m), or (rows,) of discrete ones.
 
         Raises:
             ValueError: As :meth:`by_agent`.
         """
-        array = _as_array(actions, "action")
+        array = actions if type(actions) is np.ndarray else _as_array(actions, "action")
         if array.shape != self._shape:
             raise ValueError(f"action has shape {array.shape}, wanted {self._shape}")
-        return self._checked(array)
+        if array.dtype is _FLOAT32 and not self._discrete:
+            self._plane[...] = array
+            if self._first_bad(self.read) < 0:
+                return
+        if not (self._discrete and array.dtype.kind in "iu"):
+            for agent, row in zip(self._agents, array, strict=True):
+                self._row(agent, row)
+        self.read[...] = self._in_space(array, self._agents)
 
     def one(self, agent: str, action: npt.ArrayLike) -> FloatArray:
         """Return the action of one agent, checked, (2 + m,).
@@ -115,20 +128,14 @@ class ActionReader:
         checked: FloatArray = self._in_space(array[None], (agent,))[0, 0]
         return checked
 
-    def _checked(self, array: npt.NDArray[Any]) -> FloatArray:
-        if self._discrete:
-            if array.dtype.kind in "iu":
-                return self._in_space(array, self._agents)
-        elif array.dtype is _FLOAT32:
-            kernel = np.ascontiguousarray(array)[None]
-            if bad_action(kernel) < 0:
-                return kernel
-        for agent, row in zip(self._agents, array, strict=True):
-            self._row(agent, row)
-        return self._in_space(array, self._agents)
+    def _first_bad_of_all(self, actions: FloatArray) -> int:
+        """Look through the actions, for the first time: from then on without this detour."""
+        position = bad_action(actions)
+        self._first_bad = direct(bad_action)
+        return position
 
-    def _by_agent_slowly(self, actions: Mapping[str, Any]) -> FloatArray:
-        """Return the actions, or find out which of them is wrong in which way."""
+    def _by_agent_slowly(self, actions: Mapping[str, Any]) -> None:
+        """Read the actions, or find out which of them is wrong in which way."""
         if not isinstance(actions, Mapping):
             raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
         known = f"agents are: {', '.join(self._agents)}"
@@ -139,7 +146,7 @@ class ActionReader:
             if agent not in actions:
                 raise ValueError(f"no action for {agent}: every agent needs one; {known}")
         rows = [self._row(agent, actions[agent]) for agent in self._agents]
-        return self._in_space(np.stack(rows), self._agents)
+        self.read[...] = self._in_space(np.stack(rows), self._agents)
 
     def _row(self, agent: str, action: npt.ArrayLike) -> npt.NDArray[Any]:
         """Return one agent's action as an array of the right type and shape."""

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.arrays import BoolArray, FloatArray, Records
-from posse.compiled import UNCOMPILED, direct
+from posse.compiled import direct
 from posse.metrics import episode_metrics
 from posse.observation import ObservationLayout
 from posse.reward import REWARD_TERMS, TermsByName
@@ -344,29 +344,34 @@ class Batch:
             observations = self._end(observations, terminated | truncated, infos)
         return observations, rewards, terminated, truncated, infos
 
-    def advance(
+    def stepper(
         self, actions: FloatArray, rewards: FloatArray, terms: FloatArray
-    ) -> tuple[FloatArray, int]:
-        """Advance every world by one control step as :meth:`step` does, but pack up nothing.
+    ) -> Callable[[], tuple[FloatArray, int]]:
+        """Return a function that advances every world by one control step, and packs up nothing.
 
-        For the environments of one world, where the packing would take longer than the step. The
-        actions are taken as they are: they must have been through :meth:`check_actions`, or
-        through as good a check. No episode is started in the mode "same_step".
+        For the environments of one world, where to look up what a step needs, and to pack up what
+        it gives, would take longer than the step. Each call reads the actions anew and returns
+        observations (E, rows, F) and how many worlds' episodes are over. It works on the calling
+        thread alone, starts no episode in the mode "same_step", and checks nothing: the worlds
+        must have been reset, and the actions been through as good a check as
+        :meth:`check_actions`. Made before the first :meth:`reset` it is slower than afterwards.
 
         Args:
-            actions: (E, rows, 2 + message_size).
+            actions: Where to read the actions from, (E, rows, 2 + message_size).
             rewards: Where to write the rewards, (E, rows).
             terms: Where to write the reward terms, (E, rows, K) in the order of ``REWARD_TERMS``.
-
-        Returns:
-            observations (E, rows, F), and how many worlds' episodes are over.
-
-        Raises:
-            ResetNeeded: As :meth:`step`.
         """
-        self._check_running()
-        observations = self._observations.take()
-        return observations, self._run(self._orders, actions, observations, rewards, terms)
+        kernel, take = self._kernel, self._observations.take
+        before = (*self._fixed, actions)
+        after = (
+            rewards, terms, self._flags, self._orders, self._scratch[0], 0, self.num_worlds,
+        )  # fmt: skip
+
+        def advance() -> tuple[FloatArray, int]:
+            observations = take()
+            return observations, kernel(*before, observations, *after)
+
+        return advance
 
     def _check_running(self) -> None:
         """Raise if a step is not possible now."""
@@ -426,18 +431,13 @@ class Batch:
 
         Returns how many worlds' episodes are over.
         """
-        arguments = (
-            *self._fixed, actions, observations, rewards, terms, self._flags, orders,
-        )  # fmt: skip
-        if UNCOMPILED:
-            with np.errstate(over="ignore", under="ignore"):
-                return int(self._untyped(*arguments, self._scratch[0], 0, self.num_worlds))
-        if len(self._scratch) == 1:
-            return self._kernel(*arguments, self._scratch[0], 0, self.num_worlds)
-        return self._spread(arguments)
-
-    def _spread(self, arguments: tuple[Any, ...]) -> int:
         kernel, scratch = self._kernel, self._scratch
+        if len(scratch) == 1:
+            return kernel(
+                *self._fixed, actions, observations, rewards, terms, self._flags, orders,
+                scratch[0], 0, self.num_worlds,
+            )  # fmt: skip
+        arguments = (*self._fixed, actions, observations, rewards, terms, self._flags, orders)
 
         def work(thread: int, first: int, last: int) -> int:
             return kernel(*arguments, scratch[thread], first, last)

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar, cast, overload
 
 import numba
+import numpy as np
 from numba.core import types
 from numba.core.registry import CPUDispatcher
 
@@ -133,7 +134,10 @@ def direct(function: F) -> F:
 
     numba's own call looks up the type of every argument, which takes longer than a world's step.
     Whoever calls the compiled form has to pass arguments of just those types. Where a kernel has
-    not been called yet, or has been with several types, it is returned as it is.
+    not been called yet, or has been with several types, it is returned as it is. Plain Python is
+    kept from warning where compiled code would not.
     """
+    if UNCOMPILED:
+        return np.errstate(over="ignore", under="ignore")(function)
     forms = list(getattr(function, "overloads", {}).values())
     return cast("F", forms[0].entry_point) if len(forms) == 1 else function

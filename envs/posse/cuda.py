@@ -337,9 +337,9 @@ class CudaBatch(Batch):
                 observations = self._begin(done.over, anew=False)
         return observations, done.rewards, done.terminated, done.truncated, infos
 
-    def advance(self, actions: FloatArray, rewards: FloatArray, terms: FloatArray) -> Any:
+    def stepper(self, actions: FloatArray, rewards: FloatArray, terms: FloatArray) -> Any:
         """Not offered: it is for environments of one world, which a GPU would only slow down."""
-        raise NotImplementedError("a batch on the GPU has no advance(): call step()")
+        raise NotImplementedError("a batch on the GPU has no stepper(): call step()")
 
     def _take(self, actions: Any) -> DeviceArray:
         """Return the actions on the device, contiguous float32 of the right shape."""

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from posse.actions import MOTIONS, ActionReader, single_action_space
+from posse.actions import MOTIONS, single_action_space
 from posse.arrays import FloatArray
 from posse.observation import ObservationLayout
-from posse.reward import name_terms
+from posse.reward import TERM_NAMES, name_terms
 from posse.scenario import Scenario, ScenarioError
 from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.spaces import box
@@ -72,8 +72,9 @@ class TeamEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         self.scenario = self.fitting_scenario(scenario, None, overrides)
         self._world = SingleWorld(
-            self.scenario, seed=seed, split=split, first_world=first_world, render_mode=render_mode
-        )
+            self.scenario, discrete_actions=discrete_actions, seed=seed, split=split,
+            first_world=first_world, render_mode=render_mode,
+        )  # fmt: skip
         self.metadata = {  # type: ignore[misc]
             **type(self).metadata,
             "render_fps": frames_per_second(self.scenario),
@@ -81,7 +82,6 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         self.render_mode = render_mode
         self.layout: ObservationLayout = self._world.batch.layout
         self.observation_space, self.action_space = self.spaces_of(self.scenario, discrete_actions)
-        self._reader = ActionReader(self.scenario, discrete_actions)
         self._breakable = self.scenario.breaks > 0
 
     @classmethod
@@ -147,22 +147,23 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         world = self._world
         if not world.running:
             world.check_running()
-        observations, over = world.advance(self._reader.by_row(action))
+        world.actions.by_row(action)
+        observations, over = world.advance()
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": name_terms(*world.terms[0].T.copy()),
+            # zip's default is right: as many of each, and this is the hot path.
+            "reward_terms": dict(zip(TERM_NAMES, world.terms.T.copy())),  # noqa: B905
         }
         if self._breakable:
             info["working"] = world.working()
         terminated = truncated = False
         if over:
-            terminated = world.terminated
+            terminated, info["metrics"] = world.end()
             truncated = not terminated
-            info["metrics"] = world.metrics()
         if self.render_mode == "human":
             self.render()
-        row = world.rewards.tolist()[0]
-        return observations[0], sum(row) / len(row), terminated, truncated, info
+        rewards = world.rewards.tolist()
+        return observations[0], sum(rewards) / len(rewards), terminated, truncated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
@@ -224,17 +225,16 @@ class SoloEnv(TeamEnv):
         world = self._world
         if not world.running:
             world.check_running()
-        actions = self._reader.by_agent({"tracker_0": action})
-        observations, over = world.advance(actions)
+        world.actions.by_agent({"tracker_0": action})
+        observations, over = world.advance()
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": name_terms(*world.terms[0, 0].tolist()),
+            "reward_terms": name_terms(*world.terms[0].tolist()),
         }
         terminated = truncated = False
         if over:
-            terminated = world.terminated
+            terminated, info["metrics"] = world.end()
             truncated = not terminated
-            info["metrics"] = world.metrics()
         if self.render_mode == "human":
             self.render()
         return observations[0, 0], world.rewards.item(), terminated, truncated, info

@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
-from posse.actions import ActionReader, agent_names, single_action_space
+from posse.actions import agent_names, single_action_space
 from posse.arrays import FloatArray
 from posse.observation import ObservationLayout
 from posse.reward import name_terms
@@ -91,8 +91,9 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
     ) -> None:
         self.scenario = shortened(scenario, max_cycles, target_overrides(target, overrides))
         self._world = SingleWorld(
-            self.scenario, seed=seed, split=split, first_world=first_world, render_mode=render_mode
-        )
+            self.scenario, discrete_actions=discrete_actions, seed=seed, split=split,
+            first_world=first_world, render_mode=render_mode,
+        )  # fmt: skip
         self.metadata = {  # type: ignore[misc]
             **type(self).metadata,
             "render_fps": frames_per_second(self.scenario),
@@ -107,7 +108,6 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             agent: single_action_space(self.scenario, discrete_actions)
             for agent in self.possible_agents
         }
-        self._reader = ActionReader(self.scenario, discrete_actions)
         self._breakable = self.scenario.breaks > 0
         self._nobody = dict.fromkeys(self.possible_agents, False)
         self._state_space: spaces.Box | None = None
@@ -180,20 +180,21 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         world, agents = self._world, self.agents
         if not world.running:
             world.check_running()
-        observations, over = world.advance(self._reader.by_agent(actions))
+        world.actions.by_agent(actions)
+        observations, over = world.advance()
         score = world.score
         infos: _Infos = {
             agent: {"score": score, "reward_terms": name_terms(*values)}
             # zip's default is right: as many of each, and this is the hot path.
-            for agent, values in zip(agents, world.terms.tolist()[0])  # noqa: B905
+            for agent, values in zip(agents, world.terms.tolist())  # noqa: B905
         }
         if self._breakable:
             self._tell_who_works(infos)
         terminated, truncated = self._nobody.copy(), self._nobody.copy()
         if over:
-            ended = terminated if world.terminated else truncated
+            was_terminated, metrics = world.end()
+            ended = terminated if was_terminated else truncated
             ended.update(dict.fromkeys(agents, True))
-            metrics = world.metrics()
             for info in infos.values():
                 info["metrics"] = metrics.copy()
             self.agents = []
@@ -201,7 +202,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             self.render()
         return (
             dict(zip(agents, observations[0])),  # noqa: B905
-            dict(zip(agents, world.rewards.tolist()[0])),  # noqa: B905
+            dict(zip(agents, world.rewards.tolist())),  # noqa: B905
             terminated,
             truncated,
             infos,
@@ -218,7 +219,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         Raises:
             ValueError: Of a wrong type or shape, not finite, or out of its space.
         """
-        self._reader.one(agent, action)
+        self._world.actions.one(agent, action)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.actions import ActionReader
 from posse.arrays import FloatArray
 from posse.batch import Batch
 from posse.global_state import StateLayout
@@ -28,6 +29,7 @@ class SingleWorld:
 
     Args:
         scenario: What the world is like.
+        discrete_actions: Whether actions are ``Discrete``.
         seed: Of every random draw; ``None``: one from the system's entropy, at the first reset.
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Which world of the seed.
@@ -35,8 +37,11 @@ class SingleWorld:
 
     Attributes:
         running: Whether a step is possible: after a reset, and before the end.
-        rewards: (1, rows) of the last step; the next one overwrites them.
-        terms: (1, rows, K) reward terms of the last step, likewise.
+        actions: What reads the actions for :attr:`advance`.
+        advance: Makes a control step with the actions that were read; returns observations
+            (1, rows, F), and 1 where the episode is over: then :meth:`end` is called.
+        rewards: (rows,) of the last step; the next one overwrites them.
+        terms: (rows, K) reward terms of the last step, likewise.
 
     Raises:
         ValueError: An unknown split or render mode, a negative seed or number of the world.
@@ -46,6 +51,7 @@ class SingleWorld:
         self,
         scenario: Scenario,
         *,
+        discrete_actions: bool = False,
         seed: int | None = None,
         split: str = "train",
         first_world: int = 0,
@@ -64,6 +70,7 @@ class SingleWorld:
         )
         self.render_mode = render_mode
         self.running = False
+        self._discrete = discrete_actions
         self._seeded = seed is not None
         self._started = False
         self._state_layout: StateLayout | None = None
@@ -73,11 +80,20 @@ class SingleWorld:
     def _prepare(self) -> None:
         # Made once: making a view or an array takes longer than reading it.
         self._score = self.batch.worlds["score"]
-        self.rewards: FloatArray = np.zeros((1, self.scenario.num_agents), np.float32)
-        self.terms: FloatArray = np.zeros((*self.rewards.shape, len(REWARD_TERMS)), np.float32)
+        self.actions = ActionReader(self.scenario, self._discrete)
+        self._rewards: FloatArray = np.zeros((1, self.scenario.num_agents), np.float32)
+        self._terms: FloatArray = np.zeros((*self._rewards.shape, len(REWARD_TERMS)), np.float32)
+        self.rewards: FloatArray = self._rewards[0]
+        self.terms: FloatArray = self._terms[0]
+        self._make_ready()
+
+    def _make_ready(self) -> None:
+        self.advance = self.batch.stepper(self.actions.read, self._rewards, self._terms)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None, "_score": None, "_state_layout": None}
+        derived = ("_score", "actions", "_rewards", "_terms", "rewards", "terms", "advance")
+        kept = {k: v for k, v in self.__dict__.items() if k not in derived}
+        return {**kept, "_renderer": None, "_state_layout": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -112,20 +128,10 @@ class SingleWorld:
         if seed is None and not self._seeded:
             seed = secrets.randbits(32)
         observations = self.batch.reset(seed=seed, options=options)
+        self._make_ready()
         self.running = self._seeded = self._started = True
         first: FloatArray = observations[0]
         return first
-
-    def advance(self, actions: FloatArray) -> tuple[FloatArray, int]:
-        """Make a control step; actions (1, rows, 2 + m) that were checked.
-
-        Returns:
-            observations (1, rows, F), and 1 where the episode is over.
-        """
-        result = self.batch.advance(actions, self.rewards, self.terms)
-        if result[1]:
-            self.running = False
-        return result
 
     def check_running(self) -> None:
         """Raise if a step is not possible now.
@@ -137,14 +143,15 @@ class SingleWorld:
             when = "after the end of the episode" if self._started else "before reset"
             raise ResetNeeded(f"step {when}: call reset() first")
 
-    @property
-    def terminated(self) -> bool:
-        """Whether the episode was terminated, rather than truncated."""
-        return bool(self.batch.worlds["terminated"][0])
+    def end(self) -> tuple[bool, dict[str, float]]:
+        """Take note that the episode is over.
 
-    def metrics(self) -> dict[str, float]:
-        """Return every metric by name, of the episode as it stands."""
-        return {name: float(value[0]) for name, value in self.batch.metrics().items()}
+        Returns:
+            Whether it was terminated, rather than truncated, and every metric by name.
+        """
+        self.running = False
+        metrics = {name: float(value[0]) for name, value in self.batch.metrics().items()}
+        return bool(self.batch.worlds["terminated"][0]), metrics
 
     def working(self) -> npt.NDArray[np.bool_]:
         """Return which trackers work, (N,)."""

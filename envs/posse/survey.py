@@ -53,6 +53,7 @@ BEAM_COS: Final = 8 * ROW
 BEAM_SIN: Final = 9 * ROW
 READING: Final = 10 * ROW
 TASK: Final = 11 * ROW  # what every tracker is told of its task
+PREPARED: Final = 12 * ROW - 1  # not 0 once what is the same for all worlds stands there
 GAP: Final = 12 * ROW  # of each tracker: free width to the nearest disc, m
 EXCESS: Final = 13 * ROW  # of each tracker: not above 0 if anything is near
 SLOT: Final = 14 * ROW  # of each tracker: the nearest slot
@@ -90,7 +91,7 @@ _NO_BITS: Final = np.uint64(0)
 
 
 def new_scratch() -> FloatArray:
-    """Return scratch memory for one thread, SIZE numbers."""
+    """Return scratch memory for one thread and one scenario, SIZE numbers."""
     return np.zeros(SIZE, np.float32)
 
 

@@ -28,7 +28,7 @@ from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
 from posse.state import NEVER, beam_directions, config_record, slot_records
-from posse.survey import lay_out, lay_out_constants
+from posse.survey import PREPARED, lay_out, lay_out_constants
 from posse.target_motion import AGENT
 
 _ZERO: Final = np.float32(0.0)
@@ -259,7 +259,9 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
         c = config if own_config is None else own_config
         offsets = slots if own_slots is None else own_slots
         directions = beams if own_beams is None else own_beams
-        prepare(c, directions, scratch)
+        if scratch[PREPARED] == _ZERO:
+            prepare(c, directions, scratch)
+            scratch[PREPARED] = _ONE
         over = 0
         for e in range(first, last):
             if advance_world(
