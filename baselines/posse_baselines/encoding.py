@@ -21,6 +21,7 @@ from posse import ObservationLayout
 from posse.arrays import FloatArray
 from posse.compiled import compiled, kernel
 from posse_baselines.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
+from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import PolicyError
 
 KINDS: Final = ("plain", "slots")
@@ -203,9 +204,13 @@ def _encode_rows(
     with_features: int,
     scratch: FloatArray,
     out: FloatArray,
+    thread: int,
+    first: int,
+    last: int,
 ) -> None:
-    for r in range(len(rows)):
-        encode_row(rows[r], columns, unknown, offsets, slots, with_features, scratch, out[r])
+    s = scratch[thread]
+    for r in range(first, last):
+        encode_row(rows[r], columns, unknown, offsets, slots, with_features, s, out[r])
 
 
 class Encoder:
@@ -219,7 +224,7 @@ class Encoder:
         self.encoding = encoding
         columns, unknown = encoding.columns(layout)
         offsets, slots = feature_tables(layout)
-        self._scratch = np.empty(SCRATCH, np.float32)
+        self._scratch = np.empty((MOST_THREADS, SCRATCH), np.float32)
         self.tables = (columns, unknown, offsets, slots, int(encoding.kind == "slots"))
         """What :func:`encode_row` takes between the observation and the output."""
 
@@ -228,5 +233,6 @@ class Encoder:
         rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
         if out is None:
             out = np.empty((len(rows), self.encoding.size), np.float32)
-        _encode_rows(rows, *self.tables, self._scratch, out)
+        # Each row is a world of one tracker, to those who share the work out.
+        over_worlds(_encode_rows, (rows, *self.tables, self._scratch, out), len(rows), 1)
         return out

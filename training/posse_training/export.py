@@ -21,6 +21,7 @@ from posse_baselines.learned import LearnedPolicy, Network
 from posse_training.normalisation import LIMIT, Normaliser
 from posse_training.provenance import commit
 from posse_training.settings import TrainSettings
+from posse_training.tanh import QuickTanh
 
 
 def export(
@@ -46,7 +47,7 @@ def export(
     modules, output = _actor(model)
     layers = [module for module in modules if isinstance(module, nn.Linear)]
     between = {type(m) for m in modules[:-1] if not isinstance(m, (nn.Linear, nn.Flatten))}
-    names: dict[type[nn.Module], str] = {nn.Tanh: "tanh", nn.ReLU: "relu"}
+    names: dict[type[nn.Module], str] = {nn.Tanh: "tanh", QuickTanh: "tanh", nn.ReLU: "relu"}
     if len(between) > 1 or not between <= set(names):
         raise TypeError(f"no policy file holds layers of {sorted(t.__name__ for t in between)}")
     inputs = encoding.size + (0 if adviser is None else MOTION)

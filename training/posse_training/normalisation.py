@@ -37,7 +37,7 @@ class Normaliser(BaseFeaturesExtractor):
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Return the normalised observations, of the same shape."""
-        return ((observations - self.mean) * self.scale).clamp_(-LIMIT, LIMIT)
+        return (observations - self.mean).mul_(self.scale).clamp_(-LIMIT, LIMIT)
 
 
 class RunningStatistics:

@@ -24,6 +24,7 @@ from posse_baselines.encoding import Encoder, Encoding
 from posse_training.world_state import StateWriter
 
 _NEVER: Final = -1
+_ALL: Final = slice(None)
 
 
 @dataclass
@@ -203,13 +204,14 @@ class TeamVecEnv(VecEnv):
             self._encode(part, raw, observations[slots])
         return observations, rewards, dones, infos
 
-    def _encode(self, part: _Part, raw: FloatArray, out: FloatArray) -> None:
-        part.encoder.encode(raw, out[:, : self.encoding.size])
+    def _encode(self, part: _Part, raw: FloatArray, out: FloatArray, worlds: Any = _ALL) -> None:
+        """Write the observations of all slots, or of those of some worlds, to ``out``."""
+        part.encoder.encode(raw[worlds], out[:, : self.encoding.size])
         if part.advice is not None:
-            proposals = part.advice.proposals[..., :MOTION].reshape(-1, MOTION)
+            proposals = part.advice.proposals[worlds, :, :MOTION].reshape(-1, MOTION)
             out[:, self.encoding.size : self.private_size] = proposals
         if part.state is not None:
-            part.state.write(out[:, self.private_size :])
+            part.state.write(out[:, self.private_size :], worlds)
 
     def _report(
         self,
@@ -222,11 +224,12 @@ class TeamVecEnv(VecEnv):
     ) -> None:
         """Fill the infos of worlds whose episodes ended; ``over``: not by shortening."""
         trackers = part.batch.scenario.num_trackers
-        final = np.empty((len(ended) * trackers, self._size), np.float32)
-        self._encode(part, raw, final)
+        worlds = np.flatnonzero(ended)
+        final = np.empty((len(worlds) * trackers, self._size), np.float32)
+        self._encode(part, raw, final, worlds)
         metrics = part.batch.metrics()
         steps = part.batch.worlds["step"]
-        for e in np.flatnonzero(ended):
+        for k, e in enumerate(worlds):
             whole = over[e] and (
                 part.cut_at[e] == _NEVER or steps[e] == part.batch.scenario.horizon
             )
@@ -234,7 +237,7 @@ class TeamVecEnv(VecEnv):
             for i in range(trackers):
                 info = infos[part.slots.start + e * trackers + i]
                 # A copy: a view would keep the observations of all slots alive.
-                info["terminal_observation"] = final[e * trackers + i].copy()
+                info["terminal_observation"] = final[k * trackers + i].copy()
                 info["TimeLimit.truncated"] = not terminated[e]
                 if whole:
                     info["metrics"] = dict(summary)

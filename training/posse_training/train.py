@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 from rich.console import Console
-from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3 import SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, configure
@@ -53,12 +53,15 @@ from posse_training.rollout_buffer import FlatRolloutBuffer
 from posse_training.sb3_vec_env import TeamVecEnv
 from posse_training.settings import SettingsError, TrainSettings, read_settings
 from posse_training.statistics import mean
+from posse_training.tanh import QuickTanh
+from posse_training.team_ppo import TeamPPO
 
 VALIDATION_SEED: Final = 0
 BEST: Final = "best.safetensors"
 LAST: Final = "last.safetensors"
 CURVE: Final = "curve.csv"
-_ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+_ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": QuickTanh, "relu": nn.ReLU}
+_ADAM_EPSILON: Final = 1e-5  # what stable-baselines3's PPO takes unless told otherwise
 _WARM_WORLDS: Final = 32
 _WARM_REACH: Final = 0.1  # of random answers to an adviser
 _EXPLORATION: Final = 0.1  # deviation of the noise that td3 adds to its actions
@@ -201,6 +204,7 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     network: dict[str, Any] = {
         "activation_fn": _ACTIVATIONS[s.activation],
         "features_extractor_class": Normaliser,
+        "optimizer_kwargs": {"fused": True},
     }
     if not s.on_policy:
         shape = env.action_shape
@@ -219,11 +223,12 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
             seed=s.seed,
             device="cpu",
         )
+    network["optimizer_kwargs"]["eps"] = _ADAM_EPSILON
     if s.algorithm == "mappo":
         network |= {"private_size": env.private_size, "hidden": s.hidden}
     else:
         network |= {"net_arch": list(s.hidden)}
-    return PPO(
+    return TeamPPO(
         CentralizedCriticPolicy if s.algorithm == "mappo" else "MlpPolicy",
         env,
         learning_rate=learning_rate,

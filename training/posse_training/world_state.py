@@ -6,7 +6,7 @@ does not matter. The tracker whose value is asked for comes first, the others fo
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -84,7 +84,13 @@ class StateWriter:
         self.size = TARGET_SIZE + places * TRACKER_SIZE + obstacles * OBSTACLE_SIZE
         """Numbers in a state."""
 
-    def write(self, out: FloatArray) -> None:
-        """Write the state of each world for each of its trackers to ``out`` (E N, size)."""
+    def write(self, out: FloatArray, worlds: Any = slice(None)) -> None:
+        """Write the state of each world, or of some, for each of its trackers.
+
+        ``out`` is (trackers of these worlds, size).
+        """
         arrays = self._batch.arrays
-        _write(self._config, arrays.world, arrays.tracker, arrays.obstacle, self._places, out)
+        world, tracker, obstacle = (
+            a[worlds] for a in (arrays.world, arrays.tracker, arrays.obstacle)
+        )
+        _write(self._config, world, tracker, obstacle, self._places, out)
