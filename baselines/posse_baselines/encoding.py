@@ -20,6 +20,7 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.arrays import FloatArray
 from posse.compiled import compiled, kernel
+from posse.turn_code import Numbers, worlds_of
 from posse_baselines.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
 from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import PolicyError
@@ -205,11 +206,10 @@ def _encode_rows(
     scratch: FloatArray,
     out: FloatArray,
     thread: int,
-    first: int,
-    last: int,
+    turns: Numbers,
 ) -> None:
     s = scratch[thread]
-    for r in range(first, last):
+    for r in worlds_of(thread, turns):
         encode_row(rows[r], columns, unknown, offsets, slots, with_features, s, out[r])
 
 

@@ -27,6 +27,7 @@ from safetensors.numpy import save_file
 from posse import ObservationLayout
 from posse.arrays import BoolArray, FloatArray
 from posse.compiled import compiled, kernel
+from posse.turn_code import Numbers, worlds_of
 from posse_baselines.advice import MOTION, Adviser, advised, check_adviser
 from posse_baselines.encoding import Encoder, Encoding, encode_row
 from posse_baselines.features import SCRATCH
@@ -153,19 +154,18 @@ def _act(
     squashed: int,
     scratch: FloatArray,
     actions: FloatArray,
-    part: int,
-    first: int,
-    last: int,
+    thread: int,
+    turns: Numbers,
 ) -> None:
-    """Write the actions (E, N, 2 + m) of worlds ``first`` to ``last``."""
+    """Write the actions (E, N, 2 + m) of a thread's worlds."""
     widest = 0
     for k in range(len(sizes)):
         widest = max(widest, sizes[k])
-    work = scratch[part, :SCRATCH]
-    for e in range(first, last):
+    work = scratch[thread, :SCRATCH]
+    for e in worlds_of(thread, turns):
         for i in range(observations.shape[1]):
-            x = scratch[part, SCRATCH : SCRATCH + widest]
-            y = scratch[part, SCRATCH + widest :]
+            x = scratch[thread, SCRATCH : SCRATCH + widest]
+            y = scratch[thread, SCRATCH + widest :]
             encode_row(observations[e, i], columns, unknown, offsets, slots, with_features, work, x)
             for j in range(proposals.shape[2]):
                 x[sizes[0] - proposals.shape[2] + j] = proposals[e, i, j]

@@ -16,6 +16,7 @@ from posse import Batch, ObservationLayout
 from posse.arrays import BoolArray, FloatArray, Record, Records
 from posse.compiled import compiled, kernel
 from posse.state import NEVER, config_record, slot_records
+from posse.turn_code import Numbers, worlds_of
 from posse_baselines.assignment import WORK_ROWS, assign
 from posse_baselines.guidance import wrap
 from posse_baselines.parallel import MOST_THREADS, over_worlds
@@ -352,13 +353,12 @@ def lead_all(
     bodies: Records,
     plays: Records,
     actions: FloatArray,
-    part: int,
-    first: int,
-    last: int,
+    thread: int,
+    turns: Numbers,
 ) -> None:
-    """Write the actions of worlds ``first`` to ``last``."""
-    for e in range(first, last):
+    """Write the actions of a thread's worlds."""
+    for e in worlds_of(thread, turns):
         lead(
             config[0], slots, settings[0], world[e], tracker[e], obstacle[e], plans[e],
-            costs[part], work[part], discs[part], bodies[part], plays[part], actions[e],
+            costs[thread], work[thread], discs[thread], bodies[thread], plays[thread], actions[e],
         )  # fmt: skip

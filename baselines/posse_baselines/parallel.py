@@ -16,7 +16,7 @@ MOST_THREADS: Final = os.cpu_count() or 1
 def over_worlds(
     kernel: Callable[..., None], arguments: tuple[Any, ...], num_worlds: int, num_trackers: int
 ) -> None:
-    """Call ``kernel(*arguments, thread, first, last)`` for parts that together are all worlds.
+    """Call ``kernel(*arguments, thread, turns)`` once for each thread (:mod:`posse.turns`).
 
     Threads are numbered from 0 to at most ``MOST_THREADS`` - 1, for kernels that need a place
     of their own to work in.

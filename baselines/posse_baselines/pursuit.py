@@ -10,6 +10,7 @@ import numpy as np
 from posse import ObservationLayout
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled, kernel
+from posse.turn_code import Numbers, worlds_of
 from posse_baselines.offsets import offsets_of
 from posse_baselines.parallel import over_worlds
 from posse_baselines.policy import (
@@ -74,12 +75,11 @@ def pursue_all(
     offsets: Records,
     observations: FloatArray,
     actions: FloatArray,
-    part: int,
-    first: int,
-    last: int,
+    thread: int,
+    turns: Numbers,
 ) -> None:
-    """Write the actions of worlds ``first`` to ``last``."""
+    """Write the actions of a thread's worlds."""
     f = offsets[0]
-    for e in range(first, last):
+    for e in worlds_of(thread, turns):
         for i in range(observations.shape[1]):
             pursue(f, observations[e, i], actions[e, i])

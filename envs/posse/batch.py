@@ -31,7 +31,8 @@ from posse.state import (
     slot_records,
 )
 from posse.survey import new_scratch
-from posse.turns import by_turns, threads_for
+from posse.turn_code import Numbers
+from posse.turns import all_at_once, by_turns, threads_for
 from posse.world import (
     LOOK,
     START,
@@ -170,6 +171,7 @@ class Batch:
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         # What every call of the kernel begins with.
         self._fixed = (*self._tables, self._weights, *self._arrays.all())
+        self._alone = all_at_once(num_worlds)
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
         self._scratch = [new_scratch() for _ in range(threads)]
@@ -178,7 +180,7 @@ class Batch:
         derived = (
             "_config", "_tables", "_weights", "_fixed",
             "_observations", "_rewards", "_terms", "_flags", "_score",
-            "_scratch", "_orders", "_kernel", "_untyped",
+            "_scratch", "_orders", "_alone", "_kernel", "_untyped",
         )  # fmt: skip
         return {k: v for k, v in self.__dict__.items() if k not in derived}
 
@@ -364,7 +366,7 @@ class Batch:
         kernel, take = self._kernel, self._observations.take
         before = (*self._fixed, actions)
         after = (
-            rewards, terms, self._flags, self._orders, self._scratch[0], 0, self.num_worlds,
+            rewards, terms, self._flags, self._orders, self._scratch[0], 0, self._alone,
         )  # fmt: skip
 
         def advance() -> tuple[FloatArray, int]:
@@ -435,12 +437,12 @@ class Batch:
         if len(scratch) == 1:
             return kernel(
                 *self._fixed, actions, observations, rewards, terms, self._flags, orders,
-                scratch[0], 0, self.num_worlds,
+                scratch[0], 0, self._alone,
             )  # fmt: skip
         arguments = (*self._fixed, actions, observations, rewards, terms, self._flags, orders)
 
-        def work(thread: int, first: int, last: int) -> int:
-            return kernel(*arguments, scratch[thread], first, last)
+        def work(thread: int, turns: Numbers) -> int:
+            return kernel(*arguments, scratch[thread], thread, turns)
 
         return sum(by_turns(work, self.num_worlds, len(scratch)))
 

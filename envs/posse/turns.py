@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import os
 import threading
 from collections.abc import Callable
@@ -12,13 +11,25 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from posse.compiled import UNCOMPILED
-from posse.lookout import look_out
+from posse.turn_code import (
+    BELL,
+    END,
+    HEARD,
+    NEXT,
+    NO_BELL,
+    SIZE,
+    TURN,
+    WAKE,
+    Numbers,
+    look_out,
+    ring,
+)
 
 T = TypeVar("T")
 
 _SERIAL_BELOW: Final = 2048
 """Robots below which a second thread costs more than it saves."""
-_PARTS: Final = 4
+_PARTS: Final = 16
 """Parts of the worlds for each thread."""
 _LOOKS: Final = 400_000
 """How often who waits looks before it falls asleep: for some tenths of a millisecond. Where there
@@ -33,25 +44,44 @@ def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
     return 1 if num_worlds * robots_each < _SERIAL_BELOW else min(most, num_worlds)
 
 
-def by_turns(work: Callable[[int, int, int], T], num_worlds: int, threads: int) -> list[T]:
-    """Call ``work(thread, first, last)`` for parts that together are all worlds, from 0 on.
+@functools.lru_cache(maxsize=64)
+def all_at_once(num_worlds: int) -> Numbers:
+    """Return the turns of a thread that does everything by itself; they may be used again."""
+    turns = np.zeros((1, TURN), np.int64)
+    turns[0, END] = num_worlds
+    return turns
 
-    Threads take the next part by turns, so that none waits long for a slower one; the caller's is
-    thread 0. Returns what the calls returned, in no order. While another thread of the program is
-    here, the caller does everything by itself.
+
+def by_turns(work: Callable[[int, Numbers], T], num_worlds: int, threads: int) -> list[T]:
+    """Call ``work(thread, turns)`` once for each thread, which together are all worlds.
+
+    What is called goes through :func:`posse.turn_code.worlds_of` its thread, which hands worlds out
+    part by part, so that no thread waits long for a slower one; the caller's is thread 0. Returns
+    what the calls returned, in no order. While another thread of the program is here, the caller
+    does everything by itself.
     """
     if threads == 1 or UNCOMPILED:
-        return [work(0, 0, num_worlds)]
+        return [work(0, all_at_once(num_worlds))]
     crew = _crew()
     if not crew.free.acquire(blocking=False):
-        return [work(0, 0, num_worlds)]
+        return [work(0, all_at_once(num_worlds))]
     try:
-        return crew.share(work, num_worlds, threads)
+        return crew.share(work, _fresh_turns(num_worlds, threads).copy())
     except BaseException:
         _leave(crew)
         raise
     finally:
         crew.free.release()
+
+
+@functools.lru_cache(maxsize=64)
+def _fresh_turns(num_worlds: int, threads: int) -> Numbers:
+    """Return turns of which none is taken."""
+    edges = [num_worlds * k // threads for k in range(threads + 1)]
+    turns = np.zeros((threads, TURN), np.int64)
+    turns[:, NEXT], turns[:, END] = edges[:-1], edges[1:]
+    turns[:, SIZE] = max(1, num_worlds // (threads * _PARTS))
+    return turns
 
 
 class _Bell:
@@ -63,24 +93,23 @@ class _Bell:
 
     def __init__(self, looks: int) -> None:
         self._looks = looks
-        self._rung = np.zeros(1, np.int64)
+        self._state = np.zeros(BELL, np.int64)
         self._heard = 0
-        self._asleep = False
         self._wake = threading.Semaphore(0)
 
     def ring(self) -> None:
-        self._rung[0] += 1
-        if self._asleep:
-            self._asleep = False
+        if ring(self._state):
             self._wake.release()
 
-    def wait(self, pause: int = 0) -> None:
-        if not look_out(self._rung, self._heard, self._looks, pause):
-            while self._rung[0] == self._heard:
-                self._asleep = True
-                # Once more: it may have been rung before it could be seen that this one sleeps.
-                if self._rung[0] == self._heard:
-                    self._wake.acquire()
+    def wait(self, pause: int = 0, answer: _Bell | None = None) -> None:
+        """Ring another bell, if given, and wait for this one."""
+        told = NO_BELL if answer is None else answer._state
+        result = look_out(self._state, self._heard, self._looks, pause, told)
+        if result == WAKE and answer is not None:
+            answer._wake.release()
+            result = look_out(self._state, self._heard, self._looks, pause, NO_BELL)
+        if result != HEARD:
+            self._wake.acquire()
         self._heard += 1
 
 
@@ -91,24 +120,25 @@ class _Helper(threading.Thread):
         super().__init__(name=f"posse-{number}", daemon=True)
         looks = _LOOKS if number < _cores() else 0
         self.begin, self.done = _Bell(looks), _Bell(looks)
-        self.task: Callable[[], list[Any]] | None = None
+        self.task: Callable[[], Any] | None = None
         self.dismissed = False
-        self.results: list[Any] = []
+        self.result: Any = None
         self.error: BaseException | None = None
         self.start()
 
     def run(self) -> None:
+        done: _Bell | None = None
         while True:
-            self.begin.wait(_PAUSE)
+            self.begin.wait(_PAUSE, answer=done)
             task, self.task = self.task, None
             if self.dismissed or task is None:
                 return
             try:
-                self.results = task()
+                self.result = task()
             except BaseException as error:  # for the caller to raise
                 self.error = error
             del task  # it holds the step's arrays, whose memory is used again when nobody does
-            self.done.ring()
+            done = self.done
 
 
 def _cores() -> int:
@@ -126,34 +156,29 @@ class _Crew:
         self.free = threading.Lock()
         self.helpers: list[_Helper] = []
 
-    def share(self, work: Callable[[int, int, int], T], num_worlds: int, threads: int) -> list[T]:
-        count = min(num_worlds, threads * _PARTS)
-        edges = [num_worlds * k // count for k in range(count + 1)]
-        parts = iter(list(itertools.pairwise(edges)))
-
-        def take(thread: int) -> list[T]:
-            return [work(thread, first, last) for first, last in parts]
-
-        while len(self.helpers) < threads - 1:
+    def share(self, work: Callable[[int, Numbers], T], turns: Numbers) -> list[T]:
+        others = len(turns) - 1
+        while len(self.helpers) < others:
             self.helpers.append(_Helper(len(self.helpers) + 1))
-        helpers = self.helpers[: threads - 1]
+        helpers = self.helpers[:others]
         begun = []
         try:
             for thread, helper in enumerate(helpers, 1):
-                helper.task = functools.partial(take, thread)
+                helper.task = functools.partial(work, thread, turns)
                 helper.begin.ring()
                 begun.append(helper)
-            results = take(0)
+            results = [work(0, turns)]
+        except BaseException:
+            turns[:, NEXT] = turns[:, END]  # nobody begins another part
+            raise
         finally:
-            for _ in parts:  # after an error: nobody begins another part, or is still at one
-                pass
             for helper in begun:
                 helper.done.wait()
         for helper in helpers:
             if helper.error is not None:
                 raise helper.error
-            results += helper.results
-            helper.results = []
+            results.append(helper.result)
+            helper.result = None
         return results
 
 

@@ -30,6 +30,7 @@ from posse.start import draw_start, rest
 from posse.state import NEVER, beam_directions, config_record, slot_records
 from posse.survey import PREPARED, lay_out, lay_out_constants
 from posse.target_motion import AGENT
+from posse.turn_code import Numbers, worlds_of
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -253,8 +254,8 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
         flags: BoolArray,
         orders: npt.NDArray[np.uint8],
         scratch: FloatArray,
-        first: int,
-        last: int,
+        thread: int,
+        turns: Numbers,
     ) -> int:
         c = config if own_config is None else own_config
         offsets = slots if own_slots is None else own_slots
@@ -263,7 +264,7 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
             prepare(c, directions, scratch)
             scratch[PREPARED] = _ONE
         over = 0
-        for e in range(first, last):
+        for e in worlds_of(thread, turns):
             if advance_world(
                 e, c, offsets, weights, world, tracker, obstacle,
                 heard, broadcast, heard_message, message,
@@ -276,9 +277,9 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
 
 
 advance: Final = _stepping(None)
-"""Do what each world is ordered to, for worlds ``first`` to ``last``; the one loop over worlds.
+"""Do what each world is ordered to, for the worlds of a thread; the one loop over worlds.
 
-See :func:`advance_world`. Returns how many of these worlds' episodes are over.
+See :func:`advance_world`. Returns how many of the episodes of the worlds that it took are over.
 """
 
 

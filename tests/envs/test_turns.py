@@ -6,33 +6,52 @@ import threading
 import time
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import posse
 from posse import turns
+from posse.compiled import kernel
+from posse.turn_code import Numbers, worlds_of
 from posse.turns import by_turns
 
 
+@kernel
+def count(times: npt.NDArray[np.int64], thread: int, mine: Numbers) -> int:
+    """Count how often each world was worked on; return how many this thread had."""
+    worlds = 0
+    for e in worlds_of(thread, mine):
+        times[e] += 1
+        worlds += 1
+    return worlds
+
+
 class Ledger:
-    """Counts how often each world was worked on, and by whom."""
+    """Counts how often each world was worked on, and by whom; some threads begin late."""
 
-    def __init__(self, worlds: int) -> None:
+    def __init__(self, worlds: int, late: tuple[int, ...] = ()) -> None:
         self.times = np.zeros(worlds, np.int64)
-        self.threads: set[int] = set()
+        self.late = late
+        self.shares: dict[int, int] = {}
 
-    def work(self, thread: int, first: int, last: int) -> int:
-        self.times[first:last] += 1
-        self.threads.add(thread)
-        time.sleep(0.001)  # so that others get their turn
-        return last - first
+    def work(self, thread: int, mine: Numbers) -> int:
+        if thread in self.late:
+            time.sleep(0.03)
+        self.shares[thread] = count(self.times, thread, mine)
+        return self.shares[thread]
 
 
+@pytest.fixture
+def new_crew(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(turns, "_present", None)
+
+
+@pytest.mark.usefixtures("new_crew")
 @pytest.mark.parametrize("looks", [0, turns._LOOKS])
 @pytest.mark.parametrize("threads", [1, 2, 3, 9])
 def test_every_world_is_worked_on_once(
     threads: int, looks: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(turns, "_present", None)  # a crew of its own
     monkeypatch.setattr(turns, "_LOOKS", looks)  # awake, or asleep
     for worlds in (1, 2, 7, 1000):
         for pause in (0.0, 0.02):  # helpers still look out, or sleep
@@ -40,15 +59,50 @@ def test_every_world_is_worked_on_once(
             ledger = Ledger(worlds)
             assert sum(by_turns(ledger.work, worlds, threads)) == worlds
             assert (ledger.times == 1).all()
-            assert ledger.threads <= set(range(threads))
-            if worlds == 1000:
-                assert len(ledger.threads) > threads // 3, "the work is shared"
+            assert set(ledger.shares) == set(range(threads))
+
+
+@pytest.mark.parametrize("late", [(0,), (1,), (0, 2), (1, 2)])
+def test_nobody_waits_for_a_slow_thread(late: tuple[int, ...]) -> None:
+    ledger = Ledger(1000, late)
+    assert sum(by_turns(ledger.work, 1000, 3)) == 1000
+    assert (ledger.times == 1).all()
+    assert all(ledger.shares[thread] == 0 for thread in late)
+
+
+def test_a_thread_begins_with_worlds_of_its_own() -> None:
+    """They are in its core's cache from the step before."""
+    begun = {}
+
+    @kernel
+    def first(thread: int, mine: Numbers) -> int:
+        for e in worlds_of(thread, mine):
+            return e
+        return -1
+
+    def work(thread: int, mine: Numbers) -> None:
+        begun[thread] = first(thread, mine)
+
+    by_turns(work, 900, 3)
+    assert begun == {0: 0, 1: 300, 2: 600}
+
+
+def test_no_part_is_taken_twice_however_many_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(turns, "_PARTS", 20_000)
+    turns._fresh_turns.cache_clear()
+    worlds = 100_003
+    try:
+        for _ in range(30):
+            ledger = Ledger(worlds)
+            assert sum(by_turns(ledger.work, worlds, 4)) == worlds
+            assert (ledger.times == 1).all()
+    finally:
+        turns._fresh_turns.cache_clear()
 
 
 @pytest.mark.parametrize("thread_that_fails", [0, 1])
 def test_an_error_reaches_the_caller_and_the_next_work_is_done(thread_that_fails: int) -> None:
-    def fail(thread: int, first: int, last: int) -> int:
-        time.sleep(0.002)
+    def fail(thread: int, mine: Numbers) -> int:
         if thread == thread_that_fails:
             raise ArithmeticError(f"thread {thread}")
         return 0
@@ -61,37 +115,38 @@ def test_an_error_reaches_the_caller_and_the_next_work_is_done(thread_that_fails
 
 
 def test_nobody_is_still_at_work_after_an_error() -> None:
-    begun, ended = [], []
+    begun, ended, taken = threading.Event(), [], []
 
-    def work(thread: int, first: int, last: int) -> int:
-        begun.append(first)
+    def work(thread: int, mine: Numbers) -> int:
         if thread == 0:
+            begun.wait(5)
             raise KeyboardInterrupt
+        begun.set()
         time.sleep(0.05)
-        ended.append(first)
+        taken.append(count(np.zeros(100, np.int64), thread, mine))
+        ended.append(thread)
         return 0
 
     with pytest.raises(KeyboardInterrupt):
         by_turns(work, 100, 2)
-    count = len(begun)
-    assert len(ended) == count - 1, "the caller waited for the helper's part"
-    time.sleep(0.1)
-    assert len(begun) == count, "no part was begun afterwards"
+    assert ended == [1], "the caller waited for the helper"
+    assert taken == [0], "no part was begun afterwards"
 
 
 def test_without_a_compiler_the_caller_works_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(turns, "UNCOMPILED", True)
     ledger = Ledger(100)
     assert by_turns(ledger.work, 100, 3) == [100]
-    assert ledger.threads == {0}
+    assert ledger.shares == {0: 100}
 
 
-def test_helpers_that_an_error_left_behind_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(turns, "_present", None)
+@pytest.mark.usefixtures("new_crew")
+def test_helpers_that_an_error_left_behind_end() -> None:
     by_turns(Ledger(10).work, 10, 3)
     helpers = list(turns._crew().helpers)
+    assert len(helpers) == 2
 
-    def fail(thread: int, first: int, last: int) -> int:
+    def fail(thread: int, mine: Numbers) -> int:
         raise ArithmeticError
 
     with pytest.raises(ArithmeticError):
@@ -102,7 +157,7 @@ def test_helpers_that_an_error_left_behind_end(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_two_at_once_are_both_served() -> None:
-    ledgers = [Ledger(500), Ledger(500)]
+    ledgers = [Ledger(500, late=(0,)), Ledger(500, late=(0,))]
     callers = [threading.Thread(target=by_turns, args=(ledger.work, 500, 2)) for ledger in ledgers]
     for caller in callers:
         caller.start()

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled, kernel
+from posse.turn_code import Numbers, worlds_of
 from posse_baselines.ddcs.leadership import settle_lead
 from posse_baselines.ddcs.memory import SEARCHING
 from posse_baselines.ddcs.messages import write_message
@@ -105,16 +106,15 @@ def decide_all(
     bodies: Records,
     plays: Records,
     actions: FloatArray,
-    part: int,
-    first: int,
-    last: int,
+    thread: int,
+    turns: Numbers,
 ) -> None:
-    """Write the actions of worlds ``first`` to ``last``."""
+    """Write the actions of a thread's worlds."""
     f, s = offsets[0], settings[0]
-    for e in range(first, last):
+    for e in worlds_of(thread, turns):
         for i in range(observations.shape[1]):
             decide(
                 f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                costs[part], work[part], beams, discs[part], bodies[part],
-                plays[part], actions[e, i],
+                costs[thread], work[thread], beams, discs[thread], bodies[thread],
+                plays[thread], actions[e, i],
             )  # fmt: skip
