@@ -165,7 +165,6 @@ class Batch:
         self._observations = _Recycler((num_worlds, rows, size))
         self._rewards = _Recycler((num_worlds, rows))
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
-        self._flags = np.zeros((2, num_worlds), np.bool_)
         self._untyped: Callable[..., int] = own_kernel(scenario) if self.own_kernel else advance
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
@@ -179,7 +178,7 @@ class Batch:
     def __getstate__(self) -> dict[str, Any]:
         derived = (
             "_config", "_tables", "_weights", "_fixed",
-            "_observations", "_rewards", "_terms", "_flags", "_score",
+            "_observations", "_rewards", "_terms", "_score",
             "_scratch", "_orders", "_alone", "_kernel", "_untyped",
         )  # fmt: skip
         return {k: v for k, v in self.__dict__.items() if k not in derived}
@@ -336,8 +335,9 @@ class Batch:
         checked = self.check_actions(actions)
         observations = self._observations.take()
         rewards, terms = self._rewards.take(), self._terms.take()
-        over = self._run(self._orders, checked, observations, rewards, terms)
-        terminated, truncated = self._flags.copy()
+        flags = self._new_flags()
+        over = self._run(self._orders, checked, observations, rewards, terms, flags)
+        terminated, truncated = flags
         infos: dict[str, Any] = {
             "score": self._score.copy(),
             "reward_terms": TermsByName(terms),
@@ -366,7 +366,7 @@ class Batch:
         kernel, take = self._kernel, self._observations.take
         before = (*self._fixed, actions)
         after = (
-            rewards, terms, self._flags, self._orders, self._scratch[0], 0, self._alone,
+            rewards, terms, self._new_flags(), self._orders, self._scratch[0], 0, self._alone,
         )  # fmt: skip
 
         def advance() -> tuple[FloatArray, int]:
@@ -428,6 +428,7 @@ class Batch:
         observations: FloatArray,
         rewards: FloatArray,
         terms: FloatArray,
+        flags: BoolArray,
     ) -> int:
         """Have the kernel do what each world is ordered to, spread over the threads.
 
@@ -436,22 +437,27 @@ class Batch:
         kernel, scratch = self._kernel, self._scratch
         if len(scratch) == 1:
             return kernel(
-                *self._fixed, actions, observations, rewards, terms, self._flags, orders,
+                *self._fixed, actions, observations, rewards, terms, flags, orders,
                 scratch[0], 0, self._alone,
             )  # fmt: skip
-        arguments = (*self._fixed, actions, observations, rewards, terms, self._flags, orders)
+        arguments = (*self._fixed, actions, observations, rewards, terms, flags, orders)
 
         def work(thread: int, turns: Numbers) -> int:
             return kernel(*arguments, scratch[thread], thread, turns)
 
         return sum(by_turns(work, self.num_worlds, len(scratch)))
 
+    def _new_flags(self) -> BoolArray:
+        """Return room for what a step says of episodes' ends: terminated, truncated, (2, E)."""
+        return np.empty((2, self.num_worlds), np.bool_)
+
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
         """Start an episode in the chosen worlds; return every world's observations."""
         observations = self._observations.take()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         actions = np.empty(self.action_shape, np.float32)  # not read
-        self._run(orders, actions, observations, self._rewards.take(), self._terms.take())
+        rewards, terms = self._rewards.take(), self._terms.take()
+        self._run(orders, actions, observations, rewards, terms, self._new_flags())
         self._kernel = direct(self._untyped)  # by now there is one
         return observations
 
