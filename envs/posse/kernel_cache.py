@@ -142,7 +142,9 @@ class KernelCache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return a kernel's compiled form, or None where it has to be compiled."""
         try:
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            # Not numba's own load_overload: that first gets everything ready to compile, which
+            # takes longer than all else to the first step, and is done anyway by who compiles.
+            found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except (OSError, EOFError, pickle.UnpicklingError):
             found = None
             with contextlib.suppress(OSError):

@@ -89,6 +89,28 @@ fill(out)
 print(out.sum(), code.count("store double"), 0)
 """
 
+ONE_MAIN = """
+from herd.kernels import total
+
+print(total(3), 0, 0)
+"""
+
+LOADED_MAIN = """
+import sys
+import numba
+import numpy as np
+from herd.kernels import doubled, total
+
+answer = total(3)
+ready = int("numba.np.arraymath" in sys.modules)
+assert sum(total.stats.cache_hits.values()) == 1
+
+assert doubled(2.0) == 6.0
+assert sum(doubled.stats.cache_misses.values()) == 1
+assert numba.njit(lambda a: np.sort(a * np.arange(3.0)).sum())(np.ones(3)) == 3.0
+print(answer, ready, int("numba.np.arraymath" in sys.modules))
+"""
+
 MAIN = """
 from herd.kernels import doubled, total
 
@@ -166,6 +188,16 @@ def test_a_kernel_is_compiled_once_and_again_when_a_helper_in_another_file_chang
     herd.write_helper(step=1)
     back = herd.run(cache)
     assert (back.answer, back.hits) == (6.0, 1), "the first version is still filed under its stamp"
+
+
+def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(
+    herd: Herd, tmp_path: Path
+) -> None:
+    Herd(herd.root, ONE_MAIN).run(tmp_path / "cache")
+    loaded = Herd(herd.root, LOADED_MAIN).run(tmp_path / "cache")
+    ready_when_loaded, ready_after_compiling = loaded.hits, loaded.misses
+    assert loaded.answer == 6.0
+    assert (ready_when_loaded, ready_after_compiling) == (0, 1)
 
 
 def test_a_kernel_of_short_loops_is_kept_too(herd: Herd, tmp_path: Path) -> None:
