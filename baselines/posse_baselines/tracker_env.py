@@ -122,7 +122,7 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
         own = self._reader.one(f"tracker_{self.number}", action)
         actions, self._memory = self.teammates.act(self._observations, self._memory)
         team = world.actions.read
-        team[...] = actions
+        team[...] = world.batch.check_actions(actions)
         team[0, self.number] = 0
         team[0, self.number, : len(own)] = own
         observations, over = world.advance()

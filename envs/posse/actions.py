@@ -78,7 +78,10 @@ class ActionReader:
         self._first_bad = self._first_bad_of_all
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return ActionReader, (self._scenario, self._discrete)  # rows must stay the buffer's
+        return ActionReader, (
+            self._scenario,
+            self._discrete,
+        )  # rows must stay those of what is read
 
     def by_agent(self, actions: Mapping[str, Any]) -> None:
         """Read the actions of a dictionary by agent.

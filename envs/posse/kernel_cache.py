@@ -144,7 +144,9 @@ class KernelCache(FunctionCache):
         try:
             # Not numba's own load_overload: that first gets everything ready to compile, which
             # takes longer than all else to the first step, and is done anyway by who compiles.
-            found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            found = None
+            with self._guard_against_spurious_io_errors():
+                found = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except (OSError, EOFError, pickle.UnpicklingError):
             found = None
             with contextlib.suppress(OSError):

@@ -21,13 +21,12 @@ from posse.compiled import compiled, kernel
 Numbers = npt.NDArray[np.int64]
 
 # Turns are a row for each thread, (threads, TURN): the worlds that it takes first.
-NEXT: Final = 0  # world that the next part begins with
+NEXT: Final = 0  # world that the next part begins with; at the front, for _add
 SIZE: Final = 1  # worlds of a part; 0: there is one thread, and one part
 END: Final = 2  # world after the last
-TURN: Final = 8  # numbers of a row: no two threads' share a line of the cache
+TURN: Final = 16  # numbers of a row: no two threads' share a line of the cache
 
-# A bell, (BELL,).
-RUNG: Final = 0  # how often it was rung
+# A bell, (BELL,). At its front, for _add and _read, how often it was rung.
 ASLEEP: Final = 1  # 1 if who waits has to be woken
 BELL: Final = 2
 NO_BELL: Final = np.zeros(0, np.int64)

@@ -105,11 +105,14 @@ class _Bell:
         """Ring another bell, if given, and wait for this one."""
         told = NO_BELL if answer is None else answer._state
         result = look_out(self._state, self._heard, self._looks, pause, told)
-        if result == WAKE and answer is not None:
-            answer._wake.release()
-            result = look_out(self._state, self._heard, self._looks, pause, NO_BELL)
-        if result != HEARD:
-            self._wake.acquire()
+        # To be woken is no proof that this bell was rung: who rang it last may have been held up
+        # between ringing and looking for sleepers, and have come upon this later sleep.
+        while result != HEARD:
+            if result == WAKE and answer is not None:
+                answer._wake.release()
+            else:
+                self._wake.acquire()
+            result = look_out(self._state, self._heard, self._looks, 0, NO_BELL)
         self._heard += 1
 
 

@@ -12,7 +12,7 @@ import pytest
 import posse
 from posse import turns
 from posse.compiled import kernel
-from posse.turn_code import Numbers, worlds_of
+from posse.turn_code import ASLEEP, Numbers, worlds_of
 from posse.turns import by_turns
 
 
@@ -131,6 +131,31 @@ def test_nobody_is_still_at_work_after_an_error() -> None:
         by_turns(work, 100, 2)
     assert ended == [1], "the caller waited for the helper"
     assert taken == [0], "no part was begun afterwards"
+
+
+@pytest.mark.parametrize("looks", [0, 1000])
+def test_a_ring_that_was_held_up_does_not_pass_for_the_next(looks: int) -> None:
+    """Ringing is two things: to count, and to wake who sleeps; a thread can be stopped between."""
+    bell, heard = turns._Bell(looks), []
+
+    def wait_twice() -> None:
+        for number in (1, 2):
+            bell.wait()
+            heard.append(number)
+
+    bell._state[0] += 1  # the first half of a ring
+    waiting = threading.Thread(target=wait_twice)
+    waiting.start()
+    while bell._state[ASLEEP] == 0:  # until it sleeps for the second
+        time.sleep(0.001)
+    assert heard == [1]
+    bell._state[ASLEEP] = 0  # and now the second half
+    bell._wake.release()
+    time.sleep(0.05)
+    assert heard == [1]
+    bell.ring()
+    waiting.join(5)
+    assert heard == [1, 2]
 
 
 def test_without_a_compiler_the_caller_works_alone(monkeypatch: pytest.MonkeyPatch) -> None:

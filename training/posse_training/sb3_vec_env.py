@@ -236,7 +236,7 @@ class TeamVecEnv(VecEnv):
             summary = {name: float(values[e]) for name, values in metrics.items()}
             for i in range(trackers):
                 info = infos[part.slots.start + e * trackers + i]
-                # A copy: a view would keep the observations of all slots alive.
+                # A copy: a view would keep those of all slots that ended alive.
                 info["terminal_observation"] = final[k * trackers + i].copy()
                 info["TimeLimit.truncated"] = not terminated[e]
                 if whole:
