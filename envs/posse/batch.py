@@ -170,7 +170,6 @@ class Batch:
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         # What every call of the kernel begins with.
         self._fixed = (*self._tables, self._weights, *self._arrays.all())
-        self._alone = all_at_once(num_worlds)
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
         self._scratch = [new_scratch() for _ in range(threads)]
@@ -179,7 +178,7 @@ class Batch:
         derived = (
             "_config", "_tables", "_weights", "_fixed",
             "_observations", "_rewards", "_terms", "_score",
-            "_scratch", "_orders", "_alone", "_kernel", "_untyped",
+            "_scratch", "_orders", "_kernel", "_untyped",
         )  # fmt: skip
         return {k: v for k, v in self.__dict__.items() if k not in derived}
 
@@ -366,7 +365,8 @@ class Batch:
         kernel, take = self._kernel, self._observations.take
         before = (*self._fixed, actions)
         after = (
-            rewards, terms, self._new_flags(), self._orders, self._scratch[0], 0, self._alone,
+            rewards, terms, self._new_flags(), self._orders,
+            self._scratch[0], 0, all_at_once(self.num_worlds),
         )  # fmt: skip
 
         def advance() -> tuple[FloatArray, int]:
@@ -435,11 +435,6 @@ class Batch:
         Returns how many worlds' episodes are over.
         """
         kernel, scratch = self._kernel, self._scratch
-        if len(scratch) == 1:
-            return kernel(
-                *self._fixed, actions, observations, rewards, terms, flags, orders,
-                scratch[0], 0, self._alone,
-            )  # fmt: skip
         arguments = (*self._fixed, actions, observations, rewards, terms, flags, orders)
 
         def work(thread: int, turns: Numbers) -> int:

@@ -104,15 +104,14 @@ class _Bell:
     def wait(self, pause: int = 0, answer: _Bell | None = None) -> None:
         """Ring another bell, if given, and wait for this one."""
         told = NO_BELL if answer is None else answer._state
-        result = look_out(self._state, self._heard, self._looks, pause, told)
         # To be woken is no proof that this bell was rung: who rang it last may have been held up
         # between ringing and looking for sleepers, and have come upon this later sleep.
-        while result != HEARD:
-            if result == WAKE and answer is not None:
+        while (said := look_out(self._state, self._heard, self._looks, pause, told)) != HEARD:
+            told = NO_BELL
+            if said == WAKE and answer is not None:
                 answer._wake.release()
             else:
                 self._wake.acquire()
-            result = look_out(self._state, self._heard, self._looks, 0, NO_BELL)
         self._heard += 1
 
 

@@ -24,7 +24,7 @@ class _TanhByLogistic(torch.autograd.Function):
 
 
 class QuickTanh(nn.Tanh):
-    """``nn.Tanh`` to within 3e-7. Beside small layers the tangent itself takes longest."""
+    """``nn.Tanh`` to within 3e-7, which takes longest on the way through small layers."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Return tanh x, of the same shape."""
