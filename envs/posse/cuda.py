@@ -26,7 +26,7 @@ from posse.reward import REWARD_TERMS
 from posse.scenario import Scenario
 from posse.state import SPLITS, WorldArrays
 from posse.survey import SIZE_FOR_ONE
-from posse.world import LOOK, START, STEP, advance_world, prepare
+from posse.world import LOOK, START, STEP, advance_worlds, prepare
 
 _CONFIG: Final[Any] = numba.config
 
@@ -102,8 +102,8 @@ def _advance(
         if _SIMULATED:
             scratch[:] = 0.0  # numpy would warn of what lies in lanes that nobody looks at
         prepare(config, beams, scratch)
-        over = advance_world(
-            e, config, slots, weights, world, tracker, obstacle,
+        over = advance_worlds(
+            e, 1, config, slots, weights, world, tracker, obstacle,
             heard, broadcast, heard_message, message,
             actions, observations, rewards, terms, flags, orders, scratch,
         )  # fmt: skip

@@ -15,6 +15,7 @@ import numpy as np
 from posse.compiled import compiled
 from posse.lanes import Lanes, greater, lesser
 
+_ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
 _THREE_HALVES: Final = np.float32(1.5)
@@ -24,6 +25,8 @@ _C42: Final = np.float32(1 / 42)
 _C12: Final = np.float32(1 / 12)
 _C30: Final = np.float32(1 / 30)
 _C56: Final = np.float32(1 / 56)
+_SMALL: Final = np.float32(5e-7)  # tangents up to this are their angles, and what rounding leaves
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
@@ -76,9 +79,17 @@ def turn_towards(
 ) -> np.float32:
     """Return the turn rate, at most ``most``, that brings a heading to a wanted one in ``time``.
 
-    The short way round; a heading exactly opposite turns left.
+    The short way round; from a heading exactly opposite, either.
     """
     along = cosine * wanted_c + sine * wanted_s
     across = cosine * wanted_s - sine * wanted_c
+    # Nearly always it is too far to reach, or reached: neither needs an inverse tangent. The
+    # tangent of the farthest turn is at most limit / near_one.
+    limit = most * time
+    near_one = _ONE - _HALF * limit * limit
+    if near_one > _ZERO and abs(across) * near_one > _A_LITTLE_MORE * limit * along:
+        return np.float32(math.copysign(most, across))
+    if abs(across) < _SMALL * along:
+        return np.float32(across / along / time)
     error = np.float32(math.atan2(across, along))
     return min(max(error / time, -most), most)

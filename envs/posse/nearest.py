@@ -23,7 +23,6 @@ from posse.survey import (
     LISTED,
     ROW,
     SHORTLIST,
-    VIEW,
     X,
     Y,
     blocks,
@@ -59,7 +58,7 @@ def list_nearest(c: Record, trackers: Records, first: int, last: int, s: FloatAr
         rank_eight(c.num_trackers, first, s)
     for i in range(first, last):
         if not together or s[_CERTAIN + i - first] == _ZERO:
-            at = natural((i - first) * VIEW)
+            at = natural((i - first) * ROW)
             measure_team(c.num_trackers, trackers[i], i, s)
             choose_nearest(c.num_trackers, c.neighbours, LISTED + at, s)
 
@@ -88,7 +87,7 @@ def rank_eight(n: int, first: int, s: FloatArray) -> None:
         | (f * _CLOSER <= e) | (g * _CLOSER <= f) | (h * _CLOSER <= g) | (ninth * _CLOSER <= h)
     )  # fmt: skip
     store(s, _CERTAIN, choose(doubtful, _ZERO, _ONE))
-    store_rows(tag(a), tag(b), tag(c), tag(d), tag(e), tag(f), tag(g), tag(h), LISTED, VIEW, s)
+    store_rows(tag(a), tag(b), tag(c), tag(d), tag(e), tag(f), tag(g), tag(h), LISTED, ROW, s)
 
 
 @compiled

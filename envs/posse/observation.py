@@ -21,58 +21,36 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
-from posse.lanes import choose, greater, load, root, store
+from posse.lanes import load, root, store
 from posse.nearest import list_nearest
 from posse.scenario import Scenario
 from posse.sonar import ping
 from posse.state import FIX, NEVER, POSE
 from posse.survey import (
-    AHEAD,
     BLOCK,
-    COS,
-    DISTANCE,
-    INDEX,
-    LEFT,
     LISTED,
-    MATE,
     OWN,
-    PLACE,
     ROW,
     SHORTLIST,
-    SIN,
-    SPEED,
     TASK,
-    TURN_RATE,
-    VIEW,
-    X,
-    Y,
     blocks,
     columns,
     columns_of,
     describe_mates,
-    find_places,
     group_size,
     natural,
-    store_rows,
-    survey,
     within_one,
 )
+from posse.together import SONAR_AT, TARGET_AT, copy_message, whole_team
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _TINY: Final = np.float32(1e-9)
-_DESCRIBED: Final = 16  # up to this team size, what is observed of all fits a row of MATE
 _TOLD: Final = 17  # numbers of the task that are the same for all of an episode
-# Rows of scratch memory, of each tracker: when its fix was, whether it sees the target, and what it
-# is told of it, sixteen numbers each.
-_FIXED_AT: Final = OWN
-_SEES: Final = OWN + 1 * ROW
-_TARGET: Final = OWN + 2 * ROW
-# Of one tracker: what is observed of eight of the nearest, eight numbers each, and how they turn;
-# or the nearest so far, how far and who.
-_MATES: Final = OWN
-_TURN_RATES: Final = OWN + 1 * ROW
+# Rows of scratch memory, of one tracker: how eight of the nearest turn; or the nearest so far, how
+# far and who.
+_TURN_RATES: Final = OWN
 _SO_FAR: Final = SHORTLIST
 _WHO: Final = SHORTLIST + 1 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
@@ -252,53 +230,6 @@ def _write_place(
 
 
 @compiled
-def lay_out_fixes(c: Record, w: Record, trackers: Records, s: FloatArray) -> None:
-    """Write what each tracker observes of the target to scratch memory, sixteen numbers each.
-
-    Fields 0 to 7 come first, then 4 to 11, so that both are stored and copied at once.
-    """
-    n = natural(c.num_trackers)
-    for i in range(n):
-        t = trackers[i]
-        s[_FIXED_AT + i], s[_SEES + i] = np.float32(t.fix_step), np.float32(t.sees)
-    for block in range(blocks(n)):
-        i = BLOCK * block
-        hc, hs = load(s, COS + i), load(s, SIN + i)
-        x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = columns(trackers, i, n, FIX)
-        dx, dy = x - load(s, X + i), y - load(s, Y + i)
-        distance = root(dx * dx + dy * dy)
-        per_metre = _ONE / greater(distance, _TINY)
-        ux, uy = dx * per_metre, dy * per_metre
-        fixed_at = load(s, _FIXED_AT + i)
-        known = fixed_at >= _ZERO
-        age = choose(known, (np.float32(w.step) - fixed_at) * c.dt, _MINUS_ONE)
-        ahead = choose(distance > _ZERO, within_one(ux * hc + uy * hs), _ONE)
-        ahead = choose(known, ahead, _ZERO)
-        left = choose(known, within_one(uy * hc - ux * hs), _ZERO)
-        heading_cos = choose(known, within_one(heading_x * hc + heading_y * hs), _ZERO)
-        heading_sin = choose(known, within_one(heading_y * hc - heading_x * hs), _ZERO)
-        frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
-        frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
-        store_rows(
-            choose(known, _ONE, _ZERO), load(s, _SEES + i), age,
-            choose(known, distance, _MINUS_ONE), ahead, left, heading_cos, heading_sin,
-            _TARGET + 2 * BLOCK * i, 2 * BLOCK, s,
-        )  # fmt: skip
-        store_rows(
-            ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
-            choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
-            _TARGET + 2 * BLOCK * i + BLOCK, 2 * BLOCK, s,
-        )  # fmt: skip
-
-
-@compiled
-def _write_target(i: int, s: FloatArray, o: FloatArray, k: int) -> int:
-    store(o, k, load(s, _TARGET + 2 * BLOCK * i))
-    store(o, k + 4, load(s, _TARGET + 2 * BLOCK * i + BLOCK))
-    return k + 12
-
-
-@compiled
 def _write_no_target(o: FloatArray, k: int) -> int:
     for j in range(k, k + 12):
         o[j] = _ZERO
@@ -370,33 +301,7 @@ def _write_no_neighbour(c: Record, o: FloatArray, k: int) -> None:
 def _write_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
     """Write what team-mate j said, a row of (N, m), into its place, which begins at k."""
     if c.message_size > 0:
-        _copy_message(c, said, j, o, k)
-
-
-@compiled(seldom=True)
-def _copy_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
-    for q in range(c.message_size):
-        o[k + 9 + q] = said[j, q]
-
-
-@compiled
-def _write_whole_team(
-    c: Record,
-    i: int,
-    said: FloatArray,
-    at: int,
-    s: FloatArray,
-    o: FloatArray,
-    k: int,
-) -> None:
-    """Write every team-mate, nearest first, where all are heard and each has a place."""
-    size = 9 + c.message_size
-    for j in range(natural(c.num_trackers)):
-        if j != i:  # its own disc is far, and thereby last
-            start = natural(k + int(s[PLACE + at + j]) * size)
-            store(o, start, load(s, MATE + at + BLOCK * j))
-            o[start + 8] = s[TURN_RATE + j]
-            _write_message(c, said, j, o, start)
+        copy_message(c, said[j], o, k)
 
 
 @compiled
@@ -439,7 +344,7 @@ def _observe_nearest(
     list_nearest(c, trackers, first, last, s)
     for i in range(first, last):
         _write_nearest(
-            c, trackers, trackers[i], LISTED + natural((i - first) * VIEW), said, s,
+            c, trackers, trackers[i], LISTED + natural((i - first) * ROW), said, s,
             observations[i], k,
         )  # fmt: skip
 
@@ -468,15 +373,11 @@ def _write_nearest(
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
         metres, numbers = root(ahead * ahead + left * left), load(s, p)
         store(s, _TURN_RATES, turn_rate)
-        if left_over >= BLOCK:
-            describe_mates(t, numbers, ahead, left, metres, heading_x, heading_y, speed, o, k, size)
-        else:  # no room for eight
-            describe_mates(
-                t, numbers, ahead, left, metres, heading_x, heading_y, speed, s, _MATES, BLOCK
-            )
-            for q in range(left_over):
-                store(o, k + q * size, load(s, _MATES + BLOCK * q))
+        mates = describe_mates(
+            hc, hs, numbers, ahead, left, metres, heading_x, heading_y, speed
+        )
         for q in range(min(BLOCK, left_over)):
+            store(o, k, mates[q])
             o[k + 8] = s[_TURN_RATES + q]
             _write_message(c, said, natural(int(s[p + q])), o, k)
             k += size
@@ -534,7 +435,7 @@ def _write_heard(
 
 
 @compiled
-def observe_trackers(
+def observe_alone(
     c: Record,
     w: Record,
     trackers: Records,
@@ -544,49 +445,24 @@ def observe_trackers(
     s: FloatArray,
     observations: FloatArray,
 ) -> None:
-    """Write what each tracker is given, (rows, F); ``s`` holds where every disc is."""
+    """Write what each tracker of a world is given, (rows, F), but for :mod:`posse.together`.
+
+    Where every disc is stands in ``s``.
+    """
     n = natural(c.num_trackers)
-    whole_team = c.perfect_radio != 0 and n <= _DESCRIBED and n == c.neighbours + 1
-    lay_out_fixes(c, w, trackers, s)
-    together, k = group_size(s), 0
-    for first in range(0, n, together):
-        last = min(first + together, n)
-        for i in range(first, last if whole_team else first):
-            survey(c, trackers[i], i, natural((i - first) * VIEW), s)
-        for i in range(first, last if whole_team else first):
-            _describe_team(c, trackers[i], natural((i - first) * VIEW), s)
-        for i in range(first, last):
-            o = observations[i]
-            k = natural(_write_alone(c, w, trackers[i], i, s, o))
-            if whole_team:
-                _write_whole_team(c, i, message[0], natural((i - first) * VIEW), s, o, k)
-        if c.perfect_radio and not whole_team:
-            _observe_nearest(c, trackers, first, last, message[0], s, observations, k)
+    for i in range(n):
+        t, o = trackers[i], observations[i]
+        k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
+        _write_task(c, w, i, s, o, k)
+        ping(c, t, i, s, o, SONAR_AT)
+    k = SONAR_AT + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
-
-
-@compiled
-def _describe_team(c: Record, t: Record, at: int, s: FloatArray) -> None:
-    """Write what a tracker observes of each in its team, itself included, and each one's place."""
-    for block in range(blocks(c.num_trackers)):
-        j = BLOCK * block
-        describe_mates(
-            t, load(s, INDEX + j), load(s, AHEAD + at + j), load(s, LEFT + at + j),
-            load(s, DISTANCE + at + j), load(s, COS + j), load(s, SIN + j), load(s, SPEED + j),
-            s, MATE + at + BLOCK * j, BLOCK,
-        )  # fmt: skip
-    find_places(c.num_trackers, DISTANCE + at, PLACE + at, s)
-
-
-@compiled
-def _write_alone(c: Record, w: Record, t: Record, i: int, s: FloatArray, o: FloatArray) -> int:
-    """Write what tracker i knows without its team; return where the team-mates' part begins."""
-    k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
-    k = _write_task(c, w, i, s, o, k)
-    k = _write_target(i, s, o, k)
-    ping(c, t, i, s, o, k)
-    return k + natural(c.sonar_beams)
+    elif not whole_team(c):
+        together = group_size(s)
+        for first in range(0, n, together):
+            last = min(first + together, n)
+            _observe_nearest(c, trackers, first, last, message[0], s, observations, k)
 
 
 @compiled(seldom=True)
@@ -599,7 +475,6 @@ def observe_target(
     o: FloatArray,
 ) -> None:
     """Write what a target that is an agent is given, (F,): it knows where trackers are."""
-    survey(c, w, c.num_trackers, 0, s)
     touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
     k = _write_own(c, w, touching, 1, o, 0)
     own = k
@@ -611,7 +486,8 @@ def observe_target(
     k += natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
-        filled = _keep_nearest(c.neighbours, filled, j, s[DISTANCE + j], s)
+        dx, dy = trackers[j].x - w.x, trackers[j].y - w.y
+        filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
     for p in range(c.neighbours):
         _write_no_neighbour(c, o, k)
         if p < filled:

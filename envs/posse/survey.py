@@ -43,39 +43,33 @@ one's square roots, it goes on with another's.
 ROW: Final = 136
 X: Final = 0  # common frame, m
 Y: Final = 1 * ROW
-COS: Final = 2 * ROW  # heading, common frame; trackers only
-SIN: Final = 3 * ROW
-SPEED: Final = 4 * ROW  # trackers only
-TURN_RATE: Final = 5 * ROW
-RADIUS: Final = 6 * ROW
-INDEX: Final = 7 * ROW  # 0, 1, 2, …
-BEAM_COS: Final = 8 * ROW
-BEAM_SIN: Final = 9 * ROW
-READING: Final = 10 * ROW
-TASK: Final = 11 * ROW  # what every tracker is told of its task
-PREPARED: Final = 12 * ROW - 1  # not 0 once what is the same for all worlds stands there
-GAP: Final = 12 * ROW  # of each tracker: free width to the nearest disc, m
-EXCESS: Final = 13 * ROW  # of each tracker: not above 0 if anything is near
-SLOT: Final = 14 * ROW  # of each tracker: the nearest slot
-SLOT_DISTANCE: Final = 15 * ROW  # and how far it is, m
-SLOT_DISTANCE2: Final = 16 * ROW  # the same squared, m²
-HEARD2: Final = 17 * ROW  # within which the sonar has it, the square, and a little more, m²
-OWN: Final = 18 * ROW  # ten rows whose meaning is their module's own
-SHORTLIST: Final = 28 * ROW  # and six for making lists of the nearest
-_SHARED: Final = 34 * ROW
+RADIUS: Final = 2 * ROW
+INDEX: Final = 3 * ROW  # 0, 1, 2, …
+BEAM_COS: Final = 4 * ROW
+BEAM_SIN: Final = 5 * ROW
+READING: Final = 6 * ROW
+TASK: Final = 7 * ROW  # what every tracker is told of its task
+PREPARED: Final = 8 * ROW - 1  # not 0 once what is the same for all worlds stands there
+GAP: Final = 8 * ROW  # of each tracker: free width to the nearest disc, m
+EXCESS: Final = 9 * ROW  # of each tracker: not above 0 if anything is near
+SLOT: Final = 10 * ROW  # of each tracker: the nearest slot
+SLOT_DISTANCE: Final = 11 * ROW  # and how far it is, m
+SLOT_DISTANCE2: Final = 12 * ROW  # the same squared, m²
+HEARD2: Final = 13 * ROW  # within which the sonar has it, the square, and a little more, m²
+OWN: Final = 14 * ROW  # ten rows whose meaning is their module's own
+SHORTLIST: Final = 24 * ROW  # and six for making lists of the nearest
+_SHARED: Final = 30 * ROW
 
-# Rows of each tracker of a group: another's begin so many times VIEW further on.
-AHEAD: Final = _SHARED  # where every disc is, ego, m
-LEFT: Final = _SHARED + 1 * ROW
-DISTANCE: Final = _SHARED + 2 * ROW  # of the centres, m
-PLACE: Final = _SHARED + 3 * ROW  # of each team-mate by distance, the nearest 0
-MATE: Final = _SHARED + 4 * ROW  # what is observed of each in a small team: eight numbers each
-LISTED: Final = _SHARED  # instead, in a large team: who is nearest, the nearest first
-VIEW: Final = 5 * ROW
+# Then one of two: of each tracker of a group in a large team, who is nearest, the nearest first; or
+# the rows of a small team (posse.together).
+LISTED: Final = _SHARED
+TEAM: Final = _SHARED
+MOST_TOGETHER: Final = 16
+"""Up to this team size, a whole team fits there."""
 
-SIZE: Final = _SHARED + GROUP * VIEW
-SIZE_FOR_ONE: Final = _SHARED + VIEW
-"""Where memory is short: trackers are then looked after one by one."""
+SIZE: Final = _SHARED + 6 * (2 * MOST_TOGETHER * BLOCK + BLOCK)
+SIZE_FOR_ONE: Final = _SHARED + 6 * (2 * MOST_TOGETHER + BLOCK)
+"""Where memory is short: lists are then made one by one, and each world is looked after alone."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -98,7 +92,7 @@ def new_scratch() -> FloatArray:
 @compiled
 def group_size(s: FloatArray) -> int:
     """Return how many trackers can be looked after together."""
-    return natural((s.shape[0] - _SHARED) // VIEW)
+    return GROUP if s.shape[0] >= SIZE else 1
 
 
 @compiled
@@ -214,15 +208,11 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Floa
     n = natural(c.num_trackers)
     for block in range(blocks(n + 1)):
         j = BLOCK * block
-        x, y, cosine, sine, speed, turn_rate, _, _ = columns(trackers, j, n, POSE)
+        x, y, _, _, _, _, _, _ = columns(trackers, j, n, POSE)
         number = load(s, INDEX + j)
         tracker, target = number < np.float32(n), number == np.float32(n)
         store(s, X + j, choose(tracker, x, choose(target, w.x, FAR)))
         store(s, Y + j, choose(tracker, y, choose(target, w.y, FAR)))
-        store(s, COS + j, cosine)
-        store(s, SIN + j, sine)
-        store(s, SPEED + j, speed)
-        store(s, TURN_RATE + j, turn_rate)
     count = num_discs(c)
     if count > n + 1:
         for k in range(natural(c.num_obstacles)):
@@ -241,26 +231,9 @@ def num_discs(c: Record) -> int:
 
 
 @compiled
-def survey(c: Record, robot: Record, number: int, at: int, s: FloatArray) -> None:
-    """Write where every disc is as the robot sees it; its own, ``number``, is too far to count.
-
-    To the rows that begin ``at`` further on than the first of a group.
-    """
-    x, y, hc, hs = robot.x, robot.y, robot.heading_cos, robot.heading_sin
-    own = np.float32(number)
-    for block in range(blocks(num_discs(c))):
-        j = BLOCK * block
-        dx, dy = load(s, X + j) - x, load(s, Y + j) - y
-        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-        distance = root(ahead * ahead + left * left)
-        store(s, AHEAD + at + j, ahead)
-        store(s, LEFT + at + j, left)
-        store(s, DISTANCE + at + j, choose(load(s, INDEX + j) == own, FAR, distance))
-
-
-@compiled
 def describe_mates(
-    robot: Record,
+    hc: Lanes,
+    hs: Lanes,
     numbers: Lanes,
     ahead: Lanes,
     left: Lanes,
@@ -268,24 +241,19 @@ def describe_mates(
     heading_x: Lanes,
     heading_y: Lanes,
     speed: Lanes,
-    out: FloatArray,
-    to: int,
-    stride: int,
-) -> None:
-    """Write what a robot observes of eight team-mates to ``out``, eight numbers each.
+) -> tuple[Lanes, ...]:
+    """Return what robots observe of eight team-mates, of each as it stands in an observation.
 
-    Number, age (0), range, bearing and heading (cosine and sine, ego), speed: as they follow on
-    each other in an observation. The first from ``to`` on, the next ``stride`` further on, and so
-    forth. From who they are, where they are as the robot sees it, and their headings in the common
-    frame.
+    Number, age (0), range, bearing and heading (cosine and sine, ego), speed. From how the robots
+    head (one, or eight), who the team-mates are, where they are as the robots see it, and their
+    headings in the common frame.
     """
-    hc, hs = robot.heading_cos, robot.heading_sin
     per_metre = _ONE / greater(metres, _TINY)
-    store_rows(
+    return transpose(
         numbers, eight(_ZERO), metres,
         within_one(ahead * per_metre), within_one(left * per_metre),
         within_one(heading_x * hc + heading_y * hs), within_one(heading_y * hc - heading_x * hs),
-        speed, to, stride, out,
+        speed,
     )  # fmt: skip
 
 

@@ -65,8 +65,8 @@ _read: Any = intrinsic(_reading)
 
 
 @compiled
-def worlds_of(thread: int, turns: Numbers) -> Iterator[int]:
-    """Yield the worlds that are a thread's turn, until all are taken.
+def parts_of(thread: int, turns: Numbers) -> Iterator[tuple[int, int]]:
+    """Yield the parts of the worlds that are a thread's turn, until all are taken: first, end.
 
     A thread takes its own worlds first, part after part, which lie in its core's cache from the
     step before; then others'.
@@ -76,16 +76,23 @@ def worlds_of(thread: int, turns: Numbers) -> Iterator[int]:
         turns: Of this step, (threads, TURN).
     """
     if turns[0, SIZE] == 0:
-        for e in range(turns[0, END]):
-            yield e
+        yield 0, turns[0, END]
     else:
         threads = len(turns)
         for k in range(threads):
             turn = turns[(thread + k) % threads]
             while turn[NEXT] < turn[END]:
                 first = _add(turn, turn[SIZE])
-                for e in range(first, min(first + turn[SIZE], turn[END])):
-                    yield e
+                if first < turn[END]:
+                    yield first, min(first + turn[SIZE], turn[END])
+
+
+@compiled
+def worlds_of(thread: int, turns: Numbers) -> Iterator[int]:
+    """Yield the worlds that are a thread's turn, one by one (:func:`parts_of`)."""
+    for first, end in parts_of(thread, turns):
+        for e in range(first, end):
+            yield e
 
 
 @kernel

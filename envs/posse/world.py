@@ -20,7 +20,7 @@ from posse.compiled import compiled, kernel
 from posse.contact import meet
 from posse.faults import apply_faults
 from posse.motion import motion
-from posse.observation import lay_out_task, observe_target, observe_trackers
+from posse.observation import lay_out_task, observe_alone, observe_target
 from posse.radio import hear, send, share_fixes
 from posse.reward import write_reward
 from posse.scenario import Scenario
@@ -28,9 +28,10 @@ from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
 from posse.state import NEVER, beam_directions, config_record, slot_records
-from posse.survey import PREPARED, lay_out, lay_out_constants
+from posse.survey import BLOCK, PREPARED, lay_out, lay_out_constants, natural
 from posse.target_motion import AGENT
-from posse.turn_code import Numbers, worlds_of
+from posse.together import observe_together
+from posse.turn_code import Numbers, parts_of
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -70,8 +71,8 @@ def observe(
     scratch: FloatArray,
     observations: FloatArray,
 ) -> None:
-    """Write the observations of every agent of a world, (rows, F)."""
-    observe_trackers(c, w, trackers, heard, heard_message, message, scratch, observations)
+    """Write what every agent of a world observes, (rows, F), but for observe_together."""
+    observe_alone(c, w, trackers, heard, heard_message, message, scratch, observations)
     if c.motion == AGENT:
         observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
 
@@ -151,10 +152,14 @@ START: Final = 1
 START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
+TOGETHER: Final = BLOCK
+"""Worlds that are stepped one after the other, and then observed together."""
+
 
 @compiled
-def advance_world(
-    e: int,
+def advance_worlds(
+    first: int,
+    count: int,
     config: Records,
     slots: Records,
     weights: FloatArray,
@@ -172,8 +177,8 @@ def advance_world(
     flags: BoolArray,
     orders: npt.NDArray[np.uint8],
     scratch: FloatArray,
-) -> bool:
-    """Do what world e is ordered to; return whether its episode is over.
+) -> int:
+    """Do what worlds are ordered to, ``count`` from ``first`` on; return how many are over.
 
     ================== =============================================================================
     STEP               a control step; or, where the episode is over, the start of the next one
@@ -182,42 +187,47 @@ def advance_world(
     LOOK               nothing but the observations
     ================== =============================================================================
 
-    Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K) and flags (2, E):
-    terminated, truncated. The scratch memory has been through :func:`prepare`.
+    At most TOGETHER worlds. Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K)
+    and flags (2, E): terminated, truncated. The scratch memory has been through :func:`prepare`.
     """
-    c, w, trackers, obstacles = config[0], world[e], tracker[e], obstacle[e]
-    order = orders[e]
-    if order == STEP and w.over != 0:
-        w.episode += 1
-        order = START
-    if order == STEP:
-        act(c, w, trackers, obstacles, message[e], actions[e], scratch)
-    elif order != LOOK:
-        if order == START:
-            draw_start(c, w, trackers, obstacles)
-        begin(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e])
-    lay_out(c, w, trackers, obstacles, scratch)
-    if order != LOOK:
-        meet(c, w, trackers, obstacles, scratch)
-        sense(
-            c, w, trackers, obstacles, heard[e], broadcast[e], heard_message[e], message[e], scratch
-        )
-        occupy(c, w, trackers, slots, scratch)
-    if order == STEP:
-        end_step(c, w, trackers, slots)
-        reward(c, w, trackers, weights, rewards[e], terms[e])
-    else:
+    c, over = config[0], 0
+    for e in range(first, first + count):
+        w, trackers, obstacles = world[e], tracker[e], obstacle[e]
+        order = orders[e]
+        if order == STEP and w.over != 0:
+            w.episode += 1
+            order = START
+        if order == STEP:
+            act(c, w, trackers, obstacles, message[e], actions[e], scratch)
+        elif order != LOOK:
+            if order == START:
+                draw_start(c, w, trackers, obstacles)
+            begin(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e])
+        lay_out(c, w, trackers, obstacles, scratch)
         if order != LOOK:
-            w.held, w.score = 0, _ZERO
-        rewards[e, :] = _ZERO
-        terms[e, :, :] = _ZERO
-    flags[0, e] = w.terminated != 0
-    flags[1, e] = w.over != 0 and w.terminated == 0
-    observe(
-        c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
-        scratch, observations[e],
-    )  # fmt: skip
-    return bool(w.over != 0)
+            meet(c, w, trackers, obstacles, scratch)
+            sense(
+                c, w, trackers, obstacles, heard[e], broadcast[e], heard_message[e], message[e],
+                scratch,
+            )  # fmt: skip
+            occupy(c, w, trackers, slots, scratch)
+        if order == STEP:
+            end_step(c, w, trackers, slots)
+            reward(c, w, trackers, weights, rewards[e], terms[e])
+        else:
+            if order != LOOK:
+                w.held, w.score = 0, _ZERO
+            rewards[e, :] = _ZERO
+            terms[e, :, :] = _ZERO
+        flags[0, e] = w.terminated != 0
+        flags[1, e] = w.over != 0 and w.terminated == 0
+        over += w.over != 0
+        observe(
+            c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
+            scratch, observations[e],
+        )  # fmt: skip
+    observe_together(c, world, tracker, first, count, message, scratch, observations)
+    return over
 
 
 @compiled
@@ -264,13 +274,13 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
             prepare(c, directions, scratch)
             scratch[PREPARED] = _ONE
         over = 0
-        for e in worlds_of(thread, turns):
-            if advance_world(
-                e, c, offsets, weights, world, tracker, obstacle,
-                heard, broadcast, heard_message, message,
-                actions, observations, rewards, terms, flags, orders, scratch,
-            ):  # fmt: skip
-                over += 1
+        for first, last in parts_of(thread, turns):
+            for e in range(natural(first), last, TOGETHER):
+                over += advance_worlds(
+                    e, min(TOGETHER, last - e), c, offsets, weights, world, tracker, obstacle,
+                    heard, broadcast, heard_message, message,
+                    actions, observations, rewards, terms, flags, orders, scratch,
+                )  # fmt: skip
         return over
 
     return advance
@@ -279,7 +289,7 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
 advance: Final = _stepping(None)
 """Do what each world is ordered to, for the worlds of a thread; the one loop over worlds.
 
-See :func:`advance_world`. Returns how many of the episodes of the worlds that it took are over.
+See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are over.
 """
 
 

@@ -1,0 +1,300 @@
+"""What trackers observe of their target and of a whole team: eight observers at once, a lane each.
+
+The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds, the
+trackers of one (0). Rows of scratch memory hold a team twice, one after the other, so that a
+team-mate lies as many places behind its observer, whoever that is.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled
+from posse.lanes import (
+    WIDTH,
+    Lanes,
+    choose,
+    eight,
+    greater,
+    load,
+    load_fields,
+    root,
+    store,
+    transpose,
+)
+from posse.state import FIX, POSE
+from posse.survey import (
+    INDEX,
+    MOST_TOGETHER,
+    OWN,
+    ROW,
+    TEAM,
+    columns,
+    describe_mates,
+    natural,
+    store_rows,
+    within_one,
+)
+
+TARGET_AT: Final = 26
+"""Where in an observation the target's part begins; own motion and the task come before."""
+SONAR_AT: Final = TARGET_AT + 12
+"""Where the sonar's part begins; team-mates follow."""
+
+# Scratch memory, of the eight observers. Of the target: which step it is, when the fix was, whether
+# it is seen, and what is observed of it, sixteen numbers each. Of every team-mate, how far it is and
+# how many are nearer. Of one: where in the observation it belongs.
+_STEP: Final = OWN
+_FIXED_AT: Final = OWN + 1 * WIDTH
+_SEES: Final = OWN + 2 * WIDTH
+_START: Final = OWN + 3 * WIDTH
+_TARGET: Final = OWN + 1 * ROW
+_DISTANCE: Final = OWN + 2 * ROW
+_PLACE: Final = OWN + 3 * ROW
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_MINUS_ONE: Final = np.float32(-1.0)
+_TINY: Final = np.float32(1e-9)
+
+
+@compiled
+def _stride(across: int) -> int:
+    """Return how far one tracker lies from the next in a row of the team."""
+    return WIDTH if across else 1
+
+
+@compiled
+def _row(n: int, across: int) -> int:
+    """Return how far one row of the team lies from the next."""
+    return natural(2 * n * _stride(across) + WIDTH)
+
+
+@compiled
+def _columns(tracker: Records, e: int, i: int, across: int, offset: int) -> tuple[Lanes, ...]:
+    """Return :func:`posse.survey.columns` of eight trackers, of (E, N), from world e's i on."""
+    if across:
+        return transpose(
+            load_fields(tracker[e, i], offset),
+            load_fields(tracker[e + 1, i], offset),
+            load_fields(tracker[e + 2, i], offset),
+            load_fields(tracker[e + 3, i], offset),
+            load_fields(tracker[e + 4, i], offset),
+            load_fields(tracker[e + 5, i], offset),
+            load_fields(tracker[e + 6, i], offset),
+            load_fields(tracker[e + 7, i], offset),
+        )
+    return columns(tracker[e], i, tracker.shape[1], offset)
+
+
+@compiled
+def whole_team(c: Record) -> bool:
+    """Say whether a tracker observes its whole team, where it is now, and that is written here."""
+    return bool(
+        c.perfect_radio != 0 and c.num_trackers <= MOST_TOGETHER and c.num_trackers == c.neighbours + 1
+    )
+
+
+@compiled
+def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
+    """Write the rows of the team of world e, or of eight worlds.
+
+    They hold x, y, heading (cosine, sine), speed and turn rate.
+    """
+    n = natural(tracker.shape[1])
+    stride, row = _stride(across), _row(n, across)
+    for again in range(2):  # what fills the first time's last block is overwritten
+        for i in range(0, n, WIDTH // stride):
+            x, y, cosine, sine, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
+            at = TEAM + natural(stride * (i + again * n))
+            store(s, at, x)
+            store(s, at + row, y)
+            store(s, at + 2 * row, cosine)
+            store(s, at + 3 * row, sine)
+            store(s, at + 4 * row, speed)
+            store(s, at + 5 * row, turn_rate)
+
+
+@compiled
+def observe_target_of(
+    c: Record,
+    world: Records,
+    tracker: Records,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write what observers know of their target, twelve numbers from k on.
+
+    They are ``count`` trackers, the first of them i of world e.
+    """
+    for lane in range(count):
+        to, own = natural(e + lane * across), natural(i + lane * (1 - across))
+        t = tracker[to, own]
+        s[_STEP + lane] = np.float32(world[to].step)
+        s[_FIXED_AT + lane], s[_SEES + lane] = np.float32(t.fix_step), np.float32(t.sees)
+    own_x, own_y, hc, hs, _, _, _, _ = _columns(tracker, e, i, across, POSE)
+    x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = _columns(tracker, e, i, across, FIX)
+    dx, dy = x - own_x, y - own_y
+    distance = root(dx * dx + dy * dy)
+    per_metre = _ONE / greater(distance, _TINY)
+    ux, uy = dx * per_metre, dy * per_metre
+    fixed_at = load(s, _FIXED_AT)
+    known = fixed_at >= _ZERO
+    age = choose(known, (load(s, _STEP) - fixed_at) * c.dt, _MINUS_ONE)
+    ahead = choose(distance > _ZERO, within_one(ux * hc + uy * hs), _ONE)
+    ahead = choose(known, ahead, _ZERO)
+    left = choose(known, within_one(uy * hc - ux * hs), _ZERO)
+    heading_cos = choose(known, within_one(heading_x * hc + heading_y * hs), _ZERO)
+    heading_sin = choose(known, within_one(heading_y * hc - heading_x * hs), _ZERO)
+    frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
+    frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
+    # Fields 0 to 7, then 4 to 11, so that both are written at once.
+    store_rows(
+        choose(known, _ONE, _ZERO), load(s, _SEES), age,
+        choose(known, distance, _MINUS_ONE), ahead, left, heading_cos, heading_sin,
+        _TARGET, 2 * WIDTH, s,
+    )  # fmt: skip
+    store_rows(
+        ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
+        choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
+        _TARGET + WIDTH, 2 * WIDTH, s,
+    )  # fmt: skip
+    for lane in range(count):
+        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+        store(o, k, load(s, _TARGET + 2 * WIDTH * lane))
+        store(o, k + 4, load(s, _TARGET + 2 * WIDTH * lane + WIDTH))
+
+
+@compiled
+def _number(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
+    """Return the numbers of the team-mates m + 1 places behind their observers."""
+    number = (eight(np.float32(i)) if across else load(s, INDEX + i)) + np.float32(m + 1)
+    return choose(number >= np.float32(n), number - np.float32(n), number)
+
+
+@compiled
+def _find_places(n: int, i: int, across: int, s: FloatArray) -> None:
+    """Write how far each team-mate is from its observers, and how many are nearer.
+
+    Or as near, and of a lower number.
+    """
+    stride, row = _stride(across), _row(n, across)
+    own = TEAM + natural(stride * i)
+    x, y = load(s, own), load(s, own + row)
+    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+    for m in range(n - 1):
+        at = own + natural(stride * (m + 1))
+        dx, dy = load(s, at) - x, load(s, at + row) - y
+        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        distance = root(ahead * ahead + left * left)
+        number, place = _number(n, i, m, across, s), eight(_ZERO)
+        for q in range(m):
+            other, before = load(s, _DISTANCE + WIDTH * q), _number(n, i, q, across, s) < number
+            nearer = (other < distance) | ((other == distance) & before)
+            place = place + choose(nearer, _ONE, _ZERO)
+            store(s, _PLACE + WIDTH * q, load(s, _PLACE + WIDTH * q) + choose(nearer, _ZERO, _ONE))
+        store(s, _DISTANCE + WIDTH * m, distance)
+        store(s, _PLACE + WIDTH * m, place)
+
+
+@compiled
+def observe_team(
+    c: Record,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write every team-mate of observers from k on, nearest first: each has a place.
+
+    They are ``count`` trackers, the first of them i of world e.
+    """
+    n, size = natural(c.num_trackers), np.float32(9 + c.message_size)
+    stride, row = _stride(across), _row(n, across)
+    own = TEAM + natural(stride * i)
+    x, y = load(s, own), load(s, own + row)
+    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+    _find_places(n, i, across, s)
+    for m in range(n - 1):
+        at = own + natural(stride * (m + 1))
+        dx, dy = load(s, at) - x, load(s, at + row) - y
+        mates = describe_mates(
+            hc, hs, _number(n, i, m, across, s), dx * hc + dy * hs, dy * hc - dx * hs,
+            load(s, _DISTANCE + WIDTH * m), load(s, at + 2 * row), load(s, at + 3 * row),
+            load(s, at + 4 * row),
+        )  # fmt: skip
+        store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
+        for lane in range(count):
+            o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+            start = natural(int(s[_START + lane]))
+            store(o, start, mates[lane])
+            o[start + 8] = s[at + 5 * row + lane]
+            if c.message_size > 0:
+                mate = natural(int(o[start]))
+                copy_message(c, message[natural(e + lane * across), 0, mate], o, start)
+
+
+@compiled(seldom=True)
+def copy_message(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
+    """Write what a team-mate said, (m,), into its place, which begins at k."""
+    for q in range(c.message_size):
+        o[k + 9 + q] = said[q]
+
+
+@compiled
+def observe_some(
+    c: Record,
+    world: Records,
+    tracker: Records,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what ``count`` trackers, the first of them i of world e, observe together."""
+    observe_target_of(c, world, tracker, e, i, count, across, s, observations, TARGET_AT)
+    if whole_team(c):
+        k = SONAR_AT + natural(c.sonar_beams)
+        observe_team(c, e, i, count, across, message, s, observations, k)
+
+
+@compiled
+def observe_together(
+    c: Record,
+    world: Records,
+    tracker: Records,
+    e: int,
+    worlds: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what trackers of ``worlds`` worlds, at most eight, from e on, observe together."""
+    n = natural(c.num_trackers)
+    if worlds == WIDTH:
+        if whole_team(c):
+            lay_out_team(tracker, e, 1, s)
+        for i in range(n):
+            observe_some(c, world, tracker, e, i, WIDTH, 1, message, s, observations)
+        return
+    for each in range(e, e + worlds):
+        if whole_team(c):
+            lay_out_team(tracker, each, 0, s)
+        for i in range(0, n, WIDTH):
+            count = min(WIDTH, n - i)
+            observe_some(c, world, tracker, each, i, count, 0, message, s, observations)
