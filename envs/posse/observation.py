@@ -39,18 +39,20 @@ from posse.survey import (
     describe_mates,
     group_size,
     natural,
+    store_each,
     within_one,
 )
-from posse.together import SONAR_AT, TARGET_AT, copy_message, whole_team
+from posse.together import SONAR_AT, TASK_AT, copy_message, whole_team
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _TINY: Final = np.float32(1e-9)
 _TOLD: Final = 17  # numbers of the task that are the same for all of an episode
-# Rows of scratch memory, of one tracker: how eight of the nearest turn; or the nearest so far, how
-# far and who.
-_TURN_RATES: Final = OWN
+# Rows of scratch memory, of one tracker: what is observed of eight of the nearest, eight numbers
+# each, and how they turn; or the nearest so far, how far and who.
+_MATES: Final = OWN
+_TURN_RATES: Final = OWN + 1 * ROW
 _SO_FAR: Final = SHORTLIST
 _WHO: Final = SHORTLIST + 1 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
@@ -373,11 +375,14 @@ def _write_nearest(
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
         metres, numbers = root(ahead * ahead + left * left), load(s, p)
         store(s, _TURN_RATES, turn_rate)
-        mates = describe_mates(
-            hc, hs, numbers, ahead, left, metres, heading_x, heading_y, speed
-        )
+        mates = describe_mates(hc, hs, numbers, ahead, left, metres, heading_x, heading_y, speed)
+        if left_over >= BLOCK:
+            store_each(mates, k, size, o)
+        else:  # no room for eight
+            store_each(mates, _MATES, BLOCK, s)
+            for q in range(left_over):
+                store(o, k + q * size, load(s, _MATES + BLOCK * q))
         for q in range(min(BLOCK, left_over)):
-            store(o, k, mates[q])
             o[k + 8] = s[_TURN_RATES + q]
             _write_message(c, said, natural(int(s[p + q])), o, k)
             k += size
@@ -451,10 +456,9 @@ def observe_alone(
     """
     n = natural(c.num_trackers)
     for i in range(n):
-        t, o = trackers[i], observations[i]
-        k = _write_own(c, t, t.touching, t.broken_at == NEVER, o, 0)
-        _write_task(c, w, i, s, o, k)
-        ping(c, t, i, s, o, SONAR_AT)
+        o = observations[i]
+        _write_task(c, w, i, s, o, TASK_AT)
+        ping(c, trackers[i], i, s, o, SONAR_AT)
     k = SONAR_AT + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)

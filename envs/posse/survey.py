@@ -191,7 +191,13 @@ def store_rows(
     s: FloatArray,
 ) -> None:
     """Write what :func:`columns` gives back as it stands in records, ``stride`` apart."""
-    a, b, c, d, e, f, g, h = transpose(a, b, c, d, e, f, g, h)
+    store_each(transpose(a, b, c, d, e, f, g, h), at, stride, s)
+
+
+@compiled
+def store_each(rows: tuple[Lanes, ...], at: int, stride: int, s: FloatArray) -> None:
+    """Write eight lanes, ``stride`` apart."""
+    a, b, c, d, e, f, g, h = rows
     store(s, at, a)
     store(s, at + stride, b)
     store(s, at + 2 * stride, c)

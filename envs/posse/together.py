@@ -1,4 +1,4 @@
-"""What trackers observe of their target and of a whole team: eight observers at once, a lane each.
+"""What trackers observe of themselves, their target and a whole team: eight at once, a lane each.
 
 The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds, the
 trackers of one (0). Rows of scratch memory hold a team twice, one after the other, so that a
@@ -25,7 +25,7 @@ from posse.lanes import (
     store,
     transpose,
 )
-from posse.state import FIX, POSE
+from posse.state import FIX, NEVER, POSE
 from posse.survey import (
     INDEX,
     MOST_TOGETHER,
@@ -35,25 +35,26 @@ from posse.survey import (
     columns,
     describe_mates,
     natural,
-    store_rows,
     within_one,
 )
 
-TARGET_AT: Final = 26
-"""Where in an observation the target's part begins; own motion and the task come before."""
+# Where in an observation its parts begin: own motion at 0, then the task, the target, the sonar,
+# and team-mates.
+TASK_AT: Final = 8
+TARGET_AT: Final = TASK_AT + 18
 SONAR_AT: Final = TARGET_AT + 12
-"""Where the sonar's part begins; team-mates follow."""
 
-# Scratch memory, of the eight observers. Of the target: which step it is, when the fix was, whether
-# it is seen, and what is observed of it, sixteen numbers each. Of every team-mate, how far it is and
-# how many are nearer. Of one: where in the observation it belongs.
+# Scratch memory, of the eight observers: which step it is, when the fix was, whether it sees the
+# target, touches anything, and works; where in the observation a team-mate belongs. Of every
+# team-mate: how far it is, and how many are nearer.
 _STEP: Final = OWN
 _FIXED_AT: Final = OWN + 1 * WIDTH
 _SEES: Final = OWN + 2 * WIDTH
-_START: Final = OWN + 3 * WIDTH
-_TARGET: Final = OWN + 1 * ROW
-_DISTANCE: Final = OWN + 2 * ROW
-_PLACE: Final = OWN + 3 * ROW
+_TOUCHING: Final = OWN + 3 * WIDTH
+_WORKING: Final = OWN + 4 * WIDTH
+_START: Final = OWN + 5 * WIDTH
+_DISTANCE: Final = OWN + 1 * ROW
+_PLACE: Final = OWN + 2 * ROW
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -119,7 +120,47 @@ def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
 
 
 @compiled
-def observe_target_of(
+def write_rows(
+    rows: tuple[Lanes, ...],
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write eight numbers to each of ``count`` observations, from k on."""
+    a, b, c, d, f, g, h, j = rows
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    write_row(a, 0, e, i, count, across, observations, k)
+    write_row(b, 1, e, i, count, across, observations, k)
+    write_row(c, 2, e, i, count, across, observations, k)
+    write_row(d, 3, e, i, count, across, observations, k)
+    write_row(f, 4, e, i, count, across, observations, k)
+    write_row(g, 5, e, i, count, across, observations, k)
+    write_row(h, 6, e, i, count, across, observations, k)
+    write_row(j, 7, e, i, count, across, observations, k)
+
+
+@compiled
+def write_row(
+    row: Lanes,
+    lane: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write eight numbers to one of ``count`` observations, if there are so many."""
+    if lane < count:
+        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+        store(o, k, row)
+
+
+@compiled
+def observe_own_and_target(
     c: Record,
     world: Records,
     tracker: Records,
@@ -129,18 +170,24 @@ def observe_target_of(
     across: int,
     s: FloatArray,
     observations: FloatArray,
-    k: int,
 ) -> None:
-    """Write what observers know of their target, twelve numbers from k on.
+    """Write what observers know of themselves and of their target.
 
     They are ``count`` trackers, the first of them i of world e.
     """
     for lane in range(count):
-        to, own = natural(e + lane * across), natural(i + lane * (1 - across))
-        t = tracker[to, own]
+        to = natural(e + lane * across)
+        t = tracker[to, natural(i + lane * (1 - across))]
         s[_STEP + lane] = np.float32(world[to].step)
         s[_FIXED_AT + lane], s[_SEES + lane] = np.float32(t.fix_step), np.float32(t.sees)
-    own_x, own_y, hc, hs, _, _, _, _ = _columns(tracker, e, i, across, POSE)
+        s[_TOUCHING + lane] = np.float32(t.touching)
+        s[_WORKING + lane] = np.float32(t.broken_at == NEVER)
+    own_x, own_y, hc, hs, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
+    own = transpose(
+        within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
+        load(s, _TOUCHING), load(s, _WORKING),
+    )  # fmt: skip
+    write_rows(own, e, i, count, across, observations, 0)
     x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = _columns(tracker, e, i, across, FIX)
     dx, dy = x - own_x, y - own_y
     distance = root(dx * dx + dy * dy)
@@ -156,21 +203,17 @@ def observe_target_of(
     heading_sin = choose(known, within_one(heading_y * hc - heading_x * hs), _ZERO)
     frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
     frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
-    # Fields 0 to 7, then 4 to 11, so that both are written at once.
-    store_rows(
-        choose(known, _ONE, _ZERO), load(s, _SEES), age,
-        choose(known, distance, _MINUS_ONE), ahead, left, heading_cos, heading_sin,
-        _TARGET, 2 * WIDTH, s,
+    # Fields 0 to 7, then 4 to 11, eight at once.
+    fields = transpose(
+        choose(known, _ONE, _ZERO), load(s, _SEES), age, choose(known, distance, _MINUS_ONE),
+        ahead, left, heading_cos, heading_sin,
     )  # fmt: skip
-    store_rows(
+    write_rows(fields, e, i, count, across, observations, TARGET_AT)
+    fields = transpose(
         ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
         choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
-        _TARGET + WIDTH, 2 * WIDTH, s,
     )  # fmt: skip
-    for lane in range(count):
-        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-        store(o, k, load(s, _TARGET + 2 * WIDTH * lane))
-        store(o, k + 4, load(s, _TARGET + 2 * WIDTH * lane + WIDTH))
+    write_rows(fields, e, i, count, across, observations, TARGET_AT + 4)
 
 
 @compiled
@@ -230,20 +273,47 @@ def observe_team(
     for m in range(n - 1):
         at = own + natural(stride * (m + 1))
         dx, dy = load(s, at) - x, load(s, at + row) - y
-        mates = describe_mates(
+        first, second, third, fourth, fifth, sixth, seventh, eighth = describe_mates(
             hc, hs, _number(n, i, m, across, s), dx * hc + dy * hs, dy * hc - dx * hs,
             load(s, _DISTANCE + WIDTH * m), load(s, at + 2 * row), load(s, at + 3 * row),
             load(s, at + 4 * row),
         )  # fmt: skip
         store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
-        for lane in range(count):
-            o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-            start = natural(int(s[_START + lane]))
-            store(o, start, mates[lane])
-            o[start + 8] = s[at + 5 * row + lane]
-            if c.message_size > 0:
-                mate = natural(int(o[start]))
-                copy_message(c, message[natural(e + lane * across), 0, mate], o, start)
+        turn_rates = at + 5 * row
+        _write_mate(c, first, 0, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, second, 1, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, third, 2, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, fourth, 3, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, fifth, 4, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, sixth, 5, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, seventh, 6, e, i, count, across, turn_rates, message, s, observations)
+        _write_mate(c, eighth, 7, e, i, count, across, turn_rates, message, s, observations)
+
+
+@compiled
+def _write_mate(
+    c: Record,
+    fields: Lanes,
+    lane: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    turn_rates: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what one of ``count`` observers observes of a team-mate, if there are so many."""
+    if lane >= count:
+        return
+    to = natural(e + lane * across)
+    o = observations[to, natural(i + lane * (1 - across))]
+    start = natural(int(s[_START + lane]))
+    store(o, start, fields)
+    o[start + 8] = s[turn_rates + lane]
+    if c.message_size > 0:
+        copy_message(c, message[to, 0, natural(int(o[start]))], o, start)
 
 
 @compiled(seldom=True)
@@ -267,7 +337,7 @@ def observe_some(
     observations: FloatArray,
 ) -> None:
     """Write what ``count`` trackers, the first of them i of world e, observe together."""
-    observe_target_of(c, world, tracker, e, i, count, across, s, observations, TARGET_AT)
+    observe_own_and_target(c, world, tracker, e, i, count, across, s, observations)
     if whole_team(c):
         k = SONAR_AT + natural(c.sonar_beams)
         observe_team(c, e, i, count, across, message, s, observations, k)
