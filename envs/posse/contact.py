@@ -14,7 +14,7 @@ import numpy as np
 from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.lanes import Lanes, bits, choose, greater, least, lesser, load, root
-from posse.survey import BLOCK, EXCESS, FAR, GAP, INDEX, TOUCHING_GAP, X, Y, blocks, find_gaps
+from posse.survey import BLOCK, EXCESS, FAR, GAP, INDEX, TOUCHING_GAP, X, Y, blocks
 from posse.target_motion import AGENT
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -127,9 +127,8 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
     """Work out who touches whom, count the contacts that begin, and flag who is near to anything.
 
     ``near`` marks robots that could touch something within the next control step; the others move
-    without a sweep. Where the discs are stands in ``s`` (:func:`posse.survey.lay_out`).
+    without a sweep. How near the discs are stands in ``s`` (:func:`posse.survey.find_gaps`).
     """
-    find_gaps(c, s)
     inner = c.half_arena - c.radius
     smallest = w.least_gap
     target_touching, target_near = _NO_BITS, False

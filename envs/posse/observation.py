@@ -25,16 +25,15 @@ from posse.lanes import load, root, store
 from posse.nearest import list_nearest
 from posse.scenario import Scenario
 from posse.sonar import ping
-from posse.state import FIX, NEVER, POSE
+from posse.state import POSE
 from posse.survey import (
     BLOCK,
+    GAP,
     LISTED,
     OWN,
     ROW,
     SHORTLIST,
-    TASK,
     blocks,
-    columns,
     columns_of,
     describe_mates,
     group_size,
@@ -42,13 +41,12 @@ from posse.survey import (
     store_each,
     within_one,
 )
-from posse.together import SONAR_AT, TASK_AT, copy_message, whole_team
+from posse.together import SONAR_AT, TARGET_AT, TASK_AT, copy_message, whole_team, write_task
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _TINY: Final = np.float32(1e-9)
-_TOLD: Final = 17  # numbers of the task that are the same for all of an episode
 # Rows of scratch memory, of one tracker: what is observed of eight of the nearest, eight numbers
 # each, and how they turn; or the nearest so far, how far and who.
 _MATES: Final = OWN
@@ -91,19 +89,6 @@ def _own_fields(s: Scenario) -> list[Field]:
 
 def _most_turn(s: Scenario) -> float:
     return max(s.tracker_turn_rate, s.target_turn_rate) * _SLACK
-
-
-@compiled
-def _write_own(c: Record, robot: Record, touching: int, working: int, o: FloatArray, k: int) -> int:
-    o[k] = within_one(robot.heading_cos)
-    o[k + 1] = within_one(robot.heading_sin)
-    o[k + 2] = robot.x
-    o[k + 3] = robot.y
-    o[k + 4] = robot.speed
-    o[k + 5] = robot.turn_rate
-    o[k + 6] = np.float32(touching)
-    o[k + 7] = np.float32(working)
-    return k + 8
 
 
 def _task_fields(s: Scenario) -> list[Field]:
@@ -154,37 +139,6 @@ def _known(value: float, name: str, unit: str, meaning: str) -> Field:
     return Field(name, 1, unit, value / _SLACK, value * _SLACK, meaning)
 
 
-@compiled
-def lay_out_task(c: Record, s: FloatArray) -> None:
-    """Write what every tracker of every world is told of its task to a row of scratch memory."""
-    for k in range(_TOLD):
-        s[TASK + k] = _ZERO
-    s[TASK + c.formation] = _ONE
-    s[TASK + 4] = np.float32(c.num_trackers)
-    s[TASK + 5] = c.formation_distance
-    s[TASK + 6] = c.formation_spacing
-    s[TASK + 7] = c.tracker_speed
-    s[TASK + 8] = c.tracker_turn_rate
-    s[TASK + 9] = c.acceleration_time
-    s[TASK + 10] = c.turn_acceleration_time
-    s[TASK + 11] = c.tolerance
-    s[TASK + 12] = c.radius
-    s[TASK + 13] = c.dt
-    s[TASK + 14] = c.told_sensing_range
-    s[TASK + 15] = c.sonar_range
-    s[TASK + 16] = c.told_arena
-
-
-@compiled
-def _write_task(c: Record, w: Record, number: int, s: FloatArray, o: FloatArray, k: int) -> int:
-    store(o, k, load(s, TASK))
-    store(o, k + 8, load(s, TASK + 8))
-    o[k + 16] = s[TASK + 16]
-    o[k + 3] = np.float32(number)
-    o[k + _TOLD] = np.float32(c.horizon - w.step) * c.dt
-    return k + _TOLD + 1
-
-
 def _target_fields(s: Scenario) -> list[Field]:
     noise = 1 + 3 * s.range_noise + 3 * s.bearing_noise
     most = s.range_bound * noise * _SLACK
@@ -229,15 +183,6 @@ def _write_place(
     o[k + 1] = _ONE
     o[k + 2] = _ZERO
     return k + 3
-
-
-@compiled
-def _write_no_target(o: FloatArray, k: int) -> int:
-    for j in range(k, k + 12):
-        o[j] = _ZERO
-    o[k + 2] = _MINUS_ONE
-    o[k + 3] = _MINUS_ONE
-    return k + 12
 
 
 def _sonar_fields(s: Scenario) -> list[Field]:
@@ -456,9 +401,7 @@ def observe_alone(
     """
     n = natural(c.num_trackers)
     for i in range(n):
-        o = observations[i]
-        _write_task(c, w, i, s, o, TASK_AT)
-        ping(c, trackers[i], i, s, o, SONAR_AT)
+        ping(c, trackers[i], i, s[GAP + i], s, observations[i], SONAR_AT)
     k = SONAR_AT + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
@@ -479,15 +422,19 @@ def observe_target(
     o: FloatArray,
 ) -> None:
     """Write what a target that is an agent is given, (F,): it knows where trackers are."""
-    touching = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
-    k = _write_own(c, w, touching, 1, o, 0)
-    own = k
-    k = _write_task(c, w, -1, s, o, k)
-    o[own + 7], o[own + 8] = c.target_speed, c.target_turn_rate
-    o[own + 9], o[own + 10] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
-    k = _write_no_target(o, k)
-    ping(c, w, c.num_trackers, s, o, k)
-    k += natural(c.sonar_beams)
+    o[0], o[1] = within_one(w.heading_cos), within_one(w.heading_sin)
+    o[2], o[3], o[4], o[5] = w.x, w.y, w.speed, w.turn_rate
+    o[6] = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
+    o[7] = _ONE
+    write_task(-1, s, o)
+    o[TASK_AT + 7], o[TASK_AT + 8] = c.target_speed, c.target_turn_rate
+    o[TASK_AT + 9], o[TASK_AT + 10] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
+    o[TARGET_AT - 2], o[TARGET_AT - 1] = c.told_arena, np.float32(c.horizon - w.step) * c.dt
+    for j in range(TARGET_AT, SONAR_AT):
+        o[j] = _ZERO
+    o[TARGET_AT + 2], o[TARGET_AT + 3] = _MINUS_ONE, _MINUS_ONE
+    ping(c, w, c.num_trackers, _ZERO, s, o, SONAR_AT)
+    k = SONAR_AT + natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
         dx, dy = trackers[j].x - w.x, trackers[j].y - w.y

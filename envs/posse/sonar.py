@@ -29,6 +29,7 @@ _WORD: Final = 8  # blocks of eight discs, a bit each, that fill a number of 64 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _TINY: Final = np.float32(1e-9)
+_A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
 
 _Echo = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 
@@ -135,14 +136,8 @@ def _next(near: int, otherwise: int) -> int:
 
 
 @compiled
-def ping(c: Record, robot: Record, number: int, s: FloatArray, o: FloatArray, first: int) -> None:
-    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
-
-    The robot is disc ``number`` of those whose places stand in ``s``
-    (:func:`posse.survey.lay_out`).
-    """
-    for block in range(blocks(c.sonar_beams)):
-        store(s, READING + BLOCK * block, eight(c.sonar_range))
+def listen_to_discs(c: Record, robot: Record, number: int, s: FloatArray) -> None:
+    """Shorten the sonar readings by all discs that are near."""
     x, y = robot.x, robot.y
     discs = blocks(num_discs(c))
     for first_block in range(0, discs, _WORD):
@@ -169,7 +164,29 @@ def ping(c: Record, robot: Record, number: int, s: FloatArray, o: FloatArray, fi
                 c, echo(c, robot, at + one, s), echo(c, robot, at + two, s),
                 echo(c, robot, at + three, s), echo(c, robot, at + four, s), s,
             )  # fmt: skip
-    if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.radius:
+
+
+@compiled
+def ping(
+    c: Record,
+    robot: Record,
+    number: int,
+    gap: np.float32,
+    s: FloatArray,
+    o: FloatArray,
+    first: int,
+) -> None:
+    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
+
+    The robot is disc ``number`` of those whose places stand in ``s``
+    (:func:`posse.survey.lay_out`). No other is nearer than ``gap``, m between the rims.
+    """
+    for block in range(blocks(c.sonar_beams)):
+        store(s, READING + BLOCK * block, eight(c.sonar_range))
+    if gap < c.sonar_range + _A_LITTLE:
+        listen_to_discs(c, robot, number, s)
+    half = c.half_arena - max(abs(robot.x), abs(robot.y))
+    if c.walled and half < c.sonar_range + c.radius:
         listen_to_walls(c, robot, s)
     beams = natural(c.sonar_beams)
     whole = beams // BLOCK

@@ -31,6 +31,7 @@ from posse.survey import (
     MOST_TOGETHER,
     OWN,
     ROW,
+    TASK,
     TEAM,
     columns,
     describe_mates,
@@ -56,6 +57,7 @@ _START: Final = OWN + 5 * WIDTH
 _DISTANCE: Final = OWN + 1 * ROW
 _PLACE: Final = OWN + 2 * ROW
 
+_NUMBER_AT: Final = np.float32(3)  # in the task's part: which tracker it is
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
@@ -95,7 +97,9 @@ def _columns(tracker: Records, e: int, i: int, across: int, offset: int) -> tupl
 def whole_team(c: Record) -> bool:
     """Say whether a tracker observes its whole team, where it is now, and that is written here."""
     return bool(
-        c.perfect_radio != 0 and c.num_trackers <= MOST_TOGETHER and c.num_trackers == c.neighbours + 1
+        c.perfect_radio != 0
+        and c.num_trackers <= MOST_TOGETHER
+        and c.num_trackers == c.neighbours + 1
     )
 
 
@@ -117,6 +121,33 @@ def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
             store(s, at + 3 * row, sine)
             store(s, at + 4 * row, speed)
             store(s, at + 5 * row, turn_rate)
+
+
+@compiled
+def lay_out_task(c: Record, s: FloatArray) -> None:
+    """Write what every tracker of every world is told of its task to a row of scratch memory."""
+    for k in range(2 * WIDTH):
+        s[TASK + k] = _ZERO
+    s[TASK + c.formation] = _ONE
+    s[TASK + 4] = np.float32(c.num_trackers)
+    s[TASK + 5] = c.formation_distance
+    s[TASK + 6] = c.formation_spacing
+    s[TASK + 7] = c.tracker_speed
+    s[TASK + 8] = c.tracker_turn_rate
+    s[TASK + 9] = c.acceleration_time
+    s[TASK + 10] = c.turn_acceleration_time
+    s[TASK + 11] = c.tolerance
+    s[TASK + 12] = c.radius
+    s[TASK + 13] = c.dt
+    s[TASK + 14] = c.told_sensing_range
+    s[TASK + 15] = c.sonar_range
+
+
+@compiled
+def write_task(number: int, s: FloatArray, o: FloatArray) -> None:
+    """Write what a tracker is told of its task, but for the last two."""
+    store(o, TASK_AT, choose(load(s, INDEX) == _NUMBER_AT, np.float32(number), load(s, TASK)))
+    store(o, TASK_AT + WIDTH, load(s, TASK + WIDTH))
 
 
 @compiled
@@ -176,12 +207,13 @@ def observe_own_and_target(
     They are ``count`` trackers, the first of them i of world e.
     """
     for lane in range(count):
-        to = natural(e + lane * across)
-        t = tracker[to, natural(i + lane * (1 - across))]
+        to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+        t, o = tracker[to, who], observations[to, who]
         s[_STEP + lane] = np.float32(world[to].step)
         s[_FIXED_AT + lane], s[_SEES + lane] = np.float32(t.fix_step), np.float32(t.sees)
         s[_TOUCHING + lane] = np.float32(t.touching)
         s[_WORKING + lane] = np.float32(t.broken_at == NEVER)
+        write_task(who, s, o)
     own_x, own_y, hc, hs, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
     own = transpose(
         within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
@@ -203,12 +235,13 @@ def observe_own_and_target(
     heading_sin = choose(known, within_one(heading_y * hc - heading_x * hs), _ZERO)
     frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
     frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
-    # Fields 0 to 7, then 4 to 11, eight at once.
+    # The end of the task and the first of the target; then its last, eight at once.
+    time_left = (np.float32(c.horizon) - load(s, _STEP)) * c.dt
     fields = transpose(
-        choose(known, _ONE, _ZERO), load(s, _SEES), age, choose(known, distance, _MINUS_ONE),
-        ahead, left, heading_cos, heading_sin,
+        eight(c.told_arena), time_left, choose(known, _ONE, _ZERO), load(s, _SEES), age,
+        choose(known, distance, _MINUS_ONE), ahead, left,
     )  # fmt: skip
-    write_rows(fields, e, i, count, across, observations, TARGET_AT)
+    write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
     fields = transpose(
         ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
         choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),

@@ -20,7 +20,7 @@ from posse.compiled import compiled, kernel
 from posse.contact import meet
 from posse.faults import apply_faults
 from posse.motion import motion
-from posse.observation import lay_out_task, observe_alone, observe_target
+from posse.observation import observe_alone, observe_target
 from posse.radio import hear, send, share_fixes
 from posse.reward import write_reward
 from posse.scenario import Scenario
@@ -28,9 +28,9 @@ from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
 from posse.state import NEVER, beam_directions, config_record, slot_records
-from posse.survey import BLOCK, PREPARED, lay_out, lay_out_constants, natural
+from posse.survey import BLOCK, PREPARED, find_gaps, lay_out, lay_out_constants, natural
 from posse.target_motion import AGENT
-from posse.together import observe_together
+from posse.together import lay_out_task, observe_together
 from posse.turn_code import Numbers, parts_of
 
 _ZERO: Final = np.float32(0.0)
@@ -204,6 +204,7 @@ def advance_worlds(
                 draw_start(c, w, trackers, obstacles)
             begin(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e])
         lay_out(c, w, trackers, obstacles, scratch)
+        find_gaps(c, scratch)
         if order != LOOK:
             meet(c, w, trackers, obstacles, scratch)
             sense(
