@@ -23,6 +23,7 @@ from posse.lanes import (
     bits,
     choose,
     eight,
+    fetch,
     greater,
     least,
     lesser,
@@ -212,6 +213,26 @@ def _lower_load(context: Any, builder: Any, sig: Any, values: Any) -> Any:
 def _lower_store(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     array, index, value = values
     builder.store(value, _address(context, builder, sig.args[0], array, index), align=4)
+    return context.get_dummy_value()
+
+
+@infer_global(fetch)
+class _Fetch(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(types.none, args[0], types.intp)
+
+
+@lower_builtin(fetch, types.Array, types.intp)
+def _lower_fetch(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    array, offset = values
+    data = context.make_array(sig.args[0])(context, builder, array).data
+    first = builder.bitcast(data, ir.IntType(8).as_pointer())
+    address = builder.gep(first, [offset])
+    whole, name = ir.IntType(32), "llvm.prefetch.p0i8"
+    kind = ir.FunctionType(ir.VoidType(), [address.type, whole, whole, whole])
+    to_write, near, of_data = ir.Constant(whole, 1), ir.Constant(whole, 3), ir.Constant(whole, 1)
+    function = cgutils.get_or_insert_function(builder.module, kind, name)
+    builder.call(function, [address, to_write, near, of_data])
     return context.get_dummy_value()
 
 

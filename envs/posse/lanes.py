@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from posse.arrays import FloatArray, Record
 
@@ -36,6 +37,13 @@ def store(array: FloatArray, index: int, value: Lanes) -> None:
     """Write eight numbers from ``index`` on."""
     for k, number in enumerate(np.broadcast_to(value, WIDTH)):
         array[index + k] = number
+
+
+def fetch(array: npt.NDArray[Any], offset: int) -> None:
+    """Have the processor bring what lies so many bytes into an array into its cache.
+
+    To be written soon: nothing else follows from it.
+    """
 
 
 def eight(value: np.float32) -> Lanes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from posse.arrays import BoolArray, FloatArray, Record, Records
 from posse.compiled import compiled, kernel
 from posse.contact import meet
 from posse.faults import apply_faults
+from posse.lanes import fetch
 from posse.motion import motion
 from posse.observation import observe_alone, observe_target
 from posse.radio import hear, send, share_fixes
@@ -147,11 +148,20 @@ def end_step(c: Record, w: Record, trackers: Records, slots: Records) -> None:
     w.over = w.terminated != 0 or w.step >= c.horizon
 
 
+@compiled
+def fetch_all(array: npt.NDArray[Any]) -> None:
+    """Have the processor bring an array that is soon to be written to into its cache."""
+    for offset in range(0, array.size * array.itemsize, LINE):
+        fetch(array, offset)
+
+
 STEP: Final = 0
 START: Final = 1
 START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
+LINE: Final = 64
+"""Bytes in a line of the cache."""
 TOGETHER: Final = BLOCK
 """Worlds that are stepped one after the other, and then observed together."""
 
@@ -193,6 +203,7 @@ def advance_worlds(
     c, over = config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
+        fetch_all(observations[e])
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
