@@ -203,7 +203,8 @@ def advance_worlds(
     c, over = config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
-        fetch_all(observations[e])
+        if count > 1:
+            fetch_all(observations[e])  # written below, and after the last of these worlds
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
