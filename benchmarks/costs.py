@@ -21,12 +21,12 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse import contact, motion, score, survey, world
+from posse import contact, motion, score, survey, together, world
 from posse.compiled import kernel
 
 PARTS = (
-    "motion", "where the discs are", "contact", "target sensor and radio", "score", "metrics",
-    "reward", "observations",
+    "motion", "where the discs are, and how near", "contact", "target sensor and radio", "score",
+    "metrics", "reward", "observations",
 )  # fmt: skip
 
 
@@ -58,6 +58,7 @@ def one_part(  # type: ignore[no-untyped-def]
             motion.motion(c, w, t, o, actions[e], scratch)
             continue
         survey.lay_out(c, w, t, o, scratch)  # what the other parts start from
+        survey.find_gaps(c, scratch)
         if part == 2:
             contact.meet(c, w, t, o, scratch)
         elif part == 3:
@@ -73,6 +74,11 @@ def one_part(  # type: ignore[no-untyped-def]
             world.observe(
                 c, w, t, o, heard[e], heard_message[e], message[e], scratch, observations[e]
             )
+            begun = e % world.TOGETHER + 1
+            if begun == world.TOGETHER or e == len(worlds) - 1:
+                together.observe_together(
+                    c, worlds, trackers, e + 1 - begun, begun, message, scratch, observations
+                )
 
 
 def best(call: Callable[[], object], seconds: float) -> float:

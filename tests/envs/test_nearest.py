@@ -17,9 +17,9 @@ from posse.state import OBSTACLE, TRACKER, WORLD, beam_directions, config_record
 from posse.survey import (
     GROUP,
     LISTED,
+    ROW,
     SIZE,
     SIZE_FOR_ONE,
-    VIEW,
     group_size,
     lay_out,
     lay_out_constants,
@@ -44,7 +44,7 @@ def make_lists(
         list_nearest(c, trackers, first, last, s)
         for i in range(first, last):
             for p in range(c.neighbours):
-                lists[i, p] = s[LISTED + (i - first) * VIEW + p]
+                lists[i, p] = s[LISTED + (i - first) * ROW + p]
             certain[i] = s[_CERTAIN + i - first]
 
 
