@@ -66,6 +66,25 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
     return decorate if function is None else decorate(function)
 
 
+class _Linked(CPUDispatcher):
+    """The form for kernels to link, compiled once for all whole numbers that it is called with.
+
+    numba would compile it anew for each constant and each width.
+    """
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how to call it with arguments of these types (numba's name for it)."""
+        return super().get_call_template(
+            tuple(_widest(kind) for kind in args),
+            {name: _widest(kind) for name, kind in kws.items()},
+        )
+
+
+def _widest(kind: Any) -> Any:
+    plain = types.unliteral(kind)  # type: ignore[no-untyped-call]
+    return types.int64 if plain in (types.int32, types.uint8) else plain
+
+
 class _Function(CPUDispatcher):
     """A compiled function: one form of it for Python to call, one for kernels to link.
 
@@ -80,7 +99,7 @@ class _Function(CPUDispatcher):
     def __init__(self, function: Callable[..., Any], inline: bool) -> None:
         options = {**_OPTIONS, "nopython": True, "boundscheck": None}
         super().__init__(function, targetoptions=options)
-        self._linked = CPUDispatcher(
+        self._linked = _Linked(
             function,
             targetoptions={**options, **_LINKED, "forceinline": inline},
             pipeline_class=LinkedForm,

@@ -401,7 +401,9 @@ def observe_alone(
     """
     n = natural(c.num_trackers)
     for i in range(n):
-        ping(c, trackers[i], i, s[GAP + i], s, observations[i], SONAR_AT)
+        t = trackers[i]
+        pose = (t.x, t.y, t.heading_cos, t.heading_sin)
+        ping(c, pose, i, s[GAP + i], s, observations[i], SONAR_AT)
     k = SONAR_AT + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
@@ -433,7 +435,8 @@ def observe_target(
     for j in range(TARGET_AT, SONAR_AT):
         o[j] = _ZERO
     o[TARGET_AT + 2], o[TARGET_AT + 3] = _MINUS_ONE, _MINUS_ONE
-    ping(c, w, c.num_trackers, _ZERO, s, o, SONAR_AT)
+    pose = (w.x, w.y, w.heading_cos, w.heading_sin)
+    ping(c, pose, c.num_trackers, _ZERO, s, o, SONAR_AT)
     k = SONAR_AT + natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):

@@ -31,11 +31,13 @@ _ONE: Final = np.float32(1.0)
 _TINY: Final = np.float32(1e-9)
 _A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
 
+Pose = tuple[np.float32, np.float32, np.float32, np.float32]
+"""Where a robot is and how it heads, x, y, cosine, sine: of a tracker, or of the target."""
 _Echo = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 
 
 @compiled
-def echo(c: Record, robot: Record, j: int, s: FloatArray) -> _Echo:
+def echo(c: Record, robot: Pose, j: int, s: FloatArray) -> _Echo:
     """Return what the sonar has of disc j.
 
     Where its centre lies, ahead and to the left; how far its nearest point is; how far along a
@@ -44,8 +46,8 @@ def echo(c: Record, robot: Record, j: int, s: FloatArray) -> _Echo:
     axis meets it but that of the beam in whose width it lies. What is out of reach is far.
     """
     at = natural(j)
-    dx, dy, radius = s[X + at] - robot.x, s[Y + at] - robot.y, s[RADIUS + at]
-    hc, hs = robot.heading_cos, robot.heading_sin
+    x, y, hc, hs = robot
+    dx, dy, radius = s[X + at] - x, s[Y + at] - y, s[RADIUS + at]
     ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
     distance = root(ahead * ahead + left * left)
     reached = distance - radius < c.sonar_range + c.radius
@@ -97,9 +99,9 @@ def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
 
 
 @compiled(seldom=True)
-def listen_to_walls(c: Record, robot: Record, s: FloatArray) -> None:
+def listen_to_walls(c: Record, robot: Pose, s: FloatArray) -> None:
     """Shorten the sonar readings by the walls of the arena."""
-    half, x, y = c.half_arena, robot.x, robot.y
+    half, (x, y, _, _) = c.half_arena, robot
     listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
     listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
     listen_to_wall(c, robot, _ZERO, _ONE, half - y, s)
@@ -109,7 +111,7 @@ def listen_to_walls(c: Record, robot: Record, s: FloatArray) -> None:
 @compiled
 def listen_to_wall(
     c: Record,
-    robot: Record,
+    robot: Pose,
     normal_x: np.float32,
     normal_y: np.float32,
     distance: np.float32,
@@ -119,8 +121,8 @@ def listen_to_wall(
     if distance >= c.sonar_range + c.radius:
         return
     nearest = max(distance - c.radius, _ZERO)
-    ahead = normal_x * robot.heading_cos + normal_y * robot.heading_sin
-    left = normal_y * robot.heading_cos - normal_x * robot.heading_sin
+    _, _, hc, hs = robot
+    ahead, left = normal_x * hc + normal_y * hs, normal_y * hc - normal_x * hs
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
         towards = ahead * load(s, BEAM_COS + k) + left * load(s, BEAM_SIN + k)
@@ -136,9 +138,9 @@ def _next(near: int, otherwise: int) -> int:
 
 
 @compiled
-def listen_to_discs(c: Record, robot: Record, number: int, s: FloatArray) -> None:
+def listen_to_discs(c: Record, robot: Pose, number: int, s: FloatArray) -> None:
     """Shorten the sonar readings by all discs that are near."""
-    x, y = robot.x, robot.y
+    x, y, _, _ = robot
     discs = blocks(num_discs(c))
     for first_block in range(0, discs, _WORD):
         near = 0  # a bit for each disc that may be, looked at without a square root
@@ -169,7 +171,7 @@ def listen_to_discs(c: Record, robot: Record, number: int, s: FloatArray) -> Non
 @compiled
 def ping(
     c: Record,
-    robot: Record,
+    robot: Pose,
     number: int,
     gap: np.float32,
     s: FloatArray,
@@ -185,8 +187,8 @@ def ping(
         store(s, READING + BLOCK * block, eight(c.sonar_range))
     if gap < c.sonar_range + _A_LITTLE:
         listen_to_discs(c, robot, number, s)
-    half = c.half_arena - max(abs(robot.x), abs(robot.y))
-    if c.walled and half < c.sonar_range + c.radius:
+    x, y, _, _ = robot
+    if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.radius:
         listen_to_walls(c, robot, s)
     beams = natural(c.sonar_beams)
     whole = beams // BLOCK
