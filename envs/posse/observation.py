@@ -1,9 +1,10 @@
 """The observation of one robot: a flat float32 vector, its fields declared by name.
 
-The fields come in five blocks. Each block's declaration stands above the function that writes it,
-so that adding a field touches one place. Directions are cosine and sine; *ego* means the robot's
-own frame, x ahead and y to the left; the *common frame* is the one that the team agreed on at the
-start.
+The fields come in five blocks, all declared here: own motion, the task, the target, which
+:mod:`posse.together` writes, as it does the mates of a team that is observed as a whole; the sonar
+(:mod:`posse.sonar`); and team-mates that are chosen, or heard of, which stand here. Directions are
+cosine and sine; *ego* means the robot's own frame, x ahead and y to the left; the *common frame* is
+the one that the team agreed on at the start.
 A quantity that is not known holds the field's ``unknown`` value.
 """
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import posse
+from posse.together import SONAR_AT, TARGET_AT, TASK_AT
 
 TEAMS: list[dict[str, Any]] = [
     {"num_trackers": 1},
@@ -43,6 +44,12 @@ def test_worlds_that_are_observed_together_are_as_each_alone(team: dict[str, Any
             observed = together.reset(options={"reset_mask": mask})
             for e in np.flatnonzero(mask):
                 expected[e] = alone[e].reset()[0]
+
+
+def test_parts_are_written_where_they_are_declared() -> None:
+    offsets = posse.batch("smart", 1).layout.offsets
+    names = {"heading": 0, "formation": TASK_AT, "target_known": TARGET_AT, "sonar": SONAR_AT}
+    assert {name: offsets[name] for name in names} == names
 
 
 @pytest.mark.parametrize("worlds", [1, 8])
