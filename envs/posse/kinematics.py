@@ -90,6 +90,7 @@ def turn_towards(
     if near_one > _ZERO and abs(across) * near_one > _A_LITTLE_MORE * limit * along:
         return np.float32(math.copysign(most, across))
     if abs(across) < _SMALL * along:
-        return np.float32(across / along / time)
-    error = np.float32(math.atan2(across, along))
+        error = np.float32(across / along)
+    else:
+        error = np.float32(math.atan2(across, along))
     return min(max(error / time, -most), most)

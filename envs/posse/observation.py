@@ -2,7 +2,8 @@
 
 The fields come in five blocks, all declared here: own motion, the task, the target, which
 :mod:`posse.together` writes, as it does the mates of a team that is observed as a whole; the sonar
-(:mod:`posse.sonar`); and team-mates that are chosen, or heard of, which stand here. Directions are
+(:mod:`posse.sonar`); and team-mates that are chosen, or heard of, which stand here, with all that a
+target is given that is an agent. Directions are
 cosine and sine; *ego* means the robot's own frame, x ahead and y to the left; the *common frame* is
 the one that the team agreed on at the start.
 A quantity that is not known holds the field's ``unknown`` value.
@@ -47,7 +48,6 @@ from posse.together import SONAR_AT, TARGET_AT, TASK_AT, copy_message, whole_tea
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
-_TINY: Final = np.float32(1e-9)
 # Rows of scratch memory, of one tracker: what is observed of eight of the nearest, eight numbers
 # each, and how they turn; or the nearest so far, how far and who.
 _MATES: Final = OWN

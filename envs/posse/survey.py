@@ -1,9 +1,9 @@
 """Where every disc of a world is, laid out so that the processor works on eight of them at once.
 
 Discs (trackers, the target, obstacles) lie side by side in rows of a thread's scratch memory.
-Contact, score, target sensor, sonar and the view of team-mates all start from these rows, and go
-over them by blocks of eight (:mod:`posse.lanes`); what fills the last block is too far away to
-count.
+Contact, score, target sensor, sonar and the lists of the nearest team-mates all start from these
+rows, and go over them by blocks of eight (:mod:`posse.lanes`); what fills the last block is too far
+away to count.
 """
 
 from __future__ import annotations
@@ -32,11 +32,7 @@ from posse.state import POSE
 BLOCK: Final = WIDTH
 
 GROUP: Final = 8
-"""Trackers that are looked after together.
-
-A part of the work is done for all of them before the next begins: while the processor waits for
-one's square roots, it goes on with another's.
-"""
+"""Trackers whose nearest team-mates are listed at once, a lane each (:mod:`posse.nearest`)."""
 
 # Rows of scratch memory: where each begins. 64 trackers, the target and 60 obstacles fit a row, and
 # a length that is no power of two keeps rows apart in the processor's cache.
@@ -60,15 +56,15 @@ OWN: Final = 14 * ROW  # ten rows whose meaning is their module's own
 SHORTLIST: Final = 24 * ROW  # and six for making lists of the nearest
 _SHARED: Final = 30 * ROW
 
-# Then one of two: of each tracker of a group in a large team, who is nearest, the nearest first; or
-# the rows of a small team (posse.together).
+# Then one of two: of each tracker of a group, who is nearest, the nearest first; or, where a small
+# team is observed as a whole, its rows (posse.together).
 LISTED: Final = _SHARED
 TEAM: Final = _SHARED
-MOST_TOGETHER: Final = 16
+MOST_IN_TEAM: Final = 16
 """Up to this team size, a whole team fits there."""
 
-SIZE: Final = _SHARED + 6 * (2 * MOST_TOGETHER * BLOCK + BLOCK)
-SIZE_FOR_ONE: Final = _SHARED + 6 * (2 * MOST_TOGETHER + BLOCK)
+SIZE: Final = _SHARED + 6 * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
+SIZE_FOR_ONE: Final = _SHARED + 6 * (2 * MOST_IN_TEAM + BLOCK)
 """Where memory is short: lists are then made one by one, and each world is looked after alone."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
@@ -91,7 +87,7 @@ def new_scratch() -> FloatArray:
 
 @compiled
 def group_size(s: FloatArray) -> int:
-    """Return how many trackers can be looked after together."""
+    """Return how many trackers' nearest team-mates there is room to list at once."""
     return GROUP if s.shape[0] >= SIZE else 1
 
 

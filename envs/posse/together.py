@@ -28,7 +28,7 @@ from posse.lanes import (
 from posse.state import FIX, NEVER, POSE
 from posse.survey import (
     INDEX,
-    MOST_TOGETHER,
+    MOST_IN_TEAM,
     OWN,
     ROW,
     TASK,
@@ -38,6 +38,9 @@ from posse.survey import (
     natural,
     within_one,
 )
+
+TOGETHER: Final = WIDTH
+"""Worlds that are observed together."""
 
 # Where in an observation its parts begin: own motion at 0, then the task, the target, the sonar,
 # and team-mates.
@@ -72,7 +75,10 @@ def _stride(across: int) -> int:
 
 @compiled
 def _row(n: int, across: int) -> int:
-    """Return how far one row of the team lies from the next."""
+    """Return how far one row of the team lies from the next.
+
+    The last block of a row may run over the end of what it holds.
+    """
     return natural(2 * n * _stride(across) + WIDTH)
 
 
@@ -98,7 +104,7 @@ def whole_team(c: Record) -> bool:
     """Say whether a tracker observes its whole team, where it is now, and that is written here."""
     return bool(
         c.perfect_radio != 0
-        and c.num_trackers <= MOST_TOGETHER
+        and c.num_trackers <= MOST_IN_TEAM
         and c.num_trackers == c.neighbours + 1
     )
 
@@ -389,7 +395,7 @@ def observe_together(
 ) -> None:
     """Write what trackers of ``worlds`` worlds, at most eight, from e on, observe together."""
     n = natural(c.num_trackers)
-    if worlds == WIDTH:
+    if worlds == TOGETHER:
         if whole_team(c):
             lay_out_team(tracker, e, 1, s)
         for i in range(n):

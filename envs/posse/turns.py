@@ -31,6 +31,8 @@ _SERIAL_BELOW: Final = 2048
 """Robots below which a second thread costs more than it saves."""
 _PARTS: Final = 16
 """Parts of the worlds for each thread."""
+_TOGETHER: Final = 8
+"""Worlds that are observed together, and thereby faster (:mod:`posse.together`)."""
 _LOOKS: Final = 400_000
 """How often who waits looks before it falls asleep: for some tenths of a millisecond. Where there
 are more threads than cores it falls asleep at once."""
@@ -55,10 +57,10 @@ def all_at_once(num_worlds: int) -> Numbers:
 def by_turns(work: Callable[[int, Numbers], T], num_worlds: int, threads: int) -> list[T]:
     """Call ``work(thread, turns)`` once for each thread, which together are all worlds.
 
-    What is called goes through :func:`posse.turn_code.worlds_of` its thread, which hands worlds out
-    part by part, so that no thread waits long for a slower one; the caller's is thread 0. Returns
-    what the calls returned, in no order. While another thread of the program is here, the caller
-    does everything by itself.
+    What is called goes through :func:`posse.turn_code.worlds_of` its thread, or ``parts_of``, which
+    hand worlds out part by part, so that no thread waits long for a slower one; the caller's is
+    thread 0. Returns what the calls returned, in no order. While another thread of the program is
+    here, the caller does everything by itself.
     """
     if threads == 1 or UNCOMPILED:
         return [work(0, all_at_once(num_worlds))]
@@ -77,10 +79,11 @@ def by_turns(work: Callable[[int, Numbers], T], num_worlds: int, threads: int) -
 @functools.lru_cache(maxsize=64)
 def _fresh_turns(num_worlds: int, threads: int) -> Numbers:
     """Return turns of which none is taken."""
-    edges = [num_worlds * k // threads for k in range(threads + 1)]
+    grain = _TOGETHER if num_worlds >= threads * _PARTS * _TOGETHER // 2 else 1
+    edges = [num_worlds * k // (threads * grain) * grain for k in range(threads)] + [num_worlds]
     turns = np.zeros((threads, TURN), np.int64)
     turns[:, NEXT], turns[:, END] = edges[:-1], edges[1:]
-    turns[:, SIZE] = max(1, num_worlds // (threads * _PARTS))
+    turns[:, SIZE] = max(1, num_worlds // (threads * _PARTS * grain)) * grain
     return turns
 
 

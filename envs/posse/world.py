@@ -3,7 +3,8 @@
 actions → faults → the target decides → physics (target first, then trackers by number) → the slot
 frame follows → contacts → sensing → radio → score → reward → end → observation.
 
-Only the kernels at the end loop over a batch; everything else is about one world.
+Only the kernels at the end loop over a batch; everything else is about one world, or about eight
+that are observed together.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
 from posse.state import NEVER, beam_directions, config_record, slot_records
-from posse.survey import BLOCK, PREPARED, find_gaps, lay_out, lay_out_constants, natural
+from posse.survey import PREPARED, find_gaps, lay_out, lay_out_constants, natural
 from posse.target_motion import AGENT
-from posse.together import lay_out_task, observe_together
+from posse.together import TOGETHER, lay_out_task, observe_together
 from posse.turn_code import Numbers, parts_of
 
 _ZERO: Final = np.float32(0.0)
@@ -162,8 +163,6 @@ LOOK: Final = 3
 
 LINE: Final = 64
 """Bytes in a line of the cache."""
-TOGETHER: Final = BLOCK
-"""Worlds that are stepped one after the other, and then observed together."""
 
 
 @compiled
@@ -287,10 +286,10 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
             prepare(c, directions, scratch)
             scratch[PREPARED] = _ONE
         over = 0
-        for first, last in parts_of(thread, turns):
-            for e in range(natural(first), last, TOGETHER):
+        for first, end in parts_of(thread, turns):
+            for e in range(natural(first), end, TOGETHER):
                 over += advance_worlds(
-                    e, min(TOGETHER, last - e), c, offsets, weights, world, tracker, obstacle,
+                    e, min(TOGETHER, end - e), c, offsets, weights, world, tracker, obstacle,
                     heard, broadcast, heard_message, message,
                     actions, observations, rewards, terms, flags, orders, scratch,
                 )  # fmt: skip
@@ -300,7 +299,7 @@ def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., 
 
 
 advance: Final = _stepping(None)
-"""Do what each world is ordered to, for the worlds of a thread; the one loop over worlds.
+"""Do what each world is ordered to, for the worlds of a thread; the one loop over a batch.
 
 See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are over.
 """

@@ -8,7 +8,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
 import pytest
+
+from posse.compiled import compiled, kernel
 
 HELPER = """
 from posse.compiled import compiled
@@ -284,3 +288,18 @@ def test_without_the_compiler_the_plain_functions_run(herd: Herd, tmp_path: Path
     assert (run.answer, run.hits) == (6.0, -1)
     assert run.stderr == ""
     assert not cache.exists()
+
+
+def test_a_function_is_compiled_once_for_all_whole_numbers() -> None:
+    """A constant, and numbers of 32 and of 64 bits: each form costs a tenth of a second."""
+
+    @compiled
+    def twice(x: int) -> int:
+        return 2 * x
+
+    @kernel
+    def total(narrow: npt.NDArray[np.int32], wide: npt.NDArray[np.int64]) -> int:
+        return twice(3) + twice(4) + twice(narrow[0]) + twice(wide[0])
+
+    assert total(np.array([2**31 - 1], np.int32), np.array([2**40])) == 14 + 2 * (2**31 - 1 + 2**40)
+    assert len(twice._linked.overloads) == 1  # type: ignore[attr-defined]

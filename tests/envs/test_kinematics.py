@@ -125,3 +125,31 @@ def test_approach_and_turn_towards() -> None:
         wanted = F(math.cos(2.0 + error)), F(math.sin(2.0 + error))
         rate = turn_towards(F(math.cos(2.0)), F(math.sin(2.0)), *wanted, F(1.5), F(0.1))
         assert rate == pytest.approx(max(-1.5, min(1.5, error / 0.1)), abs=1e-5)
+
+
+@settings(derandomize=True, max_examples=1000, deadline=None)
+@given(
+    st.floats(-math.pi, math.pi),
+    st.sampled_from([1e-7, 1e-3, 0.1, 0.99, 1.4, 1.5, 20.0]),
+    st.sampled_from([0.0, 1e-8, 3e-7, 1e-6, 1e-3, 0.5, 0.9999, 1.0, 1.00005, 1.001, 2.0, 30.0]),
+    st.sampled_from([-1.0, 1.0]),
+)
+def test_a_turn_is_the_angle_within_its_limit(
+    heading: float, limit: float, share: float, side: float
+) -> None:
+    """However near it lies to the limit, to nothing, or to an about-turn."""
+    error = side * min(share * limit, math.pi)
+    most, time = F(limit / 0.1), F(0.1)
+    cosine, sine = F(math.cos(heading)), F(math.sin(heading))
+    wanted = F(math.cos(heading + error)), F(math.sin(heading + error))
+    rate = turn_towards(cosine, sine, *wanted, most, time)
+    # float32 has the two headings to a ten millionth, which is what the angle can be known to.
+    exact = math.atan2(
+        float(cosine) * float(wanted[1]) - float(sine) * float(wanted[0]),
+        float(cosine) * float(wanted[0]) + float(sine) * float(wanted[1]),
+    )
+    assert abs(rate) <= most
+    if abs(exact) < 3.1:
+        assert float(rate) * 0.1 == pytest.approx(max(-limit, min(limit, exact)), abs=3e-7)
+    else:
+        assert abs(float(rate)) == pytest.approx(min(float(most), math.pi / 0.1), rel=1e-3)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import posse
-from posse.together import SONAR_AT, TARGET_AT, TASK_AT
+from posse.survey import MOST_IN_TEAM, SIZE, SIZE_FOR_ONE, TEAM
+from posse.together import SONAR_AT, TARGET_AT, TASK_AT, _row
 
 TEAMS: list[dict[str, Any]] = [
     {"num_trackers": 1},
@@ -50,6 +51,11 @@ def test_parts_are_written_where_they_are_declared() -> None:
     offsets = posse.batch("smart", 1).layout.offsets
     names = {"heading": 0, "formation": TASK_AT, "target_known": TARGET_AT, "sonar": SONAR_AT}
     assert {name: offsets[name] for name in names} == names
+
+
+@pytest.mark.parametrize(("across", "size"), [(0, SIZE_FOR_ONE), (1, SIZE)])
+def test_the_largest_team_fits_its_memory(across: int, size: int) -> None:
+    assert TEAM + 6 * _row(MOST_IN_TEAM, across) <= size
 
 
 @pytest.mark.parametrize("worlds", [1, 8])

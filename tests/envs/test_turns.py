@@ -12,7 +12,7 @@ import pytest
 import posse
 from posse import turns
 from posse.compiled import kernel
-from posse.turn_code import ASLEEP, Numbers, worlds_of
+from posse.turn_code import ASLEEP, END, NEXT, SIZE, Numbers, worlds_of
 from posse.turns import by_turns
 
 
@@ -83,8 +83,18 @@ def test_a_thread_begins_with_worlds_of_its_own() -> None:
     def work(thread: int, mine: Numbers) -> None:
         begun[thread] = first(thread, mine)
 
-    by_turns(work, 900, 3)
-    assert begun == {0: 0, 1: 300, 2: 600}
+    by_turns(work, 90, 3)
+    assert begun == {0: 0, 1: 30, 2: 60}
+
+
+@pytest.mark.parametrize(("worlds", "threads"), [(1024, 2), (1000, 3), (8192, 8), (513, 4)])
+def test_parts_of_many_worlds_are_eights(worlds: int, threads: int) -> None:
+    """Eight are observed together; only the end of all may be less."""
+    fresh = turns._fresh_turns(worlds, threads)
+    assert (fresh[:, NEXT] % 8 == 0).all()
+    assert (fresh[:, SIZE] % 8 == 0).all()
+    np.testing.assert_array_equal(fresh[1:, NEXT], fresh[:-1, END])
+    assert fresh[-1, END] == worlds
 
 
 def test_no_part_is_taken_twice_however_many_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
