@@ -30,7 +30,7 @@ from posse.score import add_up, occupy
 from posse.sensing import look
 from posse.start import draw_start, rest
 from posse.state import NEVER, beam_directions, config_record, slot_records
-from posse.survey import PREPARED, find_gaps, lay_out, lay_out_constants, natural
+from posse.survey import MOST_IN_TEAM, PREPARED, find_gaps, lay_out, lay_out_constants, natural
 from posse.target_motion import AGENT
 from posse.together import TOGETHER, lay_out_task, observe_together
 from posse.turn_code import Numbers, parts_of
@@ -163,6 +163,8 @@ LOOK: Final = 3
 
 LINE: Final = 64
 """Bytes in a line of the cache."""
+FETCHED: Final = MOST_IN_TEAM
+"""Up to this team size, what is fetched for a world has room in the first cache."""
 
 
 @compiled
@@ -202,7 +204,7 @@ def advance_worlds(
     c, over = config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = world[e], tracker[e], obstacle[e]
-        if count > 1:
+        if count > 1 and trackers.shape[0] <= FETCHED:
             fetch_all(observations[e])  # written below, and after the last of these worlds
         order = orders[e]
         if order == STEP and w.over != 0:
