@@ -74,8 +74,8 @@ def one_part(  # type: ignore[no-untyped-def]
             world.observe(
                 c, w, t, o, heard[e], heard_message[e], message[e], scratch, observations[e]
             )
-            begun = e % world.TOGETHER + 1
-            if begun == world.TOGETHER or e == len(worlds) - 1:
+            begun = e % together.TOGETHER + 1
+            if begun == together.TOGETHER or e == len(worlds) - 1:
                 together.observe_together(
                     c, worlds, trackers, e + 1 - begun, begun, message, scratch, observations
                 )

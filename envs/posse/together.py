@@ -157,7 +157,7 @@ def write_task(number: int, s: FloatArray, o: FloatArray) -> None:
 
 
 @compiled
-def write_rows(
+def _write_rows(
     rows: tuple[Lanes, ...],
     e: int,
     i: int,
@@ -169,18 +169,18 @@ def write_rows(
     """Write eight numbers to each of ``count`` observations, from k on."""
     a, b, c, d, f, g, h, j = rows
     # Not in a loop: which of a tuple is meant would be looked up at run time.
-    write_row(a, 0, e, i, count, across, observations, k)
-    write_row(b, 1, e, i, count, across, observations, k)
-    write_row(c, 2, e, i, count, across, observations, k)
-    write_row(d, 3, e, i, count, across, observations, k)
-    write_row(f, 4, e, i, count, across, observations, k)
-    write_row(g, 5, e, i, count, across, observations, k)
-    write_row(h, 6, e, i, count, across, observations, k)
-    write_row(j, 7, e, i, count, across, observations, k)
+    _write_row(a, 0, e, i, count, across, observations, k)
+    _write_row(b, 1, e, i, count, across, observations, k)
+    _write_row(c, 2, e, i, count, across, observations, k)
+    _write_row(d, 3, e, i, count, across, observations, k)
+    _write_row(f, 4, e, i, count, across, observations, k)
+    _write_row(g, 5, e, i, count, across, observations, k)
+    _write_row(h, 6, e, i, count, across, observations, k)
+    _write_row(j, 7, e, i, count, across, observations, k)
 
 
 @compiled
-def write_row(
+def _write_row(
     row: Lanes,
     lane: int,
     e: int,
@@ -225,7 +225,7 @@ def observe_own_and_target(
         within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
         load(s, _TOUCHING), load(s, _WORKING),
     )  # fmt: skip
-    write_rows(own, e, i, count, across, observations, 0)
+    _write_rows(own, e, i, count, across, observations, 0)
     x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = _columns(tracker, e, i, across, FIX)
     dx, dy = x - own_x, y - own_y
     distance = root(dx * dx + dy * dy)
@@ -247,12 +247,12 @@ def observe_own_and_target(
         eight(c.told_arena), time_left, choose(known, _ONE, _ZERO), load(s, _SEES), age,
         choose(known, distance, _MINUS_ONE), ahead, left,
     )  # fmt: skip
-    write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
+    _write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
     fields = transpose(
         ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
         choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
     )  # fmt: skip
-    write_rows(fields, e, i, count, across, observations, TARGET_AT + 4)
+    _write_rows(fields, e, i, count, across, observations, TARGET_AT + 4)
 
 
 @compiled
@@ -363,7 +363,7 @@ def copy_message(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
 
 
 @compiled
-def observe_some(
+def _observe_some(
     c: Record,
     world: Records,
     tracker: Records,
@@ -399,11 +399,11 @@ def observe_together(
         if whole_team(c):
             lay_out_team(tracker, e, 1, s)
         for i in range(n):
-            observe_some(c, world, tracker, e, i, WIDTH, 1, message, s, observations)
+            _observe_some(c, world, tracker, e, i, WIDTH, 1, message, s, observations)
         return
     for each in range(e, e + worlds):
         if whole_team(c):
             lay_out_team(tracker, each, 0, s)
         for i in range(0, n, WIDTH):
             count = min(WIDTH, n - i)
-            observe_some(c, world, tracker, each, i, count, 0, message, s, observations)
+            _observe_some(c, world, tracker, each, i, count, 0, message, s, observations)
