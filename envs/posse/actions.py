@@ -78,10 +78,8 @@ class ActionReader:
         self._first_bad = self._first_bad_of_all
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return ActionReader, (
-            self._scenario,
-            self._discrete,
-        )  # rows must stay those of what is read
+        # Made anew, so that rows stay those of what is read.
+        return ActionReader, (self._scenario, self._discrete)
 
     def by_agent(self, actions: Mapping[str, Any]) -> None:
         """Read the actions of a dictionary by agent.

@@ -117,10 +117,12 @@ def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
     """
     n = natural(tracker.shape[1])
     stride, row = _stride(across), _row(n, across)
-    for again in range(2):  # what fills the first time's last block is overwritten
-        for i in range(0, n, WIDTH // stride):
-            x, y, cosine, sine, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
-            at = TEAM + natural(stride * (i + again * n))
+    each = WIDTH // stride
+    # From the last block on: what fills it is overwritten by the others' second place.
+    for block in range((n + each - 1) // each - 1, -1, -1):
+        i = natural(each * block)
+        x, y, cosine, sine, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
+        for at in (TEAM + stride * i, TEAM + natural(stride * (i + n))):
             store(s, at, x)
             store(s, at + row, y)
             store(s, at + 2 * row, cosine)
@@ -263,19 +265,24 @@ def _number(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
 
 
 @compiled
+def _seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+    """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
+    stride, row = _stride(across), _row(n, across)
+    own = TEAM + natural(stride * i)
+    at = own + natural(stride * (m + 1))
+    dx, dy = load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+    return dx * hc + dy * hs, dy * hc - dx * hs
+
+
+@compiled
 def _find_places(n: int, i: int, across: int, s: FloatArray) -> None:
     """Write how far each team-mate is from its observers, and how many are nearer.
 
     Or as near, and of a lower number.
     """
-    stride, row = _stride(across), _row(n, across)
-    own = TEAM + natural(stride * i)
-    x, y = load(s, own), load(s, own + row)
-    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
     for m in range(n - 1):
-        at = own + natural(stride * (m + 1))
-        dx, dy = load(s, at) - x, load(s, at + row) - y
-        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        ahead, left = _seen_at(n, i, m, across, s)
         distance = root(ahead * ahead + left * left)
         number, place = _number(n, i, m, across, s), eight(_ZERO)
         for q in range(m):
@@ -306,16 +313,14 @@ def observe_team(
     n, size = natural(c.num_trackers), np.float32(9 + c.message_size)
     stride, row = _stride(across), _row(n, across)
     own = TEAM + natural(stride * i)
-    x, y = load(s, own), load(s, own + row)
-    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
     _find_places(n, i, across, s)
     for m in range(n - 1):
         at = own + natural(stride * (m + 1))
-        dx, dy = load(s, at) - x, load(s, at + row) - y
+        ahead, left = _seen_at(n, i, m, across, s)
         first, second, third, fourth, fifth, sixth, seventh, eighth = describe_mates(
-            hc, hs, _number(n, i, m, across, s), dx * hc + dy * hs, dy * hc - dx * hs,
-            load(s, _DISTANCE + WIDTH * m), load(s, at + 2 * row), load(s, at + 3 * row),
-            load(s, at + 4 * row),
+            load(s, own + 2 * row), load(s, own + 3 * row), _number(n, i, m, across, s),
+            ahead, left, load(s, _DISTANCE + WIDTH * m),
+            load(s, at + 2 * row), load(s, at + 3 * row), load(s, at + 4 * row),
         )  # fmt: skip
         store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
         turn_rates = at + 5 * row
