@@ -79,6 +79,16 @@ class _Linked(CPUDispatcher):
             {name: _widest(kind) for name, kind in kws.items()},
         )
 
+    def compile(self, sig: Any) -> Any:
+        """Compile it for arguments of these types, if that is still to do (numba's name for it).
+
+        numba's own would also look on disk, and time itself: each of them and all within it.
+        """
+        if sig not in self.overloads:
+            with self._compiling_counter:
+                self.add_overload(self._compiler.compile(sig, None))  # type: ignore[attr-defined]
+        return self.overloads[sig].entry_point  # type: ignore[attr-defined]
+
 
 def _widest(kind: Any) -> Any:
     plain = types.unliteral(kind)  # type: ignore[no-untyped-call]

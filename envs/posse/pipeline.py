@@ -7,6 +7,8 @@ link skip what would be thrown away or finds nothing in plain scalar code.
 from __future__ import annotations
 
 import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Final
 
 from numba.core.codegen import JITCodeLibrary
@@ -20,6 +22,9 @@ _NEEDLESS: Final = frozenset(
         "WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction", "InlineInlinables",
         "InlineOverloads", "FindLiterallyCalls", "LiteralUnroll",
         "LiteralPropagationSubPipelinePass", "RewriteDynamicRaises",
+        # Arrays as expressions, branches that constants decide (LLVM finds those too), and where a
+        # variable is let go of, which matters only to what is counted.
+        "NopythonRewrites", "RewriteSemanticConstants", "DeadBranchPrune", "IRLegalization",
         # For people to read.
         "AnnotateTypes", "DumpParforDiagnostics", "NoPythonSupportedFeatureValidation",
     }
@@ -30,8 +35,11 @@ _NEEDLESS: Final = frozenset(
 class LinkedForm(CompilerBase):
     """numba's compiler for a function that kernels link: fewer passes, no machine code."""
 
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+    def __init__(self, typing: Any, target: Any, *others: Any) -> None:
+        # numba would look what was added to all it knows, as it just did for what links this one.
+        with _instead(typing, refresh=_nothing), _instead(target, refresh=_nothing):
+            super().__init__(typing, target, *others)  # type: ignore[no-untyped-call]
+        vars(self.state.targetctx).pop("refresh", None)  # a copy of the target
         self.state.flags = _PlainFlags(self.state.flags)  # type: ignore[no-untyped-call]
 
     def define_pipelines(self) -> list[Any]:
@@ -51,10 +59,12 @@ class Kernel(CompilerBase):
         Millions of objects live until the end of it, and to look for those that do not takes a
         tenth of the time.
         """
+        typing = self.state.typingctx
         collects = gc.isenabled()
         gc.disable()
         try:
-            return super().compile_extra(func)  # type: ignore[no-untyped-call]
+            with _instead(typing, resolve_function_type=_remembered(typing.resolve_function_type)):
+                return super().compile_extra(func)  # type: ignore[no-untyped-call]
         finally:
             if collects:
                 gc.enable()
@@ -82,6 +92,40 @@ def _pipeline(state: Any, library: type[JITCodeLibrary]) -> Any:
     codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
     state.library = library(codegen, name)
     return DefaultPassBuilder.define_nopython_pipeline(state)  # type: ignore[no-untyped-call]
+
+
+@contextmanager
+def _instead(context: Any, **methods: Callable[..., Any]) -> Iterator[None]:
+    """Let one of numba's contexts do something else for a while (it holds its lock meanwhile)."""
+    vars(context).update(methods)
+    try:
+        yield
+    finally:
+        for name in methods:
+            vars(context).pop(name, None)
+
+
+def _nothing() -> None:
+    pass
+
+
+def _remembered(resolve: Callable[..., Any]) -> Callable[..., Any]:
+    """Return numba's search for what a call of these types returns, with a memory.
+
+    It tries every form of an operator anew wherever the operator stands, for an eighth of the time.
+    """
+    found: dict[Any, Any] = {}
+
+    def look_up(function: Any, args: Any, kws: Any) -> Any:
+        # What is only a name to numba ("static_getitem") takes values, not types.
+        if kws or isinstance(function, str):
+            return resolve(function, args, kws)
+        key = function, tuple(args)
+        if key not in found:
+            found[key] = resolve(function, args, kws)
+        return found[key]
+
+    return look_up
 
 
 class _PlainFlags(Flags):

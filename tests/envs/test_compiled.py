@@ -7,7 +7,9 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -303,3 +305,42 @@ def test_a_function_is_compiled_once_for_all_whole_numbers() -> None:
 
     assert total(np.array([2**31 - 1], np.int32), np.array([2**40])) == 14 + 2 * (2**31 - 1 + 2**40)
     assert len(twice._linked.overloads) == 1  # type: ignore[attr-defined]
+
+
+def test_what_a_kernel_remembers_while_it_compiles_is_gone_afterwards() -> None:
+    """numba's contexts are everyone's: nothing of ours may stay in them."""
+    from numba.core.registry import cpu_target
+
+    contexts = cpu_target.typing_context, cpu_target.target_context
+    before = [set(vars(context)) for context in contexts]
+
+    @compiled
+    def shifted(x: float) -> float:
+        return x + 1.0
+
+    @kernel
+    def moved(x: float) -> float:
+        return shifted(x)
+
+    @kernel
+    def wrong(x: float) -> float:
+        return shifted(x, x)  # type: ignore[call-arg]
+
+    assert moved(2.0) == 3.0
+    with pytest.raises(numba.TypingError):
+        wrong(2.0)
+    assert [set(vars(context)) for context in contexts] == before
+
+    @numba.extending.overload(moved_later)
+    def _(x: Any) -> Any:
+        def tenfold(x: Any) -> Any:
+            return 10.0 * x
+
+        return tenfold
+
+    assert numba.njit(lambda x: moved_later(x))(2.0) == 20.0, "numba still learns new functions"
+
+
+def moved_later(x: float) -> float:
+    """Return what compiled code is told only after kernels have been compiled."""
+    raise NotImplementedError
