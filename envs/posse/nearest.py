@@ -18,7 +18,6 @@ from posse.lanes import Lanes, choose, eight, greater, lesser, load, root, store
 from posse.survey import (
     BLOCK,
     FAR,
-    GROUP,
     INDEX,
     LISTED,
     ROW,
@@ -27,13 +26,12 @@ from posse.survey import (
     Y,
     blocks,
     find_places,
-    group_size,
     natural,
-    store_rows,
+    store_each,
 )
 
 # Rows of scratch memory: how far each team-mate is, which of them may be among the nearest and how
-# far, by place; what the lanes hold; which lists of a group are beyond doubt.
+# far, by place; what the lanes hold; which of eight lists are beyond doubt.
 _DISTANCE: Final = SHORTLIST
 _CANDIDATE: Final = SHORTLIST + 1 * ROW
 _CANDIDATE_NUMBER: Final = SHORTLIST + 2 * ROW
@@ -51,16 +49,18 @@ _Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 
 
 @compiled
-def list_nearest(c: Record, trackers: Records, first: int, last: int, s: FloatArray) -> None:
-    """List the nearest team-mates of trackers ``first`` to ``last``, a group, in LISTED rows."""
-    together = group_size(s) == GROUP and c.neighbours <= BLOCK < c.num_trackers - 1
+def list_nearest(c: Record, trackers: Records, first: int, count: int, s: FloatArray) -> None:
+    """List the nearest team-mates of ``count`` trackers, at most eight, from ``first`` on.
+
+    Their nearest stand side by side from LISTED on, a lane each, then their second nearest.
+    """
+    together = c.neighbours <= BLOCK < c.num_trackers - 1
     if together:
         rank_eight(c.num_trackers, first, s)
-    for i in range(first, last):
-        if not together or s[_CERTAIN + i - first] == _ZERO:
-            at = natural((i - first) * ROW)
-            measure_team(c.num_trackers, trackers[i], i, s)
-            choose_nearest(c.num_trackers, c.neighbours, LISTED + at, s)
+    for lane in range(count):
+        if not together or s[_CERTAIN + lane] == _ZERO:
+            measure_team(c.num_trackers, trackers[first + lane], first + lane, s)
+            choose_nearest(c.num_trackers, c.neighbours, natural(lane), s)
 
 
 @compiled
@@ -87,7 +87,8 @@ def rank_eight(n: int, first: int, s: FloatArray) -> None:
         | (f * _CLOSER <= e) | (g * _CLOSER <= f) | (h * _CLOSER <= g) | (ninth * _CLOSER <= h)
     )  # fmt: skip
     store(s, _CERTAIN, choose(doubtful, _ZERO, _ONE))
-    store_rows(tag(a), tag(b), tag(c), tag(d), tag(e), tag(f), tag(g), tag(h), LISTED, ROW, s)
+    lists = tag(a), tag(b), tag(c), tag(d), tag(e), tag(f), tag(g), tag(h)
+    store_each(lists, LISTED, BLOCK, s)
 
 
 @compiled
@@ -197,8 +198,8 @@ def bound_nearest(n: int, s: FloatArray) -> np.float32:
 
 
 @compiled
-def choose_nearest(n: int, places: int, listed: int, s: FloatArray) -> None:
-    """List the nearest of n team-mates, from ``listed`` on."""
+def choose_nearest(n: int, places: int, lane: int, s: FloatArray) -> None:
+    """List the nearest of n team-mates of the tracker in a lane."""
     most = bound_nearest(n, s) if places <= BLOCK else _NEARER_THAN_FAR
     count = 0
     for j in range(natural(n)):  # without a branch, which could not be predicted
@@ -207,4 +208,4 @@ def choose_nearest(n: int, places: int, listed: int, s: FloatArray) -> None:
         count = natural(count + int(distance <= most))
     find_places(count, _CANDIDATE, _PLACE, s)
     for q in range(count):
-        s[listed + natural(int(s[_PLACE + q]))] = s[_CANDIDATE_NUMBER + q]
+        s[LISTED + lane + BLOCK * natural(int(s[_PLACE + q]))] = s[_CANDIDATE_NUMBER + q]

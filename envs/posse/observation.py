@@ -23,7 +23,7 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
-from posse.lanes import load, root, store
+from posse.lanes import Lanes, load, root, store
 from posse.nearest import list_nearest
 from posse.scenario import Scenario
 from posse.sonar import ping
@@ -35,12 +35,10 @@ from posse.survey import (
     OWN,
     ROW,
     SHORTLIST,
-    blocks,
+    columns,
     columns_of,
     describe_mates,
-    group_size,
     natural,
-    store_each,
     within_one,
 )
 from posse.together import SONAR_AT, TARGET_AT, TASK_AT, copy_message, whole_team, write_task
@@ -48,10 +46,9 @@ from posse.together import SONAR_AT, TARGET_AT, TASK_AT, copy_message, whole_tea
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
-# Rows of scratch memory, of one tracker: what is observed of eight of the nearest, eight numbers
-# each, and how they turn; or the nearest so far, how far and who.
-_MATES: Final = OWN
-_TURN_RATES: Final = OWN + 1 * ROW
+# Rows of scratch memory: how eight team-mates turn; of one tracker the nearest so far, how far and
+# who.
+_TURN_RATES: Final = OWN
 _SO_FAR: Final = SHORTLIST
 _WHO: Final = SHORTLIST + 1 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
@@ -278,63 +275,64 @@ def _keep_nearest(
 def _observe_nearest(
     c: Record,
     trackers: Records,
-    first: int,
-    last: int,
     said: FloatArray,
     s: FloatArray,
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates of trackers ``first`` to ``last``, where all are heard.
+    """Write the nearest team-mates of all trackers, where all are heard, from ``k`` on.
 
-    They begin at ``k`` in each tracker's row of ``observations``.
+    Of eight trackers at once, a lane each.
     """
-    list_nearest(c, trackers, first, last, s)
-    for i in range(first, last):
-        _write_nearest(
-            c, trackers, trackers[i], LISTED + natural((i - first) * ROW), said, s,
-            observations[i], k,
-        )  # fmt: skip
+    n, size = natural(c.num_trackers), 9 + natural(c.message_size)
+    filled = min(n - 1, natural(c.neighbours))
+    for first in range(0, n, BLOCK):
+        count = min(BLOCK, n - first)
+        list_nearest(c, trackers, first, count, s)
+        own_x, own_y, hc, hs, _, _, _, _ = columns(trackers, first, n, POSE)
+        for place in range(natural(filled)):
+            listed, at = LISTED + BLOCK * place, k + place * size
+            x, y, heading_x, heading_y, speed, turn_rate, _, _ = columns_of(
+                trackers, listed, count, POSE, s
+            )
+            dx, dy = x - own_x, y - own_y
+            ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+            store(s, _TURN_RATES, turn_rate)
+            a, b, d, e, f, g, h, j = describe_mates(
+                hc, hs, load(s, listed), ahead, left, root(ahead * ahead + left * left),
+                heading_x, heading_y, speed,
+            )  # fmt: skip
+            _write_mate(a, 0, first, count, s, observations, at)
+            _write_mate(b, 1, first, count, s, observations, at)
+            _write_mate(d, 2, first, count, s, observations, at)
+            _write_mate(e, 3, first, count, s, observations, at)
+            _write_mate(f, 4, first, count, s, observations, at)
+            _write_mate(g, 5, first, count, s, observations, at)
+            _write_mate(h, 6, first, count, s, observations, at)
+            _write_mate(j, 7, first, count, s, observations, at)
+        for i in range(first, first + count):
+            for place in range(filled, natural(c.neighbours)):
+                _write_no_neighbour(c, observations[i], k + place * size)
+            for place in range(filled if c.message_size > 0 else 0):
+                mate = natural(int(s[LISTED + BLOCK * place + i - first]))
+                copy_message(c, said[mate], observations[i], k + place * size)
 
 
 @compiled
-def _write_nearest(
-    c: Record,
-    trackers: Records,
-    t: Record,
-    listed: int,
-    said: FloatArray,
+def _write_mate(
+    fields: Lanes,
+    lane: int,
+    first: int,
+    count: int,
     s: FloatArray,
-    o: FloatArray,
+    observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the team-mates in a tracker's list, which begins at ``listed``."""
-    filled = natural(min(c.num_trackers - 1, c.neighbours))
-    size = 9 + natural(c.message_size)
-    hc, hs = t.heading_cos, t.heading_sin
-    for block in range(blocks(filled)):
-        p, left_over = listed + BLOCK * block, filled - BLOCK * block
-        x, y, heading_x, heading_y, speed, turn_rate, _, _ = columns_of(
-            trackers, p, left_over, POSE, s
-        )
-        dx, dy = x - t.x, y - t.y
-        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-        metres, numbers = root(ahead * ahead + left * left), load(s, p)
-        store(s, _TURN_RATES, turn_rate)
-        mates = describe_mates(hc, hs, numbers, ahead, left, metres, heading_x, heading_y, speed)
-        if left_over >= BLOCK:
-            store_each(mates, k, size, o)
-        else:  # no room for eight
-            store_each(mates, _MATES, BLOCK, s)
-            for q in range(left_over):
-                store(o, k + q * size, load(s, _MATES + BLOCK * q))
-        for q in range(min(BLOCK, left_over)):
-            o[k + 8] = s[_TURN_RATES + q]
-            _write_message(c, said, natural(int(s[p + q])), o, k)
-            k += size
-    for _ in range(filled, c.neighbours):
-        _write_no_neighbour(c, o, k)
-        k += size
+    """Write what one of ``count`` trackers observes of a team-mate, if there are so many."""
+    if lane < count:
+        o = observations[natural(first + lane)]
+        store(o, k, fields)
+        o[k + 8] = s[_TURN_RATES + lane]
 
 
 @compiled(seldom=True)
@@ -409,10 +407,7 @@ def observe_alone(
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
     elif not whole_team(c):
-        together = group_size(s)
-        for first in range(0, n, together):
-            last = min(first + together, n)
-            _observe_nearest(c, trackers, first, last, message[0], s, observations, k)
+        _observe_nearest(c, trackers, message[0], s, observations, k)
 
 
 @compiled(seldom=True)

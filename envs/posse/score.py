@@ -14,7 +14,15 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.radio import connected
 from posse.state import NEVER
-from posse.survey import SLOT, SLOT_DISTANCE, SLOT_DISTANCE2, find_slots
+from posse.survey import (
+    BLOCK,
+    SLOT,
+    SLOT_DISTANCE,
+    SLOT_DISTANCE2,
+    blocks,
+    find_slots,
+    natural,
+)
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -35,7 +43,9 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
 
     Where the discs are stands in ``s`` (:func:`posse.survey.lay_out`).
     """
-    find_slots(c, w, slots, _NO_BITS, s)
+    n = natural(c.num_trackers)
+    for block in range(blocks(n)):
+        find_slots(c, w, BLOCK * block, slots, _NO_BITS, s)
     taken = _NO_BITS
     occupied = 0
     near2 = c.tolerance * c.tolerance
@@ -52,12 +62,18 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
                 taken |= bit
                 occupied += 1
                 t.slot = best
-    if taken != _NO_BITS:
-        find_slots(c, w, slots, taken, s)
-        for i in range(c.num_trackers):
-            t = trackers[i]
-            if t.slot < 0 and s[SLOT + i] >= _ZERO:
-                t.slot_distance = s[SLOT_DISTANCE + i]
+    for first in range(0, n if taken != _NO_BITS else 0, BLOCK):
+        last = min(first + BLOCK, n)
+        looking = False  # anyone for whom the nearest slot of all is another's
+        for i in range(first, last):
+            taken_by_others = taken & (_BIT << np.uint64(s[SLOT + i])) != _NO_BITS
+            looking |= taken_by_others and trackers[i].slot < 0
+        if looking:
+            find_slots(c, w, first, slots, taken, s)
+            for i in range(first, last):
+                t = trackers[i]
+                if t.slot < 0 and s[SLOT + i] >= _ZERO:
+                    t.slot_distance = s[SLOT_DISTANCE + i]
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot_progress -= t.slot_distance

@@ -31,9 +31,6 @@ from posse.state import POSE
 
 BLOCK: Final = WIDTH
 
-GROUP: Final = 8
-"""Trackers whose nearest team-mates are listed at once, a lane each (:mod:`posse.nearest`)."""
-
 # Rows of scratch memory: where each begins. 64 trackers, the target and 60 obstacles fit a row, and
 # a length that is no power of two keeps rows apart in the processor's cache.
 ROW: Final = 136
@@ -56,16 +53,16 @@ OWN: Final = 14 * ROW  # ten rows whose meaning is their module's own
 SHORTLIST: Final = 24 * ROW  # and six for making lists of the nearest
 _SHARED: Final = 30 * ROW
 
-# Then one of two: of each tracker of a group, who is nearest, the nearest first; or, where a small
-# team is observed as a whole, its rows (posse.together).
+# Then one of two: who is nearest to each of eight trackers, the nearest first (posse.nearest); or,
+# where a small team is observed as a whole, its rows (posse.together).
 LISTED: Final = _SHARED
 TEAM: Final = _SHARED
 MOST_IN_TEAM: Final = 16
 """Up to this team size, a whole team fits there."""
 
 SIZE: Final = _SHARED + 6 * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
-SIZE_FOR_ONE: Final = _SHARED + 6 * (2 * MOST_IN_TEAM + BLOCK)
-"""Where memory is short: lists are then made one by one, and each world is looked after alone."""
+SIZE_FOR_ONE: Final = _SHARED + 64 * BLOCK
+"""Where memory is short: each world is then looked after alone."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -83,12 +80,6 @@ _NO_BITS: Final = np.uint64(0)
 def new_scratch() -> FloatArray:
     """Return scratch memory for one thread and one scenario, SIZE numbers."""
     return np.zeros(SIZE, np.float32)
-
-
-@compiled
-def group_size(s: FloatArray) -> int:
-    """Return how many trackers' nearest team-mates there is room to list at once."""
-    return GROUP if s.shape[0] >= SIZE else 1
 
 
 @compiled
@@ -155,10 +146,7 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 def columns_of(
     records: Records, listed: int, count: int, offset: int, s: FloatArray
 ) -> tuple[Lanes, ...]:
-    """Return :func:`columns` of eight of the ``count`` records whose numbers stand in a list.
-
-    It begins at ``listed``.
-    """
+    """Return :func:`columns` of the ``count`` records whose numbers stand from ``listed`` on."""
     last = count - 1
     return transpose(
         load_fields(records[natural(int(s[listed]))], offset),
@@ -311,20 +299,22 @@ def find_gaps(c: Record, s: FloatArray) -> None:
 
 
 @compiled
-def find_slots(c: Record, w: Record, slots: Records, taken: np.uint64, s: FloatArray) -> None:
-    """Write each tracker's nearest slot that is not in the set ``taken``; -1: all are."""
-    n = natural(c.num_trackers)
-    for block in range(blocks(n)):
-        i = BLOCK * block
-        dx, dy = load(s, X + i) - w.x, load(s, Y + i) - w.y
-        ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
-        nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
-        for slot in range(n):
-            if taken & (_BIT << np.uint64(slot)) == _NO_BITS:
-                dx, dy = ahead - slots[slot].x, left - slots[slot].y
-                d2 = dx * dx + dy * dy
-                nearest = choose(d2 < nearest2, np.float32(slot), nearest)
-                nearest2 = lesser(nearest2, d2)
-        store(s, SLOT + i, nearest)
-        store(s, SLOT_DISTANCE2 + i, nearest2)
-        store(s, SLOT_DISTANCE + i, root(nearest2))
+def find_slots(
+    c: Record, w: Record, i: int, slots: Records, taken: np.uint64, s: FloatArray
+) -> None:
+    """Write the nearest slot that is not in the set ``taken`` of eight trackers from i on.
+
+    -1: all are.
+    """
+    dx, dy = load(s, X + i) - w.x, load(s, Y + i) - w.y
+    ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+    nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
+    for slot in range(natural(c.num_trackers)):
+        if taken & (_BIT << np.uint64(slot)) == _NO_BITS:
+            dx, dy = ahead - slots[slot].x, left - slots[slot].y
+            d2 = dx * dx + dy * dy
+            nearest = choose(d2 < nearest2, np.float32(slot), nearest)
+            nearest2 = lesser(nearest2, d2)
+    store(s, SLOT + i, nearest)
+    store(s, SLOT_DISTANCE2 + i, nearest2)
+    store(s, SLOT_DISTANCE + i, root(nearest2))

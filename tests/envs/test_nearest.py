@@ -14,16 +14,7 @@ import posse
 from posse.compiled import kernel
 from posse.nearest import _CERTAIN, list_nearest
 from posse.state import OBSTACLE, TRACKER, WORLD, beam_directions, config_record
-from posse.survey import (
-    GROUP,
-    LISTED,
-    ROW,
-    SIZE,
-    SIZE_FOR_ONE,
-    group_size,
-    lay_out,
-    lay_out_constants,
-)
+from posse.survey import BLOCK, LISTED, SIZE_FOR_ONE, lay_out, lay_out_constants
 
 Numbers = npt.NDArray[np.float32]
 
@@ -37,15 +28,14 @@ def make_lists(
     c = config[0]
     lay_out_constants(c, beams, s)
     lay_out(c, world[0], trackers, obstacles, s)
-    together = group_size(s)
-    for first in range(0, c.num_trackers, together):
-        last = min(first + together, c.num_trackers)
-        s[_CERTAIN : _CERTAIN + GROUP] = 0
-        list_nearest(c, trackers, first, last, s)
-        for i in range(first, last):
+    for first in range(0, c.num_trackers, BLOCK):
+        count = min(BLOCK, c.num_trackers - first)
+        s[_CERTAIN : _CERTAIN + BLOCK] = 0
+        list_nearest(c, trackers, first, count, s)
+        for lane in range(count):
             for p in range(c.neighbours):
-                lists[i, p] = s[LISTED + (i - first) * ROW + p]
-            certain[i] = s[_CERTAIN + i - first]
+                lists[first + lane, p] = s[LISTED + BLOCK * p + lane]
+            certain[first + lane] = s[_CERTAIN + lane]
 
 
 def team(x: Numbers, y: Numbers, heading: Numbers) -> npt.NDArray[Any]:
@@ -55,7 +45,7 @@ def team(x: Numbers, y: Numbers, heading: Numbers) -> npt.NDArray[Any]:
     return trackers
 
 
-def listed(trackers: npt.NDArray[Any], neighbours: int, size: int) -> tuple[Numbers, Numbers]:
+def listed(trackers: npt.NDArray[Any], neighbours: int) -> tuple[Numbers, Numbers]:
     n = len(trackers)
     scenario = posse.get_scenario(
         "constant", num_trackers=n, num_neighbours=neighbours, formation="ring"
@@ -64,7 +54,7 @@ def listed(trackers: npt.NDArray[Any], neighbours: int, size: int) -> tuple[Numb
     certain = np.zeros(n, np.float32)
     make_lists(
         config_record(scenario), np.zeros(1, WORLD), trackers, np.zeros(0, OBSTACLE),
-        beam_directions(scenario), np.zeros(size, np.float32), lists, certain,
+        beam_directions(scenario), np.zeros(SIZE_FOR_ONE, np.float32), lists, certain,
     )  # fmt: skip
     return lists, certain
 
@@ -88,9 +78,8 @@ def test_the_nearest_are_listed_in_order(number: int, neighbours: int) -> None:
     rng = np.random.default_rng(number)
     x, y = rng.uniform(-20, 20, (2, number)).astype(np.float32)
     trackers = team(x, y, rng.uniform(-3, 3, number).astype(np.float32))
-    lists, certain = listed(trackers, neighbours, SIZE)
+    lists, certain = listed(trackers, neighbours)
     np.testing.assert_array_equal(lists, expected(trackers, neighbours))
-    np.testing.assert_array_equal(listed(trackers, neighbours, SIZE_FOR_ONE)[0], lists)
     if neighbours <= 8:
         assert certain.mean() > 0.9, "lanes alone make nearly every list"
 
@@ -106,7 +95,7 @@ def test_equal_and_nearly_equal_distances_are_told_apart(
     x, y = np.stack([cells % 10, cells // 10]) * (1 + rng.uniform(-apart, apart, (2, number)))
     heading = rng.choice([0.0, 0.3, np.pi / 2, -2.0], number)
     trackers = team(x.astype(np.float32), y.astype(np.float32), heading.astype(np.float32))
-    lists, certain = listed(trackers, 8, SIZE)
+    lists, certain = listed(trackers, 8)
     np.testing.assert_array_equal(lists, expected(trackers, 8))
     if apart == 0.0:
         assert not certain.all(), "where lanes cannot tell, they say so"
