@@ -9,10 +9,11 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler_machinery import PassManager
 
 _NO_RUNTIME_UNROLL: Final = "llvm.loop.unroll.runtime.disable"
 
@@ -35,6 +36,8 @@ _NEEDLESS: Final = frozenset(
 class LinkedForm(CompilerBase):
     """numba's compiler for a function that kernels link: fewer passes, no machine code."""
 
+    _passes: ClassVar[_Passes | None] = None  # the same for all
+
     def __init__(self, typing: Any, target: Any, *others: Any) -> None:
         # numba would look what was added to all it knows, as it just did for what links this one.
         with _instead(typing, refresh=_nothing), _instead(target, refresh=_nothing):
@@ -44,10 +47,10 @@ class LinkedForm(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes (numba's name for it)."""
-        inlined = self.state.flags.forceinline
-        pipeline = _pipeline(self.state, _LinkedLibrary if inlined else _ApartLibrary)
-        pipeline.passes = [p for p in pipeline.passes if p[0].__name__ not in _NEEDLESS]
-        return [pipeline]
+        _give_library(self.state, _LinkedLibrary if self.state.flags.forceinline else _ApartLibrary)
+        if LinkedForm._passes is None:
+            LinkedForm._passes = _Passes(self.state)
+        return [LinkedForm._passes]
 
 
 class Kernel(CompilerBase):
@@ -83,15 +86,33 @@ class ShortLoops(Kernel):
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes (numba's name for it)."""
-        pipeline = _pipeline(self.state, _ShortLoopsLibrary)
+        _give_library(self.state, _ShortLoopsLibrary)
         self.state.library.enable_object_caching()
-        return [pipeline]
+        return super().define_pipelines()
 
 
-def _pipeline(state: Any, library: type[JITCodeLibrary]) -> Any:
-    codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
-    state.library = library(codegen, name)
-    return DefaultPassBuilder.define_nopython_pipeline(state)  # type: ignore[no-untyped-call]
+def _give_library(state: Any, library: type[JITCodeLibrary]) -> None:
+    """Set where the LLVM code of what is compiled goes to."""
+    state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
+
+
+class _Passes(PassManager):
+    """The passes of a linked function, one after the other.
+
+    numba's own would tell who listens of each, time it, and print the types of all arguments.
+    """
+
+    def __init__(self, state: Any) -> None:
+        super().__init__("nopython")  # type: ignore[no-untyped-call]
+        whole = DefaultPassBuilder.define_nopython_pipeline(state)  # type: ignore[no-untyped-call]
+        self.passes = [p for p in whole.passes if p[0].__name__ not in _NEEDLESS]
+        self.finalize()  # type: ignore[no-untyped-call]
+
+    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:  # noqa: N802 (numba's)
+        pss.analysis = self._analysis
+        pss.run_initialization(internal_state)
+        pss.run_pass(internal_state)
+        pss.run_finalizer(internal_state)
 
 
 @contextmanager
