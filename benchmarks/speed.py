@@ -36,6 +36,7 @@ FIRST_STEP = (
     "env = gymnasium.make('posse/Team-v0', scenario='smart'); "
     "env.reset(seed=0); env.step(env.action_space.sample())"
 )
+BUSY = "while True: pass"
 
 
 @dataclass(frozen=True)
@@ -194,23 +195,37 @@ def interfaces(settings: Settings) -> dict[str, list[float]]:
     }
 
 
-def beside_others(settings: Settings) -> dict[str, float]:
-    """Return a single world's speed beside busy processes, as a share of its speed alone."""
+def beside_others(settings: Settings) -> dict[str, dict[str, float]]:
+    """Return how fast a single world is beside busy processes, as a share of its speed alone.
+
+    And a plain loop, by turns, since a processor that is busy may be a slower one.
+    """
     env: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=1_000_000).unwrapped
     env.reset(seed=0)
     action = np.zeros(env.action_space.shape, np.float32)
-    alone = per_second(lambda: env.step(action), settings.seconds)[0]
+    work: dict[str, Callable[[], object]] = {
+        "one world": lambda: env.step(action),
+        "a plain loop": lambda: sum(range(1000)),
+    }
+
+    def rates() -> dict[str, float]:
+        return {name: per_second(step, settings.seconds / 2)[0] for name, step in work.items()}
+
     shares = {}
-    cores = os.cpu_count() or 1
-    for count in sorted({1, cores}):
-        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
-        try:
-            rate = per_second(lambda: env.step(action), settings.seconds)[0]
-        finally:
-            for process in busy:
-                process.kill()
-                process.wait()
-        shares[str(count)] = rate / alone
+    for count in sorted({1, os.cpu_count() or 1}):
+        rounds = []
+        for _ in range(5):
+            alone = rates()
+            busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(count)]
+            time.sleep(0.2)  # until they are busy
+            try:
+                beside = rates()
+            finally:
+                for process in busy:
+                    process.kill()
+                    process.wait()
+            rounds.append({name: beside[name] / alone[name] for name in work})
+        shares[str(count)] = {name: statistics.median(r[name] for r in rounds) for name in work}
     return shares
 
 
@@ -269,11 +284,12 @@ def main() -> None:
     console.print(table)
     for name, (median, low, high) in single.items():
         console.print(f"{name}: {median:,.0f} steps/s [{low:,.0f}, {high:,.0f}], one world")
-    for count, share in figures["beside_busy_processes"].items():
+    for count, shares in figures["beside_busy_processes"].items():
         fair = min(1.0, (os.cpu_count() or 1) / (int(count) + 1))
         console.print(
-            f"one world beside {count} busy processes: {share:.2f} of its speed alone "
-            f"(its share of the cores: {fair:.2f})"
+            f"beside busy processes, {count}, of the speed alone: "
+            + ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
+            + f" (share of the cores: {fair:.2f})"
         )
     for name, seconds in figures.get("first_step_seconds", {}).items():
         console.print(f"first step of a fresh process, {name}: {seconds:.1f} s")
