@@ -197,6 +197,15 @@ def _mark_loops(module: Any, function: Any) -> None:
 class _LinkedLibrary(_LoopsAsWritten):
     """LLVM code that waits for a kernel to link, optimise and run it."""
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        # numba would go over all that are only called here, too: four of five.
+        codegen: Any = self._codegen
+        ll_module.data_layout = codegen._data_layout
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes, builder = codegen._function_pass_manager()
+                passes.run(function, builder)
+
     def _optimize_final_module(self) -> None:
         pass
 
