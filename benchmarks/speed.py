@@ -1,7 +1,8 @@
 """``make bench``: how fast the worlds run on this machine.
 
 Agent-steps a second of batches, the same observations written by a plain copy, environment steps
-of one world through the interfaces, and what the first step of a fresh process costs. With
+of one world through the interfaces, alone and beside busy processes, and what the first step of a
+fresh process costs. With
 ``--device cuda``, batches on the GPU instead, and what share of its memory's bandwidth they take.
 """
 
@@ -48,7 +49,7 @@ class Settings:
     worlds: tuple[int, ...] | None = None
     """Default: 1 to 16,384 on the CPU, 1,024 to 4 million on a GPU."""
     seconds: float = 1.0
-    """Each figure is the median of five runs of this length."""
+    """Each figure is the median of five runs that together take so long."""
     cold: bool = True
     """Also time the first step of a fresh process, without and with kernels kept on disk."""
     out: Path = Path("runs/bench/speed.json")
@@ -201,7 +202,6 @@ def beside_others(settings: Settings) -> dict[str, dict[str, float]]:
     And a plain loop, by turns, since a processor that is busy may be a slower one.
     """
     env: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=1_000_000).unwrapped
-    env.reset(seed=0)
     action = np.zeros(env.action_space.shape, np.float32)
     work: dict[str, Callable[[], object]] = {
         "one world": lambda: env.step(action),
@@ -215,6 +215,7 @@ def beside_others(settings: Settings) -> dict[str, dict[str, float]]:
     for count in sorted({1, os.cpu_count() or 1}):
         rounds = []
         for _ in range(5):
+            env.reset(seed=0)
             alone = rates()
             busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(count)]
             time.sleep(0.2)  # until they are busy

@@ -54,7 +54,8 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
 
     Written as ``@compiled``: it becomes part of whatever calls it. Or as
     ``@compiled(seldom=True)`` for what is long and seldom run: it stays by itself, so that what
-    runs in every step lies close together and fits the processor's cache of instructions.
+    runs in every step lies close together and fits the processor's cache of instructions. Types
+    have to fit on both sides of a branch, even where a constant decides it.
     """
 
     def decorate(function: F) -> F:

@@ -23,8 +23,8 @@ _NEEDLESS: Final = frozenset(
         "WithLifting", "InlineClosureLikes", "MakeFunctionToJitFunction", "InlineInlinables",
         "InlineOverloads", "FindLiterallyCalls", "LiteralUnroll",
         "LiteralPropagationSubPipelinePass", "RewriteDynamicRaises",
-        # Arrays as expressions, branches that constants decide (LLVM finds those too), and where a
-        # variable is let go of, which matters only to what is counted.
+        # Arrays as expressions; branches that constants decide, which LLVM finds too, so that both
+        # sides of one have to make sense; where a variable is let go of, for what is counted.
         "NopythonRewrites", "RewriteSemanticConstants", "DeadBranchPrune", "IRLegalization",
         # For people to read.
         "AnnotateTypes", "DumpParforDiagnostics", "NoPythonSupportedFeatureValidation",
@@ -99,7 +99,8 @@ def _give_library(state: Any, library: type[JITCodeLibrary]) -> None:
 class _Passes(PassManager):
     """The passes of a linked function, one after the other.
 
-    numba's own would tell who listens of each, time it, and print the types of all arguments.
+    numba's own would tell who listens of each, time it, print the types of all arguments, and take
+    its lock, which the kernel that links the function holds.
     """
 
     def __init__(self, state: Any) -> None:
@@ -118,12 +119,15 @@ class _Passes(PassManager):
 @contextmanager
 def _instead(context: Any, **methods: Callable[..., Any]) -> Iterator[None]:
     """Let one of numba's contexts do something else for a while (it holds its lock meanwhile)."""
-    vars(context).update(methods)
+    own = vars(context)
+    before = {name: own[name] for name in methods if name in own}
+    own.update(methods)
     try:
         yield
     finally:
         for name in methods:
-            vars(context).pop(name, None)
+            del own[name]
+        own.update(before)
 
 
 def _nothing() -> None:

@@ -66,8 +66,8 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
         last = min(first + BLOCK, n)
         looking = False  # anyone for whom the nearest slot of all is another's
         for i in range(first, last):
-            taken_by_others = taken & (_BIT << np.uint64(s[SLOT + i])) != _NO_BITS
-            looking |= taken_by_others and trackers[i].slot < 0
+            if trackers[i].slot < 0 and s[SLOT + i] >= _ZERO:
+                looking |= taken & (_BIT << np.uint64(s[SLOT + i])) != _NO_BITS
         if looking:
             find_slots(c, w, first, slots, taken, s)
             for i in range(first, last):

@@ -27,6 +27,7 @@ from posse.lanes import (
     store,
     transpose,
 )
+from posse.scenario import MAX_TRACKERS
 from posse.state import POSE
 
 BLOCK: Final = WIDTH
@@ -45,7 +46,7 @@ TASK: Final = 7 * ROW  # what every tracker is told of its task
 PREPARED: Final = 8 * ROW - 1  # not 0 once what is the same for all worlds stands there
 GAP: Final = 8 * ROW  # of each tracker: free width to the nearest disc, m
 EXCESS: Final = 9 * ROW  # of each tracker: not above 0 if anything is near
-SLOT: Final = 10 * ROW  # of each tracker: the nearest slot
+SLOT: Final = 10 * ROW  # of each tracker: the nearest slot, or the nearest that is free
 SLOT_DISTANCE: Final = 11 * ROW  # and how far it is, m
 SLOT_DISTANCE2: Final = 12 * ROW  # the same squared, m²
 HEARD2: Final = 13 * ROW  # within which the sonar has it, the square, and a little more, m²
@@ -61,8 +62,8 @@ MOST_IN_TEAM: Final = 16
 """Up to this team size, a whole team fits there."""
 
 SIZE: Final = _SHARED + 6 * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
-SIZE_FOR_ONE: Final = _SHARED + 64 * BLOCK
-"""Where memory is short: each world is then looked after alone."""
+SIZE_FOR_ONE: Final = _SHARED + MAX_TRACKERS * BLOCK
+"""Where memory is short: eight lists of a whole team fit, and the team's rows of one world."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -235,7 +236,7 @@ def describe_mates(
     """Return what robots observe of eight team-mates, of each as it stands in an observation.
 
     Number, age (0), range, bearing and heading (cosine and sine, ego), speed. From how the robots
-    head (one, or eight), who the team-mates are, where they are as the robots see it, and their
+    head, who the team-mates are, where they are as the robots see it, and their
     headings in the common frame.
     """
     per_metre = _ONE / greater(metres, _TINY)
@@ -300,13 +301,13 @@ def find_gaps(c: Record, s: FloatArray) -> None:
 
 @compiled
 def find_slots(
-    c: Record, w: Record, i: int, slots: Records, taken: np.uint64, s: FloatArray
+    c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: FloatArray
 ) -> None:
-    """Write the nearest slot that is not in the set ``taken`` of eight trackers from i on.
+    """Write, of eight trackers from ``first`` on, the nearest slot that is not in ``taken``.
 
-    -1: all are.
+    That is a set, a bit each; -1: all are.
     """
-    dx, dy = load(s, X + i) - w.x, load(s, Y + i) - w.y
+    dx, dy = load(s, X + first) - w.x, load(s, Y + first) - w.y
     ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
     nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
     for slot in range(natural(c.num_trackers)):
@@ -315,6 +316,6 @@ def find_slots(
             d2 = dx * dx + dy * dy
             nearest = choose(d2 < nearest2, np.float32(slot), nearest)
             nearest2 = lesser(nearest2, d2)
-    store(s, SLOT + i, nearest)
-    store(s, SLOT_DISTANCE2 + i, nearest2)
-    store(s, SLOT_DISTANCE + i, root(nearest2))
+    store(s, SLOT + first, nearest)
+    store(s, SLOT_DISTANCE2 + first, nearest2)
+    store(s, SLOT_DISTANCE + first, root(nearest2))

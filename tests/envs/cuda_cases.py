@@ -21,6 +21,7 @@ CASES: Final[dict[str, dict[str, Any]]] = {
     "radio": {"scenario": "radio", "message_size": 2, "num_trackers": 3},
     "leader-loss": {"scenario": "leader-loss", "horizon": 10, "break_window": (0.2, 0.6)},
     "field": {"scenario": "field", "horizon": 18, "sensor_outages": 1.0, "radio_outages": 1.0},
+    "crowd": {"scenario": "smart", "num_trackers": 10, "num_neighbours": 4, "message_size": 1},
     "target": {"scenario": "obstacles", "target_motion": "agent", "terminate_on_contact": True},
 }
 STEPS: Final = 24

@@ -326,7 +326,12 @@ def test_what_a_kernel_remembers_while_it_compiles_is_gone_afterwards() -> None:
     def wrong(x: float) -> float:
         return shifted(x, x)  # type: ignore[call-arg]
 
+    @kernel
+    def moved_twice(x: float) -> float:
+        return moved(x) + shifted(x)
+
     assert moved(2.0) == 3.0
+    assert moved_twice(2.0) == 6.0
     with pytest.raises(numba.TypingError):
         wrong(2.0)
     assert [set(vars(context)) for context in contexts] == before

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import posse
-from posse.survey import MOST_IN_TEAM, SIZE, SIZE_FOR_ONE, TEAM
+from posse.scenario import MAX_TRACKERS
+from posse.survey import BLOCK, LISTED, MOST_IN_TEAM, SIZE, SIZE_FOR_ONE, TEAM
 from posse.together import SONAR_AT, TARGET_AT, TASK_AT, _row
 
 TEAMS: list[dict[str, Any]] = [
@@ -56,6 +57,7 @@ def test_parts_are_written_where_they_are_declared() -> None:
 @pytest.mark.parametrize(("across", "size"), [(0, SIZE_FOR_ONE), (1, SIZE)])
 def test_the_largest_team_fits_its_memory(across: int, size: int) -> None:
     assert TEAM + 6 * _row(MOST_IN_TEAM, across) <= size
+    assert size >= LISTED + BLOCK * MAX_TRACKERS
 
 
 @pytest.mark.parametrize("worlds", [1, 8])
