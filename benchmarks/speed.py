@@ -2,8 +2,8 @@
 
 Agent-steps a second of batches, the same observations written by a plain copy, environment steps
 of one world through the interfaces, alone and beside busy processes, and what the first step of a
-fresh process costs. With
-``--device cuda``, batches on the GPU instead, and what share of its memory's bandwidth they take.
+fresh process costs. With ``--device cuda``, batches on the GPU instead, and what share of its
+memory's bandwidth they take.
 """
 
 from __future__ import annotations

@@ -3,9 +3,8 @@
 The fields come in five blocks, all declared here: own motion, the task, the target, which
 :mod:`posse.together` writes, as it does the mates of a team that is observed as a whole; the sonar
 (:mod:`posse.sonar`); and team-mates that are chosen, or heard of, which stand here, with all that a
-target is given that is an agent. Directions are
-cosine and sine; *ego* means the robot's own frame, x ahead and y to the left; the *common frame* is
-the one that the team agreed on at the start.
+target is given that is an agent. Directions are cosine and sine; *ego* means the robot's own frame,
+x ahead and y to the left; the *common frame* is the one that the team agreed on at the start.
 A quantity that is not known holds the field's ``unknown`` value.
 """
 

@@ -236,8 +236,8 @@ def describe_mates(
     """Return what robots observe of eight team-mates, of each as it stands in an observation.
 
     Number, age (0), range, bearing and heading (cosine and sine, ego), speed. From how the robots
-    head, who the team-mates are, where they are as the robots see it, and their
-    headings in the common frame.
+    head, who the team-mates are, where they are as the robots see it, and their headings in the
+    common frame.
     """
     per_metre = _ONE / greater(metres, _TINY)
     return transpose(

@@ -11,6 +11,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from posse.compiled import UNCOMPILED
+from posse.together import TOGETHER
 from posse.turn_code import (
     BELL,
     END,
@@ -31,8 +32,6 @@ _SERIAL_BELOW: Final = 2048
 """Robots below which a second thread costs more than it saves."""
 _PARTS: Final = 16
 """Parts of the worlds for each thread."""
-_TOGETHER: Final = 8
-"""Worlds that are observed together, and thereby faster (:mod:`posse.together`)."""
 _LOOKS: Final = 400_000
 """How often who waits looks before it falls asleep: for some tenths of a millisecond. Where there
 are more threads than cores it falls asleep at once."""
@@ -79,7 +78,8 @@ def by_turns(work: Callable[[int, Numbers], T], num_worlds: int, threads: int) -
 @functools.lru_cache(maxsize=64)
 def _fresh_turns(num_worlds: int, threads: int) -> Numbers:
     """Return turns of which none is taken."""
-    grain = _TOGETHER if num_worlds >= threads * _PARTS * _TOGETHER // 2 else 1
+    # Eights of worlds are observed together, and so faster.
+    grain = TOGETHER if num_worlds >= threads * _PARTS * TOGETHER // 2 else 1
     edges = [num_worlds * k // (threads * grain) * grain for k in range(threads)] + [num_worlds]
     turns = np.zeros((threads, TURN), np.int64)
     turns[:, NEXT], turns[:, END] = edges[:-1], edges[1:]
