@@ -107,10 +107,10 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     """Return what each part of a step costs for a tracker, ns; ``"step"`` is the whole."""
     batch, actions = moving(scenario, 256)
     agents = batch.num_worlds * batch.scenario.num_trackers
+    observations = np.empty(batch.observation_shape, np.float32)
     rewards = np.empty(batch.observation_shape[:2], np.float32)
     terms = np.empty((*rewards.shape, len(posse.REWARD_TERMS)), np.float32)
-    advance = batch.stepper(actions, rewards, terms)
-    observations, _ = advance()
+    advance = batch.stepper(actions, observations, rewards, terms)
     scratch = survey.new_scratch()
     arguments = (*batch._fixed, actions, observations, rewards, terms, scratch)
     costs = {"step": best(advance, seconds) / agents * 1e9}

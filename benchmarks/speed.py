@@ -58,12 +58,17 @@ class Settings:
 def per_second(step: Callable[[], object], seconds: float) -> list[float]:
     """Return calls a second, the median, least and greatest of five runs."""
     step()
+    started = time.perf_counter()
+    step()
+    # To look at the clock takes a while, too: once a millisecond will do.
+    together = 1 + int(1e-3 / (time.perf_counter() - started))
     rates = []
     for _ in range(5):
         calls, started = 0, time.perf_counter()
         while time.perf_counter() - started < seconds / 5 or calls < 3:
-            step()
-            calls += 1
+            for _ in range(together):
+                step()
+            calls += together
         rates.append(calls / (time.perf_counter() - started))
     return [statistics.median(rates), min(rates), max(rates)]
 
@@ -187,46 +192,97 @@ def interfaces(settings: Settings) -> dict[str, list[float]]:
     actions = {
         agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents
     }
-    team: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=1_000_000).unwrapped
-    team.reset(seed=0)
-    action = np.stack(list(actions.values()))
+
+    def step() -> None:
+        parallel.step(actions)
+        if not parallel.agents:
+            parallel.reset()
+
+    team = team_step(settings.scenario, np.stack(list(actions.values())))
     return {
-        "PettingZoo parallel": per_second(lambda: parallel.step(actions), settings.seconds),
-        "Gymnasium Team": per_second(lambda: team.step(action), settings.seconds),
+        "PettingZoo parallel": per_second(step, settings.seconds),
+        "Gymnasium Team": per_second(team, settings.seconds),
     }
 
 
-def beside_others(settings: Settings) -> dict[str, dict[str, float]]:
+def team_step(scenario: str, action: Any) -> Callable[[], None]:
+    """Return what makes a step of one world through Gymnasium, again and again."""
+    env: Any = gym.make("posse/Team-v0", scenario=scenario, horizon=1_000_000).unwrapped
+    env.reset(seed=0)
+
+    def step() -> None:
+        if env.step(action)[3]:
+            env.reset()
+
+    return step
+
+
+@dataclass
+class Pace:
+    """How often something was done, and what that took."""
+
+    calls: int = 0
+    seconds: float = 0.0
+    processor: float = 0.0
+    """Seconds in which it had a processor."""
+
+    def work(self, step: Callable[[], object], seconds: float) -> None:
+        """Do it for so long."""
+        started, had = time.perf_counter(), time.thread_time()
+        while time.perf_counter() - started < seconds:
+            for _ in range(10):
+                step()
+            self.calls += 10
+        self.seconds += time.perf_counter() - started
+        self.processor += time.thread_time() - had
+
+    def beside(self, alone: Pace) -> dict[str, float]:
+        """Return its speed as a share of that alone, by the clock and by the processor's."""
+        return {
+            "share": self.calls / self.seconds / (alone.calls / alone.seconds),
+            "of_the_processor": self.calls / self.processor / (alone.calls / alone.processor),
+        }
+
+
+def beside_others(settings: Settings) -> dict[str, dict[str, dict[str, float]]]:
     """Return how fast a single world is beside busy processes, as a share of its speed alone.
 
-    And a plain loop, by turns, since a processor that is busy may be a slower one.
+    And a plain loop, by turns of a hundredth of a second, since a processor that is busy may be a
+    slower one, and who gets how much of it is up to the system.
     """
-    env: Any = gym.make("posse/Team-v0", scenario=settings.scenario, horizon=1_000_000).unwrapped
-    action = np.zeros(env.action_space.shape, np.float32)
+    still = np.zeros((posse.get_scenario(settings.scenario).num_trackers, 2), np.float32)
     work: dict[str, Callable[[], object]] = {
-        "one world": lambda: env.step(action),
+        "one world": team_step(settings.scenario, still),
         "a plain loop": lambda: sum(range(1000)),
     }
 
-    def rates() -> dict[str, float]:
-        return {name: per_second(step, settings.seconds / 2)[0] for name, step in work.items()}
+    def paces() -> dict[str, Pace]:
+        found = {name: Pace() for name in work}
+        for name, step in list(work.items()) * max(1, round(50 * settings.seconds)):
+            found[name].work(step, 0.01)
+        return found
 
     shares = {}
     for count in sorted({1, os.cpu_count() or 1}):
         rounds = []
         for _ in range(5):
-            env.reset(seed=0)
-            alone = rates()
+            alone = paces()
             busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(count)]
             time.sleep(0.2)  # until they are busy
             try:
-                beside = rates()
+                beside = paces()
             finally:
                 for process in busy:
                     process.kill()
                     process.wait()
-            rounds.append({name: beside[name] / alone[name] for name in work})
-        shares[str(count)] = {name: statistics.median(r[name] for r in rounds) for name in work}
+            rounds.append({name: beside[name].beside(alone[name]) for name in work})
+        shares[str(count)] = {
+            name: {
+                kind: statistics.median(r[name][kind] for r in rounds)
+                for kind in ("share", "of_the_processor")
+            }
+            for name in work
+        }
     return shares
 
 
@@ -289,8 +345,11 @@ def main() -> None:
         fair = min(1.0, (os.cpu_count() or 1) / (int(count) + 1))
         console.print(
             f"beside busy processes, {count}, of the speed alone: "
-            + ", ".join(f"{name} {share:.2f}" for name, share in shares.items())
-            + f" (share of the cores: {fair:.2f})"
+            + ", ".join(
+                f"{name} {s['share']:.2f} ({s['of_the_processor']:.2f} per second of processor)"
+                for name, s in shares.items()
+            )
+            + f"; share of the cores: {fair:.2f}"
         )
     for name, seconds in figures.get("first_step_seconds", {}).items():
         console.print(f"first step of a fresh process, {name}: {seconds:.1f} s")

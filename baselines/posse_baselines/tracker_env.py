@@ -125,20 +125,21 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
         team[...] = world.batch.check_actions(actions)
         team[0, self.number] = 0
         team[0, self.number, : len(own)] = own
-        observations, over = world.advance()
-        self._observations = observations
+        over = world.advance()
+        self._observations = world.observations[None].copy()
         info: dict[str, Any] = {
             "score": world.score,
             "reward_terms": name_terms(*world.terms[self.number].tolist()),
             "working": bool(world.working()[self.number]),
         }
-        terminated = False
+        terminated = truncated = False
         if over:
             terminated, info["metrics"] = world.end()
+            truncated = not terminated
         if self.render_mode == "human":
             self.render()
         reward = float(world.rewards[self.number])
-        return self._own(observations), reward, terminated, bool(over) and not terminated, info
+        return self._own(self._observations), reward, terminated, truncated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".

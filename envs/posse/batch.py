@@ -346,34 +346,33 @@ class Batch:
         return observations, rewards, terminated, truncated, infos
 
     def stepper(
-        self, actions: FloatArray, rewards: FloatArray, terms: FloatArray
-    ) -> Callable[[], tuple[FloatArray, int]]:
+        self,
+        actions: FloatArray,
+        observations: FloatArray,
+        rewards: FloatArray,
+        terms: FloatArray,
+    ) -> Callable[[], int]:
         """Return a function that advances every world by one control step, and packs up nothing.
 
         For the environments of one world, where to look up what a step needs, and to pack up what
-        it gives, would take longer than the step. Each call reads the actions anew and returns
-        observations (E, rows, F) and how many worlds' episodes are over. It works on the calling
+        it gives, would take longer than the step. Each call reads the actions anew, writes to the
+        other arrays, and returns how many worlds' episodes are over. It works on the calling
         thread alone, starts no episode in the mode "same_step", and checks nothing: the worlds
         must have been reset, and the actions been through as good a check as
         :meth:`check_actions`. Made before the first :meth:`reset` it is slower than afterwards.
 
         Args:
             actions: Where to read the actions from, (E, rows, 2 + message_size).
+            observations: Where to write the observations, (E, rows, F).
             rewards: Where to write the rewards, (E, rows).
             terms: Where to write the reward terms, (E, rows, K) in the order of ``REWARD_TERMS``.
         """
-        kernel, take = self._kernel, self._observations.take
-        before = (*self._fixed, actions)
-        after = (
-            rewards, terms, self._new_flags(), self._orders,
+        arguments = (
+            *self._fixed, actions, observations, rewards, terms, self._new_flags(), self._orders,
             self._scratch[0], 0, all_at_once(self.num_worlds),
         )  # fmt: skip
-
-        def advance() -> tuple[FloatArray, int]:
-            observations = take()
-            return observations, kernel(*before, observations, *after)
-
-        return advance
+        kernel = self._kernel
+        return lambda: kernel(*arguments)
 
     def _check_running(self) -> None:
         """Raise if a step is not possible now."""

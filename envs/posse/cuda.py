@@ -337,7 +337,7 @@ class CudaBatch(Batch):
                 observations = self._begin(done.over, anew=False)
         return observations, done.rewards, done.terminated, done.truncated, infos
 
-    def stepper(self, actions: FloatArray, rewards: FloatArray, terms: FloatArray) -> Any:
+    def stepper(self, *arrays: FloatArray) -> Any:
         """Not offered: it is for environments of one world, which a GPU would only slow down."""
         raise NotImplementedError("a batch on the GPU has no stepper(): call step()")
 

@@ -148,7 +148,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         if not world.running:
             world.check_running()
         world.actions.by_row(action)
-        observations, over = world.advance()
+        over = world.advance()
         info: dict[str, Any] = {
             "score": world.score,
             # Rows that already are an array: name_terms(*rows) would take longer.
@@ -163,7 +163,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         if self.render_mode == "human":
             self.render()
         rewards = world.rewards.tolist()
-        return observations[0], sum(rewards) / len(rewards), terminated, truncated, info
+        return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
@@ -226,7 +226,7 @@ class SoloEnv(TeamEnv):
         if not world.running:
             world.check_running()
         world.actions.by_agent({"tracker_0": action})
-        observations, over = world.advance()
+        over = world.advance()
         info: dict[str, Any] = {
             "score": world.score,
             "reward_terms": name_terms(*world.terms[0].tolist()),
@@ -237,7 +237,7 @@ class SoloEnv(TeamEnv):
             truncated = not terminated
         if self.render_mode == "human":
             self.render()
-        return observations[0, 0], world.rewards.item(), terminated, truncated, info
+        return world.observations[0].copy(), world.rewards.item(), terminated, truncated, info
 
 
 def solo_options(options: dict[str, Any] | None) -> dict[str, Any] | None:

@@ -181,7 +181,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         if not world.running:
             world.check_running()
         world.actions.by_agent(actions)
-        observations, over = world.advance()
+        over = world.advance()
         score = world.score
         infos: _Infos = {
             agent: {"score": score, "reward_terms": name_terms(*values)}
@@ -201,7 +201,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         if self.render_mode == "human":
             self.render()
         return (
-            dict(zip(agents, observations[0])),  # noqa: B905
+            dict(zip(agents, world.observations.copy())),  # noqa: B905
             dict(zip(agents, world.rewards.tolist())),  # noqa: B905
             terminated,
             truncated,

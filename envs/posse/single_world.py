@@ -38,9 +38,10 @@ class SingleWorld:
     Attributes:
         running: Whether a step is possible: after a reset, and before the end.
         actions: What reads the actions for :attr:`advance`.
-        advance: Makes a control step with the actions that were read; returns observations
-            (1, rows, F), and 1 where the episode is over: then :meth:`end` is called.
-        rewards: (rows,) of the last step; the next one overwrites them.
+        advance: Makes a control step with the actions that were read; returns 1 where the episode
+            is over: then :meth:`end` is called.
+        observations: (rows, F) of the last step; the next one overwrites them.
+        rewards: (rows,) of the last step, likewise.
         terms: (rows, K) reward terms of the last step, likewise.
 
     Raises:
@@ -81,17 +82,19 @@ class SingleWorld:
         # Made once: making a view or an array takes longer than reading it.
         self._score = self.batch.worlds["score"]
         self.actions = ActionReader(self.scenario, self._discrete)
-        self._rewards: FloatArray = np.zeros((1, self.scenario.num_agents), np.float32)
-        self._terms: FloatArray = np.zeros((*self._rewards.shape, len(REWARD_TERMS)), np.float32)
-        self.rewards: FloatArray = self._rewards[0]
-        self.terms: FloatArray = self._terms[0]
+        rows = (1, self.scenario.num_agents)
+        self._written: tuple[FloatArray, ...] = tuple(
+            np.zeros(shape, np.float32)
+            for shape in (self.batch.observation_shape, rows, (*rows, len(REWARD_TERMS)))
+        )
+        self.observations, self.rewards, self.terms = (array[0] for array in self._written)
         self._make_ready()
 
     def _make_ready(self) -> None:
-        self.advance = self.batch.stepper(self.actions.read, self._rewards, self._terms)
+        self.advance = self.batch.stepper(self.actions.read, *self._written)
 
     def __getstate__(self) -> dict[str, Any]:
-        derived = ("_score", "actions", "_rewards", "_terms", "rewards", "terms", "advance")
+        derived = ("_score", "actions", "_written", "observations", "rewards", "terms", "advance")
         kept = {k: v for k, v in self.__dict__.items() if k not in derived}
         return {**kept, "_renderer": None, "_state_layout": None}
 

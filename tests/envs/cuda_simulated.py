@@ -189,9 +189,8 @@ def test_what_is_refused() -> None:
         batch.reset(options={"reset_mask": cuda.to_device(mask.astype(np.int32))})
     with pytest.raises(ValueError, match="unknown option"):
         batch.reset(options={"mask": mask})
-    rewards_and_terms = (np.zeros((3, 5), np.float32), np.zeros((3, 5, 7), np.float32))
     with pytest.raises(NotImplementedError, match="call step"):
-        batch.stepper(actions_for(batch, 0), *rewards_and_terms)
+        batch.stepper(*[actions_for(batch, 0)] * 4)
     with pytest.raises(ValueError, match="num_threads=2 is for device='cpu'"):
         make("smart", "cuda", num_threads=2)
     with pytest.raises(ValueError, match="own_kernel=True is for device='cpu'"):
