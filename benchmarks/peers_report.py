@@ -118,10 +118,11 @@ def _disturbance(rows: list[Row]) -> str:
     taken = sum(len(row["samples"]) for row in rows)
     dropped = sum(row["dropped"] for row in rows)
     if not spoilt:
+        others = f"; {dropped} others were disturbed, and repeated" if dropped else ""
         return (
-            "Nothing else that the machine knows of kept it busy during these samples; "
-            f"{dropped} others were disturbed, and repeated. A virtual machine does not know what "
-            "its host does: read the ratios rather than the speeds."
+            f"Nothing else that the machine knows of kept it busy during these samples{others}. "
+            "A virtual machine does not know what its host does: read the ratios rather than the "
+            "speeds."
         )
     return DISTURBED.format(spoilt=spoilt, taken=taken, dropped=dropped)
 

@@ -61,7 +61,7 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
     started = time.perf_counter()
     step()
     # To look at the clock takes a while, too: once a millisecond will do.
-    together = 1 + int(1e-3 / (time.perf_counter() - started))
+    together = 1 + int(1e-3 / max(time.perf_counter() - started, 1e-6))
     rates = []
     for _ in range(5):
         calls, started = 0, time.perf_counter()
@@ -211,7 +211,8 @@ def team_step(scenario: str, action: Any) -> Callable[[], None]:
     env.reset(seed=0)
 
     def step() -> None:
-        if env.step(action)[3]:
+        _, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
             env.reset()
 
     return step
@@ -224,7 +225,7 @@ class Pace:
     calls: int = 0
     seconds: float = 0.0
     processor: float = 0.0
-    """Seconds in which it had a processor."""
+    """Seconds in which the thread had a processor."""
 
     def work(self, step: Callable[[], object], seconds: float) -> None:
         """Do it for so long."""

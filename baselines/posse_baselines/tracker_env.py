@@ -126,7 +126,7 @@ class TrackerEnv(gymnasium.Env[Any, Any]):
         team[0, self.number] = 0
         team[0, self.number, : len(own)] = own
         over = world.advance()
-        self._observations = world.observations[None].copy()
+        self._observations = world.observations[None].copy()  # team-mates may keep what they saw
         info: dict[str, Any] = {
             "score": world.score,
             "reward_terms": name_terms(*world.terms[self.number].tolist()),

@@ -360,13 +360,25 @@ class Batch:
         thread alone, starts no episode in the mode "same_step", and checks nothing: the worlds
         must have been reset, and the actions been through as good a check as
         :meth:`check_actions`. Made before the first :meth:`reset` it is slower than afterwards.
+        All four arrays are float32, contiguous and writable, and no two overlap.
 
         Args:
             actions: Where to read the actions from, (E, rows, 2 + message_size).
             observations: Where to write the observations, (E, rows, F).
             rewards: Where to write the rewards, (E, rows).
             terms: Where to write the reward terms, (E, rows, K) in the order of ``REWARD_TERMS``.
+
+        Raises:
+            ValueError: An array of another type, shape or layout.
         """
+        rows = self.observation_shape[:2]
+        for name, array, shape in (
+            ("actions", actions, self.action_shape),
+            ("observations", observations, self.observation_shape),
+            ("rewards", rewards, rows),
+            ("terms", terms, (*rows, len(REWARD_TERMS))),
+        ):
+            _check_array(name, array, shape)
         arguments = (
             *self._fixed, actions, observations, rewards, terms, self._new_flags(), self._orders,
             self._scratch[0], 0, all_at_once(self.num_worlds),
@@ -533,6 +545,18 @@ def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
         f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or "
         "clip the policy's output first"
     )
+
+
+def _check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
+    """Raise if an array is not what compiled code takes it for without looking."""
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"{name} must be a numpy array, got {type(array).__name__}")
+    if array.dtype != np.float32 or array.shape != shape or not array.flags.carray:
+        raise ValueError(
+            f"{name} must be a contiguous, writable float32 array of shape {shape}, got "
+            f"{array.dtype} of shape {array.shape} with strides {array.strides}"
+            + ("" if array.flags.writeable else ", not writable")
+        )
 
 
 def _check_count(name: str, value: object, least: int) -> None:

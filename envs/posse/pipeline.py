@@ -7,18 +7,13 @@ link skip what would be thrown away or finds nothing in plain scalar code.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar, Final
 
-import numba.core.boxing  # noqa: F401 (fills the table of how arguments are taken)
-from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager
-from numba.core.pythonapi import _unboxers
-
-from posse.array_code import take_array
 
 _NO_RUNTIME_UNROLL: Final = "llvm.loop.unroll.runtime.disable"
 
@@ -45,8 +40,7 @@ class LinkedForm(CompilerBase):
 
     def __init__(self, typing: Any, target: Any, *others: Any) -> None:
         # numba would look what was added to all it knows, as it just did for what links this one.
-        still = {"refresh": _nothing}
-        with _instead(vars(typing), still), _instead(vars(target), still):
+        with _instead(typing, refresh=_nothing), _instead(target, refresh=_nothing):
             super().__init__(typing, target, *others)  # type: ignore[no-untyped-call]
         vars(self.state.targetctx).pop("refresh", None)  # a copy of the target
         self.state.flags = _PlainFlags(self.state.flags)  # type: ignore[no-untyped-call]
@@ -69,12 +63,10 @@ class Kernel(CompilerBase):
         tenth of the time.
         """
         typing = self.state.typingctx
-        memory = {"resolve_function_type": _remembered(typing.resolve_function_type)}
-        taking = {types.Array: take_array}
         collects = gc.isenabled()
         gc.disable()
         try:
-            with _instead(vars(typing), memory), _instead(_unboxers.functions, taking):
+            with _instead(typing, resolve_function_type=_remembered(typing.resolve_function_type)):
                 return super().compile_extra(func)  # type: ignore[no-untyped-call]
         finally:
             if collects:
@@ -125,16 +117,17 @@ class _Passes(PassManager):
 
 
 @contextmanager
-def _instead(table: dict[Any, Any], entries: Mapping[Any, Callable[..., Any]]) -> Iterator[None]:
-    """Have other entries in one of numba's tables for a while (it holds its lock meanwhile)."""
-    before = {key: table[key] for key in entries if key in table}
-    table.update(entries)
+def _instead(context: Any, **methods: Callable[..., Any]) -> Iterator[None]:
+    """Let one of numba's contexts do something else for a while (it holds its lock meanwhile)."""
+    own = vars(context)
+    before = {name: own[name] for name in methods if name in own}
+    own.update(methods)
     try:
         yield
     finally:
-        for key in entries:
-            del table[key]
-        table.update(before)
+        for name in methods:
+            del own[name]
+        own.update(before)
 
 
 def _nothing() -> None:

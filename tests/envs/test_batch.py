@@ -114,6 +114,38 @@ def test_a_seed_given_to_reset_is_the_seed_of_the_batch() -> None:
     np.testing.assert_array_equal(later.reset(), given.reset(), "and the next episode, too")
 
 
+def test_a_stepper_makes_the_batch_s_own_steps_and_takes_nothing_but_its_arrays() -> None:
+    batch, stepped = (posse.batch("field", 3, seed=5) for _ in range(2))
+    batch.reset()
+    stepped.reset()
+    rows = batch.observation_shape[:2]
+    shapes = batch.action_shape, batch.observation_shape, rows, (*rows, len(posse.REWARD_TERMS))
+    arrays = [np.zeros(shape, np.float32) for shape in shapes]
+    step = stepped.stepper(*arrays)
+    for k in range(20):
+        arrays[0][:] = actions_for(batch, k)
+        assert step() == 0
+        observations, rewards, _, _, infos = batch.step(arrays[0])
+        np.testing.assert_array_equal(arrays[1], observations)
+        np.testing.assert_array_equal(arrays[2], rewards)
+        for number, term in enumerate(posse.REWARD_TERMS):
+            np.testing.assert_array_equal(arrays[3][..., number], infos["reward_terms"][term.name])
+    locked = arrays[2].copy()
+    locked.setflags(write=False)
+    for place, name, wrong, said in (
+        (0, "actions", arrays[0].tolist(), "got list"),
+        (1, "observations", arrays[1][:2], "got float32 of shape \\(2, "),
+        (2, "rewards", arrays[2].astype(np.float64), "got float64"),
+        (2, "rewards", np.asfortranarray(arrays[2]), "with strides \\(4, 12\\)"),
+        (2, "rewards", locked, "not writable"),
+        (3, "terms", arrays[2], "shape \\(3, 5, 7\\), got float32 of shape \\(3, 5\\)"),
+    ):
+        given: list[Any] = [*arrays]
+        given[place] = wrong
+        with pytest.raises(ValueError, match=f"{name} must be .*{said}"):
+            stepped.stepper(*given)
+
+
 def test_autoreset_modes_play_the_same_episodes() -> None:
     """One after the other, told apart only by when the next one begins."""
     make: dict[str, Any] = {"seed": 4, "horizon": 20, "num_trackers": 3, "settle_time": 1.0}

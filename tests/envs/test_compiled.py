@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from posse.compiled import compiled, direct, kernel
+from posse.compiled import compiled, kernel
 
 HELPER = """
 from posse.compiled import compiled
@@ -309,12 +309,10 @@ def test_a_function_is_compiled_once_for_all_whole_numbers() -> None:
 
 def test_what_a_kernel_remembers_while_it_compiles_is_gone_afterwards() -> None:
     """numba's contexts are everyone's: nothing of ours may stay in them."""
-    from numba.core.pythonapi import _unboxers
     from numba.core.registry import cpu_target
 
     contexts = cpu_target.typing_context, cpu_target.target_context
     before = [set(vars(context)) for context in contexts]
-    taken = _unboxers.functions[numba.types.Array]
 
     @compiled
     def shifted(x: float) -> float:
@@ -337,7 +335,6 @@ def test_what_a_kernel_remembers_while_it_compiles_is_gone_afterwards() -> None:
     with pytest.raises(numba.TypingError):
         wrong(2.0)
     assert [set(vars(context)) for context in contexts] == before
-    assert _unboxers.functions[numba.types.Array] is taken
 
     @numba.extending.overload(moved_later)
     def _(x: Any) -> Any:
@@ -347,49 +344,6 @@ def test_what_a_kernel_remembers_while_it_compiles_is_gone_afterwards() -> None:
         return tenfold
 
     assert numba.njit(lambda x: moved_later(x))(2.0) == 20.0, "numba still learns new functions"
-
-
-_RECORD = np.dtype([("flag", "i4"), ("x", "f4")], align=True)
-_CUBE = np.arange(60, dtype=np.float32).reshape(3, 4, 5)
-
-
-@pytest.mark.parametrize(
-    "array",
-    [
-        _CUBE,
-        _CUBE[::-1, 1:, ::2],
-        _CUBE.T,
-        np.asfortranarray(_CUBE),
-        _CUBE[:, :0],
-        _CUBE.astype(np.float64)[..., 2:3],
-        np.arange(60).reshape(3, 4, 5)[::2],
-        (_CUBE > 7)[:, :, ::-2],
-        np.zeros((2, 3, 4), _RECORD)[:, ::-1],
-        np.zeros((2, 3, 4), _RECORD).view(np.recarray)["x"],
-        np.broadcast_to(np.arange(5.0), (3, 4, 5)),
-    ],
-)
-def test_a_kernel_takes_an_array_as_it_lies(array: npt.NDArray[Any]) -> None:
-    @kernel
-    def described(a: npt.NDArray[Any]) -> Any:
-        return a.size, a.itemsize, a.shape, a.strides
-
-    @kernel
-    def copied(a: npt.NDArray[Any], out: npt.NDArray[Any]) -> None:
-        for i in range(a.shape[0]):
-            for j in range(a.shape[1]):
-                for k in range(a.shape[2]):
-                    out[i, j, k] = a[i, j, k]
-
-    room = np.zeros((*array.shape[:2], 2 * array.shape[2]), array.dtype)
-    holders = sys.getrefcount(array), sys.getrefcount(room)
-    for _ in range(3):  # by numba's own call, then without it
-        assert described(array) == (array.size, array.itemsize, array.shape, array.strides)
-        described = direct(described)
-        copied(array, room[:, :, ::2])
-    assert (sys.getrefcount(array), sys.getrefcount(room)) == holders
-    np.testing.assert_array_equal(room[:, :, ::2], array)
-    assert not room[:, :, 1::2].tobytes().strip(b"\0")
 
 
 def moved_later(x: float) -> float:
