@@ -153,8 +153,16 @@ def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
             mark = " (shipped)" if seed["seed"] == card["seed"] else ""
             score = Estimate(**seed["score"])
             lines.append(row(f"`{name}`", f"{seed['seed']}{mark}", score, f"{seed['steps']:,}"))
-    lines += ["", "Those that are shipped come from:", "", "```"]
-    lines += [f"{card['command']}  # {name}" for name, card in cards.items()]
+    lines += [
+        "",
+        "They come from these commands, each at its commit. They state what the defaults of a "
+        "scenario say now, and did not yet say then.",
+        "",
+        "```",
+    ]
+    for name, card in cards.items():
+        for seed in card["training_seeds"]:
+            lines.append(f"{seed['command']}  # {name}, commit {seed['commit']}")
     return [*lines, "```"]
 
 
@@ -163,7 +171,9 @@ def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
     lines = [
         "## Another training, other worlds",
         "",
-        "The difference to the better DDCS model, with training seeds and worlds resampled.",
+        "The difference to the better DDCS model, with training seeds and worlds resampled. Of the "
+        "policies of a training, the best alone is shipped: to make this section again, train the "
+        "others with the commands above, and name all the files in `SEEDS`.",
         "",
         "| scenario | policy | training seeds | difference |",
         "|---|---|---|---|",

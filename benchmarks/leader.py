@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
+from posse.state import slot_records
 from posse_baselines import begin
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs import Settings as Team
@@ -28,14 +29,15 @@ class Settings:
 
 
 def look(law: str, scenario: str, s: Settings) -> tuple[float, float]:
-    """Return the leader's mean angle off the target's wake, degrees, and the mean score."""
+    """Return the leader's mean distance from the first slot, m, and the mean score."""
     policy = DDCS(Team(model="centralized", leader_law=law))
     batch = posse.batch(
         scenario, s.worlds, seed=s.seed, split=s.split, message_size=policy.message_size
     )
     target, trackers, every = batch.worlds, batch.arrays.tracker, np.arange(s.worlds)
     memory, observations = begin(policy, batch), batch.reset()
-    angles, scores = [], []
+    slot = slot_records(batch.scenario)[0]
+    errors, scores = [], []
     for step in range(batch.scenario.horizon - 1):
         actions, memory = policy.act(observations, memory)
         observations = batch.step(actions)[0]
@@ -44,24 +46,24 @@ def look(law: str, scenario: str, s: Settings) -> tuple[float, float]:
             continue
         leaders = np.median(policy.annotations(memory)["leader"], axis=1).astype(int)
         leader = trackers[every, np.maximum(leaders, 0)]
-        dx, dy = target["x"] - leader["x"], target["y"] - leader["y"]
-        along = dx * target["heading_cos"] + dy * target["heading_sin"]
-        across = dy * target["heading_cos"] - dx * target["heading_sin"]
-        angles.append(np.abs(np.degrees(np.arctan2(across, along)))[leaders >= 0].mean())
-    return float(np.mean(angles)), float(np.mean(scores))
+        c, sine = target["frame_cos"], target["frame_sin"]
+        dx = target["x"] + c * slot["x"] - sine * slot["y"] - leader["x"]
+        dy = target["y"] + sine * slot["x"] + c * slot["y"] - leader["y"]
+        errors.append(np.hypot(dx, dy)[leaders >= 0].mean())
+    return float(np.mean(errors)), float(np.mean(scores))
 
 
 def main() -> None:
     """Play, and print a row for each scenario."""
     s = tyro.cli(Settings)
     table = Table(title=f"ddcs-centralized, {s.worlds} worlds, split {s.split}, seed {s.seed}")
-    for column in ("scenario", "pursuit: angle", "score", "slot: angle", "score"):
+    for column in ("scenario", "pursuit: off slot", "score", "slot: off slot", "score"):
         table.add_column(column, justify="right")
     for scenario in s.scenarios:
         cells = []
         for law in ("pursuit", "slot"):
-            angle, mean = look(law, scenario, s)
-            cells += [f"{angle:.1f}°", f"{mean:.3f}"]
+            error, mean = look(law, scenario, s)
+            cells += [f"{error:.2f} m", f"{mean:.3f}"]
         table.add_row(scenario, *cells)
     Console().print(table)
 

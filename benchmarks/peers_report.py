@@ -11,7 +11,7 @@ Row = dict[str, Any]
 
 CONTENTS = {
     "posse": (
-        "`smart`: 5 trackers with limits on acceleration, an evasive target, swept contacts, "
+        "`smart`: 5 trackers with limits on speed and turn rate, an evasive target, swept contacts, "
         "target sensor, sonar ring, what team-mates tell, score and every metric, automatic "
         "resets; open plane and a perfect radio, so nothing to occlude and nothing lost"
     ),

@@ -153,7 +153,7 @@ class Scenario:
         ("progress", 0.5),
         ("contact", -0.2),
     )
-    """Weight of each reward term by name (``posse.reward_terms()`` lists them); others weigh 0."""
+    """Weight of each reward term by name (``posse.REWARD_TERMS`` lists them); others weigh 0."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reward_weights", _weights(self.reward_weights))

@@ -287,7 +287,7 @@ def test_every_law_settles_on_a_straight_target(guidance: str, model: str) -> No
 
 
 def test_pngl_spreads_bearings_by_its_constants() -> None:
-    # The bearing of the tracker with constant K settles at θ_t / K (PAPER.md: shown at θ_t = π).
+    # The bearing of the tracker with constant K settles at θ_t / K, shown at θ_t = π.
     policy = DDCS(Settings(guidance="pngl"), "pngl")
     pose = [(x, y, 3.0) for x, y in ((6.0, -2.0), (6.0, -1.0), (6.0, 0.0), (6.0, 1.0), (6.0, 2.0))]
     options = {"tracker_pose": pose, "target_pose": (0.0, 0.0, 2.6)}

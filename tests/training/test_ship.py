@@ -110,10 +110,13 @@ def test_the_command_on_record_gives_the_settings_again() -> None:
             imitate="ddcs-distributed", beside=None, tensorboard=False,
         ),
         replace(default_settings("smart,radio", "sac"), wandb="my project"),
+        default_settings("field"),
+        replace(default_settings("smart"), imitate=None, log_deviation=-0.5),
     ):  # fmt: skip
         words = shlex.split(command_of(settings))[2:]
-        default = default_settings(settings.scenario, settings.algorithm)
-        assert tyro.cli(TrainSettings, default=default, args=words) == settings
+        for own in (True, False):  # with the scenario's own defaults, and before there were any
+            default = default_settings(settings.scenario, settings.algorithm, own=own)
+            assert tyro.cli(TrainSettings, default=default, args=words) == settings
 
 
 def test_the_command_says_how_each_seed_did(

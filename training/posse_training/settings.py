@@ -177,11 +177,14 @@ class TrainSettings:
         return cls(**fitted)
 
 
-def default_settings(scenario: str = "smart", algorithm: str = "ppo") -> TrainSettings:
+def default_settings(
+    scenario: str = "smart", algorithm: str = "ppo", *, own: bool = True
+) -> TrainSettings:
     """Return the settings that a scenario is trained with unless told otherwise.
 
     They are kept in ``posse_training/defaults``, a file for each scenario; ``all.toml`` holds for
     every scenario. In each, the table ``all`` holds for every algorithm, the others for one.
+    Without the scenario's ``own`` these are what holds for every scenario.
 
     Raises:
         SettingsError: An unknown algorithm, or a default that no training can have.
@@ -193,7 +196,7 @@ def default_settings(scenario: str = "smart", algorithm: str = "ppo") -> TrainSe
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
     folder = resources.files("posse_training") / "defaults"
     name = "mixture" if "," in scenario else scenario
-    for file in (folder / "all.toml", folder / f"{name}.toml"):
+    for file in (folder / "all.toml", *([folder / f"{name}.toml"] if own else ())):
         if file.is_file():
             tables = tomllib.loads(file.read_text(encoding="utf-8"))
             for table in ("all", algorithm):

@@ -111,7 +111,7 @@ def ship(settings: Settings) -> Path:
 
 
 def _one_training(runs: Sequence[Path]) -> list[TrainSettings]:
-    """Return the settings of runs that differ in their training seeds alone.
+    """Return the settings of runs that differ in nothing but their seeds and how they were kept.
 
     Raises:
         SettingsError: They differ in something else, or two have one seed.
@@ -138,12 +138,18 @@ def _one_training(runs: Sequence[Path]) -> list[TrainSettings]:
 
 
 def command_of(settings: TrainSettings) -> str:
-    """Return the command that trains with these settings, wherever its folder was."""
+    """Return the command that trains with these settings, wherever its folder was.
+
+    What a scenario's own defaults say is stated, too: they are often written down only after the
+    training that found them, so that at the commit of the training there were none.
+    """
     default = default_settings(settings.scenario, settings.algorithm).to_dict()
+    of_all = default_settings(settings.scenario, settings.algorithm, own=False).to_dict()
     stated = ("scenario", "algorithm", "steps", "seed")
     words = ["posse", "train"]
     for name, value in settings.to_dict().items():
-        if name == "folder" or (name not in stated and value == default[name]):
+        usual = value == default[name] == of_all[name]
+        if name == "folder" or (usual and name not in stated):
             continue
         option = name.replace("_", "-")
         if isinstance(value, bool):
