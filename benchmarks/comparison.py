@@ -58,6 +58,17 @@ class Settings:
     """Folder for the rows and figures."""
 
 
+THEIR_COMMANDS: Final = (
+    "They come from these commands, each at its commit. They state what the defaults of a scenario "
+    "say now, and did not yet say then."
+)
+ANOTHER_TRAINING: Final = (
+    "The difference to the better DDCS model, with training seeds and worlds resampled. Of the "
+    "policies of a training, the best alone is shipped: to make this section again, train the "
+    "others with the commands above, and name all the files in `SEEDS`."
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Play everything, fill the page and put the figures beside it."""
     settings = tyro.cli(Settings, args=arguments)
@@ -155,8 +166,7 @@ def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
             lines.append(row(f"`{name}`", f"{seed['seed']}{mark}", score, f"{seed['steps']:,}"))
     lines += [
         "",
-        "They come from these commands, each at its commit. They state what the defaults of a "
-        "scenario say now, and did not yet say then.",
+        THEIR_COMMANDS,
         "",
         "```",
     ]
@@ -171,9 +181,7 @@ def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
     lines = [
         "## Another training, other worlds",
         "",
-        "The difference to the better DDCS model, with training seeds and worlds resampled. Of the "
-        "policies of a training, the best alone is shipped: to make this section again, train the "
-        "others with the commands above, and name all the files in `SEEDS`.",
+        ANOTHER_TRAINING,
         "",
         "| scenario | policy | training seeds | difference |",
         "|---|---|---|---|",

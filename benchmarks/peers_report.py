@@ -11,9 +11,9 @@ Row = dict[str, Any]
 
 CONTENTS = {
     "posse": (
-        "`smart`: 5 trackers with limits on speed and turn rate, an evasive target, swept contacts, "
-        "target sensor, sonar ring, what team-mates tell, score and every metric, automatic "
-        "resets; open plane and a perfect radio, so nothing to occlude and nothing lost"
+        "`smart`: 5 trackers with limits on speed and turn rate, an evasive target, swept "
+        "contacts, target sensor, sonar ring, what team-mates tell, score and every metric, "
+        "automatic resets; open plane and a perfect radio, so nothing to occlude and nothing lost"
     ),
     "posse, own kernel": (
         "the same worlds, stepped by a kernel that is compiled for this scenario alone "
