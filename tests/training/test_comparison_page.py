@@ -31,8 +31,16 @@ def make(path: Path, seed: int) -> LearnedPolicy:
         "name": path.stem,
         "scenarios": [{"name": "constant"}],
         "seed": 2,
-        "training_seeds": [{"seed": k, "score": score, "steps": 1000} for k in (1, 2, 3)],
-        "command": "posse train --seed 2",
+        "training_seeds": [
+            {
+                "seed": k,
+                "score": score,
+                "steps": 1000,
+                "commit": f"abc{k}",
+                "command": f"posse train --seed {k}",
+            }
+            for k in (1, 2, 3)
+        ],
     }
     policy = LearnedPolicy(network, encoding, card)
     policy.save(path)
@@ -83,7 +91,8 @@ def test_the_page_says_what_was_played(page: Path, tmp_path: Path) -> None:
     expected = difference_over_seeds([scores(seed, "constant") for seed in seeds], ddcs)
     assert f"| constant | `mine` | 3 | {expected} |" in text
     assert "| `learned-any` | 2 (shipped) | 0.250 [0.200, 0.300] | 1,000 |" in text
-    assert "posse train --seed 2  # learned-any" in text
+    for seed in (1, 2, 3):
+        assert f"posse train --seed {seed}  # learned-any, commit abc{seed}" in text
     for name in re.findall(r"\(media/(\S+)\)", text):
         assert (page.parent / "media" / name).is_file()
     assert text.count("](media/") == 2
