@@ -56,6 +56,8 @@ def load(policy: str | Path) -> Policy:
             f"no policy {text!r} is shipped; shipped learned ones are: "
             f"{', '.join(learned) or 'none yet'}. Train one with posse train, and name its file"
         )
+    if (path / "best.safetensors").is_file():
+        raise PolicyError(f"{text!r} is a run's folder: its policy is {path / 'best.safetensors'}")
     near = difflib.get_close_matches(text, policy_names(), n=3, cutoff=0.5)
     hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
     raise PolicyError(
@@ -85,7 +87,10 @@ def _from_module(text: str) -> Policy:
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
         raise PolicyError(f"module {module_name!r} has no {attribute!r}{hint}")
     found: Any = getattr(module, attribute)
-    made = found() if isinstance(found, type) else found
+    try:
+        made = found() if isinstance(found, type) else found
+    except TypeError as error:
+        raise PolicyError(f"{text!r} cannot be made without arguments: {error}") from error
     if not isinstance(made, Policy):
         raise PolicyError(
             f"{text!r} is no policy: it must have name, message_size, reads_state, begin, act, "

@@ -437,7 +437,10 @@ def _check_motion(s: Scenario) -> None:
     if s.break_window[1] > 1:
         _fail("break_window", s.break_window, "shares of the horizon lie in [0, 1]")
     if s.settle_time > s.duration:
-        _fail("settle_time", s.settle_time, f"an episode lasts {s.duration:g} s")
+        _fail(
+            "settle_time", s.settle_time,
+            f"an episode of horizon={s.horizon} steps of {s.control_step:g} s is over before that",
+        )  # fmt: skip
 
 
 def _check_formation(s: Scenario) -> None:

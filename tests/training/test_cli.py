@@ -53,6 +53,14 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         (["train", "--scenario", "smrt"], "did you mean 'smart'"),
         (["train", "--algorithm", "dqn"], "unknown algorithm 'dqn'"),
         (["watch", "nobody"], "unknown policy 'nobody'"),
+        (["watch", "pursuit", "--seed", "-1"], "seed=-1"),
+        (["watch", "pursuit", "--world", "-1"], "world=-1"),
+        (["watch", "pursuit", "--split", "tests"], "unknown split 'tests'"),
+        (["watch", "pursuit", "--gif", "film.mp4"], "ends in .gif"),
+        (["watch", "numpy:ndarray"], "cannot be made without arguments"),
+        (["compare"], "nobody to compare"),
+        (["compare", "pursuit", "--seed", "-1"], "seed=-1"),
+        (["compare", "pursuit", "--episodes", "0"], "episodes=0"),
     ],
 )
 def test_mistakes_are_named(

@@ -14,6 +14,7 @@ from posse_training import sweeps
 from posse_training.cli import main
 from posse_training.compare import Settings, compare
 from posse_training.contenders import read_contenders
+from posse_training.settings import SettingsError
 from posse_training.statistics import difference_over_seeds
 from posse_training.sweeps import BOUND, SWEEPS, Sweep, play_sweeps
 
@@ -45,6 +46,8 @@ def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None
     ):
         with pytest.raises(PolicyError, match=message):
             compare(Settings(("idle", named), ("constant",), out=tmp_path))
+    with pytest.raises(PolicyError, match="nobody to compare"):
+        compare(Settings((), ("constant",), out=tmp_path))
     with pytest.raises(posse.ScenarioError, match="unknown scenario 'konstant'"):
         compare(Settings(("idle",), ("constant", "konstant"), out=tmp_path))
     assert list(tmp_path.iterdir()) == []
@@ -53,8 +56,33 @@ def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None
 def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
     assert main([*arguments, "--no-figures", "--out", str(tmp_path)]) == 0
-    assert "pursuit" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line for line in lines if " pursuit " in line)
+    assert "constant" in row, "no cell is broken where lines have no end"
+    assert row.count("]") == 5, "five estimates with their intervals"
     assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_comparison_replaces_the_one_before_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    first = Settings(("idle", "pursuit"), ("constant",), 2, out=tmp_path, sweep_episodes=0)
+    compare(first)
+    before = {path.name for path in tmp_path.iterdir()}
+    assert {"constant-pursuit.csv", "constant-pursuit.json", "profile.png"} <= before
+    with pytest.raises(SettingsError, match="episodes=0"):
+        compare(replace(first, episodes=0))
+    assert {path.name for path in tmp_path.iterdir()} == before
+    compare(replace(first, policies=("idle",), figures=False))
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "notes.txt", "summary.json", "constant-idle.csv", "constant-idle.json",
+    }  # fmt: skip
+
+
+def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
+    again = files[0].replace("0.safetensors", "again.safetensors")
+    learned(0).save(Path(again))
+    found = read_contenders((*files[:2], again, f"mine={files[2]}"))
+    assert [contender.label for contender in found] == ["any-0", "any-1", again, "mine"]
 
 
 def learned(seed: int, trained: str = "train") -> LearnedPolicy:
@@ -106,11 +134,10 @@ def test_who_cannot_play_is_left_out_with_a_line(
     finally:
         del posse.scenarios._BY_NAME["few-beams"]
     shown = " ".join(capsys.readouterr().out.split())
-    assert f"left out: {files[0]} on few-beams:".replace(" ", "") in shown.replace(" ", "")
+    assert "left out: any-0 on few-beams:" in shown
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert [(row["what"], row["policy"]) for row in summary["left_out"]] == [
-        ("few-beams", files[0])
-    ]
+    left_out = [(row["what"], row["policy"]) for row in summary["left_out"]]
+    assert left_out == [("few-beams", "any-0")]
     played = [(row["scenario"], row["policy"]) for row in summary["comparison"]]
     assert played == [("few-beams", "pursuit"), ("constant", files[0]), ("constant", "pursuit")]
     # The one to compare with did not play: there is no difference to anybody else in its place.

@@ -31,7 +31,7 @@ from posse_training.export import export
 from posse_training.imitation import imitate
 from posse_training.normalisation import Normaliser, RunningStatistics
 from posse_training.settings import SettingsError, TrainSettings
-from posse_training.train import even_minibatch, make_env, make_model, resume, train
+from posse_training.train import even_minibatch, make_env, make_model, resume, steps_made, train
 
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "sac", "td3")
@@ -456,6 +456,21 @@ class TestStatistics:
         train(small(tmp_path), console=quiet())
         assert max(ratios) < 1e-5
         assert not np.array_equal(means[0], means[-1])
+
+
+def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(
+    tmp_path: Path,
+) -> None:
+    """Whole rollouts are made: what is left of the steps may be less than nothing."""
+    settings = small(tmp_path, steps=100, learning_rate=1e-3, final_learning_rate=1e-4)
+    env = make_env(settings)
+    schedule = make_model(settings, env).lr_schedule
+    assert schedule(1.0) == pytest.approx(1e-3)
+    assert schedule(0.5) == pytest.approx(5.5e-4)
+    assert schedule(0.0) == schedule(-7.0) == pytest.approx(1e-4)
+    at_once = env.num_envs * settings.rollout
+    assert steps_made(settings, env.num_envs) == -(-100 // at_once) * at_once
+    assert steps_made(replace(settings, steps=3 * at_once), env.num_envs) == 3 * at_once
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,10 +16,12 @@ from rich.table import Table
 from posse import get_scenario, scenario_names
 from posse_baselines import PolicyError
 from posse_training.contenders import Contender, Plays, play, read_contenders
+from posse_training.settings import check_worlds
 from posse_training.statistics import Estimate
 from posse_training.sweeps import LEADER_LOSS, Point, play_leader_loss, play_sweeps, write_points
 
 ORACLE: Final = "oracle"
+SUMMARY: Final = "summary.json"
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,8 @@ class Settings:
     split: str = "test"
     """Of the worlds: train, validation or test."""
     out: Path = Path("runs/compare")
-    """Folder for the rows (CSV), the summary (JSON) and the figures (PNG and SVG)."""
+    """Folder for the rows (CSV), the summary (JSON) and the figures (PNG and SVG); an earlier
+    comparison in it is replaced."""
     figures: bool = True
     """Draw figures; the oracle plays, too, as a reference."""
     sweep_episodes: int = 200
@@ -48,6 +52,8 @@ class Settings:
 class Comparison:
     """Everything that was played, and who could not play what."""
 
+    reference: str
+    """The policy that differences are to."""
     plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
     """By scenario and policy."""
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -60,6 +66,8 @@ class Comparison:
     """Of the scenario in which the leader breaks."""
     figures: list[Path] = field(default_factory=list)
     """The files that were drawn."""
+    files: list[str] = field(default_factory=list)
+    """Names of the files with rows."""
 
     def leave_out(self, policy: str, what: str, why: str) -> None:
         """Note that a policy cannot play something."""
@@ -70,10 +78,12 @@ def compare(settings: Settings) -> Comparison:
     """Play everything; write rows, summary and figures.
 
     Raises:
-        PolicyError: An unknown policy; nothing is played.
+        SettingsError: No worlds to play.
+        PolicyError: An unknown policy, or none; nothing is played.
         ScenarioError: An unknown scenario; nothing is played.
         TrainedSplitError: A split that a policy was trained on.
     """
+    check_worlds(settings.seed, settings.split, episodes=settings.episodes)
     contenders = read_contenders(settings.policies)
     named = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
     for name in named:
@@ -81,7 +91,8 @@ def compare(settings: Settings) -> Comparison:
     if settings.figures and ORACLE not in settings.policies:
         contenders += read_contenders((ORACLE,))
     settings.out.mkdir(parents=True, exist_ok=True)
-    found = Comparison()
+    remove_former(settings.out)
+    found = Comparison(contenders[0].label)
     for scenario in named:
         play_scenario(found, scenario, contenders, settings)
     if settings.figures:
@@ -104,7 +115,9 @@ def play_scenario(
         for k, results in enumerate(plays.results):
             member = f"-{k + 1}" if len(plays.results) > 1 else ""
             label = contender.label.replace("/", "_").replace(":", "_")
-            results.write(settings.out / f"{scenario}-{label}{member}.csv")
+            rows = settings.out / f"{scenario}-{label}{member}.csv"
+            results.write(rows)
+            found.files += [rows.name, rows.with_suffix(".json").name]
         found.plays[scenario, contender.label] = plays
         found.rows.append(
             {"scenario": scenario, "policy": contender.label, **summary(plays, reference)}
@@ -123,6 +136,7 @@ def draw(found: Comparison, contenders: Sequence[Contender], settings: Settings)
         ordered = sorted(contenders, key=lambda contender: contender.label == ORACLE)
         found.points = play_sweeps(ordered, *worlds, found.leave_out)
         write_points(settings.out / "sweeps.csv", found.points)
+        found.files.append("sweeps.csv")
         if not found.losses:
             found.losses = play_leader_loss(contenders, *worlds, found.leave_out)
     found.figures = figures.draw(settings.out, found.plays, found.points, found.losses)
@@ -149,15 +163,28 @@ def write_summary(found: Comparison, settings: Settings) -> None:
         for row in found.rows
     ]
     stated = {"seed": settings.seed, "split": settings.split, "episodes": settings.episodes}
-    text = json.dumps({**stated, "comparison": rows, "left_out": found.left_out}, indent=2)
-    (settings.out / "summary.json").write_text(text + "\n")
+    files = [*found.files, *(path.name for path in found.figures)]
+    whole = {**stated, "comparison": rows, "left_out": found.left_out, "files": files}
+    (settings.out / SUMMARY).write_text(json.dumps(whole, indent=2) + "\n")
+
+
+def remove_former(folder: Path) -> None:
+    """Remove what an earlier comparison wrote to a folder, so that two are never mixed."""
+    try:
+        files = json.loads((folder / SUMMARY).read_text()).get("files", [])
+    except (OSError, ValueError):
+        return
+    for name in (*files, SUMMARY):
+        if name == Path(name).name:  # in this very folder
+            (folder / name).unlink(missing_ok=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compare policies and print the table."""
     settings = tyro.cli(Settings, prog="posse compare", args=arguments)
     found = compare(settings)
-    console = Console()
+    # Where lines have no end (a pipe, a file) the table is as wide as it needs to be.
+    console = Console(width=None if sys.stdout.isatty() else 160)
     console.print(table(found, settings))
     for row in found.left_out:
         console.print(f"left out: {row['policy']} on {row['what']}: {row['why']}")
@@ -169,10 +196,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def table(found: Comparison, settings: Settings) -> Table:
     """Return the estimates as a table."""
-    first = settings.policies[0].partition("=")[0]
     shown = Table(
         title=f"{settings.episodes:,} worlds each, split {settings.split}, seed {settings.seed}; "
-        f"95 % intervals; differences are to {first}, world by world"
+        f"95 % intervals; differences are to {found.reference}, world by world"
     )
     columns = ("score", "settled", "no_contact", "difference", "improvement")
     for column in ("scenario", "policy"):

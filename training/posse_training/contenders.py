@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,20 +36,29 @@ class Contender:
 def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     """Return who is meant by names, files, ``package.module:Class``, or ``LABEL=FILE,FILE,...``.
 
+    What comes from a file goes by the name on its card, where nobody else does.
+
     Raises:
-        PolicyError: A policy that cannot be loaded, a group without files, or two of one label.
+        PolicyError: Nobody, a policy that cannot be loaded, a group without files, or two of one
+            label.
     """
+    if not texts:
+        raise PolicyError("nobody to compare: name a policy or more, the first is compared with")
     found: list[Contender] = []
     for text in texts:
         label, sign, members = text.partition("=")
         if sign and not (label and all(members.split(","))):
             raise PolicyError(f"{text!r} is no group of policies: write LABEL=FILE,FILE,...")
-        if label in {other.label for other in found}:
+        taken = {other.label for other in found}
+        if label in taken:
             raise PolicyError(
                 f"two policies are called {label!r}: give one another label, LABEL=..."
             )
         names = members.split(",") if sign else [text]
-        found.append(Contender(label, tuple(load(name) for name in names)))
+        policies = tuple(load(name) for name in names)
+        if not sign and Path(text).is_file() and policies[0].name not in taken:
+            label = policies[0].name
+        found.append(Contender(label, policies))
     return tuple(found)
 
 

@@ -133,11 +133,11 @@ def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
     scores = np.linspace(0, 1, 401)
     for axis, name in zip(axes, names, strict=False):
         axis.set_title(name, fontweight="bold")
-        for policy in policies:
+        for k, policy in enumerate(policies):
             if (name, policy) not in plays:
                 continue
             mine = plays[name, policy]["score"]
-            _steps(axis, scores, _at_least(mine, scores), policy)
+            _steps(axis, scores, _at_least(mine, scores), policy, (k + 0.5) / len(policies))
             if policy == _reference(policies):
                 _steps(axis, scores, _at_least(plays[name, policy]["bound"], scores), BOUND)
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
@@ -149,8 +149,8 @@ def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
         if k < len(names) and k + columns >= len(names):
             axis.tick_params(labelbottom=True)
     figure.supxlabel("score τ", fontsize=9)
-    figure.supylabel("share of worlds with a score of τ or more", fontsize=9)
-    _legend(figure, [*policies, BOUND], markers=False)
+    figure.supylabel("share of worlds with τ or more", fontsize=9)
+    _legend(figure, [*policies, BOUND])
     return figure
 
 
@@ -319,12 +319,12 @@ def _steps(axis: Axes, x: Any, y: Any, policy: str, phase: float | None = None) 
 
 
 _MARKERS: Final = 6
+_LEGEND: Final = 124
+"""Letters that have room side by side in a legend, the lines before them counted as seven each."""
 _TITLES: Final = {BOUND: "attainable bound", "oracle": "oracle (reads the state)"}
 
 
-def _legend(
-    figure: Figure, policies: Sequence[str], *, lines: bool = True, markers: bool = True
-) -> None:
+def _legend(figure: Figure, policies: Sequence[str], *, lines: bool = True) -> None:
     handles = []
     for policy in policies:
         look = _marker(policy)
@@ -332,10 +332,10 @@ def _legend(
             look |= {"marker": ""}
         elif not lines:
             look |= {"linestyle": ""}
-        if not markers:
-            look |= {"marker": ""}
         handles.append(Line2D([], [], label=_TITLES.get(policy, policy), **look))
+    longest = max(len(str(handle.get_label())) for handle in handles)
     figure.legend(
-        handles=handles, loc="outside upper center", ncols=min(4, len(handles)), frameon=False,
+        handles=handles, loc="outside upper center", frameon=False,
+        ncols=max(1, min(4, len(handles), _LEGEND // (longest + 7))),
         handlelength=2.6, columnspacing=1.6,
     )  # fmt: skip

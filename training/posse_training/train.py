@@ -90,6 +90,9 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
         env = make_env(settings)
         model = make_model(settings, env)
         model.set_logger(make_logger(folder, settings))
+        steps = steps_made(settings, env.num_envs)
+        if steps != settings.steps:
+            display.note(f"rollouts are whole, so that {steps:,} steps will be made")
         statistics = RunningStatistics(env.observation_size)
         display.beside(score_beside(settings, display))
         training = Training(settings, folder, env, model, statistics, display)
@@ -110,6 +113,12 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
         )
         training.finish()
     return folder / (BEST if (folder / BEST).is_file() else LAST)
+
+
+def steps_made(settings: TrainSettings, num_envs: int) -> int:
+    """Return how many steps a training makes, which is whole rollouts, or steps of all worlds."""
+    at_once = num_envs * (settings.rollout if settings.on_policy else 1)
+    return -(-settings.steps // at_once) * at_once
 
 
 def resume(folder: Path, *, console: Console | None = None, steps: int | None = None) -> Path:
@@ -199,7 +208,9 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     s = settings
 
     def learning_rate(remaining: float) -> float:
-        return s.final_learning_rate + remaining * (s.learning_rate - s.final_learning_rate)
+        # Whole rollouts are made, so that the last may end after the steps that were asked for.
+        left = max(0.0, remaining)
+        return s.final_learning_rate + left * (s.learning_rate - s.final_learning_rate)
 
     network: dict[str, Any] = {
         "activation_fn": _ACTIVATIONS[s.activation],
