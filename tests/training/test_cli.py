@@ -43,6 +43,8 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0
     shown = capsys.readouterr().out
     assert all(name in shown for name in COMMANDS)
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"posse {posse.__version__}\n"
 
 
 @pytest.mark.parametrize(
@@ -85,6 +87,19 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "--resume" in capsys.readouterr().err
     assert main(["train", "--resume", str(folder), "--steps", "1600"]) == 0
     assert json.loads((folder / "settings.json").read_text())["steps"] == 1600
+
+
+def test_who_stops_a_training_is_told_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("posse_training.train.train", stopped)
+    monkeypatch.setattr("posse_training.train.resume", stopped)
+    for arguments in (["--folder", str(tmp_path)], ["--resume", str(tmp_path)]):
+        assert main(["train", *arguments]) == 130
+        assert f"to go on: posse train --resume {tmp_path}" in capsys.readouterr().err
 
 
 def test_watch_writes_a_film(tmp_path: Path) -> None:

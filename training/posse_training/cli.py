@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -39,6 +40,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] in ("-h", "--help"):
         print(_usage())
+        return 0
+    if given[0] == "--version":
+        print(f"posse {importlib.import_module('posse').__version__}")
         return 0
     name, rest = given[0], given[1:]
     if name not in COMMANDS:
@@ -107,7 +111,8 @@ def train(arguments: list[str]) -> None:
         from posse_training.train import resume
 
         which = tyro.cli(_Resume, prog="posse train", args=arguments)
-        print(resume(which.resume, steps=which.steps))
+        with _way_back(which.resume):
+            print(resume(which.resume, steps=which.steps))
         return
     from posse_training.settings import TrainSettings, default_settings
 
@@ -123,7 +128,18 @@ def train(arguments: list[str]) -> None:
     )
     from posse_training.train import train as run
 
-    print(run(settings))
+    with _way_back(settings.run_folder):
+        print(run(settings))
+
+
+@contextmanager
+def _way_back(folder: Path) -> Iterator[None]:
+    """Say to who stops a training how to go on with it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(f"\nto go on: posse train --resume {folder}", file=sys.stderr)
+        raise
 
 
 # --- posse watch ----------------------------------------------------------------------------------
