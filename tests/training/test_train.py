@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -183,6 +184,10 @@ def test_an_advised_training_exports_what_it_played(tmp_path: Path) -> None:
     scenario = small(tmp_path, **ADVISED).scenarios[0]
     again = evaluate(policy, scenario, 3, 0, split="validation", progress=False)["score"].mean()
     assert again == pytest.approx(policy.card["validation_score"], abs=1e-12)
+    with (file.parent / "curve.csv").open(newline="") as lines:
+        curve = list(csv.DictReader(lines))
+    assert float(curve[0]["steps"]) == 0, "what it begins with is scored, too"
+    assert again == pytest.approx(max(float(row["score"]) for row in curve), abs=1e-12)
     with pytest.raises(SettingsError, match="neither imitate nor message_size"):
         small(tmp_path, advise="ddcs-distributed", message_size=1)
 
