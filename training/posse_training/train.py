@@ -368,7 +368,7 @@ class Training(BaseCallback):
         self.curve: list[dict[str, float]] = []
         self._seconds_before = 0.0
         self._started = time.monotonic()
-        # A copy, or what an adviser does by itself, may be better than what a short run makes of it.
+        # A copy, or an adviser by itself, may be better than what a short run makes of it.
         begins_with_something = settings.imitate is not None or settings.advise is not None
         self._next_evaluation = 0 if begins_with_something else settings.evaluate_every
         self._next_checkpoint = 0
