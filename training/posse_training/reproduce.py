@@ -224,7 +224,9 @@ def curves_figure(recording: Recording, world: int, settled: float, paper: float
     for axis in axes[1]:
         axis.set_xlabel("time, s", fontsize=8)
     axes[0, 0].legend(fontsize=6, ncols=2)
-    figure.suptitle(f"dashed: settled; dotted: the paper's {paper:g} s", fontsize=9)
+    axes[1, 0].legend(handles=axes[1, 0].lines[-1:], fontsize=6)  # the target
+    here = f"dashed red: settled, {settled:.1f} s" if np.isfinite(settled) else "never settled"
+    figure.suptitle(f"{here}; dotted: the paper's {paper:g} s", fontsize=9)
     return figure
 
 
