@@ -65,6 +65,7 @@ def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 def test_a_comparison_replaces_the_one_before_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "summary.json").write_text("[]")  # of somebody else
     first = Settings(("idle", "pursuit"), ("constant",), 2, out=tmp_path, sweep_episodes=0)
     compare(first)
     before = {path.name for path in tmp_path.iterdir()}

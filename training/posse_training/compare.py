@@ -172,7 +172,7 @@ def remove_former(folder: Path) -> None:
     """Remove what an earlier comparison wrote to a folder, so that two are never mixed."""
     try:
         files = json.loads((folder / SUMMARY).read_text()).get("files", [])
-    except (OSError, ValueError):
+    except (OSError, ValueError, AttributeError):  # none, or not one of ours
         return
     for name in (*files, SUMMARY):
         if name == Path(name).name:  # in this very folder
