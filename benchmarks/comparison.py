@@ -164,12 +164,7 @@ def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
             mark = " (shipped)" if seed["seed"] == card["seed"] else ""
             score = Estimate(**seed["score"])
             lines.append(row(f"`{name}`", f"{seed['seed']}{mark}", score, f"{seed['steps']:,}"))
-    lines += [
-        "",
-        THEIR_COMMANDS,
-        "",
-        "```",
-    ]
+    lines += ["", THEIR_COMMANDS, "", "```"]
     for name, card in cards.items():
         for seed in card["training_seeds"]:
             lines.append(f"{seed['command']}  # {name}, commit {seed['commit']}")

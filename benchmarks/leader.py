@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse.state import slot_records
+from posse.formation import slot_offsets
 from posse_baselines import begin
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs import Settings as Team
@@ -36,7 +36,7 @@ def look(law: str, scenario: str, s: Settings) -> tuple[float, float]:
     )
     target, trackers, every = batch.worlds, batch.arrays.tracker, np.arange(s.worlds)
     memory, observations = begin(policy, batch), batch.reset()
-    slot = slot_records(batch.scenario)[0]
+    x, y = slot_offsets(batch.scenario)[0]
     errors, scores = [], []
     for step in range(batch.scenario.horizon - 1):
         actions, memory = policy.act(observations, memory)
@@ -47,8 +47,8 @@ def look(law: str, scenario: str, s: Settings) -> tuple[float, float]:
         leaders = np.median(policy.annotations(memory)["leader"], axis=1).astype(int)
         leader = trackers[every, np.maximum(leaders, 0)]
         c, sine = target["frame_cos"], target["frame_sin"]
-        dx = target["x"] + c * slot["x"] - sine * slot["y"] - leader["x"]
-        dy = target["y"] + sine * slot["x"] + c * slot["y"] - leader["y"]
+        dx = target["x"] + c * x - sine * y - leader["x"]
+        dy = target["y"] + sine * x + c * y - leader["y"]
         errors.append(np.hypot(dx, dy)[leaders >= 0].mean())
     return float(np.mean(errors)), float(np.mean(scores))
 

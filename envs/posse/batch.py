@@ -21,7 +21,7 @@ from posse.compiled import direct
 from posse.metrics import episode_metrics
 from posse.observation import ObservationLayout
 from posse.reward import REWARD_TERMS, TermsByName
-from posse.scenario import Scenario
+from posse.scenario import Scenario, ScenarioError
 from posse.state import (
     SPLITS,
     WorldArrays,
@@ -112,7 +112,7 @@ class Batch:
         action_shape: (E, rows, 2 + message_size).
 
     Raises:
-        ValueError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode,
+        ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode,
             an ``own_kernel`` that is no truth value.
     """
 
@@ -133,11 +133,11 @@ class Batch:
         if num_threads is not None:
             _check_count("num_threads", num_threads, 1)
         if not isinstance(own_kernel, bool):
-            raise ValueError(f"own_kernel={own_kernel!r} is not possible: it is True or False")
+            raise ScenarioError(f"own_kernel={own_kernel!r} is not possible: it is True or False")
         if split not in SPLITS:
-            raise ValueError(f"unknown split {split!r}; splits are: {', '.join(SPLITS)}")
+            raise ScenarioError(f"unknown split {split!r}; splits are: {', '.join(SPLITS)}")
         if autoreset not in AUTORESET_MODES:
-            raise ValueError(
+            raise ScenarioError(
                 f"unknown autoreset mode {autoreset!r}; modes are: {', '.join(AUTORESET_MODES)}"
             )
         self.scenario = scenario
@@ -561,10 +561,10 @@ def _check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
 
 def _check_count(name: str, value: object, least: int) -> None:
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < least:
-        raise ValueError(f"{name}={value!r} must be a whole number, at least {least}")
+        raise ScenarioError(f"{name}={value!r} must be a whole number, at least {least}")
 
 
 def _check_seed(seed: object) -> int:
     if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or not 0 <= seed < 2**63:
-        raise ValueError(f"seed={seed!r} must be a whole number in [0, 2**63)")
+        raise ScenarioError(f"seed={seed!r} must be a whole number in [0, 2**63)")
     return int(seed)

@@ -84,6 +84,8 @@ def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
     learned(0).save(Path(again))
     found = read_contenders((*files[:2], again, f"mine={files[2]}"))
     assert [contender.label for contender in found] == ["any-0", "any-1", again, "mine"]
+    found = read_contenders((files[0], f"any-0={files[1]}"))
+    assert [contender.label for contender in found] == [files[0], "any-0"]
 
 
 def learned(seed: int, trained: str = "train") -> LearnedPolicy:

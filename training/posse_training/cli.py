@@ -171,11 +171,7 @@ def watch(arguments: list[str]) -> None:
     from posse import Batch, get_scenario
     from posse.render import Renderer
     from posse_baselines import begin, load
-    from posse_training.settings import SettingsError, check_worlds
 
-    check_worlds(which.seed, which.split, first=which.world)
-    if which.gif is not None and which.gif.suffix != ".gif":
-        raise SettingsError(f"--gif {which.gif} is not possible: the file's name ends in .gif")
     policy = load(which.policy)
     overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
     scenario = get_scenario(which.scenario, **overrides)

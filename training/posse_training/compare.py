@@ -16,7 +16,6 @@ from rich.table import Table
 from posse import get_scenario, scenario_names
 from posse_baselines import PolicyError
 from posse_training.contenders import Contender, Plays, play, read_contenders
-from posse_training.settings import check_worlds
 from posse_training.statistics import Estimate
 from posse_training.sweeps import LEADER_LOSS, Point, play_leader_loss, play_sweeps, write_points
 
@@ -78,12 +77,11 @@ def compare(settings: Settings) -> Comparison:
     """Play everything; write rows, summary and figures.
 
     Raises:
-        SettingsError: No worlds to play.
+        SettingsError: No episodes to play.
         PolicyError: An unknown policy, or none; nothing is played.
-        ScenarioError: An unknown scenario; nothing is played.
+        ScenarioError: An unknown scenario or split, an impossible seed; nothing is played.
         TrainedSplitError: A split that a policy was trained on.
     """
-    check_worlds(settings.seed, settings.split, episodes=settings.episodes)
     contenders = read_contenders(settings.policies)
     named = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
     for name in named:
@@ -91,7 +89,6 @@ def compare(settings: Settings) -> Comparison:
     if settings.figures and ORACLE not in settings.policies:
         contenders += read_contenders((ORACLE,))
     settings.out.mkdir(parents=True, exist_ok=True)
-    remove_former(settings.out)
     found = Comparison(contenders[0].label)
     for scenario in named:
         play_scenario(found, scenario, contenders, settings)
@@ -165,18 +162,18 @@ def write_summary(found: Comparison, settings: Settings) -> None:
     stated = {"seed": settings.seed, "split": settings.split, "episodes": settings.episodes}
     files = [*found.files, *(path.name for path in found.figures)]
     whole = {**stated, "comparison": rows, "left_out": found.left_out, "files": files}
+    for name in former_files(settings.out) - set(files):  # so that two are never mixed
+        (settings.out / name).unlink(missing_ok=True)
     (settings.out / SUMMARY).write_text(json.dumps(whole, indent=2) + "\n")
 
 
-def remove_former(folder: Path) -> None:
-    """Remove what an earlier comparison wrote to a folder, so that two are never mixed."""
+def former_files(folder: Path) -> set[str]:
+    """Return the names of the files that an earlier comparison wrote to a folder."""
     try:
         files = json.loads((folder / SUMMARY).read_text()).get("files", [])
     except (OSError, ValueError, AttributeError):  # none, or not one of ours
-        return
-    for name in (*files, SUMMARY):
-        if name == Path(name).name:  # in this very folder
-            (folder / name).unlink(missing_ok=True)
+        return set()
+    return {name for name in files if name == Path(name).name}  # in this very folder
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -45,6 +45,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     if not texts:
         raise PolicyError("nobody to compare: name a policy or more, the first is compared with")
     found: list[Contender] = []
+    stated = {text.partition("=")[0] for text in texts}
     for text in texts:
         label, sign, members = text.partition("=")
         if sign and not (label and all(members.split(","))):
@@ -56,7 +57,7 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
             )
         names = members.split(",") if sign else [text]
         policies = tuple(load(name) for name in names)
-        if not sign and Path(text).is_file() and policies[0].name not in taken:
+        if not sign and Path(text).is_file() and policies[0].name not in taken | stated:
             label = policies[0].name
         found.append(Contender(label, policies))
     return tuple(found)

@@ -20,6 +20,7 @@ import posse
 from posse import Scenario, get_scenario
 from posse_baselines import BasePolicy, Policy, load, rollout
 from posse_baselines.policy import Memory
+from posse_training.settings import SettingsError
 from posse_training.statistics import Estimate, mean
 
 WORLDS_AT_ONCE: Final = 500
@@ -132,14 +133,14 @@ def evaluate(
         **overrides: Settings of the scenario.
 
     Raises:
-        ValueError: ``episodes`` below 1.
+        SettingsError: ``episodes`` below 1.
         TrainedSplitError: A split that the policy was trained on.
-        ScenarioError: An unknown scenario or an impossible setting.
+        ScenarioError: An unknown scenario or split, an impossible setting or seed.
     """
     if isinstance(policy, str):
         policy = load(policy)
     if episodes < 1:
-        raise ValueError(f"episodes={episodes} must be at least 1")
+        raise SettingsError(f"episodes={episodes} must be at least 1")
     refuse_trained_split(policy, split)
     settings = get_scenario(scenario, **overrides)
     settings = settings.replace(message_size=max(settings.message_size, policy.message_size))

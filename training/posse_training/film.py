@@ -15,6 +15,7 @@ from posse import Batch, Scenario, get_scenario
 from posse.render import LEAST_SIZE, Renderer
 from posse.render_style import GRID, PALETTE
 from posse_baselines.policy import Policy, PolicyError, begin
+from posse_training.settings import SettingsError
 
 Frame = npt.NDArray[np.uint8]
 
@@ -58,7 +59,7 @@ def film(
         The path.
 
     Raises:
-        ValueError: No policy, a path that does not end in ``.gif``, or a number out of its range.
+        SettingsError: No policy, a path that does not end in ``.gif``, a number out of its range.
         PolicyError: A policy that does not fit the scenario.
     """
     path = Path(path)
@@ -205,13 +206,13 @@ def _check(
     size: int | None,
 ) -> None:
     if not policies:
-        raise ValueError("nothing to film: give at least one (label, policy)")
+        raise SettingsError("nothing to film: give at least one (label, policy)")
     if path.suffix.lower() != ".gif":
-        raise ValueError(f"path={str(path)!r} must end in .gif: no other format is written")
+        raise SettingsError(f"path={str(path)!r} must end in .gif: no other format is written")
     for name, value in (("seconds", seconds), ("speed", speed)):
         if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name}={value!r} must be a finite number above 0")
+            raise SettingsError(f"{name}={value!r} must be a finite number above 0")
     if every != int(every) or every < 1:
-        raise ValueError(f"every={every!r} must be a whole number of control steps, at least 1")
+        raise SettingsError(f"every={every!r} must be a whole number of control steps, at least 1")
     if size is not None and size < LEAST_SIZE:
-        raise ValueError(f"size={size!r} must be at least {LEAST_SIZE} px")
+        raise SettingsError(f"size={size!r} must be at least {LEAST_SIZE} px")

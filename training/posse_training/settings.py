@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from posse import Scenario, get_scenario
-from posse.state import SPLITS
 from posse_baselines import load
 
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
@@ -203,19 +202,6 @@ def default_settings(
             for table in ("all", algorithm):
                 values.update(tables.get(table, {}))
     return TrainSettings.from_dict(values)
-
-
-def check_worlds(seed: int, split: str, *, episodes: int = 1, first: int = 0) -> None:
-    """Raise if these are no worlds to play.
-
-    Raises:
-        SettingsError: A negative seed or number of a world, an unknown split, no episode.
-    """
-    for name, value, least in (("seed", seed, 0), ("world", first, 0), ("episodes", episodes, 1)):
-        if value < least:
-            raise SettingsError(f"{name}={value} is not possible: it is {least} or more")
-    if split not in SPLITS:
-        raise SettingsError(f"unknown split {split!r}; splits are: {', '.join(SPLITS)}")
 
 
 def read_settings(path: Path) -> TrainSettings:
