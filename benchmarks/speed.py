@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -45,6 +45,8 @@ class Settings:
     """What ``make bench`` takes."""
 
     scenario: str = "smart"
+    overrides: dict[str, int] = field(default_factory=dict)
+    """Whole numbers that the worlds of the batches have instead of the scenario's."""
     device: Literal["cpu", "cuda"] = "cpu"
     worlds: tuple[int, ...] | None = None
     """Default: 1 to 16,384 on the CPU, 1,024 to 4 million on a GPU."""
@@ -85,7 +87,10 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
         sorted({1, os.cpu_count() or 1}),
     )
     for own_kernel, count, threads in kinds:
-        batch = posse.batch(settings.scenario, count, num_threads=threads, own_kernel=own_kernel)
+        batch = posse.batch(
+            settings.scenario, count, num_threads=threads, own_kernel=own_kernel,
+            **settings.overrides,
+        )  # fmt: skip
         observations = batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
@@ -127,7 +132,7 @@ def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
     limit = bandwidth(settings.seconds)
     rows = []
     for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
-        batch: Any = posse.batch(settings.scenario, count, device="cuda")
+        batch: Any = posse.batch(settings.scenario, count, device="cuda", **settings.overrides)
         batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
@@ -162,6 +167,7 @@ def report_gpu(settings: Settings) -> None:
         "device": name.decode() if isinstance(name, bytes) else str(name),
         "machine": machine.describe(),
         "scenario": settings.scenario,
+        "overrides": settings.overrides,
         "batches": rows,
     }
     table = Table(title=f"{settings.scenario} on {figures['device']}")
@@ -314,6 +320,7 @@ def main() -> None:
     figures: dict[str, Any] = {
         "machine": machine.describe(),
         "scenario": settings.scenario,
+        "overrides": settings.overrides,
         "batches": rows,
         "one_world": single,
         "cores_busy_with_other_work": disturbed,
