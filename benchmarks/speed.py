@@ -89,7 +89,7 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
     for own_kernel, count, threads in kinds:
         batch = posse.batch(
             settings.scenario, count, num_threads=threads, own_kernel=own_kernel,
-            **settings.overrides,
+            **dict[str, Any](settings.overrides),
         )  # fmt: skip
         observations = batch.reset(seed=0)
         rng = np.random.default_rng(0)
@@ -132,7 +132,9 @@ def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
     limit = bandwidth(settings.seconds)
     rows = []
     for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
-        batch: Any = posse.batch(settings.scenario, count, device="cuda", **settings.overrides)
+        batch: Any = posse.batch(
+            settings.scenario, count, device="cuda", **dict[str, Any](settings.overrides)
+        )
         batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
