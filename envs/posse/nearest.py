@@ -1,9 +1,8 @@
-"""Which team-mates are nearest to a tracker, where the team is larger than what is observed of it.
+"""Which team-mates are nearest to eight trackers, a lane each, where not all are observed.
 
-Two ways that give the same list. Eight trackers at once, a lane each: the squared distances to
-eight team-mates are sorted and merged with the nearest so far, without a branch. That keeps a
-distance to five digits and six bits of who it is; where two distances are nearer to each other than
-that can tell, the list is made again the other way, one by one and exactly.
+Squared distances to eight team-mates are sorted and merged with the nearest so far, without a
+branch. That keeps a distance to five digits and six bits of whose it is; where two distances are
+nearer to each other than that can tell, the lane's list is made again, one by one and exactly.
 """
 
 from __future__ import annotations
@@ -12,36 +11,36 @@ from typing import Final
 
 import numpy as np
 
-from posse.arrays import FloatArray, Record, Records
+from posse.arrays import FloatArray
 from posse.compiled import compiled
-from posse.lanes import Lanes, choose, eight, greater, lesser, load, root, store, tag, tagged
-from posse.survey import (
-    BLOCK,
-    FAR,
-    INDEX,
-    LISTED,
-    ROW,
-    SHORTLIST,
-    X,
-    Y,
-    blocks,
-    find_places,
-    natural,
-    store_each,
+from posse.lanes import (
+    WIDTH,
+    Lanes,
+    Mask,
+    choose,
+    eight,
+    greater,
+    lesser,
+    load,
+    root,
+    store,
+    tag,
+    tagged,
 )
+from posse.survey import FAR, INDEX, OWN, ROW, SHORTLIST, TEAM, blocks, natural, store_each
+from posse.team import row_length, stride_of
 
-# Rows of scratch memory: how far each team-mate is, which of them may be among the nearest and how
-# far, by place; what the lanes hold; which of eight lists are beyond doubt.
-_DISTANCE: Final = SHORTLIST
-_CANDIDATE: Final = SHORTLIST + 1 * ROW
-_CANDIDATE_NUMBER: Final = SHORTLIST + 2 * ROW
-_PLACE: Final = SHORTLIST + 3 * ROW
-_LANE: Final = SHORTLIST + 4 * ROW
-_CERTAIN: Final = SHORTLIST + 5 * ROW
+LISTED: Final = OWN + 1 * ROW
+"""Where the lists stand in scratch memory: the nearest to each of the eight, a lane each, then the
+second nearest. Numbers of team-mates; four rows hold lists of the largest team."""
 
-_PLACES: Final = np.float32(BLOCK)
-_NEARER_THAN_FAR: Final = np.float32(0.9e9)
+# The nearest so far, how far and who; which of the eight lists are beyond doubt.
+_SO_FAR: Final = SHORTLIST
+WHO: Final = SHORTLIST + 1 * ROW
+_CERTAIN: Final = SHORTLIST + 2 * ROW
+
 _CLOSER: Final = np.float32(1 - 2**-15)  # two tags and rounding change half of that
+_ABSENT: Final = FAR * FAR
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 
@@ -49,66 +48,84 @@ _Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 
 
 @compiled
-def list_nearest(c: Record, trackers: Records, first: int, count: int, s: FloatArray) -> None:
-    """List the nearest team-mates of ``count`` trackers, at most eight, from ``first`` on.
+def list_nearest(n: int, places: int, i: int, count: int, across: int, s: FloatArray) -> None:
+    """List the nearest of a team of n to ``count`` trackers, at most eight, the first of them i.
 
-    Their nearest stand side by side from LISTED on, a lane each, then their second nearest.
+    There are no more places than team-mates, and the team stands in its rows
+    (:func:`posse.team.lay_out_team`).
     """
-    together = c.neighbours <= BLOCK < c.num_trackers - 1
+    together = places <= WIDTH
     if together:
-        rank_eight(c.num_trackers, first, s)
+        rank_eight(n, i, across, s)
     for lane in range(count):
         if not together or s[_CERTAIN + lane] == _ZERO:
-            measure_team(c.num_trackers, trackers[first + lane], first + lane, s)
-            choose_nearest(c.num_trackers, c.neighbours, natural(lane), s)
+            list_exactly(n, places, i, natural(lane), across, s)
 
 
 @compiled
-def rank_eight(n: int, first: int, s: FloatArray) -> None:
-    """List the eight nearest team-mates of eight trackers, and say which lists are certain.
-
-    There are at least nine team-mates.
-    """
-    x, y = load(s, X + first), load(s, Y + first)
-    a = b = c = d = e = f = g = h = ninth = eight(FAR)
-    for block in range(blocks(n)):
-        j = BLOCK * block
-        others = (
-            apart(n, j, x, y, s), apart(n, j + 1, x, y, s), apart(n, j + 2, x, y, s),
-            apart(n, j + 3, x, y, s), apart(n, j + 4, x, y, s), apart(n, j + 5, x, y, s),
-            apart(n, j + 6, x, y, s), apart(n, j + 7, x, y, s),
-        )  # fmt: skip
-        if j == first:
-            others = without_self(others, s)
-        a, b, c, d, e, f, g, h, least = merge((a, b, c, d, e, f, g, h), sort(others))
+def rank_eight(n: int, i: int, across: int, s: FloatArray) -> None:
+    """List the eight nearest team-mates of eight trackers, and say which lists are certain."""
+    last = WIDTH * (blocks(n - 1) - 1)
+    a, b, c, d, e, f, g, h = sort(eight_apart(n, i, last, False, across, s))
+    ninth = eight(_ABSENT)
+    for m in range(0, last, WIDTH):
+        others = sort(eight_apart(n, i, m, True, across, s))
+        a, b, c, d, e, f, g, h, least = merge((a, b, c, d, e, f, g, h), others)
         ninth = lesser(ninth, least)
     doubtful = (
-        (b * _CLOSER <= a) | (c * _CLOSER <= b) | (d * _CLOSER <= c) | (e * _CLOSER <= d)
-        | (f * _CLOSER <= e) | (g * _CLOSER <= f) | (h * _CLOSER <= g) | (ninth * _CLOSER <= h)
+        as_near(a, b) | as_near(b, c) | as_near(c, d) | as_near(d, e)
+        | as_near(e, f) | as_near(f, g) | as_near(g, h) | as_near(h, ninth)
     )  # fmt: skip
     store(s, _CERTAIN, choose(doubtful, _ZERO, _ONE))
-    lists = tag(a), tag(b), tag(c), tag(d), tag(e), tag(f), tag(g), tag(h)
-    store_each(lists, LISTED, BLOCK, s)
-
-
-@compiled
-def apart(n: int, j: int, x: Lanes, y: Lanes, s: FloatArray) -> Lanes:
-    """Return the squared distances of eight trackers to number j of a team of n, tagged with j."""
-    dx, dy = choose(j < n, s[X + j], FAR) - x, s[Y + j] - y
-    return tagged(dx * dx + dy * dy, j)
-
-
-@compiled
-def without_self(to: _Eight, s: FloatArray) -> _Eight:
-    """Return the distances of eight to themselves, with nobody near to itself."""
-    a, b, c, d, e, f, g, h = to
-    lane = load(s, INDEX)
-    return (
-        choose(lane == np.float32(0), FAR, a), choose(lane == np.float32(1), FAR, b),
-        choose(lane == np.float32(2), FAR, c), choose(lane == np.float32(3), FAR, d),
-        choose(lane == np.float32(4), FAR, e), choose(lane == np.float32(5), FAR, f),
-        choose(lane == np.float32(6), FAR, g), choose(lane == np.float32(7), FAR, h),
+    first = (eight(np.float32(i)) if across else load(s, INDEX + i)) + _ONE
+    lists = (
+        who(n, first, a), who(n, first, b), who(n, first, c), who(n, first, d),
+        who(n, first, e), who(n, first, f), who(n, first, g), who(n, first, h),
     )  # fmt: skip
+    store_each(lists, LISTED, WIDTH, s)
+
+
+@compiled
+def as_near(one: Lanes, next_one: Lanes) -> Mask:
+    """Say whether somebody is so near to the next in order that tags cannot tell them apart."""
+    return (next_one * _CLOSER <= one) & (one < _ABSENT)
+
+
+@compiled
+def who(n: int, first: Lanes, distance: Lanes) -> Lanes:
+    """Return the numbers of those whose distances these are; ``first``, of those next behind.
+
+    A number of the team it is also where there is nobody.
+    """
+    number = first + tag(distance)
+    number = choose(number >= np.float32(n), number - np.float32(n), number)
+    return lesser(number, np.float32(n - 1))
+
+
+@compiled
+def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: FloatArray) -> _Eight:
+    """Return how far the eight team-mates from m + 1 places behind eight trackers are, tagged.
+
+    Who is not there is too far to count.
+    """
+    return (
+        apart(n, i, m, all_there, across, s), apart(n, i, m + 1, all_there, across, s),
+        apart(n, i, m + 2, all_there, across, s), apart(n, i, m + 3, all_there, across, s),
+        apart(n, i, m + 4, all_there, across, s), apart(n, i, m + 5, all_there, across, s),
+        apart(n, i, m + 6, all_there, across, s), apart(n, i, m + 7, all_there, across, s),
+    )  # fmt: skip
+
+
+@compiled
+def apart(n: int, i: int, m: int, is_there: bool, across: int, s: FloatArray) -> Lanes:
+    """Return the squared distances to the team-mates m + 1 places behind, tagged with m."""
+    own = TEAM + natural(stride_of(across) * i)
+    at = own + natural(stride_of(across) * (m + 1))
+    row = row_length(n, across)
+    dx, dy = load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+    least = choose(is_there or m < n - 1, _ZERO, _ABSENT)
+    # Last, what makes them numbers again to LLVM: it would not sort bits as fast.
+    return greater(tagged(dx * dx + dy * dy, m), least)
 
 
 @compiled
@@ -156,56 +173,40 @@ def merge(one: _Eight, other: _Eight) -> tuple[Lanes, ...]:
 
 
 @compiled
-def measure_team(n: int, robot: Record, number: int, s: FloatArray) -> None:
-    """Write how far each of a team of n is from a robot; itself and what is no tracker are far."""
-    own = np.float32(number)
-    for block in range(blocks(n)):
-        j = BLOCK * block
-        dx, dy, who = load(s, X + j) - robot.x, load(s, Y + j) - robot.y, load(s, INDEX + j)
-        ahead = dx * robot.heading_cos + dy * robot.heading_sin
-        left = dy * robot.heading_cos - dx * robot.heading_sin
-        distance = choose(who == own, FAR, root(ahead * ahead + left * left))
-        store(s, _DISTANCE + j, choose(who < np.float32(n), distance, FAR))
+def list_exactly(n: int, places: int, i: int, lane: int, across: int, s: FloatArray) -> None:
+    """List the nearest team-mates of the tracker in a lane, in order of exact distances."""
+    stride, row = stride_of(across), row_length(n, across)
+    own_number = natural(i + lane * (1 - across))
+    first = TEAM + natural(lane * across)
+    own = first + natural(stride * own_number)
+    filled = 0
+    for number in range(n):
+        at = first + natural(stride * number)
+        dx, dy = s[at] - s[own], s[at + row] - s[own + row]
+        hc, hs = s[own + 2 * row], s[own + 3 * row]
+        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        if number != own_number:
+            distance = root(ahead * ahead + left * left)
+            filled = keep_nearest(places, filled, number, distance, s)
+    for place in range(natural(places)):
+        s[LISTED + WIDTH * place + lane] = s[WHO + place]
 
 
 @compiled
-def bound_nearest(n: int, s: FloatArray) -> np.float32:
-    """Return a distance within which the eight nearest of n team-mates are, and few others.
+def keep_nearest(places: int, filled: int, number: int, distance: np.float32, s: FloatArray) -> int:
+    """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far.
 
-    The team is dealt out to sixteen lanes. The nearest of each lane are sixteen team-mates, so none
-    of the eight nearest is farther than the eighth of these.
+    Of those as near, who came first stays first. Who they are stands from WHO on.
     """
-    first, second = eight(FAR), eight(FAR)
-    for block in range(blocks(n)):
-        distance = load(s, _DISTANCE + BLOCK * block)
-        if block & 1:
-            second = lesser(second, distance)
-        else:
-            first = lesser(first, distance)
-    store(s, _LANE, first)
-    store(s, _LANE + BLOCK, second)
-    first_rank, second_rank = eight(_ZERO), eight(_ZERO)
-    for i in range(2 * BLOCK):
-        nearer = s[_LANE + i]
-        first_rank = first_rank + choose(first > nearer, _ONE, _ZERO)
-        second_rank = second_rank + choose(second > nearer, _ONE, _ZERO)
-    first = choose(first_rank < _PLACES, first, _ZERO)
-    second = choose(second_rank < _PLACES, second, _ZERO)
-    store(s, _LANE, greater(first, second))
-    left = max(max(s[_LANE], s[_LANE + 1]), max(s[_LANE + 2], s[_LANE + 3]))
-    right = max(max(s[_LANE + 4], s[_LANE + 5]), max(s[_LANE + 6], s[_LANE + 7]))
-    return min(max(left, right), _NEARER_THAN_FAR)
-
-
-@compiled
-def choose_nearest(n: int, places: int, lane: int, s: FloatArray) -> None:
-    """List the nearest of n team-mates of the tracker in a lane."""
-    most = bound_nearest(n, s) if places <= BLOCK else _NEARER_THAN_FAR
-    count = 0
-    for j in range(natural(n)):  # without a branch, which could not be predicted
-        distance = s[_DISTANCE + j]
-        s[_CANDIDATE + count], s[_CANDIDATE_NUMBER + count] = distance, s[INDEX + j]
-        count = natural(count + int(distance <= most))
-    find_places(count, _CANDIDATE, _PLACE, s)
-    for q in range(count):
-        s[LISTED + lane + BLOCK * natural(int(s[_PLACE + q]))] = s[_CANDIDATE_NUMBER + q]
+    if filled == places:
+        if distance >= s[_SO_FAR + places - 1]:
+            return filled
+        filled -= 1
+    spot = filled
+    while spot > 0 and s[_SO_FAR + spot - 1] > distance:
+        s[_SO_FAR + spot] = s[_SO_FAR + spot - 1]
+        s[WHO + spot] = s[WHO + spot - 1]
+        spot -= 1
+    s[_SO_FAR + spot] = distance
+    s[WHO + spot] = np.float32(number)
+    return filled + 1

@@ -1,9 +1,9 @@
 """The observation of one robot: a flat float32 vector, its fields declared by name.
 
-The fields come in five blocks, all declared here: own motion, the task, the target, which
-:mod:`posse.together` writes, as it does the mates of a team that is observed as a whole; the sonar
-(:mod:`posse.sonar`); and team-mates that are chosen, or heard of, which stand here, with all that a
-target is given that is an agent. Directions are cosine and sine; *ego* means the robot's own frame,
+The fields come in five blocks, all declared here: own motion, the task and the target, which
+:mod:`posse.together` writes; the sonar (:mod:`posse.sonar`); and team-mates, where they are now
+(:mod:`posse.mates`) or as they were heard of, which stands here, with all that a target is given
+that is an agent. Directions are cosine and sine; *ego* means the robot's own frame,
 x ahead and y to the left; the *common frame* is the one that the team agreed on at the start.
 A quantity that is not known holds the field's ``unknown`` value.
 """
@@ -22,34 +22,16 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
-from posse.lanes import Lanes, load, root, store
-from posse.nearest import list_nearest
+from posse.mates import copy_message, leave_empty
+from posse.nearest import WHO, keep_nearest
 from posse.scenario import Scenario
 from posse.sonar import ping
-from posse.state import POSE
-from posse.survey import (
-    BLOCK,
-    GAP,
-    LISTED,
-    OWN,
-    ROW,
-    SHORTLIST,
-    columns,
-    columns_of,
-    describe_mates,
-    natural,
-    within_one,
-)
-from posse.together import SONAR_AT, TARGET_AT, TASK_AT, copy_message, whole_team, write_task
+from posse.survey import GAP, natural, within_one
+from posse.together import SONAR_AT, TARGET_AT, TASK_AT, write_task
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
-# Rows of scratch memory: how eight team-mates turn; of one tracker the nearest so far, how far and
-# who.
-_TURN_RATES: Final = OWN
-_SO_FAR: Final = SHORTLIST
-_WHO: Final = SHORTLIST + 1 * ROW
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 
 
@@ -231,109 +213,6 @@ def _write_neighbour(
     o[k + 1] = other.turn_rate
 
 
-@compiled
-def _write_no_neighbour(c: Record, o: FloatArray, k: int) -> None:
-    """Write a place that is not filled, from k on."""
-    for q in range(k + 3, k + 9 + c.message_size):
-        o[q] = _ZERO
-    o[k] = _MINUS_ONE
-    o[k + 1] = _MINUS_ONE
-    o[k + 2] = _MINUS_ONE
-
-
-@compiled
-def _write_message(c: Record, said: FloatArray, j: int, o: FloatArray, k: int) -> None:
-    """Write what team-mate j said, a row of (N, m), into its place, which begins at k."""
-    if c.message_size > 0:
-        copy_message(c, said[j], o, k)
-
-
-@compiled
-def _keep_nearest(
-    places: int, filled: int, number: int, distance: np.float32, s: FloatArray
-) -> int:
-    """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far.
-
-    For distances that come one by one; :mod:`posse.nearest` is for where all are known at once.
-    """
-    if filled == places:
-        if distance >= s[_SO_FAR + places - 1]:
-            return filled
-        filled -= 1
-    spot = filled
-    while spot > 0 and s[_SO_FAR + spot - 1] > distance:
-        s[_SO_FAR + spot] = s[_SO_FAR + spot - 1]
-        s[_WHO + spot] = s[_WHO + spot - 1]
-        spot -= 1
-    s[_SO_FAR + spot] = distance
-    s[_WHO + spot] = np.float32(number)
-    return filled + 1
-
-
-@compiled(seldom=True)
-def _observe_nearest(
-    c: Record,
-    trackers: Records,
-    said: FloatArray,
-    s: FloatArray,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write the nearest team-mates of all trackers, where all are heard, from ``k`` on.
-
-    Of eight trackers at once, a lane each.
-    """
-    n, size = natural(c.num_trackers), 9 + natural(c.message_size)
-    filled = min(n - 1, natural(c.neighbours))
-    for first in range(0, n, BLOCK):
-        count = min(BLOCK, n - first)
-        list_nearest(c, trackers, first, count, s)
-        own_x, own_y, hc, hs, _, _, _, _ = columns(trackers, first, n, POSE)
-        for place in range(natural(filled)):
-            listed, at = LISTED + BLOCK * place, k + place * size
-            x, y, heading_x, heading_y, speed, turn_rate, _, _ = columns_of(
-                trackers, listed, count, POSE, s
-            )
-            dx, dy = x - own_x, y - own_y
-            ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-            store(s, _TURN_RATES, turn_rate)
-            a, b, d, e, f, g, h, j = describe_mates(
-                hc, hs, load(s, listed), ahead, left, root(ahead * ahead + left * left),
-                heading_x, heading_y, speed,
-            )  # fmt: skip
-            _write_mate(a, 0, first, count, s, observations, at)
-            _write_mate(b, 1, first, count, s, observations, at)
-            _write_mate(d, 2, first, count, s, observations, at)
-            _write_mate(e, 3, first, count, s, observations, at)
-            _write_mate(f, 4, first, count, s, observations, at)
-            _write_mate(g, 5, first, count, s, observations, at)
-            _write_mate(h, 6, first, count, s, observations, at)
-            _write_mate(j, 7, first, count, s, observations, at)
-        for i in range(first, first + count):
-            for place in range(filled, natural(c.neighbours)):
-                _write_no_neighbour(c, observations[i], k + place * size)
-            for place in range(filled if c.message_size > 0 else 0):
-                mate = natural(int(s[LISTED + BLOCK * place + i - first]))
-                copy_message(c, said[mate], observations[i], k + place * size)
-
-
-@compiled
-def _write_mate(
-    fields: Lanes,
-    lane: int,
-    first: int,
-    count: int,
-    s: FloatArray,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write what one of ``count`` trackers observes of a team-mate, if there are so many."""
-    if lane < count:
-        o = observations[natural(first + lane)]
-        store(o, k, fields)
-        o[k + 8] = s[_TURN_RATES + lane]
-
-
 @compiled(seldom=True)
 def _observe_heard(
     c: Record,
@@ -370,15 +249,15 @@ def _write_heard(
         h = heard[j]
         if j != i and h.step >= 0 and w.step - h.step <= c.forget_steps:
             dx, dy = h.x - t.x, h.y - t.y
-            filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
+            filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
     for p in range(c.neighbours):
         if p < filled:
-            j = int(s[_WHO + p])
+            j = int(s[WHO + p])
             age = np.float32(w.step - heard[j].step) * c.dt
             _write_neighbour(t, heard[j], j, age, o, k)
-            _write_message(c, said, j, o, k)
+            copy_message(c, said[j], o, k)
         else:
-            _write_no_neighbour(c, o, k)
+            leave_empty(c, o, k)
         k += 9 + natural(c.message_size)
 
 
@@ -405,8 +284,6 @@ def observe_alone(
     k = SONAR_AT + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
-    elif not whole_team(c):
-        _observe_nearest(c, trackers, message[0], s, observations, k)
 
 
 @compiled(seldom=True)
@@ -436,11 +313,11 @@ def observe_target(
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
         dx, dy = trackers[j].x - w.x, trackers[j].y - w.y
-        filled = _keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
+        filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
     for p in range(c.neighbours):
-        _write_no_neighbour(c, o, k)
+        leave_empty(c, o, k)
         if p < filled:
-            j = int(s[_WHO + p])
+            j = int(s[WHO + p])
             _write_neighbour(w, trackers[j], j, _ZERO, o, k)
         k += 9 + natural(c.message_size)
 

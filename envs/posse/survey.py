@@ -1,9 +1,8 @@
 """Where every disc of a world is, laid out so that the processor works on eight of them at once.
 
 Discs (trackers, the target, obstacles) lie side by side in rows of a thread's scratch memory.
-Contact, score, target sensor, sonar and the lists of the nearest team-mates all start from these
-rows, and go over them by blocks of eight (:mod:`posse.lanes`); what fills the last block is too far
-away to count.
+Contact, score, target sensor and sonar all start from these rows, and go over them by blocks of
+eight (:mod:`posse.lanes`); what fills the last block is too far away to count.
 """
 
 from __future__ import annotations
@@ -51,19 +50,19 @@ SLOT_DISTANCE: Final = 11 * ROW  # and how far it is, m
 SLOT_DISTANCE2: Final = 12 * ROW  # the same squared, m²
 HEARD2: Final = 13 * ROW  # within which the sonar has it, the square, and a little more, m²
 OWN: Final = 14 * ROW  # ten rows whose meaning is their module's own
-SHORTLIST: Final = 24 * ROW  # and six for making lists of the nearest
-_SHARED: Final = 30 * ROW
+SHORTLIST: Final = 24 * ROW  # and three for a list of the nearest
+_SHARED: Final = 27 * ROW
 
-# Then one of two: who is nearest to each of eight trackers, the nearest first (posse.nearest); or,
-# where a small team is observed as a whole, its rows (posse.together).
-LISTED: Final = _SHARED
+# Then the rows of a team (posse.team), which is there twice, and room for the last block: of eight
+# worlds, if it is small, or of one.
 TEAM: Final = _SHARED
+_TEAM_ROWS: Final = 6
 MOST_IN_TEAM: Final = 16
-"""Up to this team size, a whole team fits there."""
+"""Up to this team size, the teams of eight worlds fit there."""
 
-SIZE: Final = _SHARED + 6 * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
-SIZE_FOR_ONE: Final = _SHARED + MAX_TRACKERS * BLOCK
-"""Where memory is short: eight lists of a whole team fit, and the team's rows of one world."""
+SIZE: Final = TEAM + _TEAM_ROWS * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
+SIZE_FOR_ONE: Final = TEAM + _TEAM_ROWS * (2 * MAX_TRACKERS + BLOCK)
+"""Where memory is short: the team of one world fits."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -73,7 +72,6 @@ _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
-_TINY: Final = np.float32(1e-9)
 _BIT: Final = np.uint64(1)
 _NO_BITS: Final = np.uint64(0)
 
@@ -144,24 +142,6 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 
 
 @compiled
-def columns_of(
-    records: Records, listed: int, count: int, offset: int, s: FloatArray
-) -> tuple[Lanes, ...]:
-    """Return :func:`columns` of the ``count`` records whose numbers stand from ``listed`` on."""
-    last = count - 1
-    return transpose(
-        load_fields(records[natural(int(s[listed]))], offset),
-        load_fields(records[natural(int(s[listed + min(1, last)]))], offset),
-        load_fields(records[natural(int(s[listed + min(2, last)]))], offset),
-        load_fields(records[natural(int(s[listed + min(3, last)]))], offset),
-        load_fields(records[natural(int(s[listed + min(4, last)]))], offset),
-        load_fields(records[natural(int(s[listed + min(5, last)]))], offset),
-        load_fields(records[natural(int(s[listed + min(6, last)]))], offset),
-        load_fields(records[natural(int(s[listed + min(7, last)]))], offset),
-    )
-
-
-@compiled
 def store_rows(
     a: Lanes,
     b: Lanes,
@@ -222,49 +202,9 @@ def num_discs(c: Record) -> int:
 
 
 @compiled
-def describe_mates(
-    hc: Lanes,
-    hs: Lanes,
-    numbers: Lanes,
-    ahead: Lanes,
-    left: Lanes,
-    metres: Lanes,
-    heading_x: Lanes,
-    heading_y: Lanes,
-    speed: Lanes,
-) -> tuple[Lanes, ...]:
-    """Return what robots observe of eight team-mates, of each as it stands in an observation.
-
-    Number, age (0), range, bearing and heading (cosine and sine, ego), speed. From how the robots
-    head, who the team-mates are, where they are as the robots see it, and their headings in the
-    common frame.
-    """
-    per_metre = _ONE / greater(metres, _TINY)
-    return transpose(
-        numbers, eight(_ZERO), metres,
-        within_one(ahead * per_metre), within_one(left * per_metre),
-        within_one(heading_x * hc + heading_y * hs), within_one(heading_y * hc - heading_x * hs),
-        speed,
-    )  # fmt: skip
-
-
-@compiled
 def within_one(value: Lanes) -> Lanes:
     """Return a cosine or sine that rounding may have carried past 1, brought back."""
     return lesser(greater(value, _MINUS_ONE), _ONE)
-
-
-@compiled
-def find_places(count: int, distances: int, to: int, s: FloatArray) -> None:
-    """Write the place of each in a row of distances: how many are nearer, or as near and first."""
-    for block in range(blocks(count)):
-        j = BLOCK * block
-        distance, number, place = load(s, distances + j), load(s, INDEX + j), eight(_ZERO)
-        for i in range(natural(count)):
-            other = s[distances + i]
-            nearer = (distance > other) | ((distance == other) & (number > np.float32(i)))
-            place = place + choose(nearer, _ONE, _ZERO)
-        store(s, to + j, place)
 
 
 @compiled

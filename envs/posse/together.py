@@ -1,8 +1,7 @@
-"""What trackers observe of themselves, their target and a whole team: eight at once, a lane each.
+"""What trackers observe of themselves, their target and their team: eight at once, a lane each.
 
-The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds, the
-trackers of one (0). Rows of scratch memory hold a team twice, one after the other, so that a
-team-mate lies as many places behind its observer, whoever that is.
+The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or the
+team is large, the trackers of one (0).
 """
 
 from __future__ import annotations
@@ -20,24 +19,14 @@ from posse.lanes import (
     eight,
     greater,
     load,
-    load_fields,
     root,
     store,
     transpose,
 )
+from posse.mates import observe_mates
 from posse.state import FIX, NEVER, POSE
-from posse.survey import (
-    INDEX,
-    MOST_IN_TEAM,
-    OWN,
-    ROW,
-    TASK,
-    TEAM,
-    columns,
-    describe_mates,
-    natural,
-    within_one,
-)
+from posse.survey import INDEX, MOST_IN_TEAM, OWN, TASK, natural, within_one
+from posse.team import lay_out_team, team_columns
 
 TOGETHER: Final = WIDTH
 """Worlds that are observed together."""
@@ -49,86 +38,18 @@ TARGET_AT: Final = TASK_AT + 18
 SONAR_AT: Final = TARGET_AT + 12
 
 # Scratch memory, of the eight observers: which step it is, when the fix was, whether it sees the
-# target, touches anything, and works; where in the observation a team-mate belongs. Of every
-# team-mate: how far it is, and how many are nearer.
+# target, touches anything, and works.
 _STEP: Final = OWN
 _FIXED_AT: Final = OWN + 1 * WIDTH
 _SEES: Final = OWN + 2 * WIDTH
 _TOUCHING: Final = OWN + 3 * WIDTH
 _WORKING: Final = OWN + 4 * WIDTH
-_START: Final = OWN + 5 * WIDTH
-_DISTANCE: Final = OWN + 1 * ROW
-_PLACE: Final = OWN + 2 * ROW
 
 _NUMBER_AT: Final = np.float32(3)  # in the task's part: which tracker it is
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
 _TINY: Final = np.float32(1e-9)
-
-
-@compiled
-def _stride(across: int) -> int:
-    """Return how far one tracker lies from the next in a row of the team."""
-    return WIDTH if across else 1
-
-
-@compiled
-def _row(n: int, across: int) -> int:
-    """Return how far one row of the team lies from the next.
-
-    The last block of a row may run over the end of what it holds.
-    """
-    return natural(2 * n * _stride(across) + WIDTH)
-
-
-@compiled
-def _columns(tracker: Records, e: int, i: int, across: int, offset: int) -> tuple[Lanes, ...]:
-    """Return :func:`posse.survey.columns` of eight trackers, of (E, N), from world e's i on."""
-    if across:
-        return transpose(
-            load_fields(tracker[e, i], offset),
-            load_fields(tracker[e + 1, i], offset),
-            load_fields(tracker[e + 2, i], offset),
-            load_fields(tracker[e + 3, i], offset),
-            load_fields(tracker[e + 4, i], offset),
-            load_fields(tracker[e + 5, i], offset),
-            load_fields(tracker[e + 6, i], offset),
-            load_fields(tracker[e + 7, i], offset),
-        )
-    return columns(tracker[e], i, tracker.shape[1], offset)
-
-
-@compiled
-def whole_team(c: Record) -> bool:
-    """Say whether a tracker observes its whole team, where it is now, and that is written here."""
-    return bool(
-        c.perfect_radio != 0
-        and c.num_trackers <= MOST_IN_TEAM
-        and c.num_trackers == c.neighbours + 1
-    )
-
-
-@compiled
-def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
-    """Write the rows of the team of world e, or of eight worlds.
-
-    They hold x, y, heading (cosine, sine), speed and turn rate.
-    """
-    n = natural(tracker.shape[1])
-    stride, row = _stride(across), _row(n, across)
-    each = WIDTH // stride
-    # From the last block on: what fills it is overwritten by the others' second place.
-    for block in range((n + each - 1) // each - 1, -1, -1):
-        i = natural(each * block)
-        x, y, cosine, sine, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
-        for at in (TEAM + stride * i, TEAM + natural(stride * (i + n))):
-            store(s, at, x)
-            store(s, at + row, y)
-            store(s, at + 2 * row, cosine)
-            store(s, at + 3 * row, sine)
-            store(s, at + 4 * row, speed)
-            store(s, at + 5 * row, turn_rate)
 
 
 @compiled
@@ -222,13 +143,13 @@ def observe_own_and_target(
         s[_TOUCHING + lane] = np.float32(t.touching)
         s[_WORKING + lane] = np.float32(t.broken_at == NEVER)
         write_task(who, s, o)
-    own_x, own_y, hc, hs, speed, turn_rate, _, _ = _columns(tracker, e, i, across, POSE)
+    own_x, own_y, hc, hs, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
     own = transpose(
         within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
         load(s, _TOUCHING), load(s, _WORKING),
     )  # fmt: skip
     _write_rows(own, e, i, count, across, observations, 0)
-    x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = _columns(tracker, e, i, across, FIX)
+    x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = team_columns(tracker, e, i, across, FIX)
     dx, dy = x - own_x, y - own_y
     distance = root(dx * dx + dy * dy)
     per_metre = _ONE / greater(distance, _TINY)
@@ -258,116 +179,6 @@ def observe_own_and_target(
 
 
 @compiled
-def _number(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
-    """Return the numbers of the team-mates m + 1 places behind their observers."""
-    number = (eight(np.float32(i)) if across else load(s, INDEX + i)) + np.float32(m + 1)
-    return choose(number >= np.float32(n), number - np.float32(n), number)
-
-
-@compiled
-def _seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
-    """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
-    stride, row = _stride(across), _row(n, across)
-    own = TEAM + natural(stride * i)
-    at = own + natural(stride * (m + 1))
-    dx, dy = load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
-    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
-    return dx * hc + dy * hs, dy * hc - dx * hs
-
-
-@compiled
-def _find_places(n: int, i: int, across: int, s: FloatArray) -> None:
-    """Write how far each team-mate is from its observers, and how many are nearer.
-
-    Or as near, and of a lower number.
-    """
-    for m in range(n - 1):
-        ahead, left = _seen_at(n, i, m, across, s)
-        distance = root(ahead * ahead + left * left)
-        number, place = _number(n, i, m, across, s), eight(_ZERO)
-        for q in range(m):
-            other, before = load(s, _DISTANCE + WIDTH * q), _number(n, i, q, across, s) < number
-            nearer = (other < distance) | ((other == distance) & before)
-            place = place + choose(nearer, _ONE, _ZERO)
-            store(s, _PLACE + WIDTH * q, load(s, _PLACE + WIDTH * q) + choose(nearer, _ZERO, _ONE))
-        store(s, _DISTANCE + WIDTH * m, distance)
-        store(s, _PLACE + WIDTH * m, place)
-
-
-@compiled
-def observe_team(
-    c: Record,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    message: FloatArray,
-    s: FloatArray,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write every team-mate of observers from k on, nearest first: each has a place.
-
-    They are ``count`` trackers, the first of them i of world e.
-    """
-    n, size = natural(c.num_trackers), np.float32(9 + c.message_size)
-    stride, row = _stride(across), _row(n, across)
-    own = TEAM + natural(stride * i)
-    _find_places(n, i, across, s)
-    for m in range(n - 1):
-        at = own + natural(stride * (m + 1))
-        ahead, left = _seen_at(n, i, m, across, s)
-        first, second, third, fourth, fifth, sixth, seventh, eighth = describe_mates(
-            load(s, own + 2 * row), load(s, own + 3 * row), _number(n, i, m, across, s),
-            ahead, left, load(s, _DISTANCE + WIDTH * m),
-            load(s, at + 2 * row), load(s, at + 3 * row), load(s, at + 4 * row),
-        )  # fmt: skip
-        store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
-        turn_rates = at + 5 * row
-        _write_mate(c, first, 0, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, second, 1, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, third, 2, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, fourth, 3, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, fifth, 4, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, sixth, 5, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, seventh, 6, e, i, count, across, turn_rates, message, s, observations)
-        _write_mate(c, eighth, 7, e, i, count, across, turn_rates, message, s, observations)
-
-
-@compiled
-def _write_mate(
-    c: Record,
-    fields: Lanes,
-    lane: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    turn_rates: int,
-    message: FloatArray,
-    s: FloatArray,
-    observations: FloatArray,
-) -> None:
-    """Write what one of ``count`` observers observes of a team-mate, if there are so many."""
-    if lane >= count:
-        return
-    to = natural(e + lane * across)
-    o = observations[to, natural(i + lane * (1 - across))]
-    start = natural(int(s[_START + lane]))
-    store(o, start, fields)
-    o[start + 8] = s[turn_rates + lane]
-    if c.message_size > 0:
-        copy_message(c, message[to, 0, natural(int(o[start]))], o, start)
-
-
-@compiled(seldom=True)
-def copy_message(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
-    """Write what a team-mate said, (m,), into its place, which begins at k."""
-    for q in range(c.message_size):
-        o[k + 9 + q] = said[q]
-
-
-@compiled
 def _observe_some(
     c: Record,
     world: Records,
@@ -382,9 +193,15 @@ def _observe_some(
 ) -> None:
     """Write what ``count`` trackers, the first of them i of world e, observe together."""
     observe_own_and_target(c, world, tracker, e, i, count, across, s, observations)
-    if whole_team(c):
+    if observes_mates(c):
         k = SONAR_AT + natural(c.sonar_beams)
-        observe_team(c, e, i, count, across, message, s, observations, k)
+        observe_mates(c, tracker, e, i, count, across, message, s, observations, k)
+
+
+@compiled
+def observes_mates(c: Record) -> bool:
+    """Say whether trackers observe where team-mates are now, not what they last heard of them."""
+    return bool(c.perfect_radio != 0 and c.neighbours > 0)
 
 
 @compiled
@@ -400,14 +217,14 @@ def observe_together(
 ) -> None:
     """Write what trackers of ``worlds`` worlds, at most eight, from e on, observe together."""
     n = natural(c.num_trackers)
-    if worlds == TOGETHER:
-        if whole_team(c):
+    if worlds == TOGETHER and n <= MOST_IN_TEAM:
+        if observes_mates(c):
             lay_out_team(tracker, e, 1, s)
         for i in range(n):
             _observe_some(c, world, tracker, e, i, WIDTH, 1, message, s, observations)
         return
     for each in range(e, e + worlds):
-        if whole_team(c):
+        if observes_mates(c):
             lay_out_team(tracker, each, 0, s)
         for i in range(0, n, WIDTH):
             count = min(WIDTH, n - i)

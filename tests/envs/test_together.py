@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import posse
+from posse.nearest import LISTED
 from posse.scenario import MAX_TRACKERS
-from posse.survey import BLOCK, LISTED, MOST_IN_TEAM, SIZE, SIZE_FOR_ONE, TEAM
-from posse.together import SONAR_AT, TARGET_AT, TASK_AT, _row
+from posse.survey import BLOCK, MOST_IN_TEAM, SHORTLIST, SIZE, SIZE_FOR_ONE, TEAM
+from posse.team import row_length
+from posse.together import SONAR_AT, TARGET_AT, TASK_AT
 
 TEAMS: list[dict[str, Any]] = [
     {"num_trackers": 1},
@@ -21,6 +23,11 @@ TEAMS: list[dict[str, Any]] = [
     {"num_trackers": 16, "num_neighbours": 15},
     {"num_trackers": 17, "num_neighbours": 16, "message_size": 1},
     {"num_trackers": 5, "num_neighbours": 2},
+    {"num_trackers": 5, "num_neighbours": 7, "message_size": 1},
+    {"num_trackers": 8, "num_neighbours": 3, "message_size": 2},
+    {"num_trackers": 16, "message_size": 1},
+    {"num_trackers": 16, "num_neighbours": 9},
+    {"num_trackers": 3, "num_neighbours": 0},
     {"num_trackers": 5, "field_of_view": 2.0, "sensing_range": 9.0},
 ]
 WORLDS = 11  # eight together, and three each alone
@@ -54,10 +61,10 @@ def test_parts_are_written_where_they_are_declared() -> None:
     assert {name: offsets[name] for name in names} == names
 
 
-@pytest.mark.parametrize(("across", "size"), [(0, SIZE_FOR_ONE), (1, SIZE)])
-def test_the_largest_team_fits_its_memory(across: int, size: int) -> None:
-    assert TEAM + 6 * _row(MOST_IN_TEAM, across) <= size
-    assert size >= LISTED + BLOCK * MAX_TRACKERS
+def test_the_largest_team_fits_its_memory() -> None:
+    assert TEAM + 6 * row_length(MOST_IN_TEAM, across=1) <= SIZE
+    assert TEAM + 6 * row_length(MAX_TRACKERS, across=0) <= SIZE_FOR_ONE <= SIZE
+    assert LISTED + BLOCK * (MAX_TRACKERS - 1) <= SHORTLIST
 
 
 @pytest.mark.parametrize("worlds", [1, 8])

@@ -1,0 +1,286 @@
+"""What trackers observe of their team-mates where the radio is perfect: eight at once, a lane each.
+
+Of a small team that is observed as a whole, each team-mate is worked out once and written to its
+place. Where there are fewer places than team-mates, or the team is large, the nearest are listed
+first (:mod:`posse.nearest`), and then the nearest of all eight are written together, after them the
+second nearest, and so on.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.arrays import FloatArray, Record, Records
+from posse.compiled import compiled
+from posse.lanes import (
+    WIDTH,
+    Lanes,
+    choose,
+    eight,
+    greater,
+    load,
+    load_fields,
+    root,
+    store,
+    transpose,
+)
+from posse.nearest import LISTED, list_nearest
+from posse.state import POSE
+from posse.survey import MOST_IN_TEAM, OWN, ROW, TEAM, natural, within_one
+from posse.team import number_behind, row_length, seen_at, stride_of
+
+# Scratch memory: how eight team-mates turn; where in an observation each belongs; of a team that is
+# observed as a whole, how far each mate is, and how many are nearer.
+_TURN_RATES: Final = OWN
+_START: Final = OWN + WIDTH
+_DISTANCE: Final = OWN + 1 * ROW
+_PLACE: Final = OWN + 2 * ROW
+
+_SCATTERED: Final = -1
+"""Not the same place for all eight, but for each what _START says."""
+
+_MATE: Final = 9
+"""Numbers that are observed of a team-mate, what it said apart."""
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_MINUS_ONE: Final = np.float32(-1.0)
+_TINY: Final = np.float32(1e-9)
+
+
+@compiled
+def observe_mates(
+    c: Record,
+    tracker: Records,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write the nearest team-mates of observers from k on, the nearest first.
+
+    They are ``count`` trackers, the first of them i of world e, whose team stands in its rows
+    (:func:`posse.team.lay_out_team`).
+    """
+    mates, places = natural(c.num_trackers - 1), natural(c.neighbours)
+    if mates <= places and mates < MOST_IN_TEAM:
+        _observe_whole_team(c, e, i, count, across, s, observations, k)
+    elif places > 0:
+        _observe_nearest(c, tracker, e, i, count, across, s, observations, k)
+    if c.message_size > 0 or mates < places:
+        for lane in range(count):
+            to = natural(e + lane * across)
+            o = observations[to, natural(i + lane * (1 - across))]
+            _write_the_rest(c, message[to, 0], o, k)
+
+
+@compiled(seldom=True)
+def _write_the_rest(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
+    """Write what team-mates said, of (N, m), to their places, and that others are empty."""
+    for place in range(c.neighbours):
+        start = natural(k + place * (_MATE + c.message_size))
+        if place < c.num_trackers - 1:
+            copy_message(c, said[natural(int(o[start]))], o, start)
+        else:
+            leave_empty(c, o, start)
+
+
+@compiled
+def _find_places(n: int, i: int, across: int, s: FloatArray) -> None:
+    """Write how far each team-mate is from its observers, and how many are nearer.
+
+    Or as near, and of a lower number.
+    """
+    for m in range(n - 1):
+        ahead, left = seen_at(n, i, m, across, s)
+        distance = root(ahead * ahead + left * left)
+        number, place = number_behind(n, i, m, across, s), eight(_ZERO)
+        for q in range(m):
+            other, whose = load(s, _DISTANCE + WIDTH * q), number_behind(n, i, q, across, s)
+            nearer = (other < distance) | ((other == distance) & (whose < number))
+            place = place + choose(nearer, _ONE, _ZERO)
+            store(s, _PLACE + WIDTH * q, load(s, _PLACE + WIDTH * q) + choose(nearer, _ZERO, _ONE))
+        store(s, _DISTANCE + WIDTH * m, distance)
+        store(s, _PLACE + WIDTH * m, place)
+
+
+@compiled
+def _observe_whole_team(
+    c: Record,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write every team-mate of observers from k on: each has a place."""
+    n, size = natural(c.num_trackers), np.float32(_MATE + c.message_size)
+    stride, row = stride_of(across), row_length(n, across)
+    own = TEAM + natural(stride * i)
+    _find_places(n, i, across, s)
+    for m in range(n - 1):
+        at = own + natural(stride * (m + 1))
+        ahead, left = seen_at(n, i, m, across, s)
+        mates = _describe_mates(
+            load(s, own + 2 * row), load(s, own + 3 * row), number_behind(n, i, m, across, s),
+            ahead, left, load(s, _DISTANCE + WIDTH * m),
+            load(s, at + 2 * row), load(s, at + 3 * row), load(s, at + 4 * row),
+        )  # fmt: skip
+        store(s, _TURN_RATES, load(s, at + 5 * row))
+        store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
+        _write_mates(c, mates, _SCATTERED, e, i, count, across, s, observations)
+
+
+@compiled
+def _observe_nearest(
+    c: Record,
+    tracker: Records,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    s: FloatArray,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write the nearest team-mates of observers from k on, where not all have a place."""
+    n, size = natural(c.num_trackers), natural(_MATE + c.message_size)
+    places = min(n - 1, natural(c.neighbours))
+    row = row_length(n, across)
+    own = TEAM + natural(stride_of(across) * i)
+    list_nearest(n, places, i, count, across, s)
+    for place in range(natural(places)):
+        listed = LISTED + WIDTH * place
+        own_x, own_y, hc, hs = (
+            load(s, own), load(s, own + row), load(s, own + 2 * row), load(s, own + 3 * row)
+        )  # fmt: skip
+        x, y, heading_x, heading_y, speed, turn_rate, _, _ = _columns_of(
+            tracker, listed, e, across, s
+        )
+        dx, dy = x - own_x, y - own_y
+        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        mates = _describe_mates(
+            hc, hs, load(s, listed), ahead, left, root(ahead * ahead + left * left),
+            heading_x, heading_y, speed,
+        )  # fmt: skip
+        store(s, _TURN_RATES, turn_rate)
+        at = natural(k + place * size)
+        _write_mates(c, mates, at, e, i, count, across, s, observations)
+
+
+@compiled
+def _describe_mates(
+    hc: Lanes,
+    hs: Lanes,
+    numbers: Lanes,
+    ahead: Lanes,
+    left: Lanes,
+    metres: Lanes,
+    heading_x: Lanes,
+    heading_y: Lanes,
+    speed: Lanes,
+) -> tuple[Lanes, ...]:
+    """Return what robots observe of eight team-mates, of each as it stands in an observation.
+
+    Number, age (0), range, bearing and heading (cosine and sine, ego), speed. From how the robots
+    head, who the team-mates are, where they are as the robots see it, and their headings in the
+    common frame.
+    """
+    per_metre = _ONE / greater(metres, _TINY)
+    return transpose(
+        numbers, eight(_ZERO), metres,
+        within_one(ahead * per_metre), within_one(left * per_metre),
+        within_one(heading_x * hc + heading_y * hs), within_one(heading_y * hc - heading_x * hs),
+        speed,
+    )  # fmt: skip
+
+
+@compiled
+def _columns_of(
+    tracker: Records, listed: int, e: int, across: int, s: FloatArray
+) -> tuple[Lanes, ...]:
+    """Return :func:`posse.team.team_columns` of the pose of those whose numbers are listed."""
+    return transpose(
+        _pose(tracker, listed, 0, e, across, s), _pose(tracker, listed, 1, e, across, s),
+        _pose(tracker, listed, 2, e, across, s), _pose(tracker, listed, 3, e, across, s),
+        _pose(tracker, listed, 4, e, across, s), _pose(tracker, listed, 5, e, across, s),
+        _pose(tracker, listed, 6, e, across, s), _pose(tracker, listed, 7, e, across, s),
+    )  # fmt: skip
+
+
+@compiled
+def _pose(tracker: Records, listed: int, lane: int, e: int, across: int, s: FloatArray) -> Lanes:
+    """Return the pose of whom a lane's list names, and what follows on it."""
+    number = natural(int(s[listed + lane]))
+    return load_fields(tracker[natural(e + lane * across), number], POSE)
+
+
+@compiled
+def _write_mates(
+    c: Record,
+    mates: tuple[Lanes, ...],
+    at: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what each of ``count`` observers observes of one team-mate, from ``at`` on."""
+    first, second, third, fourth, fifth, sixth, seventh, eighth = mates
+    _write_mate(c, first, 0, at, e, i, count, across, s, observations)
+    _write_mate(c, second, 1, at, e, i, count, across, s, observations)
+    _write_mate(c, third, 2, at, e, i, count, across, s, observations)
+    _write_mate(c, fourth, 3, at, e, i, count, across, s, observations)
+    _write_mate(c, fifth, 4, at, e, i, count, across, s, observations)
+    _write_mate(c, sixth, 5, at, e, i, count, across, s, observations)
+    _write_mate(c, seventh, 6, at, e, i, count, across, s, observations)
+    _write_mate(c, eighth, 7, at, e, i, count, across, s, observations)
+
+
+@compiled
+def _write_mate(
+    c: Record,
+    fields: Lanes,
+    lane: int,
+    at: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what one of ``count`` observers observes of a team-mate, if there are so many."""
+    if lane >= count:
+        return
+    o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+    start = natural(int(s[_START + lane])) if at == _SCATTERED else natural(at)
+    store(o, start, fields)
+    o[start + 8] = s[_TURN_RATES + lane]
+
+
+@compiled
+def copy_message(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
+    """Write what a team-mate said, (m,), into its place, which begins at k."""
+    for q in range(c.message_size):
+        o[k + _MATE + q] = said[q]
+
+
+@compiled
+def leave_empty(c: Record, o: FloatArray, k: int) -> None:
+    """Write a place that no team-mate fills, from k on."""
+    for q in range(k + 3, k + _MATE + c.message_size):
+        o[q] = _ZERO
+    o[k] = _MINUS_ONE
+    o[k + 1] = _MINUS_ONE
+    o[k + 2] = _MINUS_ONE

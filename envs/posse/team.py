@@ -1,0 +1,88 @@
+"""A team laid out in rows, for eight observers at once, a lane each.
+
+The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or
+teams are large, the trackers of one (0). A row holds the team twice, one after the other, so that a
+team-mate lies as many places behind its observer, whoever that is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from posse.arrays import FloatArray, Records
+from posse.compiled import compiled
+from posse.lanes import WIDTH, Lanes, choose, eight, load, load_fields, store, transpose
+from posse.state import POSE
+from posse.survey import INDEX, TEAM, columns, natural
+
+
+@compiled
+def stride_of(across: int) -> int:
+    """Return how far one tracker lies from the next in a row of the team."""
+    return WIDTH if across else 1
+
+
+@compiled
+def row_length(n: int, across: int) -> int:
+    """Return how far one row of a team of n lies from the next.
+
+    The last block of a row may run over the end of what it holds.
+    """
+    return natural(2 * n * stride_of(across) + WIDTH)
+
+
+@compiled
+def team_columns(tracker: Records, e: int, i: int, across: int, offset: int) -> tuple[Lanes, ...]:
+    """Return :func:`posse.survey.columns` of eight trackers, of (E, N), from world e's i on."""
+    if across:
+        return transpose(
+            load_fields(tracker[e, i], offset),
+            load_fields(tracker[e + 1, i], offset),
+            load_fields(tracker[e + 2, i], offset),
+            load_fields(tracker[e + 3, i], offset),
+            load_fields(tracker[e + 4, i], offset),
+            load_fields(tracker[e + 5, i], offset),
+            load_fields(tracker[e + 6, i], offset),
+            load_fields(tracker[e + 7, i], offset),
+        )
+    return columns(tracker[e], i, tracker.shape[1], offset)
+
+
+@compiled
+def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
+    """Write the rows of the team of world e, or of eight worlds.
+
+    They hold x, y, heading (cosine, sine), speed and turn rate.
+    """
+    n = natural(tracker.shape[1])
+    stride, row = stride_of(across), row_length(n, across)
+    each = WIDTH // stride
+    # From the last block on: what fills it is overwritten by the others' second place.
+    for block in range((n + each - 1) // each - 1, -1, -1):
+        i = natural(each * block)
+        x, y, cosine, sine, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
+        for at in (TEAM + stride * i, TEAM + natural(stride * (i + n))):
+            store(s, at, x)
+            store(s, at + row, y)
+            store(s, at + 2 * row, cosine)
+            store(s, at + 3 * row, sine)
+            store(s, at + 4 * row, speed)
+            store(s, at + 5 * row, turn_rate)
+
+
+@compiled
+def number_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
+    """Return the numbers of the team-mates m + 1 places behind their observers."""
+    number = (eight(np.float32(i)) if across else load(s, INDEX + i)) + np.float32(m + 1)
+    return choose(number >= np.float32(n), number - np.float32(n), number)
+
+
+@compiled
+def seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+    """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
+    stride, row = stride_of(across), row_length(n, across)
+    own = TEAM + natural(stride * i)
+    at = own + natural(stride * (m + 1))
+    dx, dy = load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+    return dx * hc + dy * hs, dy * hc - dx * hs
