@@ -63,7 +63,7 @@ def one_part(  # type: ignore[no-untyped-def]
             contact.meet(c, w, t, o, scratch)
         elif part == 3:
             w.step += 1
-            world.sense(c, w, t, o, heard[e], broadcast[e], heard_message[e], message[e], scratch)
+            world.sense(c, w, t, heard[e], broadcast[e], heard_message[e], message[e], scratch)
         elif part == 4:
             score.occupy(c, w, t, slots, scratch)
         elif part == 5:

@@ -11,6 +11,7 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.lanes import (
     Lanes,
+    bits,
     choose,
     eight,
     greater,
@@ -24,6 +25,7 @@ from posse.state import FIX, NEVER
 from posse.survey import (
     BLOCK,
     OWN,
+    RADIUS,
     ROW,
     X,
     Y,
@@ -48,7 +50,7 @@ _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of th
 
 @compiled
 def in_sight(
-    c: Record, w: Record, t: Record, obstacles: Records, dx: np.float32, dy: np.float32
+    c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray
 ) -> bool:
     """Say whether a tracker's sensor has the target, which lies (dx, dy) from it.
 
@@ -63,15 +65,25 @@ def in_sight(
         along = dx * t.heading_cos + dy * t.heading_sin
         if along < c.view_cosine * np.float32(math.sqrt(d2)):
             return False
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
-        ox, oy = o.x - t.x, o.y - t.y
-        along = ox * dx + oy * dy
-        if along > _ZERO and along < d2:
-            across = ox * dy - oy * dx
-            if across * across < o.radius * o.radius * d2:
-                return False
-    return True
+    return not hidden(c, t, dx, dy, s)
+
+
+@compiled
+def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray) -> bool:
+    """Say whether an obstacle lies across the line from a tracker to what is (dx, dy) from it.
+
+    Eight at a time: which of them is across cannot be predicted.
+    """
+    d2 = dx * dx + dy * dy
+    first = natural(c.num_trackers) + 1
+    for block in range(blocks(c.num_obstacles)):
+        j = first + BLOCK * block
+        ox, oy, radius = load(s, X + j) - t.x, load(s, Y + j) - t.y, load(s, RADIUS + j)
+        along, across = ox * dx + oy * dy, ox * dy - oy * dx
+        meets = (along > _ZERO) & (along < d2) & (across * across < radius * radius * d2)
+        if bits(meets) != 0:
+            return True
+    return False
 
 
 @compiled
@@ -123,10 +135,10 @@ def take_fix(
 
 
 @compiled
-def look(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> int:
+def look(c: Record, w: Record, trackers: Records, s: FloatArray) -> int:
     """Let every tracker look for the target, and note the fix if it has it; return how many do.
 
-    Where the trackers are stands in ``s`` (:func:`posse.survey.lay_out`).
+    Where the discs are stands in ``s`` (:func:`posse.survey.lay_out`).
     """
     n = natural(c.num_trackers)
     noisy = c.range_noise > _ZERO or c.bearing_noise > _ZERO
@@ -134,7 +146,7 @@ def look(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
     for i in range(n):
         t = trackers[i]
         dx, dy = w.x - t.x, w.y - t.y
-        t.sees = t.broken_at == NEVER and in_sight(c, w, t, obstacles, dx, dy)
+        t.sees = t.broken_at == NEVER and in_sight(c, w, t, dx, dy, s)
         seeing += t.sees
         s[_FIXED_AT + i] = np.float32(t.fix_step)
         if noisy and t.sees:

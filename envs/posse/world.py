@@ -44,7 +44,6 @@ def sense(
     c: Record,
     w: Record,
     trackers: Records,
-    obstacles: Records,
     heard: Records,
     broadcast: Records,
     heard_message: FloatArray,
@@ -52,7 +51,7 @@ def sense(
     scratch: FloatArray,
 ) -> None:
     """Let every tracker look for the target, then tell and hear."""
-    seeing = look(c, w, trackers, obstacles, scratch)
+    seeing = look(c, w, trackers, scratch)
     if c.perfect_radio:
         if seeing < c.num_trackers:  # else nobody has anything to hear
             share_fixes(c, trackers)
@@ -220,10 +219,7 @@ def advance_worlds(
         find_gaps(c, scratch)
         if order != LOOK:
             meet(c, w, trackers, obstacles, scratch)
-            sense(
-                c, w, trackers, obstacles, heard[e], broadcast[e], heard_message[e], message[e],
-                scratch,
-            )  # fmt: skip
+            sense(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e], scratch)
             occupy(c, w, trackers, slots, scratch)
         if order == STEP:
             end_step(c, w, trackers, slots)
