@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,9 +46,17 @@ def test_sight_ends_at_the_field_of_view(view: float) -> None:
     assert batch.state["tracker_sees"].tolist() == [[1, 1, 0, 0]]
 
 
-@pytest.mark.parametrize("name", ["obstacles", "field", "search"])
-def test_sight_is_what_geometry_says(name: str) -> None:
-    batch = posse.batch(name, 40, field_of_view=4.0)
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [
+        ("obstacles", {}),
+        ("field", {}),
+        ("search", {}),
+        ("obstacles", {"num_obstacles": 19, "arena": 36.0}),
+    ],
+)
+def test_sight_is_what_geometry_says(name: str, more: dict[str, Any]) -> None:
+    batch = posse.batch(name, 40, field_of_view=4.0, **more)
     batch.reset(seed=1)
     rng = np.random.default_rng(1)
     seen = 0
