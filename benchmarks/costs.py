@@ -71,9 +71,7 @@ def one_part(  # type: ignore[no-untyped-def]
         elif part == 6:
             world.reward(c, w, t, weights, rewards[e], terms[e])
         elif part == 7:
-            world.observe(
-                c, w, t, o, heard[e], heard_message[e], message[e], scratch, observations[e]
-            )
+            world.observe(c, w, t, o, heard[e], heard_message[e], scratch, observations[e])
             begun = e % together.TOGETHER + 1
             if begun == together.TOGETHER or e == len(worlds) - 1:
                 together.observe_together(

@@ -41,7 +41,7 @@ _PLACE: Final = OWN + 2 * ROW
 _SCATTERED: Final = -1
 """Not the same place for all eight, but for each what _START says."""
 
-_MATE: Final = 9
+MATE: Final = 9
 """Numbers that are observed of a team-mate, what it said apart."""
 
 _ZERO: Final = np.float32(0.0)
@@ -84,9 +84,10 @@ def observe_mates(
 def _write_the_rest(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
     """Write what team-mates said, of (N, m), to their places, and that others are empty."""
     for place in range(c.neighbours):
-        start = natural(k + place * (_MATE + c.message_size))
+        start = natural(k + place * (MATE + c.message_size))
         if place < c.num_trackers - 1:
-            copy_message(c, said[natural(int(o[start]))], o, start)
+            number = min(natural(int(o[start])), natural(c.num_trackers - 1))
+            copy_message(c, said[number], o, start)
         else:
             leave_empty(c, o, start)
 
@@ -122,7 +123,7 @@ def _observe_whole_team(
     k: int,
 ) -> None:
     """Write every team-mate of observers from k on: each has a place."""
-    n, size = natural(c.num_trackers), np.float32(_MATE + c.message_size)
+    n, size = natural(c.num_trackers), np.float32(MATE + c.message_size)
     stride, row = stride_of(across), row_length(n, across)
     own = TEAM + natural(stride * i)
     _find_places(n, i, across, s)
@@ -151,8 +152,8 @@ def _observe_nearest(
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates of observers from k on, where not all have a place."""
-    n, size = natural(c.num_trackers), natural(_MATE + c.message_size)
+    """Write the nearest team-mates of observers from k on, as many as there are places."""
+    n, size = natural(c.num_trackers), natural(MATE + c.message_size)
     places = min(n - 1, natural(c.neighbours))
     row = row_length(n, across)
     own = TEAM + natural(stride_of(across) * i)
@@ -163,7 +164,7 @@ def _observe_nearest(
             load(s, own), load(s, own + row), load(s, own + 2 * row), load(s, own + 3 * row)
         )  # fmt: skip
         x, y, heading_x, heading_y, speed, turn_rate, _, _ = _columns_of(
-            tracker, listed, e, across, s
+            tracker, listed, e, count, across, s
         )
         dx, dy = x - own_x, y - own_y
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
@@ -205,21 +206,30 @@ def _describe_mates(
 
 @compiled
 def _columns_of(
-    tracker: Records, listed: int, e: int, across: int, s: FloatArray
+    tracker: Records, listed: int, e: int, count: int, across: int, s: FloatArray
 ) -> tuple[Lanes, ...]:
     """Return :func:`posse.team.team_columns` of the pose of those whose numbers are listed."""
     return transpose(
-        _pose(tracker, listed, 0, e, across, s), _pose(tracker, listed, 1, e, across, s),
-        _pose(tracker, listed, 2, e, across, s), _pose(tracker, listed, 3, e, across, s),
-        _pose(tracker, listed, 4, e, across, s), _pose(tracker, listed, 5, e, across, s),
-        _pose(tracker, listed, 6, e, across, s), _pose(tracker, listed, 7, e, across, s),
-    )  # fmt: skip
+        _pose(tracker, listed, 0, e, count, across, s),
+        _pose(tracker, listed, 1, e, count, across, s),
+        _pose(tracker, listed, 2, e, count, across, s),
+        _pose(tracker, listed, 3, e, count, across, s),
+        _pose(tracker, listed, 4, e, count, across, s),
+        _pose(tracker, listed, 5, e, count, across, s),
+        _pose(tracker, listed, 6, e, count, across, s),
+        _pose(tracker, listed, 7, e, count, across, s),
+    )
 
 
 @compiled
-def _pose(tracker: Records, listed: int, lane: int, e: int, across: int, s: FloatArray) -> Lanes:
-    """Return the pose of whom a lane's list names, and what follows on it."""
-    number = natural(int(s[listed + lane]))
+def _pose(
+    tracker: Records, listed: int, lane: int, e: int, count: int, across: int, s: FloatArray
+) -> Lanes:
+    """Return the pose of whom a lane's list names, and what follows on it.
+
+    The last of ``count`` lanes stands in for those that there are not.
+    """
+    number = natural(int(s[listed + min(lane, count - 1)]))
     return load_fields(tracker[natural(e + lane * across), number], POSE)
 
 
@@ -266,20 +276,20 @@ def _write_mate(
     o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
     start = natural(int(s[_START + lane])) if at == _SCATTERED else natural(at)
     store(o, start, fields)
-    o[start + 8] = s[_TURN_RATES + lane]
+    o[start + MATE - 1] = s[_TURN_RATES + lane]
 
 
 @compiled
 def copy_message(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
     """Write what a team-mate said, (m,), into its place, which begins at k."""
     for q in range(c.message_size):
-        o[k + _MATE + q] = said[q]
+        o[k + MATE + q] = said[q]
 
 
 @compiled
 def leave_empty(c: Record, o: FloatArray, k: int) -> None:
     """Write a place that no team-mate fills, from k on."""
-    for q in range(k + 3, k + _MATE + c.message_size):
+    for q in range(k + 3, k + MATE + c.message_size):
         o[q] = _ZERO
     o[k] = _MINUS_ONE
     o[k + 1] = _MINUS_ONE

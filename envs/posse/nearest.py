@@ -1,8 +1,9 @@
-"""Which team-mates are nearest to eight trackers, a lane each, where not all are observed.
+"""Which team-mates are nearest to eight trackers, a lane each.
 
-Squared distances to eight team-mates are sorted and merged with the nearest so far, without a
-branch. That keeps a distance to five digits and six bits of whose it is; where two distances are
-nearer to each other than that can tell, the lane's list is made again, one by one and exactly.
+Up to eight of the nearest are found for all lanes at once: squared distances to eight team-mates
+are sorted and merged with the nearest so far, without a branch. That keeps a distance to five
+digits and six bits of whose it is; where two distances are nearer to each other than that can tell,
+the lane's list is made again, one by one and exactly. Longer lists are always made so.
 """
 
 from __future__ import annotations
@@ -21,18 +22,18 @@ from posse.lanes import (
     eight,
     greater,
     lesser,
-    load,
     root,
     store,
     tag,
     tagged,
 )
-from posse.survey import FAR, INDEX, OWN, ROW, SHORTLIST, TEAM, blocks, natural, store_each
-from posse.team import row_length, stride_of
+from posse.survey import FAR, OWN, ROW, SHORTLIST, TEAM, blocks, natural, store_each
+from posse.team import own_numbers, round_again, row_length, stride_of, way_behind
 
 LISTED: Final = OWN + 1 * ROW
 """Where the lists stand in scratch memory: the nearest to each of the eight, a lane each, then the
-second nearest. Numbers of team-mates; four rows hold lists of the largest team."""
+second nearest. Numbers of team-mates; four rows hold lists of the largest team. The first of the
+rows that are a module's own stays with who asks for the lists."""
 
 # The nearest so far, how far and who; which of the eight lists are beyond doubt.
 _SO_FAR: Final = SHORTLIST
@@ -49,8 +50,9 @@ _Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 
 @compiled
 def list_nearest(n: int, places: int, i: int, count: int, across: int, s: FloatArray) -> None:
-    """List the nearest of a team of n to ``count`` trackers, at most eight, the first of them i.
+    """List, from LISTED on, the nearest of a team of n to ``count`` trackers, the first of them i.
 
+    They are at most eight; what other lanes hold is of no use.
     There are no more places than team-mates, and the team stands in its rows
     (:func:`posse.team.lay_out_team`).
     """
@@ -77,10 +79,10 @@ def rank_eight(n: int, i: int, across: int, s: FloatArray) -> None:
         | as_near(e, f) | as_near(f, g) | as_near(g, h) | as_near(h, ninth)
     )  # fmt: skip
     store(s, _CERTAIN, choose(doubtful, _ZERO, _ONE))
-    first = (eight(np.float32(i)) if across else load(s, INDEX + i)) + _ONE
+    behind = own_numbers(i, across, s) + _ONE
     lists = (
-        who(n, first, a), who(n, first, b), who(n, first, c), who(n, first, d),
-        who(n, first, e), who(n, first, f), who(n, first, g), who(n, first, h),
+        whose(n, behind, a), whose(n, behind, b), whose(n, behind, c), whose(n, behind, d),
+        whose(n, behind, e), whose(n, behind, f), whose(n, behind, g), whose(n, behind, h),
     )  # fmt: skip
     store_each(lists, LISTED, WIDTH, s)
 
@@ -92,14 +94,9 @@ def as_near(one: Lanes, next_one: Lanes) -> Mask:
 
 
 @compiled
-def who(n: int, first: Lanes, distance: Lanes) -> Lanes:
-    """Return the numbers of those whose distances these are; ``first``, of those next behind.
-
-    A number of the team it is also where there is nobody.
-    """
-    number = first + tag(distance)
-    number = choose(number >= np.float32(n), number - np.float32(n), number)
-    return lesser(number, np.float32(n - 1))
+def whose(n: int, behind: Lanes, distance: Lanes) -> Lanes:
+    """Return the numbers of those whose distances these are; ``behind``, of those next behind."""
+    return round_again(n, behind + tag(distance))
 
 
 @compiled
@@ -118,14 +115,14 @@ def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: FloatAr
 
 @compiled
 def apart(n: int, i: int, m: int, is_there: bool, across: int, s: FloatArray) -> Lanes:
-    """Return the squared distances to the team-mates m + 1 places behind, tagged with m."""
-    own = TEAM + natural(stride_of(across) * i)
-    at = own + natural(stride_of(across) * (m + 1))
-    row = row_length(n, across)
-    dx, dy = load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+    """Return the squared distances to the team-mates m + 1 places behind, tagged with m.
+
+    Of who is not there anything is read, and may be no number.
+    """
+    dx, dy = way_behind(n, i, m, across, s)
     least = choose(is_there or m < n - 1, _ZERO, _ABSENT)
     # Last, what makes them numbers again to LLVM: it would not sort bits as fast.
-    return greater(tagged(dx * dx + dy * dy, m), least)
+    return greater(least, tagged(dx * dx + dy * dy, m))
 
 
 @compiled
@@ -172,16 +169,16 @@ def merge(one: _Eight, other: _Eight) -> tuple[Lanes, ...]:
     return a, b, c, d, e, f, g, h, least
 
 
-@compiled
+@compiled(seldom=True)
 def list_exactly(n: int, places: int, i: int, lane: int, across: int, s: FloatArray) -> None:
     """List the nearest team-mates of the tracker in a lane, in order of exact distances."""
     stride, row = stride_of(across), row_length(n, across)
     own_number = natural(i + lane * (1 - across))
-    first = TEAM + natural(lane * across)
-    own = first + natural(stride * own_number)
+    team = TEAM + natural(lane * across)
+    own = team + natural(stride * own_number)
     filled = 0
     for number in range(n):
-        at = first + natural(stride * number)
+        at = team + natural(stride * number)
         dx, dy = s[at] - s[own], s[at + row] - s[own + row]
         hc, hs = s[own + 2 * row], s[own + 3 * row]
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs

@@ -22,7 +22,7 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.contact import touches_surroundings
 from posse.formation import FORMATIONS
-from posse.mates import copy_message, leave_empty
+from posse.mates import MATE, copy_message, leave_empty
 from posse.nearest import WHO, keep_nearest
 from posse.scenario import Scenario
 from posse.sonar import ping
@@ -258,7 +258,7 @@ def _write_heard(
             copy_message(c, said[j], o, k)
         else:
             leave_empty(c, o, k)
-        k += 9 + natural(c.message_size)
+        k += MATE + natural(c.message_size)
 
 
 @compiled
@@ -268,7 +268,6 @@ def observe_alone(
     trackers: Records,
     heard: Records,
     heard_message: FloatArray,
-    message: FloatArray,
     s: FloatArray,
     observations: FloatArray,
 ) -> None:
@@ -319,7 +318,7 @@ def observe_target(
         if p < filled:
             j = int(s[WHO + p])
             _write_neighbour(w, trackers[j], j, _ZERO, o, k)
-        k += 9 + natural(c.message_size)
+        k += MATE + natural(c.message_size)
 
 
 class ObservationLayout:

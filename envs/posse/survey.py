@@ -51,17 +51,16 @@ SLOT_DISTANCE2: Final = 12 * ROW  # the same squared, m²
 HEARD2: Final = 13 * ROW  # within which the sonar has it, the square, and a little more, m²
 OWN: Final = 14 * ROW  # ten rows whose meaning is their module's own
 SHORTLIST: Final = 24 * ROW  # and three for a list of the nearest
-_SHARED: Final = 27 * ROW
 
 # Then the rows of a team (posse.team), which is there twice, and room for the last block: of eight
 # worlds, if it is small, or of one.
-TEAM: Final = _SHARED
-_TEAM_ROWS: Final = 6
+TEAM: Final = 27 * ROW
+TEAM_ROWS: Final = 6
 MOST_IN_TEAM: Final = 16
 """Up to this team size, the teams of eight worlds fit there."""
 
-SIZE: Final = TEAM + _TEAM_ROWS * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
-SIZE_FOR_ONE: Final = TEAM + _TEAM_ROWS * (2 * MAX_TRACKERS + BLOCK)
+SIZE: Final = TEAM + TEAM_ROWS * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
+SIZE_FOR_ONE: Final = TEAM + TEAM_ROWS * (2 * MAX_TRACKERS + BLOCK)
 """Where memory is short: the team of one world fits."""
 
 TOUCHING_GAP: Final = np.float32(0.001)

@@ -26,7 +26,8 @@ def stride_of(across: int) -> int:
 def row_length(n: int, across: int) -> int:
     """Return how far one row of a team of n lies from the next.
 
-    The last block of a row may run over the end of what it holds.
+    The last block of a row may run over the end of what it holds; what is read from there is of
+    nobody, and must not count.
     """
     return natural(2 * n * stride_of(across) + WIDTH)
 
@@ -71,18 +72,37 @@ def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
 
 
 @compiled
+def own_numbers(i: int, across: int, s: FloatArray) -> Lanes:
+    """Return the numbers of the observers, of which the first is i."""
+    return eight(np.float32(i)) if across else load(s, INDEX + i)
+
+
+@compiled
+def round_again(n: int, number: Lanes) -> Lanes:
+    """Return numbers that were counted on past the last of a team of n as they are in it."""
+    return choose(number >= np.float32(n), number - np.float32(n), number)
+
+
+@compiled
 def number_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
     """Return the numbers of the team-mates m + 1 places behind their observers."""
-    number = (eight(np.float32(i)) if across else load(s, INDEX + i)) + np.float32(m + 1)
-    return choose(number >= np.float32(n), number - np.float32(n), number)
+    return round_again(n, own_numbers(i, across, s) + np.float32(m + 1))
+
+
+@compiled
+def way_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+    """Return how far the team-mates m + 1 places behind are away, in x and in y, m."""
+    stride, row = stride_of(across), row_length(n, across)
+    own = TEAM + natural(stride * i)
+    at = own + natural(stride * (m + 1))
+    return load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
 
 
 @compiled
 def seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
     """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
-    stride, row = stride_of(across), row_length(n, across)
-    own = TEAM + natural(stride * i)
-    at = own + natural(stride * (m + 1))
-    dx, dy = load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+    row = row_length(n, across)
+    own = TEAM + natural(stride_of(across) * i)
+    dx, dy = way_behind(n, i, m, across, s)
     hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
     return dx * hc + dy * hs, dy * hc - dx * hs

@@ -78,7 +78,7 @@ def by_turns(work: Callable[[int, Numbers], T], num_worlds: int, threads: int) -
 @functools.lru_cache(maxsize=64)
 def _fresh_turns(num_worlds: int, threads: int) -> Numbers:
     """Return turns of which none is taken."""
-    # Eights of worlds are observed together, and so faster.
+    # Eights of worlds are observed together, and so faster where teams are small.
     grain = TOGETHER if num_worlds >= threads * _PARTS * TOGETHER // 2 else 1
     edges = [num_worlds * k // (threads * grain) * grain for k in range(threads)] + [num_worlds]
     turns = np.zeros((threads, TURN), np.int64)

@@ -68,12 +68,11 @@ def observe(
     obstacles: Records,
     heard: Records,
     heard_message: FloatArray,
-    message: FloatArray,
     scratch: FloatArray,
     observations: FloatArray,
 ) -> None:
     """Write what every agent of a world observes, (rows, F), but for observe_together."""
-    observe_alone(c, w, trackers, heard, heard_message, message, scratch, observations)
+    observe_alone(c, w, trackers, heard, heard_message, scratch, observations)
     if c.motion == AGENT:
         observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
 
@@ -232,10 +231,7 @@ def advance_worlds(
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe(
-            c, w, trackers, obstacles, heard[e], heard_message[e], message[e],
-            scratch, observations[e],
-        )  # fmt: skip
+        observe(c, w, trackers, obstacles, heard[e], heard_message[e], scratch, observations[e])
     observe_together(c, world, tracker, first, count, message, scratch, observations)
     return over
 

@@ -22,6 +22,7 @@ CASES: Final[dict[str, dict[str, Any]]] = {
     "leader-loss": {"scenario": "leader-loss", "horizon": 10, "break_window": (0.2, 0.6)},
     "field": {"scenario": "field", "horizon": 18, "sensor_outages": 1.0, "radio_outages": 1.0},
     "crowd": {"scenario": "smart", "num_trackers": 10, "num_neighbours": 4, "message_size": 1},
+    "many": {"scenario": "constant", "num_trackers": 11, "num_neighbours": 9},
     "target": {"scenario": "obstacles", "target_motion": "agent", "terminate_on_contact": True},
 }
 STEPS: Final = 24

@@ -62,9 +62,12 @@ def test_the_number_of_threads_changes_nothing() -> None:
         assert_equal(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
 
 
-@pytest.mark.parametrize("name", ["smart", "field"])
-def test_a_kernel_of_its_own_changes_nothing(name: str) -> None:
-    make: dict[str, Any] = {"seed": 3, "horizon": 60, "num_threads": 1}
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [("smart", {}), ("field", {}), ("smart", {"num_trackers": 11, "num_neighbours": 3})],
+)
+def test_a_kernel_of_its_own_changes_nothing(name: str, more: dict[str, Any]) -> None:
+    make: dict[str, Any] = {"seed": 3, "horizon": 60, "num_threads": 1, **more}
     whole = play(posse.batch(name, 40, **make), 140)
     batch = posse.batch(name, 40, **make, own_kernel=True)
     assert_equal(play(batch, 140), whole)
@@ -383,19 +386,29 @@ def in_another_process(
         return [arrays[key] for key in arrays]
 
 
+# Eight worlds together and one alone: of the largest whole team, of one of which a few are chosen,
+# and of one of which many are.
+NINE: dict[str, dict[str, Any]] = {
+    "smart": {"num_trackers": 16, "num_neighbours": 15},
+    "constant": {"num_trackers": 10, "num_neighbours": 3},
+    "search": {"num_trackers": 11, "num_neighbours": 9},
+}
+
+
 def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
     make: dict[str, Any] = {"seed": 11, "horizon": 25, "message_size": 1, "settle_time": 1.0}
-    worlds = 2
-    if name == "smart":  # eight worlds together and one alone, of the largest whole team
-        worlds, make = 9, {**make, "num_trackers": 16, "num_neighbours": 15}
-    return play(posse.batch(name, worlds, **make), steps)
+    worlds = 9 if name in NINE else 2
+    return play(posse.batch(name, worlds, **make, **NINE.get(name, {})), steps)
 
 
 def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
     assert_equal(in_another_process(tmp_path, "field", 60), here("field", 60))
 
 
-@pytest.mark.parametrize(("name", "steps"), [("accelerating", 30), ("field", 30), ("smart", 3)])
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [("accelerating", 30), ("field", 30), ("smart", 3), ("constant", 3), ("search", 3)],
+)
 def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_path: Path) -> None:
     """For 30 steps, a new episode among them; and no index is out of bounds, which numpy sees."""
     plain = in_another_process(tmp_path, name, steps, NUMBA_DISABLE_JIT="1")

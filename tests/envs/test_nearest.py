@@ -52,7 +52,8 @@ def listed(trackers: Teams, places: int, across: int) -> tuple[Numbers, Numbers]
     worlds, n = trackers.shape
     lists = np.full((worlds, n, places), -1, np.float32)
     certain = np.zeros((worlds, n), np.float32)
-    scratch = np.zeros(SIZE if across else SIZE_FOR_ONE, np.float32)
+    # What nobody has written must not count.
+    scratch = np.full(SIZE if across else SIZE_FOR_ONE, np.nan, np.float32)
     config = config_record(posse.get_scenario("constant"))
     beams = np.zeros((2, 0), np.float32)
     make_lists(config, trackers, beams, across, places, scratch, lists, certain)

@@ -10,7 +10,7 @@ import pytest
 import posse
 from posse.nearest import LISTED
 from posse.scenario import MAX_TRACKERS
-from posse.survey import BLOCK, MOST_IN_TEAM, SHORTLIST, SIZE, SIZE_FOR_ONE, TEAM
+from posse.survey import BLOCK, MOST_IN_TEAM, SHORTLIST, SIZE, SIZE_FOR_ONE, TEAM, TEAM_ROWS
 from posse.team import row_length
 from posse.together import SONAR_AT, TARGET_AT, TASK_AT
 
@@ -62,8 +62,8 @@ def test_parts_are_written_where_they_are_declared() -> None:
 
 
 def test_the_largest_team_fits_its_memory() -> None:
-    assert TEAM + 6 * row_length(MOST_IN_TEAM, across=1) <= SIZE
-    assert TEAM + 6 * row_length(MAX_TRACKERS, across=0) <= SIZE_FOR_ONE <= SIZE
+    assert TEAM + TEAM_ROWS * row_length(MOST_IN_TEAM, across=1) <= SIZE
+    assert TEAM + TEAM_ROWS * row_length(MAX_TRACKERS, across=0) <= SIZE_FOR_ONE <= SIZE
     assert LISTED + BLOCK * (MAX_TRACKERS - 1) <= SHORTLIST
 
 
