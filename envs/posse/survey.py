@@ -224,7 +224,7 @@ def find_gaps(c: Record, s: FloatArray) -> None:
         nearest2 = eight(FAR)
         for j in range(n):
             dx, dy = x - s[X + j], y - s[Y + j]
-            d2 = choose(number == np.float32(j), FAR, dx * dx + dy * dy)
+            d2 = choose(number == s[INDEX + j], FAR, dx * dx + dy * dy)  # j, from memory: sooner
             nearest2 = lesser(nearest2, d2)
         dx, dy = x - s[X + n], y - s[Y + n]
         d2 = dx * dx + dy * dy
@@ -253,7 +253,7 @@ def find_slots(
         if taken & (_BIT << np.uint64(slot)) == _NO_BITS:
             dx, dy = ahead - slots[slot].x, left - slots[slot].y
             d2 = dx * dx + dy * dy
-            nearest = choose(d2 < nearest2, np.float32(slot), nearest)
+            nearest = choose(d2 < nearest2, s[INDEX + slot], nearest)
             nearest2 = lesser(nearest2, d2)
     store(s, SLOT + first, nearest)
     store(s, SLOT_DISTANCE2 + first, nearest2)
