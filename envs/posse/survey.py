@@ -224,7 +224,8 @@ def find_gaps(c: Record, s: FloatArray) -> None:
         nearest2 = eight(FAR)
         for j in range(n):
             dx, dy = x - s[X + j], y - s[Y + j]
-            d2 = choose(number == s[INDEX + j], FAR, dx * dx + dy * dy)  # j, from memory: sooner
+            # That is j: to read it is faster than to convert it.
+            d2 = choose(number == s[INDEX + j], FAR, dx * dx + dy * dy)
             nearest2 = lesser(nearest2, d2)
         dx, dy = x - s[X + n], y - s[Y + n]
         d2 = dx * dx + dy * dy
