@@ -29,7 +29,7 @@ from posse.lanes import (
 from posse.nearest import LISTED, list_nearest
 from posse.state import POSE
 from posse.survey import MOST_IN_TEAM, OWN, ROW, TEAM, natural, within_one
-from posse.team import number_behind, row_length, seen_at, stride_of
+from posse.team import number_behind, row_length, seen_at, stride_of, write_rows
 
 # Scratch memory: how eight team-mates turn; where in an observation each belongs; of a team that is
 # observed as a whole, how far each mate is, and how many are nearer.
@@ -37,9 +37,6 @@ _TURN_RATES: Final = OWN
 _START: Final = OWN + WIDTH
 _DISTANCE: Final = OWN + 1 * ROW
 _PLACE: Final = OWN + 2 * ROW
-
-_SCATTERED: Final = -1
-"""Not the same place for all eight, but for each what _START says."""
 
 MATE: Final = 9
 """Numbers that are observed of a team-mate, what it said apart."""
@@ -137,7 +134,7 @@ def _observe_whole_team(
         )  # fmt: skip
         store(s, _TURN_RATES, load(s, at + 5 * row))
         store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
-        _write_mates(c, mates, _SCATTERED, e, i, count, across, s, observations)
+        _write_mates(mates, e, i, count, across, s, observations)
 
 
 @compiled
@@ -160,9 +157,9 @@ def _observe_nearest(
     list_nearest(n, places, i, count, across, s)
     for place in range(natural(places)):
         listed = LISTED + WIDTH * place
-        own_x, own_y, hc, hs = (
-            load(s, own), load(s, own + row), load(s, own + 2 * row), load(s, own + 3 * row)
-        )  # fmt: skip
+        # Not kept from place to place: to load them again costs less than registers do.
+        own_x, own_y = load(s, own), load(s, own + row)
+        hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
         x, y, heading_x, heading_y, speed, turn_rate, _, _ = _columns_of(
             tracker, listed, e, count, across, s
         )
@@ -174,7 +171,10 @@ def _observe_nearest(
         )  # fmt: skip
         store(s, _TURN_RATES, turn_rate)
         at = natural(k + place * size)
-        _write_mates(c, mates, at, e, i, count, across, s, observations)
+        write_rows(mates, e, i, count, across, observations, at)
+        for lane in range(count):
+            o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+            o[at + MATE - 1] = s[_TURN_RATES + lane]
 
 
 @compiled
@@ -235,9 +235,7 @@ def _pose(
 
 @compiled
 def _write_mates(
-    c: Record,
     mates: tuple[Lanes, ...],
-    at: int,
     e: int,
     i: int,
     count: int,
@@ -245,24 +243,22 @@ def _write_mates(
     s: FloatArray,
     observations: FloatArray,
 ) -> None:
-    """Write what each of ``count`` observers observes of one team-mate, from ``at`` on."""
+    """Write what each of ``count`` observers observes of one team-mate, from where _START says."""
     first, second, third, fourth, fifth, sixth, seventh, eighth = mates
-    _write_mate(c, first, 0, at, e, i, count, across, s, observations)
-    _write_mate(c, second, 1, at, e, i, count, across, s, observations)
-    _write_mate(c, third, 2, at, e, i, count, across, s, observations)
-    _write_mate(c, fourth, 3, at, e, i, count, across, s, observations)
-    _write_mate(c, fifth, 4, at, e, i, count, across, s, observations)
-    _write_mate(c, sixth, 5, at, e, i, count, across, s, observations)
-    _write_mate(c, seventh, 6, at, e, i, count, across, s, observations)
-    _write_mate(c, eighth, 7, at, e, i, count, across, s, observations)
+    _write_mate(first, 0, e, i, count, across, s, observations)
+    _write_mate(second, 1, e, i, count, across, s, observations)
+    _write_mate(third, 2, e, i, count, across, s, observations)
+    _write_mate(fourth, 3, e, i, count, across, s, observations)
+    _write_mate(fifth, 4, e, i, count, across, s, observations)
+    _write_mate(sixth, 5, e, i, count, across, s, observations)
+    _write_mate(seventh, 6, e, i, count, across, s, observations)
+    _write_mate(eighth, 7, e, i, count, across, s, observations)
 
 
 @compiled
 def _write_mate(
-    c: Record,
     fields: Lanes,
     lane: int,
-    at: int,
     e: int,
     i: int,
     count: int,
@@ -274,7 +270,7 @@ def _write_mate(
     if lane >= count:
         return
     o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-    start = natural(int(s[_START + lane])) if at == _SCATTERED else natural(at)
+    start = natural(int(s[_START + lane]))
     store(o, start, fields)
     o[start + MATE - 1] = s[_TURN_RATES + lane]
 

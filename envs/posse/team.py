@@ -1,4 +1,4 @@
-"""A team laid out in rows, for eight observers at once, a lane each.
+"""Eight observers at once, a lane each: their team laid out in rows, and what is written to all.
 
 The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or
 teams are large, the trackers of one (0). A row holds the team twice, one after the other, so that a
@@ -106,3 +106,43 @@ def seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, 
     dx, dy = way_behind(n, i, m, across, s)
     hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
     return dx * hc + dy * hs, dy * hc - dx * hs
+
+
+@compiled
+def write_rows(
+    rows: tuple[Lanes, ...],
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write eight numbers to each of ``count`` observations, from k on."""
+    a, b, c, d, f, g, h, j = rows
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    _write_row(a, 0, e, i, count, across, observations, k)
+    _write_row(b, 1, e, i, count, across, observations, k)
+    _write_row(c, 2, e, i, count, across, observations, k)
+    _write_row(d, 3, e, i, count, across, observations, k)
+    _write_row(f, 4, e, i, count, across, observations, k)
+    _write_row(g, 5, e, i, count, across, observations, k)
+    _write_row(h, 6, e, i, count, across, observations, k)
+    _write_row(j, 7, e, i, count, across, observations, k)
+
+
+@compiled
+def _write_row(
+    row: Lanes,
+    lane: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write eight numbers to one of ``count`` observations, if there are so many."""
+    if lane < count:
+        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+        store(o, k, row)

@@ -14,7 +14,6 @@ from posse.arrays import FloatArray, Record, Records
 from posse.compiled import compiled
 from posse.lanes import (
     WIDTH,
-    Lanes,
     choose,
     eight,
     greater,
@@ -26,7 +25,7 @@ from posse.lanes import (
 from posse.mates import observe_mates
 from posse.state import FIX, NEVER, POSE
 from posse.survey import INDEX, MOST_IN_TEAM, OWN, TASK, natural, within_one
-from posse.team import lay_out_team, team_columns
+from posse.team import lay_out_team, team_columns, write_rows
 
 TOGETHER: Final = WIDTH
 """Worlds that are observed together."""
@@ -80,46 +79,6 @@ def write_task(number: int, s: FloatArray, o: FloatArray) -> None:
 
 
 @compiled
-def _write_rows(
-    rows: tuple[Lanes, ...],
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write eight numbers to each of ``count`` observations, from k on."""
-    a, b, c, d, f, g, h, j = rows
-    # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, e, i, count, across, observations, k)
-    _write_row(b, 1, e, i, count, across, observations, k)
-    _write_row(c, 2, e, i, count, across, observations, k)
-    _write_row(d, 3, e, i, count, across, observations, k)
-    _write_row(f, 4, e, i, count, across, observations, k)
-    _write_row(g, 5, e, i, count, across, observations, k)
-    _write_row(h, 6, e, i, count, across, observations, k)
-    _write_row(j, 7, e, i, count, across, observations, k)
-
-
-@compiled
-def _write_row(
-    row: Lanes,
-    lane: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write eight numbers to one of ``count`` observations, if there are so many."""
-    if lane < count:
-        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-        store(o, k, row)
-
-
-@compiled
 def observe_own_and_target(
     c: Record,
     world: Records,
@@ -148,7 +107,7 @@ def observe_own_and_target(
         within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
         load(s, _TOUCHING), load(s, _WORKING),
     )  # fmt: skip
-    _write_rows(own, e, i, count, across, observations, 0)
+    write_rows(own, e, i, count, across, observations, 0)
     x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = team_columns(tracker, e, i, across, FIX)
     dx, dy = x - own_x, y - own_y
     distance = root(dx * dx + dy * dy)
@@ -170,12 +129,12 @@ def observe_own_and_target(
         eight(c.told_arena), time_left, choose(known, _ONE, _ZERO), load(s, _SEES), age,
         choose(known, distance, _MINUS_ONE), ahead, left,
     )  # fmt: skip
-    _write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
+    write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
     fields = transpose(
         ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
         choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
     )  # fmt: skip
-    _write_rows(fields, e, i, count, across, observations, TARGET_AT + 4)
+    write_rows(fields, e, i, count, across, observations, TARGET_AT + 4)
 
 
 @compiled
