@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse.formation import slot_offsets
+from posse.scenarios.formation import slot_offsets
 from posse_baselines import begin, load
 
 

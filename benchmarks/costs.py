@@ -21,8 +21,11 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse import contact, motion, score, survey, together, world
-from posse.compiled import kernel
+from posse.engine import kernels as world
+from posse.numeric import kernel
+from posse.rules import contact, motion, score
+from posse.rules import discs as survey
+from posse.signals import together
 
 PARTS = (
     "motion", "where the discs are, and how near", "contact", "target sensor and radio", "score",

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse.formation import slot_offsets
+from posse.scenarios.formation import slot_offsets
 from posse_baselines import begin
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs import Settings as Team

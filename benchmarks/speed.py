@@ -161,7 +161,7 @@ def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
 
 def report_gpu(settings: Settings) -> None:
     """Measure a GPU, print, and write the figures."""
-    from posse.cuda import check_device  # imports numba.cuda
+    from posse.engine.cuda import check_device  # imports numba.cuda
 
     check_device()
     rows = gpu_batches(settings)

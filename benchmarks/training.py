@@ -19,9 +19,9 @@ from rich.table import Table
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from posse_training.sb3_vec_env import TeamVecEnv
-from posse_training.settings import TrainSettings
-from posse_training.train import train
+from posse_training.runs.settings import TrainSettings
+from posse_training.runs.train import train
+from posse_training.sb3.vec_env import TeamVecEnv
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from posse.turns import by_turns, threads_for
+from posse.numeric import by_turns, threads_for
 
 MOST_THREADS: Final = os.cpu_count() or 1
 """Threads that :func:`over_worlds` uses at most."""
@@ -16,7 +16,7 @@ MOST_THREADS: Final = os.cpu_count() or 1
 def over_worlds(
     kernel: Callable[..., None], arguments: tuple[Any, ...], num_worlds: int, num_trackers: int
 ) -> None:
-    """Call ``kernel(*arguments, thread, turns)`` once for each thread (:mod:`posse.turns`).
+    """Call ``kernel(*arguments, thread, turns)`` once for each thread.
 
     Threads are numbered from 0 to at most ``MOST_THREADS`` - 1, for kernels that need a place
     of their own to work in.

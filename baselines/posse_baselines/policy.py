@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout
-from posse.arrays import BoolArray, FloatArray
+from posse.numeric import BoolArray, FloatArray
 
 Memory = Any
 """What a policy remembers of its worlds; only the policy itself looks into it."""

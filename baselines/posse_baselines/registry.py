@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.learned import LearnedPolicy
+from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
-from posse_baselines.scripted import SCRIPTED
 
 _FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file}
 """Readers of policy files, by suffix: whoever brings a kind of file adds its reader here."""

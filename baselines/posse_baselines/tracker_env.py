@@ -10,11 +10,11 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from posse import ObservationLayout, Scenario, ScenarioError
-from posse.actions import ActionReader, single_action_space
-from posse.arrays import FloatArray
-from posse.reward import name_terms
-from posse.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
-from posse.spaces import box
+from posse.adapters.actions import ActionReader, single_action_space
+from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
+from posse.adapters.spaces import box
+from posse.numeric import FloatArray
+from posse.signals.reward import name_terms
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from posse import ObservationLayout
-from posse.formation import slot_offsets
+from posse.scenarios.formation import slot_offsets
 from posse_baselines import BasePolicy, load
 from posse_training import evaluate
 

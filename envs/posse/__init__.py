@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from posse.batch import Batch, Snapshot
-from posse.metrics import METRICS, Metric
-from posse.observation import Field, ObservationLayout
-from posse.pettingzoo_env import env, parallel_env
-from posse.registration import register as _register
-from posse.reward import REWARD_TERMS, RewardTerm
-from posse.scenario import Scenario, ScenarioError
-from posse.scenarios import get_scenario, scenario_names
+from posse.adapters.pettingzoo_env import env, parallel_env
+from posse.adapters.registration import register as _register
+from posse.engine.batch import Batch, Snapshot
+from posse.scenarios.named import get_scenario, scenario_names
+from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.signals.metrics import METRICS, Metric
+from posse.signals.observation import Field, ObservationLayout
+from posse.signals.reward import REWARD_TERMS, RewardTerm
 
 __version__ = "0.1.0"
 
@@ -33,8 +33,8 @@ def batch(
 ) -> Batch:
     """Return a batch of worlds, the engine under every environment; see :class:`Batch`.
 
-    With ``device="cuda"`` the worlds live on an NVIDIA GPU: see :class:`posse.cuda.CudaBatch`,
-    which needs the extra ``cuda``.
+    With ``device="cuda"`` the worlds live on an NVIDIA GPU: see
+    :class:`posse.engine.cuda.CudaBatch`, which needs the extra ``cuda``.
     """
     return _batch_class(device)(
         get_scenario(scenario, **overrides),
@@ -53,7 +53,7 @@ def _batch_class(device: str) -> type[Batch]:
     if device == "cpu":
         return Batch
     if device == "cuda":
-        from posse.cuda import CudaBatch, check_device
+        from posse.engine.cuda import CudaBatch, check_device
 
         check_device()
         return CudaBatch

@@ -21,7 +21,7 @@ from posse_baselines import (
     stack_agents,
 )
 from posse_baselines.ddcs import DDCS
-from posse_baselines.learned import LearnedPolicy
+from posse_baselines.learned.network import LearnedPolicy
 
 NAMES = policy_names()
 PLAYS_BY_THE_RULES = [name for name in NAMES if not load(name).reads_state]
@@ -155,7 +155,7 @@ def test_play_returns_the_metrics_of_one_episode_a_world() -> None:
 
 
 def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
-    from posse_baselines.simple import Random
+    from posse_baselines.policies.simple import Random
 
     batch = posse.batch("constant", 200)
     _, done = trace(Random(seed=1), batch, 10)

@@ -16,7 +16,7 @@ from stable_baselines3 import PPO
 import posse
 import posse_baselines
 from posse_training.cli import COMMANDS, main
-from posse_training.settings import (
+from posse_training.runs.settings import (
     ALGORITHMS,
     SettingsError,
     TrainSettings,
@@ -96,8 +96,8 @@ def test_who_stops_a_training_is_told_how_to_go_on(
     def stopped(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("posse_training.train.train", stopped)
-    monkeypatch.setattr("posse_training.train.resume", stopped)
+    monkeypatch.setattr("posse_training.runs.train.train", stopped)
+    monkeypatch.setattr("posse_training.runs.train.resume", stopped)
     for arguments in (["--folder", str(tmp_path)], ["--resume", str(tmp_path)]):
         assert main(["train", *arguments]) == 130
         assert f"to go on: posse train --resume {tmp_path}" in capsys.readouterr().err

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from posse_training.evaluation import Results, evaluate
+from posse_training.reports.evaluation import Results, evaluate
 
 __all__ = ["Results", "evaluate"]

@@ -25,12 +25,13 @@ class _Command:
     function: str
 
 
+_REPORTS: Final = "posse_training.reports"
 COMMANDS: Final[dict[str, _Command]] = {
     "train": _Command("train a team", __name__, "train"),
-    "compare": _Command("score policies on the same worlds", "posse_training.compare", "main"),
+    "compare": _Command("score policies on the same worlds", f"{_REPORTS}.compare", "main"),
     "watch": _Command("see a policy at work, or film it", __name__, "watch"),
-    "ship": _Command("make runs a policy that comes along", "posse_training.ship", "main"),
-    "reproduce": _Command("redo the paper's experiments", "posse_training.reproduce", "main"),
+    "ship": _Command("make runs a policy that comes along", "posse_training.runs.ship", "main"),
+    "reproduce": _Command("redo the paper's experiments", f"{_REPORTS}.reproduce", "main"),
     "scenarios": _Command("list the scenarios", __name__, "scenarios"),
 }
 
@@ -73,11 +74,11 @@ def _mendable() -> tuple[type[Exception], ...]:
     """Return the errors whose message is for the user; all others keep their traceback."""
     found: list[type[Exception]] = []
     for module, names in (
-        ("posse.scenario", ("ScenarioError",)),
+        ("posse.scenarios.scenario", ("ScenarioError",)),
         ("posse_baselines.policy", ("PolicyError",)),
-        ("posse_training.evaluation", ("TrainedSplitError",)),
-        ("posse_training.settings", ("SettingsError",)),
-        ("posse_training.checkpoint", ("RunFolderError", "CheckpointError")),
+        ("posse_training.reports.evaluation", ("TrainedSplitError",)),
+        ("posse_training.runs.settings", ("SettingsError",)),
+        ("posse_training.runs.checkpoint", ("RunFolderError", "CheckpointError")),
     ):
         if module in sys.modules:  # what was never imported was never raised
             found += [getattr(sys.modules[module], name) for name in names]
@@ -108,13 +109,13 @@ class _Resume:
 def train(arguments: list[str]) -> None:
     """Train a team, or go on with a training: ``posse train --resume DIR``."""
     if any(a == "--resume" or a.startswith("--resume=") for a in arguments):
-        from posse_training.train import resume
+        from posse_training.runs.train import resume
 
         which = tyro.cli(_Resume, prog="posse train", args=arguments)
         with _way_back(which.resume):
             print(resume(which.resume, steps=which.steps))
         return
-    from posse_training.settings import TrainSettings, default_settings
+    from posse_training.runs.settings import TrainSettings, default_settings
 
     asked = [a for a in arguments if a not in ("-h", "--help")]
     some, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
@@ -126,7 +127,7 @@ def train(arguments: list[str]) -> None:
         default=default,
         args=arguments,
     )
-    from posse_training.train import train as run
+    from posse_training.runs.train import train as run
 
     with _way_back(settings.run_folder):
         print(run(settings))
@@ -169,14 +170,14 @@ def watch(arguments: list[str]) -> None:
     """Show a policy at work."""
     which = tyro.cli(_Watch, prog="posse watch", args=arguments)
     from posse import Batch, get_scenario
-    from posse.render import Renderer
+    from posse.rendering.renderer import Renderer
     from posse_baselines import begin, load
 
     policy = load(which.policy)
     overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
     scenario = get_scenario(which.scenario, **overrides)
     if which.gif is not None:
-        from posse_training.film import film
+        from posse_training.reports.film import film
 
         print(
             film(

@@ -18,9 +18,9 @@ from rich.table import Table
 
 from posse import ObservationLayout, get_scenario
 from posse_baselines import Policy, load, policy_names
-from posse_training.evaluation import Results, evaluate, progress_bar
-from posse_training.film import film
-from posse_training.statistics import Estimate, mean, share
+from posse_training.reports.evaluation import Results, evaluate, progress_bar
+from posse_training.reports.film import film
+from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")
 POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed")

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from posse.arrays import FloatArray, Record, Records
-from posse.compiled import compiled, kernel
-from posse.turn_code import Numbers, worlds_of
+from posse.numeric import FloatArray, Numbers, Record, Records, compiled, kernel, worlds_of
 from posse_baselines.ddcs.leadership import settle_lead
 from posse_baselines.ddcs.memory import SEARCHING
 from posse_baselines.ddcs.messages import write_message
@@ -16,8 +14,8 @@ from posse_baselines.ddcs.searching import begin_search, look_around, wander
 from posse_baselines.ddcs.slots import choose_slot
 from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.ddcs.tracking import next_task, wanted_velocity
-from posse_baselines.safeguard import command, safe_velocity
-from posse_baselines.steering import write_motion
+from posse_baselines.laws.safeguard import command, safe_velocity
+from posse_baselines.laws.steering import write_motion
 
 _UNLIMITED = 1e4  # m/s² or rad/s²: what stands for no limit
 

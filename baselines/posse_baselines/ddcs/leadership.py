@@ -12,11 +12,10 @@ several hops away knows that the leader is alive.
 
 from __future__ import annotations
 
-from posse.arrays import Record, Records
-from posse.compiled import compiled
+from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.messages import COUNT, is_newer
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
-from posse_baselines.guidance import length
+from posse_baselines.laws.guidance import length
 
 
 @compiled

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from posse.arrays import FloatArray, Record
-from posse.compiled import compiled
+from posse.numeric import FloatArray, Record, compiled
 
 MESSAGE_SIZE: Final = 5
 """Task, leader, term, pulse, slot."""

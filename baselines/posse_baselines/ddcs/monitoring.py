@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 
-from posse.arrays import FloatArray, Record, Records
-from posse.compiled import compiled
+from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.messages import decode
-from posse_baselines.guidance import clip, length, wrap
+from posse_baselines.laws.guidance import clip, length, wrap
 
 _TURN_MEMORY = 1.0  # s; an older turn tells little of the heading now
 _WAY_MEMORY = 3.0  # s

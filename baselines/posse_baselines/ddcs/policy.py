@@ -10,15 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.arrays import BoolArray, FloatArray, Records
-from posse.formation import slot_offsets
-from posse.state import beam_directions, slot_records
-from posse_baselines.assignment import WORK_ROWS
+from posse.numeric import BoolArray, FloatArray, Records
+from posse.rules.state import beam_directions, slot_records
+from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs.controller import decide_all
 from posse_baselines.ddcs.memory import GRID, MATE, MIND
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings, settings_record
-from posse_baselines.offsets import offsets_of
+from posse_baselines.laws.assignment import WORK_ROWS
+from posse_baselines.laws.offsets import offsets_of
+from posse_baselines.laws.safeguard import BODY, DISC, PLAYS
 from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (
     Annotations,
@@ -28,7 +29,6 @@ from posse_baselines.policy import (
     check_observations,
     message_size_of,
 )  # fmt: skip
-from posse_baselines.safeguard import BODY, DISC, PLAYS
 
 _MOST_DISCS: Final = 32
 

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from posse.arrays import Record, Records
-from posse.compiled import compiled
+from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import GRID
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.guidance import length
+from posse_baselines.laws.guidance import length
 
 _STALE = 30.0  # s; a place not looked at for so long counts as never looked at
 _AGE_WEIGHT = 0.35  # m of way that a second since the last look is worth

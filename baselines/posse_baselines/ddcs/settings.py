@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.arrays import Records
+from posse.numeric import Records
 
 MODELS: Final = ("distributed", "centralized")
 GUIDANCE_LAWS: Final = ("cartesian", "polar", "pngl")

@@ -11,12 +11,11 @@ import math
 
 import numpy as np
 
-from posse.arrays import FloatArray, Record, Records
-from posse.compiled import compiled
-from posse_baselines.assignment import assign
+from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.guidance import length
-from posse_baselines.steering import intercept_time
+from posse_baselines.laws.assignment import assign
+from posse_baselines.laws.guidance import length
+from posse_baselines.laws.steering import intercept_time
 
 _IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
 _HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos

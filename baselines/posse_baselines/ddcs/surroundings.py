@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 
-from posse.arrays import FloatArray, Record, Records
-from posse.compiled import compiled
+from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.monitoring import mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
-from posse_baselines.guidance import length
-from posse_baselines.safeguard import put_disc, put_wall
+from posse_baselines.laws.guidance import length
+from posse_baselines.laws.safeguard import put_disc, put_wall
 
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)

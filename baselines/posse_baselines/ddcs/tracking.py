@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from posse.arrays import Record, Records
-from posse.compiled import compiled
+from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
-from posse_baselines.formation_control import (
+from posse_baselines.laws.formation_control import (
     l_l_control,
     l_phi_demand,
     polar_slot_velocity,
     separation,
 )  # fmt: skip
-from posse_baselines.guidance import (
+from posse_baselines.laws.guidance import (
     deviation,
     lawful_heading,
     length,
@@ -25,7 +24,7 @@ from posse_baselines.guidance import (
     pursuit_speed,
     wrap,
 )  # fmt: skip
-from posse_baselines.steering import approach_velocity, intercept_time, way_round
+from posse_baselines.laws.steering import approach_velocity, intercept_time, way_round
 
 CENTRALIZED: Final = 1
 POLAR: Final = 1

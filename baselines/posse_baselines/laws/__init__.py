@@ -1,0 +1,1 @@
+"""The paper's control laws, for one robot."""

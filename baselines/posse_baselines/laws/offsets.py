@@ -1,0 +1,74 @@
+"""Where kernels find each field of an observation."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from posse import ObservationLayout
+from posse.numeric import Records
+from posse.scenarios.scenario import OPEN_PLANE_EXTENT
+
+_FIELDS: Final = (
+    "heading", "position", "speed", "turn_rate", "touching", "working",
+    "formation", "number", "team_size", "formation_distance", "formation_spacing",
+    "max_speed", "max_turn_rate", "acceleration_time", "turn_acceleration_time", "time_left",
+    "target_known", "target_seen", "target_age", "target_range", "target_bearing",
+    "target_heading", "target_frame", "target_velocity", "sonar",
+    "neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing",
+    "neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message",
+)  # fmt: skip
+
+_WIDER: Final = 1.2
+_MOST_SIGHT: Final = 8.0  # m; obstacles hide more the farther one looks
+_OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
+
+OFFSETS: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                *((name, np.int32) for name in _FIELDS),  # -1: the layout has no such field
+                ("neighbours", np.int32),  # places for team-mates
+                ("stride", np.int32),  # length of one team-mate's part
+                ("sonar_beams", np.int32),
+                ("message_size", np.int32),
+                ("dt", np.float32),  # control step, s
+                ("sonar_range", np.float32),  # reading that means "nothing near", m
+                ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
+                ("radius", np.float32),  # of a robot's disc, m
+                ("extent", np.float32),  # greatest coordinate of a place that can be reached, m
+                ("walled", np.int32),
+                ("sight", np.float32),  # how far its target sensor reaches, m
+                ("area", np.float32),  # half the side of the square that is to be searched, m
+            ],
+            align=True,
+        ),
+    )
+)
+"""Of a layout: where each field begins, and what a robot knows of its own make and its place.
+
+A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
+"""
+
+
+def offsets_of(layout: ObservationLayout) -> Records:
+    """Return an array of one :data:`OFFSETS`."""
+    record = np.full(1, -1, np.int32).repeat(OFFSETS.itemsize // 4).view(OFFSETS)
+    scenario = layout.scenario
+    for name in _FIELDS:
+        record[name] = layout.offsets.get(name, -1)
+    record["neighbours"], record["stride"] = layout.neighbours, layout.stride
+    record["sonar_beams"] = scenario.sonar_beams
+    record["message_size"] = scenario.message_size
+    record["dt"] = scenario.control_step
+    record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
+    record["sonar_range"] = scenario.sonar_range
+    record["radius"] = scenario.robot_radius
+    record["extent"] = scenario.position_bound
+    record["sight"] = min(scenario.sensing_range, _MOST_SIGHT)
+    record["area"] = min(scenario.arena / 2, _OPEN_AREA)
+    record["walled"] = np.isfinite(scenario.arena)
+    return record

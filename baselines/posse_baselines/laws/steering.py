@@ -1,0 +1,95 @@
+"""When a point can be met, and with what velocity to approach it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from posse.numeric import FloatArray, compiled
+from posse_baselines.laws.formation_control import cartesian_slot_components
+from posse_baselines.laws.guidance import clip, length
+
+NEVER: Final = 1e6
+"""s. What stands for a meeting that does not happen."""
+
+_LEAST_TURN: Final = 0.6
+"""rad. How far round at least a tracker heads that is on the circle, or inside it."""
+_SPEED_LEFT: Final = 0.8
+"""Share of the greatest deceleration that a planned approach uses."""
+
+
+@compiled
+def intercept_time(x: float, y: float, speed_x: float, speed_y: float, max_speed: float) -> float:
+    """Return the earliest time (s) at which a point can be met, straight on at ``max_speed``.
+
+    The point is (x, y) away (m) and moves at a constant velocity (m/s): the least root t >= 0 of
+    ``|p + s t| = V t``. ``NEVER`` for a point that gets away.
+    """
+    surplus = max_speed**2 - speed_x**2 - speed_y**2
+    opening = x * speed_x + y * speed_y
+    square = x * x + y * y
+    if surplus <= 1e-9:
+        return NEVER if opening >= 0.0 else min(NEVER, -0.5 * square / opening)
+    time = (opening + math.sqrt(opening**2 + surplus * square)) / surplus
+    return clip(time, 0.0, NEVER)
+
+
+@compiled
+def approach_velocity(
+    offset_x: float,
+    offset_y: float,
+    slot_speed_x: float,
+    slot_speed_y: float,
+    gain: float,
+    max_speed: float,
+    deceleration: float,
+) -> tuple[float, float]:
+    """Return the wanted velocity (x, y) in m/s towards a moving slot, with room to brake.
+
+    :func:`~posse_baselines.laws.formation_control.cartesian_slot_components` with the gain lowered
+    where the tracker, whose speed changes by at most ``deceleration`` (m/s²), could not brake in
+    time.
+    """
+    distance = length(offset_x, offset_y)
+    if distance > 1e-6:
+        gain = min(gain, math.sqrt(2.0 * _SPEED_LEFT * deceleration / distance))
+    return cartesian_slot_components(
+        offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
+    )
+
+
+@compiled
+def way_round(
+    from_x: float, from_y: float, to_x: float, to_y: float, clearance: float
+) -> tuple[float, float]:
+    """Return where to head for, on the way from one place to another round the origin (m).
+
+    The place itself where the straight way keeps ``clearance`` from the origin; else the point at
+    which the tangent of that circle touches it, on the side of the shorter way. Who is on the
+    circle already heads for a point a little round it, and comes no nearer than 0.82 of it.
+    """
+    way_x, way_y = to_x - from_x, to_y - from_y
+    square = way_x * way_x + way_y * way_y
+    along = -(from_x * way_x + from_y * way_y)
+    if along <= 0.0 or along >= square:
+        return to_x, to_y
+    crossing = from_x * way_y - from_y * way_x
+    if crossing * crossing >= clearance * clearance * square:
+        return to_x, to_y
+    distance = length(from_x, from_y)
+    angle = math.acos(min(1.0, clearance / max(distance, 1e-6)))
+    angle = max(angle, _LEAST_TURN)
+    if crossing < 0.0:
+        angle = -angle
+    c, s = math.cos(angle), math.sin(angle)
+    scale = clearance / max(distance, 1e-6)
+    return (from_x * c - from_y * s) * scale, (from_x * s + from_y * c) * scale
+
+
+@compiled
+def write_motion(
+    action: FloatArray, speed: float, omega: float, max_speed: float, max_omega: float
+) -> None:
+    """Write the first two numbers of an action (2 + m,), brought into [-1, 1]."""
+    action[0] = clip(2.0 * speed / max_speed - 1.0, -1.0, 1.0)
+    action[1] = clip(omega / max_omega, -1.0, 1.0)

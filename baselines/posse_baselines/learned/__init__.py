@@ -1,0 +1,1 @@
+"""Learned policies, which play without torch."""

@@ -1,0 +1,1 @@
+"""Policies without a decision system: simple ones, pursuit, the oracle."""

@@ -1,0 +1,379 @@
+"""The oracle: a team that reads the state of the world. It does not play by the rules.
+
+A reference to hold scores against, not a bound: the best assignment of slots, intercept courses,
+feed-forward of the slots' motion, and the safeguard, all with perfect knowledge of the present.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from posse import Batch, ObservationLayout
+from posse.numeric import (
+    BoolArray,
+    FloatArray,
+    Numbers,
+    Record,
+    Records,
+    compiled,
+    kernel,
+    worlds_of,
+)
+from posse.rules.state import NEVER, config_record, slot_records
+from posse_baselines.laws.assignment import WORK_ROWS, assign
+from posse_baselines.laws.guidance import wrap
+from posse_baselines.laws.safeguard import (
+    BODY,
+    DISC,
+    PLAYS,
+    command,
+    put_disc,
+    put_wall,
+    safe_velocity,
+)
+from posse_baselines.laws.steering import (
+    approach_velocity,
+    intercept_time,
+    way_round,
+    write_motion,
+)  # fmt: skip
+from posse_baselines.parallel import MOST_THREADS, over_worlds
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    PolicyError,
+    check_fits,
+    check_observations,
+    message_size_of,
+)  # fmt: skip
+
+_MOST_DISCS: Final = 24
+_NEAR: Final = 3.0  # m; farther things are no danger yet
+_UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
+
+PLAN: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("slot", np.int32),  # -1: none yet
+                ("mean_x", np.float32),  # running mean of the target's velocity, m/s
+                ("mean_y", np.float32),
+                ("frame_c", np.float32),  # the slot frame one step ago
+                ("frame_s", np.float32),
+            ],
+            align=True,
+        ),
+    )
+)
+"""What the oracle has planned for a tracker."""
+
+
+@dataclass(frozen=True)
+class OracleSettings:
+    """How the oracle plays."""
+
+    gain: float = 1.5
+    """Of the slot law, 1/s."""
+    replan_steps: int = 3
+    """Control steps between two assignments."""
+    loyalty: float = 0.5
+    """How much sooner another assignment has to be for a tracker to leave its slot, s."""
+    weave_time: float = 1.5
+    """The target is taken to keep its present velocity for about so long, s, then its mean one."""
+    mean_time: float = 6.0
+    """Time constant of that mean, s."""
+    clearance: float = 0.75
+    """Distance at which the way to a slot leads round the target, m."""
+    margin: float = 0.15
+    """Free width that it keeps, m."""
+
+
+@dataclass
+class _OracleMemory:
+    batch: Batch
+    config: Records
+    slots: Records
+    plans: Records
+    costs: FloatArray
+    work: FloatArray
+    discs: Records
+    bodies: Records
+    plays: Records
+
+
+SETTINGS_FIELDS: Final = tuple(OracleSettings.__dataclass_fields__)
+_SETTINGS: Final[np.dtype[Any]] = np.dtype(
+    (np.record, np.dtype([(name, np.float64) for name in SETTINGS_FIELDS]))
+)
+
+
+class Oracle(BasePolicy):
+    """Reads the state of the worlds: a reference, which no team that plays by the rules can copy.
+
+    Args:
+        settings: How it plays.
+    """
+
+    name = "oracle"
+    reads_state: bool = True
+
+    def __init__(self, settings: OracleSettings | None = None) -> None:
+        self.settings = settings or OracleSettings()
+        self._batch: Batch | None = None
+
+    def watch(self, batch: Batch) -> None:
+        """Take the batch whose state is to be read by the memories made from now on."""
+        self._batch = batch
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the memory for the batch that is being watched.
+
+        Raises:
+            PolicyError: No batch was shown to it, or one of another size.
+        """
+        check_fits(self, layout)
+        batch = self._batch
+        if batch is None:
+            raise PolicyError(
+                "policy 'oracle' reads the state: show it the batch with watch(batch), or use "
+                "posse_baselines.begin(policy, batch)"
+            )
+        if batch.num_worlds != num_worlds or batch.layout.size != layout.size:
+            raise PolicyError(
+                f"policy 'oracle' watches {batch.num_worlds} worlds of {batch.scenario.name!r}, "
+                f"not {num_worlds} of {layout.scenario.name!r}: call watch(batch) before begin()"
+            )
+        n = layout.scenario.num_trackers
+        plans = np.zeros((num_worlds, n), PLAN)
+        plans["slot"] = -1
+        parts = MOST_THREADS
+        return _OracleMemory(
+            batch, config_record(layout.scenario), slot_records(layout.scenario), plans,
+            np.zeros((parts, n, n), np.float32), np.zeros((parts, WORK_ROWS, n + 1), np.float32),
+            np.zeros((parts, _MOST_DISCS), DISC), np.zeros(parts, BODY),
+            np.zeros(parts, PLAYS),
+        )  # fmt: skip
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return actions for the state that the watched batch is in; observations are not read."""
+        m: _OracleMemory = memory
+        layout, num_worlds = m.batch.layout, m.batch.num_worlds
+        check_observations(self, observations, num_worlds, layout)
+        settings = np.zeros(1, _SETTINGS)
+        for name in SETTINGS_FIELDS:
+            settings[name] = getattr(self.settings, name)
+        n = layout.scenario.num_trackers
+        actions = np.zeros((num_worlds, n, 2 + message_size_of(layout)), np.float32)
+        arrays = m.batch.arrays
+        over_worlds(
+            lead_all,
+            (
+                m.config, m.slots, settings, arrays.world, arrays.tracker, arrays.obstacle,
+                m.plans, m.costs, m.work, m.discs, m.bodies, m.plays, actions,
+            ),
+            num_worlds,
+            n,
+        )  # fmt: skip
+        return actions, memory
+
+    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
+        """Forget the plans of the worlds of a mask (E,)."""
+        m: _OracleMemory = memory
+        m.plans[mask] = np.zeros((), PLAN)
+        m.plans["slot"][mask] = -1
+        return m
+
+    def annotations(self, memory: Memory) -> dict[str, Any]:
+        """Return ``slot`` (E, N), the slot that each tracker is sent to; -1: none."""
+        return {"slot": memory.plans["slot"].copy()}
+
+
+@compiled
+def lead(
+    c: Record,
+    slots: Records,
+    s: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    plans: Records,
+    cost: FloatArray,
+    work: FloatArray,
+    discs: Records,
+    body: Record,
+    plays: Record,
+    actions: FloatArray,
+) -> None:
+    """Write the actions (N, 2 + m) of one world's team."""
+    n = c.num_trackers
+    speed, dt = float(c.tracker_speed), float(c.dt)
+    acceleration = speed / c.acceleration_time if c.acceleration_time > 0.0 else _UNLIMITED
+    turn_acceleration = _UNLIMITED
+    if c.turn_acceleration_time > 0.0:
+        turn_acceleration = c.tracker_turn_rate / c.turn_acceleration_time
+    body.max_speed, body.max_omega, body.dt = speed, c.tracker_turn_rate, dt
+    body.acceleration, body.turn_acceleration = acceleration, turn_acceleration
+    vx, vy = float(w.speed * w.heading_cos), float(w.speed * w.heading_sin)
+    # The slot frame turns towards the heading, at its limit until it is there.
+    psi = math.atan2(w.frame_sin, w.frame_cos)
+    lag = wrap(math.atan2(w.heading_sin, w.heading_cos) - psi)
+    most = math.atan2(c.frame_s, c.frame_c) / dt
+    rate = min(max(lag / dt, -most), most)
+    share = min(1.0, dt / s.mean_time) if w.step > 0 else 1.0
+    p = plans[0]
+    p.mean_x += share * (vx - p.mean_x)
+    p.mean_y += share * (vy - p.mean_y)
+    mean_x, mean_y = float(p.mean_x), float(p.mean_y)
+    if w.step % int(s.replan_steps) == 0 or p.slot < 0:
+        plan(c, slots, s, w, trackers, plans, cost, work, vx, vy, mean_x, mean_y)
+    for i in range(n):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
+            continue
+        slot = slots[plans[i].slot]
+        arm_x = slot.x * w.frame_cos - slot.y * w.frame_sin
+        arm_y = slot.x * w.frame_sin + slot.y * w.frame_cos
+        round_x, round_y = way_round(t.x - w.x, t.y - w.y, arm_x, arm_y, s.clearance)
+        x, y = w.x + round_x - t.x, w.y + round_y - t.y
+        time = intercept_time(x, y, vx, vy, speed)
+        ahead = 1.0
+        if time > dt:
+            time = min(time, 20.0)
+            ahead = s.weave_time * (1.0 - math.exp(-time / s.weave_time)) / time
+        # Far away, the slot is met where its mean motion takes it; near, where it is.
+        sx = ahead * vx + (1.0 - ahead) * mean_x - ahead * rate * arm_y
+        sy = ahead * vy + (1.0 - ahead) * mean_y + ahead * rate * arm_x
+        wx, wy = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
+        count = surround(c, w, trackers, obstacles, i, s.margin, discs)
+        body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
+        body.speed, body.omega = t.speed, t.turn_rate
+        wx, wy, _ = safe_velocity(body, discs, count, wx, wy, plays)
+        v, omega = command(body, wx, wy)
+        write_motion(actions[i], v, omega, speed, c.tracker_turn_rate)
+
+
+@compiled
+def plan(
+    c: Record,
+    slots: Records,
+    s: Record,
+    w: Record,
+    trackers: Records,
+    plans: Records,
+    cost: FloatArray,
+    work: FloatArray,
+    vx: float,
+    vy: float,
+    mean_x: float,
+    mean_y: float,
+) -> None:
+    """Assign the working trackers to slots so that they arrive soonest in total."""
+    n, rows = c.num_trackers, 0
+    speed = float(c.tracker_speed)
+    for i in range(n):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            continue
+        for k in range(n):
+            x = w.x + slots[k].x * w.frame_cos - slots[k].y * w.frame_sin - t.x
+            y = w.y + slots[k].x * w.frame_sin + slots[k].y * w.frame_cos - t.y
+            time = intercept_time(x, y, vx, vy, speed)
+            if time > s.weave_time:
+                time = intercept_time(x, y, mean_x, mean_y, speed)
+            # Turning towards it takes time, too.
+            away = wrap(math.atan2(y, x) - math.atan2(t.heading_sin, t.heading_cos))
+            time += 0.5 * abs(away) / c.tracker_turn_rate * min(1.0, time)
+            if plans[i].slot == k:
+                time -= s.loyalty
+            cost[rows, k] = time
+        rows += 1
+    assign(cost, rows, n, work)
+    rows = 0
+    for i in range(n):
+        if trackers[i].broken_at == NEVER:
+            plans[i].slot = int(work[0, rows])
+            rows += 1
+
+
+@compiled
+def surround(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    i: int,
+    margin: float,
+    discs: Records,
+) -> int:
+    """List what is near tracker i; return how many things that are."""
+    t = trackers[i]
+    count, two = 0, 2.0 * c.radius
+    dx, dy = w.x - t.x, w.y - t.y
+    if dx * dx + dy * dy < _NEAR * _NEAR:
+        count = put_disc(
+            discs,
+            count,
+            dx,
+            dy,
+            w.speed * w.heading_cos,
+            w.speed * w.heading_sin,
+            two,
+            2.0 * margin,
+        )
+    for j in range(c.num_trackers):
+        other = trackers[j]
+        dx, dy = other.x - t.x, other.y - t.y
+        if j != i and dx * dx + dy * dy < _NEAR * _NEAR:
+            count = put_disc(
+                discs, count, dx, dy,
+                other.speed * other.heading_cos, other.speed * other.heading_sin, two, margin,
+            )  # fmt: skip
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy = o.x - t.x, o.y - t.y
+        reach = o.radius + c.radius
+        if dx * dx + dy * dy < (_NEAR + reach) * (_NEAR + reach):
+            count = put_disc(discs, count, dx, dy, 0.0, 0.0, reach, margin)
+    if c.walled:
+        half = c.half_arena
+        if half - t.x < _NEAR:
+            count = put_wall(discs, count, half - t.x, 1.0, 0.0, c.radius, margin)
+        if half + t.x < _NEAR:
+            count = put_wall(discs, count, half + t.x, -1.0, 0.0, c.radius, margin)
+        if half - t.y < _NEAR:
+            count = put_wall(discs, count, half - t.y, 0.0, 1.0, c.radius, margin)
+        if half + t.y < _NEAR:
+            count = put_wall(discs, count, half + t.y, 0.0, -1.0, c.radius, margin)
+    return count
+
+
+@kernel
+def lead_all(
+    config: Records,
+    slots: Records,
+    settings: Records,
+    world: Records,
+    tracker: Records,
+    obstacle: Records,
+    plans: Records,
+    costs: FloatArray,
+    work: FloatArray,
+    discs: Records,
+    bodies: Records,
+    plays: Records,
+    actions: FloatArray,
+    thread: int,
+    turns: Numbers,
+) -> None:
+    """Write the actions of a thread's worlds."""
+    for e in worlds_of(thread, turns):
+        lead(
+            config[0], slots, settings[0], world[e], tracker[e], obstacle[e], plans[e],
+            costs[thread], work[thread], discs[thread], bodies[thread], plays[thread], actions[e],
+        )  # fmt: skip

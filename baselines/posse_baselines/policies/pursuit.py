@@ -1,0 +1,83 @@
+"""Pursuit: each tracker goes straight at the target, and avoids what its sonar finds."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse import ObservationLayout
+from posse.numeric import FloatArray, Numbers, Record, Records, compiled, kernel, worlds_of
+from posse_baselines.laws.offsets import offsets_of
+from posse_baselines.parallel import over_worlds
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    check_fits,
+    check_observations,
+    message_size_of,
+)
+
+_KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
+_STOP: Final = 0.9  # distance from the target at which it stops, m
+
+
+class Pursuit(BasePolicy):
+    """Velocity pursuit without a formation: the naive team."""
+
+    name = "pursuit"
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the memory: the layout, the number of worlds, where the fields are."""
+        check_fits(self, layout)
+        return layout, num_worlds, offsets_of(layout)
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return actions straight at the last fix of the target; in a circle without one."""
+        layout, num_worlds, offsets = memory
+        observations = check_observations(self, observations, num_worlds, layout)
+        num_trackers = observations.shape[1]
+        actions = np.zeros((num_worlds, num_trackers, 2 + message_size_of(layout)), np.float32)
+        over_worlds(pursue_all, (offsets, observations, actions), num_worlds, num_trackers)
+        return actions, memory
+
+
+@compiled
+def pursue(f: Record, o: FloatArray, action: FloatArray) -> None:
+    """Write one tracker's action (2 + m,) for what it is given, (F,)."""
+    speed, turn = 1.0, 0.2
+    if o[f.target_known] > 0.0:
+        age = max(0.0, o[f.target_age])
+        x = o[f.target_range] * o[f.target_bearing] + age * o[f.target_velocity]
+        y = o[f.target_range] * o[f.target_bearing + 1] + age * o[f.target_velocity + 1]
+        bearing = math.atan2(y, x)
+        turn = bearing / (2.0 * f.dt * o[f.max_turn_rate])
+        speed = max(0.0, math.cos(bearing)) if math.hypot(x, y) > _STOP else 0.0
+    # The nearest thing within the keep-away width turns it aside, and slows it if it is ahead.
+    for k in range(f.sonar_beams):
+        gap = o[f.sonar + k]
+        if gap < _KEEP_AWAY:
+            angle = 2.0 * math.pi * k / f.sonar_beams
+            angle = angle - 2.0 * math.pi if angle > math.pi else angle
+            closeness = 1.0 - gap / _KEEP_AWAY
+            if math.cos(angle) > 0.3:
+                speed = min(speed, 0.8 * (1.0 - closeness))
+                turn = turn - (1.0 if angle >= 0.0 else -1.0) * (0.5 + closeness)
+    action[0] = 2.0 * min(max(speed, 0.0), 1.0) - 1.0
+    action[1] = min(max(turn, -1.0), 1.0)
+
+
+@kernel
+def pursue_all(
+    offsets: Records,
+    observations: FloatArray,
+    actions: FloatArray,
+    thread: int,
+    turns: Numbers,
+) -> None:
+    """Write the actions of a thread's worlds."""
+    f = offsets[0]
+    for e in worlds_of(thread, turns):
+        for i in range(observations.shape[1]):
+            pursue(f, observations[e, i], actions[e, i])

@@ -1,0 +1,85 @@
+"""Policies to measure others against: they know nothing, and do as little."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse import ObservationLayout
+from posse.numeric import FloatArray, kernel
+from posse.rules.randomness import mix
+from posse_baselines.policy import (
+    BasePolicy,
+    Memory,
+    check_fits,
+    check_observations,
+    message_size_of,
+)
+
+_ONE: Final = np.float32(1.0)
+_SHIFT: Final = np.uint64(40)
+_TO_BOTH_SIDES: Final = np.float32(2.0**-23)
+
+
+class Idle(BasePolicy):
+    """Every tracker stays where it is."""
+
+    name = "idle"
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return V = 0 and ω = 0 for everyone."""
+        layout, num_worlds = memory
+        observations = check_observations(self, observations, num_worlds, layout)
+        actions = np.zeros((*observations.shape[:2], 2 + message_size_of(layout)), np.float32)
+        actions[:, :, 0] = -1.0
+        return actions, memory
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the memory: the layout and the number of worlds."""
+        check_fits(self, layout)
+        return layout, num_worlds
+
+
+class Random(BasePolicy):
+    """Every number of every action is drawn uniformly from [-1, 1).
+
+    A draw is a function of the seed and of what the tracker is given, so that a world plays alike
+    alone and in any batch.
+
+    Args:
+        seed: Of the draws, at least 0.
+    """
+
+    name = "random"
+
+    def __init__(self, seed: int = 0) -> None:
+        if not 0 <= seed < 2**63:
+            raise ValueError(f"seed={seed!r} must be a whole number in [0, 2**63)")
+        self.seed = seed
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the memory: the layout and the number of worlds."""
+        check_fits(self, layout)
+        return layout, num_worlds
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return random speeds, turn rates and messages."""
+        layout, num_worlds = memory
+        observations = check_observations(self, observations, num_worlds, layout)
+        actions = np.empty((*observations.shape[:2], 2 + message_size_of(layout)), np.float32)
+        draw_from_observations(observations.view(np.uint32), np.uint64(self.seed), actions)
+        return actions, memory
+
+
+@kernel
+def draw_from_observations(words: FloatArray, seed: np.uint64, actions: FloatArray) -> None:
+    """Fill actions (E, N, A) with draws keyed by the seed and observations (E, N, F) as words."""
+    for e in range(words.shape[0]):
+        for i in range(words.shape[1]):
+            key = mix(seed, np.uint64(i))
+            for k in range(words.shape[2]):
+                key = mix(key, np.uint64(words[e, i, k]))
+            for k in range(actions.shape[2]):
+                draw = mix(key, np.uint64(k)) >> _SHIFT
+                actions[e, i, k] = np.float32(draw) * _TO_BOTH_SIDES - _ONE

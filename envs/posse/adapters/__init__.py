@@ -1,0 +1,1 @@
+"""The engine as Gymnasium and PettingZoo environments."""

@@ -1,0 +1,189 @@
+"""What an action may be, and how the adapters take one: checked, and said by name what is wrong.
+
+An action is a robot's (speed, turn rate), each in [-1, 1], and after them the message. Learners
+that choose among a few actions get a `Discrete` variant: three speeds times five turn rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from posse.engine.kernels import bad_action
+from posse.numeric import FloatArray, direct
+from posse.scenarios.scenario import Scenario, ScenarioError
+
+SPEEDS: Final = (-1.0, 0.0, 1.0)
+"""Speeds to choose from: at rest, half, full."""
+TURN_RATES: Final = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Turn rates to choose from: hard right to hard left."""
+MOTIONS: Final = np.array([(v, turn) for v in SPEEDS for turn in TURN_RATES], np.float32)
+"""What each discrete action stands for, (15, 2): number 5 i + j is speed i with turn rate j."""
+
+_PARTS: Final = ("speed", "turn rate")
+_FLOAT32: Final = np.dtype(np.float32)
+
+
+def agent_names(scenario: Scenario) -> list[str]:
+    """Return the agents' names in the order of their rows, ``tracker_0`` ..., ``target_0`` last."""
+    names = [f"tracker_{i}" for i in range(scenario.num_trackers)]
+    return names + ["target_0"] * (scenario.num_agents - scenario.num_trackers)
+
+
+def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]:
+    """Return what one robot's action may be.
+
+    Raises:
+        ScenarioError: ``discrete`` with messages, which are not discrete.
+    """
+    if not isinstance(discrete, bool):
+        raise ScenarioError(f"discrete_actions={discrete!r} is not possible: it is True or False")
+    if not discrete:
+        return spaces.Box(-1.0, 1.0, (2 + scenario.message_size,), np.float32)
+    if scenario.message_size:
+        raise ScenarioError(
+            f"discrete_actions=True leaves no way to say a message of message_size="
+            f"{scenario.message_size}: set one of them back"
+        )
+    return spaces.Discrete(len(MOTIONS))
+
+
+class ActionReader:
+    """Turns what users pass as actions into what the kernels take.
+
+    Args:
+        scenario: The worlds that the actions are for.
+        discrete: Whether each action is the number of one of :data:`MOTIONS`.
+
+    Attributes:
+        read: The actions that were read last, (1, rows, 2 + m) float32; always the same array.
+    """
+
+    def __init__(self, scenario: Scenario, discrete: bool) -> None:
+        self._scenario = scenario
+        self._agents = agent_names(scenario)
+        self._discrete = discrete
+        rows = len(self._agents)
+        self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
+        self.read: FloatArray = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
+        self._plane: FloatArray = self.read[0]
+        self._rows = [
+            (a, memoryview(row)) for a, row in zip(self._agents, self._plane, strict=True)
+        ]
+        self._first_bad = self._first_bad_of_all
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Made anew, so that rows stay those of what is read.
+        return ActionReader, (self._scenario, self._discrete)
+
+    def by_agent(self, actions: Mapping[str, Any]) -> None:
+        """Read the actions of a dictionary by agent.
+
+        Raises:
+            ValueError: An agent is missing or unknown, or its action is of a wrong type or shape,
+                not finite, or outside the space; the message names agent and value.
+        """
+        if type(actions) is dict and len(actions) == len(self._rows) and not self._discrete:
+            # The usual case, an array of float32 for each agent. A memoryview takes nothing but
+            # what has its own type and shape, and says so in less time than it takes to ask.
+            try:
+                for agent, row in self._rows:
+                    row[:] = actions[agent]
+            except (KeyError, TypeError, ValueError, BufferError):
+                pass
+            else:
+                if self._first_bad(self.read) < 0:
+                    return
+        self._by_agent_slowly(actions)
+
+    def by_row(self, actions: npt.ArrayLike) -> None:
+        """Read the actions of an array (rows, 2 + m), or (rows,) of discrete ones.
+
+        Raises:
+            ValueError: As :meth:`by_agent`.
+        """
+        array = actions if type(actions) is np.ndarray else _as_array(actions, "action")
+        if array.shape != self._shape:
+            raise ValueError(f"action has shape {array.shape}, wanted {self._shape}")
+        if array.dtype is _FLOAT32 and not self._discrete:
+            self._plane[...] = array
+            if self._first_bad(self.read) < 0:
+                return
+        if not (self._discrete and array.dtype.kind in "iu"):
+            for agent, row in zip(self._agents, array, strict=True):
+                self._row(agent, row)
+        self.read[...] = self._in_space(array, self._agents)
+
+    def one(self, agent: str, action: npt.ArrayLike) -> FloatArray:
+        """Return the action of one agent, checked, (2 + m,).
+
+        Raises:
+            ValueError: As :meth:`by_agent`.
+        """
+        array = self._row(agent, action)
+        checked: FloatArray = self._in_space(array[None], (agent,))[0, 0]
+        return checked
+
+    def _first_bad_of_all(self, actions: FloatArray) -> int:
+        """Look through the actions, for the first time: from then on without this detour."""
+        position = bad_action(actions)
+        self._first_bad = direct(bad_action)
+        return position
+
+    def _by_agent_slowly(self, actions: Mapping[str, Any]) -> None:
+        """Read the actions, or find out which of them is wrong in which way."""
+        if not isinstance(actions, Mapping):
+            raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
+        known = f"agents are: {', '.join(self._agents)}"
+        for agent in actions:
+            if agent not in self._agents:
+                raise ValueError(f"action for unknown agent {agent!r}; {known}")
+        for agent in self._agents:
+            if agent not in actions:
+                raise ValueError(f"no action for {agent}: every agent needs one; {known}")
+        rows = [self._row(agent, actions[agent]) for agent in self._agents]
+        self.read[...] = self._in_space(np.stack(rows), self._agents)
+
+    def _row(self, agent: str, action: npt.ArrayLike) -> npt.NDArray[Any]:
+        """Return one agent's action as an array of the right type and shape."""
+        array = _as_array(action, f"action of {agent}")
+        wanted = "iu" if self._discrete else "fiu"
+        if array.dtype.kind not in wanted:
+            kind = "a whole number" if self._discrete else "real numbers"
+            raise ValueError(f"action of {agent} must be {kind}, got {action!r} ({array.dtype})")
+        if array.shape != self._shape[1:]:
+            raise ValueError(f"action of {agent} has shape {array.shape}, wanted {self._shape[1:]}")
+        return array if self._discrete else array.astype(np.float32)
+
+    def _in_space(self, array: npt.NDArray[Any], agents: Sequence[str]) -> FloatArray:
+        """Return rows of the right type and shape as the kernels take them, if in the space."""
+        if self._discrete:
+            outside = (array < 0) | (array >= len(MOTIONS))
+            if outside.any():
+                i = int(outside.argmax())
+                raise ValueError(
+                    f"action of {agents[i]} is {array[i]}, outside 0 to {len(MOTIONS) - 1}"
+                )
+            motions: FloatArray = MOTIONS[array][None]
+            return motions
+        kernel = np.ascontiguousarray(array, np.float32)[None]
+        position = bad_action(kernel)
+        if position >= 0:
+            i, k = divmod(position, kernel.shape[2])
+            part = _PARTS[k] if k < len(_PARTS) else f"message[{k - len(_PARTS)}]"
+            raise ValueError(
+                f"action of {agents[i]}: {part} = {kernel[0, i, k]} is not a number in [-1, 1]: "
+                "scale or clip the policy's output first"
+            )
+        return kernel
+
+
+def _as_array(action: npt.ArrayLike, subject: str) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(action)
+    except ValueError:
+        raise ValueError(f"{subject} is no array: {action!r}") from None

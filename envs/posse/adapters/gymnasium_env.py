@@ -1,0 +1,266 @@
+"""The worlds as Gymnasium environments: one agent drives the team, or is the only tracker."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from posse.adapters.actions import MOTIONS, single_action_space
+from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
+from posse.adapters.spaces import box
+from posse.numeric import FloatArray
+from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.signals.observation import ObservationLayout
+from posse.signals.reward import TERM_NAMES, name_terms
+
+
+class TeamEnv(gymnasium.Env[Any, Any]):
+    """``posse/Team-v0``: one agent drives the whole team.
+
+    **Observation**: ``Box`` (N, F) float32, what each tracker is given; its fields are
+    ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
+
+    **Action**: ``Box(-1, 1, (N, 2 + message_size))`` float32: for each tracker its speed (-1 is at
+    rest, 1 the greatest), turn rate (1 is the greatest to the left) and message. With
+    ``discrete_actions=True`` ``MultiDiscrete([15] * N)``, rows of
+    :data:`posse.adapters.actions.MOTIONS`.
+
+    **Reward**: the mean over the trackers of the weighted sum of named terms.
+
+    **Info** of every step: ``"score"`` in [0, 1]; ``"reward_terms"``, each term by name, unscaled,
+    (N,); ``"working"`` (N,), where the scenario has trackers break; at the end ``"metrics"``, each
+    metric of the episode by name (``posse.METRICS``).
+
+    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the world that is
+    the first of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
+    ``options={"tracker_pose": (N, 3), "target_pose": (3,)}`` starts from these (x, y, θ).
+
+    **End**: truncation after ``horizon`` steps; termination only with ``terminate_on_contact``.
+
+    Args:
+        scenario: Name of a scenario, or one.
+        discrete_actions: Whether actions are discrete.
+        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
+        seed: Of every random draw; ``None``: an arbitrary one.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Which world of the seed.
+        overrides: Any field of :class:`posse.Scenario`.
+
+    Raises:
+        ScenarioError: An unknown scenario or setting, or an impossible one.
+        ValueError: An unknown split or render mode, a negative seed.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 10,
+    }
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "constant",
+        *,
+        discrete_actions: bool = False,
+        render_mode: str | None = None,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        **overrides: Any,
+    ) -> None:
+        self.scenario = self.fitting_scenario(scenario, None, overrides)
+        self._world = SingleWorld(
+            self.scenario, discrete_actions=discrete_actions, seed=seed, split=split,
+            first_world=first_world, render_mode=render_mode,
+        )  # fmt: skip
+        self.metadata = {  # type: ignore[misc]
+            **type(self).metadata,
+            "render_fps": frames_per_second(self.scenario),
+        }
+        self.render_mode = render_mode
+        self.layout: ObservationLayout = self._world.batch.layout
+        self.observation_space, self.action_space = self.spaces_of(self.scenario, discrete_actions)
+        self._breakable = self.scenario.breaks > 0
+
+    @classmethod
+    def fitting_scenario(
+        cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
+    ) -> Scenario:
+        """Return the scenario with its overrides, and its episodes cut to ``horizon`` steps.
+
+        Raises:
+            ScenarioError: It is impossible, or does not fit an environment of one agent.
+        """
+        return _with_scripted_target(scenario, horizon, overrides)
+
+    @classmethod
+    def spaces_of(
+        cls, scenario: Scenario, discrete_actions: bool
+    ) -> tuple[spaces.Box, spaces.Space[Any]]:
+        """Return the spaces of observations and actions."""
+        n = scenario.num_trackers
+        low, high = ObservationLayout(scenario).bounds()
+        observation_space = box((np.tile(low, (n, 1)), np.tile(high, (n, 1))))
+        single = single_action_space(scenario, discrete_actions)
+        if discrete_actions:
+            return observation_space, spaces.MultiDiscrete([len(MOTIONS)] * n)
+        assert single.shape is not None
+        return observation_space, spaces.Box(-1.0, 1.0, (n, *single.shape), np.float32)
+
+    @property
+    def state_layout(self) -> Any:
+        """Names, units and ranges of what :meth:`state` returns."""
+        return self._world.state_layout
+
+    def state(self) -> FloatArray:
+        """Return everything there is to know of the world, (S,) float32.
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        return self._world.state()
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start an episode; see the class for seeds and options.
+
+        Raises:
+            ValueError: A bad seed or option; nothing is changed.
+        """
+        observations = self._world.reset(seed, options)
+        super().reset(seed=None if seed is None else int(seed))
+        if self.render_mode == "human":
+            self.render()
+        return observations, {}
+
+    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Advance the world by one control step.
+
+        Raises:
+            ResetNeeded: Before the first reset, or after the end.
+            ValueError: An action of a wrong type or shape, not finite, or out of its space;
+                nothing is changed.
+        """
+        world = self._world
+        if not world.running:
+            world.check_running()
+        world.actions.by_row(action)
+        over = world.advance()
+        info: dict[str, Any] = {
+            "score": world.score,
+            # Rows that already are an array: name_terms(*rows) would take longer.
+            "reward_terms": dict(zip(TERM_NAMES, world.terms.T.copy())),  # noqa: B905
+        }
+        if self._breakable:
+            info["working"] = world.working()
+        terminated = truncated = False
+        if over:
+            terminated, info["metrics"] = world.end()
+            truncated = not terminated
+        if self.render_mode == "human":
+            self.render()
+        rewards = world.rewards.tolist()
+        return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        return self._world.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._world.close()
+
+
+class SoloEnv(TeamEnv):
+    """``posse/Solo-v0``: one tracker, one target.
+
+    As :class:`TeamEnv` with a team of one, and no axis for the team: **observation** ``Box`` (F,),
+    **action** ``Box(-1, 1, (2 + message_size,))`` or ``Discrete(15)``, reward terms plain numbers.
+    ``options["tracker_pose"]`` may be (3,).
+
+    Raises:
+        ScenarioError: As :class:`TeamEnv`, and where the team is not one tracker.
+    """
+
+    @classmethod
+    def fitting_scenario(
+        cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
+    ) -> Scenario:
+        """Return the scenario with one tracker.
+
+        Raises:
+            ScenarioError: It is impossible, or asks for more trackers.
+        """
+        if overrides.get("num_trackers", 1) != 1:
+            raise ScenarioError(
+                f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has "
+                "one: use posse/Team-v0"
+            )
+        return _with_scripted_target(scenario, horizon, {**overrides, "num_trackers": 1})
+
+    @classmethod
+    def spaces_of(
+        cls, scenario: Scenario, discrete_actions: bool
+    ) -> tuple[spaces.Box, spaces.Space[Any]]:
+        """Return the spaces of observations and actions."""
+        bounds = ObservationLayout(scenario).bounds()
+        return box(bounds), single_action_space(scenario, discrete_actions)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start an episode; see :class:`TeamEnv`."""
+        observations, info = super().reset(seed=seed, options=solo_options(options))
+        return observations[0], info
+
+    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Advance the world by one control step; see :class:`TeamEnv`."""
+        world = self._world
+        if not world.running:
+            world.check_running()
+        world.actions.by_agent({"tracker_0": action})
+        over = world.advance()
+        info: dict[str, Any] = {
+            "score": world.score,
+            "reward_terms": name_terms(*world.terms[0].tolist()),
+        }
+        terminated = truncated = False
+        if over:
+            terminated, info["metrics"] = world.end()
+            truncated = not terminated
+        if self.render_mode == "human":
+            self.render()
+        return world.observations[0].copy(), world.rewards.item(), terminated, truncated, info
+
+
+def solo_options(options: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Return the options with a tracker's pose (3,) as a team's, (1, 3)."""
+    if options and "tracker_pose" in options and np.ndim(options["tracker_pose"]) == 1:
+        return {**options, "tracker_pose": np.asarray(options["tracker_pose"])[None]}
+    return options
+
+
+def _with_scripted_target(
+    scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
+) -> Scenario:
+    settings = dict(overrides)
+    if settings.pop("target", None) is not None:
+        raise ScenarioError(_NO_PLACE.format(f"target={overrides['target']!r}"))
+    found = shortened(scenario, horizon, settings)
+    if found.target_motion == "agent":
+        raise ScenarioError(_NO_PLACE.format("target_motion='agent'"))
+    return found
+
+
+_NO_PLACE = (
+    "{} has no place in an environment of one agent: use posse.parallel_env(..., target='agent'), "
+    "or a scripted target_motion"
+)

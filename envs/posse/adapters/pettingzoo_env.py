@@ -1,0 +1,295 @@
+"""The worlds as PettingZoo environments: trackers are agents, and the target, if asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from pettingzoo import ParallelEnv
+from pettingzoo.utils.conversions import parallel_to_aec_wrapper
+from pettingzoo.utils.wrappers import OrderEnforcingWrapper
+
+from posse.adapters.actions import agent_names, single_action_space
+from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
+from posse.adapters.spaces import box
+from posse.numeric import FloatArray
+from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.signals.observation import ObservationLayout
+from posse.signals.reward import name_terms
+
+_Infos = dict[str, dict[str, Any]]
+
+
+class TeamParallelEnv(ParallelEnv[str, Any, Any]):
+    """A team of unicycle robots finds, follows and holds formation on one mobile target.
+
+    **Agents**: ``tracker_0`` ... ``tracker_{N-1}``, and ``target_0`` where the target is an agent.
+    All act at once; none leaves before the end.
+
+    **Observation**: ``Box`` (F,) float32, own sensors, odometry and radio; its fields, in order,
+    are ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
+    A ``target_0`` observes in the same layout and knows where the trackers are.
+
+    **Action**: ``Box(-1, 1, (2 + message_size,))`` float32: speed (-1 is at rest, 1 the greatest),
+    turn rate (1 is the greatest to the left), message. With ``discrete_actions=True``
+    ``Discrete(15)``, the rows of :data:`posse.adapters.actions.MOTIONS`.
+
+    **Reward**: the weighted sum of named terms, ``scenario.reward_weights``; for ``target_0`` the
+    negative of the team's score.
+
+    **Info**, for each agent, of every step: ``"score"`` of the team in [0, 1]; ``"reward_terms"``,
+    each term by name, unscaled; ``"working"``, where the scenario has trackers break; at the end
+    ``"metrics"``, each metric of the episode by name (``posse.METRICS``).
+
+    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the world that is
+    the first of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
+    ``options={"tracker_pose": (N, 3), "target_pose": (3,)}`` starts from these (x, y, θ).
+
+    **End**: truncation after ``horizon`` steps; termination only with ``terminate_on_contact``.
+
+    **State**: ``env.state()`` is everything as one float32 vector; ``env.state_layout`` names it.
+
+    Args:
+        scenario: Name of a scenario, or one.
+        target: ``"agent"`` makes the target an agent: ``target_motion="agent"``, shorter.
+        discrete_actions: Whether actions are ``Discrete``.
+        max_cycles: Length of an episode in steps: another name for ``horizon``.
+        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
+        seed: Of every random draw; ``None``: an arbitrary one.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Which world of the seed.
+        overrides: Any field of :class:`posse.Scenario`.
+
+    Raises:
+        ScenarioError: An unknown scenario or setting, or an impossible one.
+        ValueError: An unknown split or render mode, a negative seed.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "posse_track_v0",
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 10,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "constant",
+        *,
+        target: str | None = None,
+        discrete_actions: bool = False,
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        **overrides: Any,
+    ) -> None:
+        self.scenario = shortened(scenario, max_cycles, target_overrides(target, overrides))
+        self._world = SingleWorld(
+            self.scenario, discrete_actions=discrete_actions, seed=seed, split=split,
+            first_world=first_world, render_mode=render_mode,
+        )  # fmt: skip
+        self.metadata = {  # type: ignore[misc]
+            **type(self).metadata,
+            "render_fps": frames_per_second(self.scenario),
+        }
+        self.render_mode = render_mode
+        self.layout: ObservationLayout = self._world.batch.layout
+        self.possible_agents = agent_names(self.scenario)
+        self.agents: list[str] = []
+        bounds = self.layout.bounds()
+        self.observation_spaces = {agent: box(bounds) for agent in self.possible_agents}
+        self.action_spaces = {
+            agent: single_action_space(self.scenario, discrete_actions)
+            for agent in self.possible_agents
+        }
+        self._breakable = self.scenario.breaks > 0
+        self._nobody = dict.fromkeys(self.possible_agents, False)
+        self._state_space: spaces.Box | None = None
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return what an agent may observe; the same object at each call."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return what an agent may do; the same object at each call."""
+        return self.action_spaces[agent]
+
+    @property
+    def state_layout(self) -> Any:
+        """Names, units and ranges of what :meth:`state` returns."""
+        return self._world.state_layout
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """What :meth:`state` may return."""
+        if self._state_space is None:
+            self._state_space = box(self.state_layout.bounds())
+        return self._state_space
+
+    def state(self) -> FloatArray:
+        """Return everything there is to know of the world, (S,) float32.
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        return self._world.state()
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, FloatArray], _Infos]:
+        """Start an episode; see the class for seeds and options.
+
+        Returns:
+            Observations and (empty) infos by agent.
+
+        Raises:
+            ValueError: A bad seed or option; nothing is changed.
+        """
+        if options:
+            # PettingZoo's own tests send {"options": 1}, to see that options are taken.
+            options = {key: value for key, value in options.items() if key != "options"}
+        observations = self._world.reset(seed, options)
+        self.agents = self.possible_agents.copy()
+        if self.render_mode == "human":
+            self.render()
+        infos: _Infos = {agent: {} for agent in self.agents}
+        return dict(zip(self.agents, observations, strict=True)), infos
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos]:
+        """Advance the world by one control step.
+
+        Args:
+            actions: One for every agent, by name.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos, each by agent.
+
+        Raises:
+            ResetNeeded: Before the first reset, or after the end.
+            ValueError: An agent is missing or unknown, or its action is of a wrong type or shape,
+                not finite, or out of its space; nothing is changed.
+        """
+        world, agents = self._world, self.agents
+        if not world.running:
+            world.check_running()
+        world.actions.by_agent(actions)
+        over = world.advance()
+        score = world.score
+        infos: _Infos = {
+            agent: {"score": score, "reward_terms": name_terms(*values)}
+            # zip's default is right: as many of each, and this is the hot path.
+            for agent, values in zip(agents, world.terms.tolist())  # noqa: B905
+        }
+        if self._breakable:
+            self._tell_who_works(infos)
+        terminated, truncated = self._nobody.copy(), self._nobody.copy()
+        if over:
+            was_terminated, metrics = world.end()
+            ended = terminated if was_terminated else truncated
+            ended.update(dict.fromkeys(agents, True))
+            for info in infos.values():
+                info["metrics"] = metrics.copy()
+            self.agents = []
+        if self.render_mode == "human":
+            self.render()
+        return (
+            dict(zip(agents, world.observations.copy())),  # noqa: B905
+            dict(zip(agents, world.rewards.tolist())),  # noqa: B905
+            terminated,
+            truncated,
+            infos,
+        )
+
+    def _tell_who_works(self, infos: _Infos) -> None:
+        working = [*self._world.working().tolist(), True]  # a target never breaks
+        for info, works in zip(infos.values(), working, strict=False):
+            info["working"] = works
+
+    def check_action(self, agent: str, action: npt.ArrayLike) -> None:
+        """Raise what is wrong with an agent's action.
+
+        Raises:
+            ValueError: Of a wrong type or shape, not finite, or out of its space.
+        """
+        self._world.actions.one(agent, action)
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        return self._world.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._world.close()
+
+
+def target_overrides(target: str | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the overrides with ``target="agent"`` written out."""
+    if target is None:
+        return dict(overrides)
+    if target != "agent":
+        raise ScenarioError(
+            f"target={target!r} is not possible: the one choice is 'agent'; target_motion= chooses "
+            "among the scripted ones"
+        )
+    if overrides.get("target_motion", "agent") != "agent":
+        raise ScenarioError(
+            f"target='agent' and target_motion={overrides['target_motion']!r} exclude each other"
+        )
+    return {**overrides, "target_motion": "agent"}
+
+
+class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):
+    """The agents in turns. A bad action is refused in its agent's own turn, not in the last."""
+
+    def step(self, action: Any) -> None:
+        agent = self.agent_selection
+        if not (self.terminations[agent] or self.truncations[agent]):
+            self.env.check_action(agent, action)
+        super().step(action)
+
+
+class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
+    """:class:`TeamParallelEnv` in turns: nothing moves before the last agent has acted."""
+
+    def __init__(self, env: TeamParallelEnv) -> None:
+        super().__init__(_InTurns(env))
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "env":  # asked for by copy and pickle, before there is anything to look into
+            raise AttributeError(name)
+        return super().__getattr__(name)
+
+    def step(self, action: Any) -> None:
+        """Take the action of the agent whose turn it is.
+
+        Raises:
+            ResetNeeded: Before the first reset, or after the end.
+            ValueError: A bad action; nothing is changed, and it is still that agent's turn.
+        """
+        if not self._has_reset:
+            raise ResetNeeded("step before reset: call reset() first")
+        if not self.agents:
+            raise ResetNeeded("step after the end of the episode: call reset() first")
+        super().step(action)
+
+
+def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:
+    """Return a PettingZoo environment whose agents act at once: :class:`TeamParallelEnv`."""
+    return TeamParallelEnv(scenario, **settings)
+
+
+def env(scenario: str | Scenario = "constant", **settings: Any) -> TeamAECEnv:
+    """Return a PettingZoo environment whose agents act in turns: :class:`TeamAECEnv`."""
+    return TeamAECEnv(TeamParallelEnv(scenario, **settings))

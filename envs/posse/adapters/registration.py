@@ -1,0 +1,28 @@
+"""Makes the environments known to Gymnasium and PettingZoo by their ids."""
+
+from __future__ import annotations
+
+import gymnasium
+import pettingzoo
+
+_GYMNASIUM = {
+    "posse/Team-v0": (
+        "posse.adapters.gymnasium_env:TeamEnv",
+        "posse.adapters.vector_env:TeamVectorEnv",
+    ),
+    "posse/Solo-v0": (
+        "posse.adapters.gymnasium_env:SoloEnv",
+        "posse.adapters.vector_env:SoloVectorEnv",
+    ),
+}
+_PETTINGZOO = "posse/track-v0"
+
+
+def register() -> None:
+    """Register every id, once however often it is called."""
+    for name, (entry_point, vector_entry_point) in _GYMNASIUM.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(name, entry_point=entry_point, vector_entry_point=vector_entry_point)
+    if _PETTINGZOO not in pettingzoo.parallel_registry:
+        pettingzoo.register("parallel", _PETTINGZOO, "posse.adapters.pettingzoo_env:parallel_env")
+        pettingzoo.register("aec", _PETTINGZOO, "posse.adapters.pettingzoo_env:env")

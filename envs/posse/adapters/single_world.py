@@ -1,0 +1,230 @@
+"""One world, and what the environments of one world share: seeds, the end, state, pictures."""
+
+from __future__ import annotations
+
+import importlib
+import secrets
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+
+from posse.adapters.actions import ActionReader
+from posse.engine.batch import Batch
+from posse.numeric import FloatArray
+from posse.rules.state import NEVER
+from posse.scenarios.named import get_scenario
+from posse.scenarios.scenario import Scenario
+from posse.signals.global_state import StateLayout
+from posse.signals.reward import REWARD_TERMS
+
+RENDER_MODES: Final = ("human", "rgb_array")
+_OPTIONS: Final = ("tracker_pose", "target_pose")
+
+
+class SingleWorld:
+    """A batch of one world, with what an environment of one world needs around it.
+
+    Args:
+        scenario: What the world is like.
+        discrete_actions: Whether actions are ``Discrete``.
+        seed: Of every random draw; ``None``: one from the system's entropy, at the first reset.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Which world of the seed.
+        render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
+
+    Attributes:
+        running: Whether a step is possible: after a reset, and before the end.
+        actions: What reads the actions for :attr:`advance`.
+        advance: Makes a control step with the actions that were read; returns 1 where the episode
+            is over: then :meth:`end` is called.
+        observations: (rows, F) of the last step; the next one overwrites them.
+        rewards: (rows,) of the last step, likewise.
+        terms: (rows, K) reward terms of the last step, likewise.
+
+    Raises:
+        ValueError: An unknown split or render mode, a negative seed or number of the world.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        discrete_actions: bool = False,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        render_mode: str | None = None,
+    ) -> None:
+        check_render_mode(render_mode)
+        self.scenario = scenario
+        self.batch = Batch(
+            scenario,
+            1,
+            seed=0 if seed is None else seed,
+            split=split,
+            first_world=first_world,
+            autoreset="next_step",  # never comes to it: the end is looked after here
+            num_threads=1,
+        )
+        self.render_mode = render_mode
+        self.running = False
+        self._discrete = discrete_actions
+        self._seeded = seed is not None
+        self._started = False
+        self._state_layout: StateLayout | None = None
+        self._renderer: Any = None
+        self._prepare()
+
+    def _prepare(self) -> None:
+        # Made once: making a view or an array takes longer than reading it.
+        self._score = self.batch.worlds["score"]
+        self.actions = ActionReader(self.scenario, self._discrete)
+        rows = (1, self.scenario.num_agents)
+        self._written: tuple[FloatArray, ...] = tuple(
+            np.zeros(shape, np.float32)
+            for shape in (self.batch.observation_shape, rows, (*rows, len(REWARD_TERMS)))
+        )
+        self.observations, self.rewards, self.terms = (array[0] for array in self._written)
+        self._make_ready()
+
+    def _make_ready(self) -> None:
+        self.advance = self.batch.stepper(self.actions.read, *self._written)
+
+    def __getstate__(self) -> dict[str, Any]:
+        derived = ("_score", "actions", "_written", "observations", "rewards", "terms", "advance")
+        kept = {k: v for k, v in self.__dict__.items() if k not in derived}
+        return {**kept, "_renderer": None, "_state_layout": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepare()
+
+    @property
+    def score(self) -> float:
+        """The present step's score."""
+        score: float = self._score.item()
+        return score
+
+    @property
+    def state_layout(self) -> StateLayout:
+        """What :meth:`state` is made of."""
+        if self._state_layout is None:
+            self._state_layout = StateLayout(self.scenario)
+        return self._state_layout
+
+    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+        """Start an episode and return the observations (rows, F).
+
+        Args:
+            seed: Start over from episode 0 of this seed; ``None``: the next episode.
+            options: ``"tracker_pose"`` (N, 3) and ``"target_pose"`` (3,): start from these.
+
+        Raises:
+            ValueError: A bad seed or option; nothing is changed.
+        """
+        for key in options or ():
+            if key not in _OPTIONS:
+                raise ValueError(f"unknown option {key!r}; options are: {', '.join(_OPTIONS)}")
+        if seed is None and not self._seeded:
+            seed = secrets.randbits(32)
+        observations = self.batch.reset(seed=seed, options=options)
+        self._make_ready()
+        self.running = self._seeded = self._started = True
+        first: FloatArray = observations[0]
+        return first
+
+    def check_running(self) -> None:
+        """Raise if a step is not possible now.
+
+        Raises:
+            ResetNeeded: Before the first reset, or after the end of the episode.
+        """
+        if not self.running:
+            when = "after the end of the episode" if self._started else "before reset"
+            raise ResetNeeded(f"step {when}: call reset() first")
+
+    def end(self) -> tuple[bool, dict[str, float]]:
+        """Take note that the episode is over.
+
+        Returns:
+            Whether it was terminated, rather than truncated, and every metric by name.
+        """
+        self.running = False
+        metrics = {name: float(value[0]) for name, value in self.batch.metrics().items()}
+        return bool(self.batch.worlds["terminated"][0]), metrics
+
+    def working(self) -> npt.NDArray[np.bool_]:
+        """Return which trackers work, (N,)."""
+        working: npt.NDArray[np.bool_] = self.batch.arrays.tracker["broken_at"][0] == NEVER
+        return working
+
+    def state(self) -> FloatArray:
+        """Return everything there is to know of the world, (S,) float32.
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        if not self._started:
+            raise ResetNeeded("state before reset: call reset() first")
+        state: FloatArray = self.state_layout.vector(self.batch.arrays)[0]
+        return state
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Draw the world: the picture (H, W, 3) in the mode "rgb_array", a window in "human".
+
+        Raises:
+            ResetNeeded: Before the first reset.
+        """
+        if not self._started:
+            raise ResetNeeded("render before reset: call reset() first")
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            self._renderer = new_renderer(self.scenario, self.render_mode)
+        picture: npt.NDArray[np.uint8] | None = self._renderer.draw(self.batch)
+        return picture
+
+    def close(self) -> None:
+        """Close the window, if there is one; may be called again."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def new_renderer(scenario: Scenario, render_mode: str) -> Any:
+    """Return a renderer; what draws is loaded when something is to be drawn, and not before."""
+    return importlib.import_module("posse.rendering.renderer").Renderer(scenario, render_mode)
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Raise ValueError for a render mode that there is not."""
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise ValueError(
+            f"unknown render_mode {render_mode!r}; modes are: {', '.join(RENDER_MODES)}, None"
+        )
+
+
+def frames_per_second(scenario: Scenario) -> int:
+    """Return how many pictures a second show the world in real time."""
+    return max(1, round(1 / scenario.control_step))
+
+
+def shortened(
+    scenario: str | Scenario, horizon: int | None, overrides: Mapping[str, Any]
+) -> Scenario:
+    """Return a scenario with overrides, its episodes cut to ``horizon`` steps unless that is None.
+
+    That is what ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium) mean. Where an
+    episode becomes shorter than ``settle_time``, that is cut to the episode's length.
+    """
+    changed = dict(overrides)
+    if horizon is None:
+        return get_scenario(scenario, **changed)
+    full = get_scenario(scenario, **changed)
+    changed["horizon"] = horizon
+    if horizon > 0:
+        changed["settle_time"] = min(full.settle_time, horizon * full.control_step)
+    return get_scenario(scenario, **changed)

@@ -1,0 +1,292 @@
+"""The worlds as Gymnasium vector environments: thousands of them, stepped by one call."""
+
+from __future__ import annotations
+
+import secrets
+from typing import Any, ClassVar, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from posse.adapters.actions import MOTIONS
+from posse.adapters.gymnasium_env import SoloEnv, TeamEnv, solo_options
+from posse.adapters.single_world import (
+    RENDER_MODES,
+    check_render_mode,
+    frames_per_second,
+    new_renderer,
+)
+from posse.engine.batch import Batch
+from posse.numeric import BoolArray, FloatArray
+from posse.scenarios.scenario import Scenario
+from posse.signals.observation import ObservationLayout
+
+_MODES: Final = {
+    AutoresetMode.NEXT_STEP: "next_step",
+    AutoresetMode.SAME_STEP: "same_step",
+    AutoresetMode.DISABLED: "disabled",
+}
+_Info = dict[str, Any]
+_Rewards = npt.NDArray[np.float64]
+
+
+class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
+    """``posse/Team-v0`` as a vector environment: E worlds, one agent drives the team in each.
+
+    What a step means is as in :class:`posse.adapters.gymnasium_env.TeamEnv`, with an axis E in
+    front.
+    World i is world ``first_world + i`` of the seed, so ``reset(seed=s)`` gives E different worlds.
+    Infos have the form that ``gymnasium.vector.SyncVectorEnv`` gives them: for each entry an
+    array over the worlds, and beside it under ``"_" + name`` a mask of the worlds it is about.
+
+    Args:
+        scenario: Name of a scenario, or one.
+        num_envs: E, at least 1.
+        autoreset_mode: What happens when an episode ends, a ``gymnasium.vector.AutoresetMode`` or
+            its value. ``NEXT_STEP``: the next step starts another, its action is ignored;
+            ``SAME_STEP``: another starts at once, the last observation is ``info["final_obs"]``;
+            ``DISABLED``: the caller resets, with ``options={"reset_mask": mask}``.
+        max_episode_steps: Length of an episode: another name for ``horizon``.
+        discrete_actions: Whether actions are discrete.
+        render_mode: ``"human"`` (a window with world 0), ``"rgb_array"`` or ``None``.
+        seed: Of every random draw; ``None``: an arbitrary one.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Index of the first world.
+        num_threads: Threads that step the worlds; never changes a result.
+        own_kernel: Whether to compile a kernel for this scenario alone, which is about a third
+            faster; never changes a result.
+        overrides: Any field of :class:`posse.Scenario`.
+
+    Raises:
+        ScenarioError: An unknown scenario or setting, or an impossible one.
+        ValueError: Anything else that is not possible; the message says what is.
+    """
+
+    single_env: ClassVar[type[TeamEnv]] = TeamEnv
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "constant",
+        num_envs: int = 1,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        discrete_actions: bool = False,
+        render_mode: str | None = None,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        num_threads: int | None = None,
+        own_kernel: bool = False,
+        **overrides: Any,
+    ) -> None:
+        check_render_mode(render_mode)
+        self.autoreset_mode = _check_mode(autoreset_mode)
+        self.scenario = self.single_env.fitting_scenario(scenario, max_episode_steps, overrides)
+        self.single_observation_space, self.single_action_space = self.single_env.spaces_of(
+            self.scenario, discrete_actions
+        )
+        self.batch = Batch(
+            self.scenario,
+            num_envs,
+            seed=0 if seed is None else seed,
+            split=split,
+            first_world=first_world,
+            autoreset=_MODES[self.autoreset_mode],
+            num_threads=num_threads,
+            own_kernel=own_kernel,
+        )
+        self._seeded = seed is not None
+        self.num_envs = num_envs
+        self.observation_space: spaces.Space[Any] = batch_space(
+            self.single_observation_space, num_envs
+        )
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.layout: ObservationLayout = self.batch.layout
+        self.render_mode = render_mode
+        self.metadata = {  # type: ignore[misc]
+            **type(self).metadata,
+            "render_fps": frames_per_second(self.scenario),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self._discrete = discrete_actions
+        self._works_at = self.layout.offsets["working"]
+        self._renderer: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_renderer": None}
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, _Info]:
+        """Start episodes, and return the observations of all worlds.
+
+        Args:
+            seed: One number: start over from episode 0 of this seed; ``None``: each world's next
+                episode.
+            options: ``"reset_mask"`` (E,) bool: only these worlds; ``"tracker_pose"`` and
+                ``"target_pose"``: start from these, as in :meth:`posse.Batch.reset`.
+
+        Raises:
+            ValueError: A bad seed or option; nothing is changed.
+        """
+        if isinstance(seed, (list, tuple)):
+            raise ValueError(
+                "seed must be one number, from which every world gets draws of its own; got a "
+                f"{type(seed).__name__} of {len(seed)}"
+            )
+        fresh = seed
+        if seed is None and not self._seeded:
+            fresh = secrets.randbits(32)
+        observations = self.batch.reset(seed=fresh, options=self._options(options))
+        self._seeded = True
+        super().reset(seed=None if seed is None else int(seed))
+        if self.render_mode == "human":
+            self.render()
+        return self._observed(observations), {}
+
+    def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
+        """Advance every world by one control step.
+
+        Args:
+            actions: In ``action_space``.
+
+        Returns:
+            observations (E, ...), rewards (E,), terminated (E,), truncated (E,), infos.
+
+        Raises:
+            ResetNeeded: Before the first reset, or after an end with ``DISABLED``.
+            ValueError: Actions of a wrong type or shape, not finite, or out of their space; nothing
+                is changed.
+        """
+        observations, rewards, terminated, truncated, batch_infos = self.batch.step(
+            self._motions(actions)
+        )
+        infos = self._infos(observations, terminated | truncated, batch_infos)
+        if self.render_mode == "human":
+            self.render()
+        return self._observed(observations), self._rewarded(rewards), terminated, truncated, infos
+
+    def _motions(self, actions: Any) -> npt.NDArray[Any]:
+        """Return actions as the batch takes them, (E, N, 2 + m)."""
+        array = np.asarray(actions)
+        if array.shape != self.action_space.shape:
+            raise ValueError(f"actions have shape {array.shape}, wanted {self.action_space.shape}")
+        if not self._discrete:
+            return array.reshape(self.batch.action_shape)
+        if array.dtype.kind not in "iu":
+            raise ValueError(f"actions must be whole numbers, got an array of {array.dtype}")
+        outside = (array < 0) | (array >= len(MOTIONS))
+        if outside.any():
+            where = tuple(int(k) for k in np.argwhere(outside)[0])
+            raise ValueError(
+                f"actions{list(where)} = {array[where]} lies outside 0 to {len(MOTIONS) - 1}"
+            )
+        motions: FloatArray = MOTIONS[array].reshape(self.batch.action_shape)
+        return motions
+
+    def _infos(self, observations: FloatArray, ended: BoolArray, found: _Info) -> _Info:
+        """Bring the batch's infos to the form of Gymnasium's own vector environments."""
+        last = found.get("final_obs", observations)
+        entries: _Info = {
+            "score": found["score"].astype(np.float64),
+            "reward_terms": {k: self._of_agents(v) for k, v in found["reward_terms"].items()},
+        }
+        if self.scenario.breaks:
+            entries["working"] = last[:, :, self._works_at] != 0
+        if self.autoreset_mode != AutoresetMode.SAME_STEP or "final_obs" not in found:
+            # A world that has just been reset has nothing to tell.
+            infos = _masked(entries, self.batch.worlds["step"] > 0)
+            if "metrics" in found:
+                infos.update(_masked({"metrics": found["metrics"]}, ended))
+            return infos
+        infos = _masked(entries, ~ended) if not ended.all() else {}
+        final = _masked({**entries, "metrics": found["metrics"]}, ended)
+        kept = np.full(self.num_envs, None, dtype=object)
+        for e in np.flatnonzero(ended):
+            kept[e] = self._observed(last[e : e + 1])[0]
+        infos["final_obs"], infos["_final_obs"] = kept, ended.copy()
+        infos["final_info"], infos["_final_info"] = final, ended.copy()
+        return infos
+
+    # What differs between a team and a single tracker.
+
+    def _options(self, options: dict[str, Any] | None) -> dict[str, Any] | None:
+        return options
+
+    def _observed(self, observations: FloatArray) -> FloatArray:
+        return observations
+
+    def _rewarded(self, rewards: FloatArray) -> _Rewards:
+        mean: _Rewards = rewards.mean(axis=1, dtype=np.float64)
+        return mean
+
+    def _of_agents(self, values: FloatArray) -> npt.NDArray[Any]:
+        return values
+
+    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
+        """Draw every world, (H, W, 3) uint8 each; in the mode "human", world 0 in a window."""
+        if self.render_mode is None:
+            return None
+        if self._renderer is None:
+            self._renderer = new_renderer(self.scenario, self.render_mode)
+        if self.render_mode == "human":
+            self._renderer.draw(self.batch)
+            return None
+        return tuple(self._renderer.draw(self.batch, world=e) for e in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+class SoloVectorEnv(TeamVectorEnv):
+    """``posse/Solo-v0`` as a vector environment; see :class:`TeamVectorEnv` and `SoloEnv`."""
+
+    single_env: ClassVar[type[TeamEnv]] = SoloEnv
+
+    def _options(self, options: dict[str, Any] | None) -> dict[str, Any] | None:
+        return solo_options(options)
+
+    def _observed(self, observations: FloatArray) -> FloatArray:
+        return observations[:, 0]
+
+    def _rewarded(self, rewards: FloatArray) -> _Rewards:
+        return rewards[:, 0].astype(np.float64)
+
+    def _of_agents(self, values: FloatArray) -> npt.NDArray[Any]:
+        return values[:, 0].astype(np.float64)
+
+
+def _masked(entries: _Info, mask: BoolArray) -> _Info:
+    """Return entries, nested or not, each with its mask; zeros where the mask is false."""
+    infos: _Info = {}
+    everywhere = bool(mask.all())
+    for name, value in entries.items():
+        if isinstance(value, dict):
+            infos[name] = _masked(value, mask)
+        elif everywhere:
+            infos[name] = value
+        else:
+            wide = mask.reshape(-1, *[1] * (value.ndim - 1))
+            infos[name] = np.where(wide, value, np.zeros((), value.dtype))
+        infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def _check_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = ", ".join(repr(each.value) for each in AutoresetMode)
+        raise ValueError(f"unknown autoreset_mode {mode!r}; modes are: {known}") from None

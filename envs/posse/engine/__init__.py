@@ -1,0 +1,1 @@
+"""Worlds by the thousand: kernels, and the batch that calls them."""

@@ -1,0 +1,440 @@
+"""The engine on an NVIDIA GPU: the same functions as on the CPU, compiled by numba-cuda.
+
+One thread steps one world. State, actions, observations, rewards and flags stay on the device.
+Imported only when ``device="cuda"`` is asked for.
+
+With ``NUMBA_ENABLE_CUDASIM=1 NUMBA_DISABLE_JIT=1`` numba simulates the device in plain Python, very
+slowly: enough to test with, on a machine that has none.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+
+from posse.engine.batch import Batch, Snapshot, action_error
+from posse.engine.kernels import LOOK, START, STEP, advance_worlds, prepare
+from posse.numeric import BoolArray, FloatArray, Records
+from posse.rules.discs import SIZE_FOR_ONE
+from posse.rules.state import SPLITS, WorldArrays
+from posse.scenarios.scenario import Scenario
+from posse.signals.metrics import episode_metrics
+from posse.signals.reward import REWARD_TERMS
+
+_CONFIG: Final[Any] = numba.config
+
+if not _CONFIG.ENABLE_CUDASIM and importlib.util.find_spec("numba_cuda") is None:
+    raise ImportError(
+        "device='cuda' needs the package numba-cuda, which is not installed: "
+        "pip install 'posse[cuda]'"
+    )
+
+import numba.cuda  # noqa: E402 (only now: an older numba has one of its own)
+
+cuda: Final[Any] = numba.cuda
+_SIMULATED: Final = bool(_CONFIG.ENABLE_CUDASIM)
+
+DeviceArray = Any
+"""numba's device array. It has ``__cuda_array_interface__``, so that torch, CuPy and JAX take it
+without a copy (``torch.as_tensor(array, device="cuda")``), and ``copy_to_host()``."""
+
+_THREADS: Final = 32
+"""A block. Nothing is shared in one, so the least there is spreads the worlds best."""
+
+# What the kernels report: the flat position of the first action that is not in [-1, 1], the first
+# world that is over and waits for a reset, and how many worlds' episodes are over.
+_BAD_ACTION: Final = 0
+_WAITING: Final = 1
+_OVER: Final = 2
+_NONE: Final = 2**62
+_NOTHING: Final = np.array([_NONE, _NONE, 0], np.int64)
+
+
+@cuda.jit  # type: ignore[untyped-decorator]
+def _check(world: Records, actions: FloatArray, report: DeviceArray, disabled: bool) -> None:
+    """Report actions that are not in [-1, 1] and, with autoreset disabled, worlds that are over."""
+    e = cuda.grid(1)
+    if e == 0:
+        report[_OVER] = 0
+    if e < len(world):
+        if disabled and world[e].over != 0:
+            cuda.atomic.min(report, _WAITING, e)
+        rows, width = actions.shape[1], actions.shape[2]
+        for i in range(rows):
+            for k in range(width):
+                if not (actions[e, i, k] >= -1.0 and actions[e, i, k] <= 1.0):
+                    cuda.atomic.min(report, _BAD_ACTION, (e * rows + i) * width + k)
+
+
+@cuda.jit  # type: ignore[untyped-decorator]
+def _advance(
+    config: Records,
+    slots: Records,
+    beams: FloatArray,
+    weights: FloatArray,
+    world: Records,
+    tracker: Records,
+    obstacle: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    actions: FloatArray,
+    observations: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+    flags: BoolArray,
+    score: FloatArray,
+    orders: npt.NDArray[np.uint8],
+    report: DeviceArray,
+) -> None:
+    """Do what each world is ordered to; nothing at all where there is something to complain of."""
+    e = cuda.grid(1)
+    if e < len(world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
+        scratch = cuda.local.array(SIZE_FOR_ONE, numba.float32)
+        if _SIMULATED:
+            scratch[:] = 0.0  # numpy would warn of what lies in lanes that nobody looks at
+        prepare(config, beams, scratch)
+        over = advance_worlds(
+            e, 1, config, slots, weights, world, tracker, obstacle,
+            heard, broadcast, heard_message, message,
+            actions, observations, rewards, terms, flags, orders, scratch,
+        )  # fmt: skip
+        flags[2, e] = over
+        score[e] = world[e].score
+        if over:
+            cuda.atomic.add(report, _OVER, 1)
+
+
+@cuda.jit  # type: ignore[untyped-decorator]
+def _choose(
+    world: Records,
+    mask: BoolArray,
+    orders: npt.NDArray[np.uint8],
+    anew: bool,
+    seed: np.uint64,
+    split: int,
+    first_world: int,
+) -> None:
+    """Order worlds to start an episode: the first of a seed, or each its next."""
+    e = cuda.grid(1)
+    if e < len(world):
+        orders[e] = LOOK
+        if mask[e]:
+            orders[e] = START
+            w = world[e]
+            if anew:
+                w.seed = seed
+                w.split = split
+                w.index = first_world + e
+                w.episode = 0
+            else:
+                w.episode += 1
+
+
+class _Results:
+    """What one pass over the worlds writes, on the device."""
+
+    def __init__(self, observation_shape: tuple[int, int, int]) -> None:
+        worlds, rows, _ = observation_shape
+        self.observations = cuda.device_array(observation_shape, np.float32)
+        self.rewards = cuda.device_array((worlds, rows), np.float32)
+        self.terms = cuda.device_array((worlds, rows, len(REWARD_TERMS)), np.float32)
+        self.flags = cuda.device_array((3, worlds), np.bool_)
+        self.score = cuda.device_array(worlds, np.float32)
+        self.terminated, self.truncated, self.over = (self.flags[k] for k in range(3))
+        self.reward_terms = {t.name: self.terms[:, :, k] for k, t in enumerate(REWARD_TERMS)}
+
+    def arrays(self) -> tuple[DeviceArray, ...]:
+        """Return the arrays in the order in which the kernel takes them."""
+        return self.observations, self.rewards, self.terms, self.flags, self.score
+
+
+class CudaBatch(Batch):
+    """A batch of E worlds on an NVIDIA GPU.
+
+    The same arguments as :class:`posse.Batch`, and the same worlds for the same seeds. Every random
+    draw is the same to the bit; what is computed in float32 differs by rounding, since a GPU
+    contracts ``a * b + c`` and has sines and cosines of its own.
+
+    What :meth:`reset` and :meth:`step` return lies in device arrays of numba, which torch takes
+    without a copy: ``torch.as_tensor(observations, device="cuda")``. They are **overwritten by the
+    second call after**: there are two sets of them, used in turn. Copy what is kept for longer.
+
+    Everything runs on the legacy default stream of the current CUDA device, as torch's work does
+    unless told otherwise. The first reset of a process compiles for about a minute.
+
+    Raises:
+        ImportError: numba-cuda is not installed.
+        RuntimeError: There is no GPU that it can use.
+        ValueError: As :class:`posse.Batch`; ``num_threads`` or ``own_kernel`` given.
+    """
+
+    def __init__(self, scenario: Scenario, num_worlds: int, **settings: Any) -> None:
+        check_device()
+        for name, unset in (("num_threads", None), ("own_kernel", False)):
+            if settings.get(name, unset) != unset:
+                raise ValueError(
+                    f"{name}={settings[name]!r} is for device='cpu' alone: leave it out"
+                )
+        super().__init__(scenario, num_worlds, **settings)
+
+    def _prepare(self) -> None:
+        """Put the batch onto the device; the host's arrays are a mirror, up to date on demand."""
+        super()._prepare()
+        self._on_device = tuple(cuda.to_device(array) for array in self._fixed)
+        self._mirrored = list(
+            zip(self._on_device[-len(self._arrays.all()) :], self._arrays.all(), strict=True)
+        )
+        self._device_world = self._mirrored[0][0]
+        self._device_actions = cuda.device_array(self.action_shape, np.float32)
+        self._all_step = cuda.to_device(np.full(self.num_worlds, STEP, np.uint8))
+        self._all_look = cuda.to_device(np.full(self.num_worlds, LOOK, np.uint8))
+        self._chosen = cuda.device_array(self.num_worlds, np.uint8)
+        self._report = cuda.to_device(_NOTHING)
+        # In the mode "same_step" a step may take two sets.
+        count = 4 if self.autoreset == "same_step" else 2
+        self._results = itertools.cycle([_Results(self.observation_shape) for _ in range(count)])
+        self._last, self._next = next(self._results), next(self._results)
+
+    def __getstate__(self) -> dict[str, Any]:
+        self._download()
+        device = (
+            "_on_device", "_mirrored", "_device_world", "_device_actions", "_all_step", "_all_look",
+            "_chosen", "_report", "_results", "_last", "_next",
+        )  # fmt: skip
+        return {k: v for k, v in super().__getstate__().items() if k not in device}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        check_device()
+        super().__setstate__(state)
+
+    @property
+    def state(self) -> dict[str, npt.NDArray[Any]]:
+        """Every state array by name, as now, on the host; they do not follow the worlds."""
+        return self.arrays.copy().by_name()
+
+    @property
+    def worlds(self) -> Records:
+        """The worlds' records, (E,) :data:`posse.rules.state.WORLD`, as now, on the host."""
+        records: Records = self._device_world.copy_to_host()
+        return records
+
+    @property
+    def arrays(self) -> WorldArrays:
+        """The arrays as they are now, on the host; the worlds do not follow them."""
+        self._download()
+        return self._arrays
+
+    @property
+    def score(self) -> DeviceArray:
+        """(E,) the score of the present step, as the last step or reset left it."""
+        return self._last.score
+
+    @property
+    def terminated(self) -> DeviceArray:
+        """(E,) whether the last step or reset left the world's episode terminated."""
+        return self._last.terminated
+
+    @property
+    def truncated(self) -> DeviceArray:
+        """(E,) whether the last step or reset left the world's episode truncated."""
+        return self._last.truncated
+
+    def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
+        """Return every metric by name, (E,), of the episodes as they stand, on the host."""
+        return episode_metrics(self.scenario, self.worlds)
+
+    def save(self) -> Snapshot:
+        """Return the worlds as they stand, on the host, for :meth:`restore`, here or on a CPU."""
+        return Snapshot(self.scenario, self.arrays.copy())
+
+    def restore(self, snapshot: Snapshot) -> DeviceArray:
+        """Go back to a snapshot and return its observations."""
+        super().restore(snapshot)
+        self._upload()
+        return self._pass(self._all_look).observations
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> DeviceArray:
+        """Start an episode in every world and return its observations, as :class:`posse.Batch`.
+
+        ``options["reset_mask"]`` may lie on the device. Start poses go by way of the host: the
+        whole state is copied there and back.
+        """
+        options = dict(options or {})
+        mask = _as_device_array(options.get("reset_mask"))
+        if mask is not None:
+            # On the device it is not looked into: that would wait for it.
+            options["reset_mask"] = mask.copy_to_host() if not self._started else None
+            if mask.dtype != np.bool_ or tuple(mask.shape) != (self.num_worlds,):
+                raise ValueError(
+                    f"reset_mask must be a bool array of shape ({self.num_worlds},), got "
+                    f"{mask.dtype} of shape {tuple(mask.shape)}"
+                )
+        chosen = self.check_reset(seed, options)
+        if options.keys() & {"tracker_pose", "target_pose"}:
+            if mask is not None:
+                options["reset_mask"] = mask.copy_to_host()
+            self._download()
+            super().reset(seed=seed, options=options)
+            self._upload()
+            return self._pass(self._all_look).observations
+        anew = seed is not None or not self._started
+        self.seed, self._started = self.seed if seed is None else int(seed), True
+        return self._begin(cuda.to_device(chosen) if mask is None else mask, anew)
+
+    def step(
+        self, actions: Any, *, check: bool = True
+    ) -> tuple[DeviceArray, DeviceArray, DeviceArray, DeviceArray, dict[str, Any]]:
+        """Advance every world by one control step.
+
+        Args:
+            actions: (E, rows, 2 + message_size) numbers in [-1, 1]. A contiguous float32 array on
+                the device (a torch tensor, or anything else with ``__cuda_array_interface__``) is
+                taken as it is; anything else is copied there.
+            check: Whether to look for actions that are not in [-1, 1] and for episodes that ended,
+                which waits for the device. ``False``, in the mode "next_step": the step is only
+                queued, actions are taken as they are, and ``infos`` holds no metrics. The other
+                modes always wait.
+
+        Returns:
+            What :meth:`posse.Batch.step` returns, on the device. ``infos["metrics"]`` and
+            ``infos["_metrics"]`` alone are numpy arrays; the worlds' records are copied to the host
+            for them in a step in which episodes end.
+
+        Raises:
+            ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
+            ValueError: Actions of a wrong type or shape, not finite, or outside [-1, 1]. Nothing is
+                changed.
+        """
+        if not self._started:
+            raise ResetNeeded("step before reset: call reset() first")
+        array = self._take(actions)
+        waits = check or self.autoreset != "next_step"
+        if waits:
+            disabled = self.autoreset == "disabled"
+            self._launch(_check, self._device_world, array, self._report, disabled)
+        self._launch_advance(array, self._all_step)
+        over = self._wait(array) if waits else 0
+        done = self._turn()
+        infos: dict[str, Any] = {"score": done.score, "reward_terms": dict(done.reward_terms)}
+        observations = done.observations
+        if over:
+            infos["metrics"], infos["_metrics"] = self.metrics(), done.over.copy_to_host()
+            if self.autoreset == "same_step":
+                infos["final_obs"], infos["_final_obs"] = observations, done.over
+                infos["final_info"] = {k: infos[k] for k in ("score", "metrics", "_metrics")}
+                infos["_final_info"] = done.over
+                observations = self._begin(done.over, anew=False)
+        return observations, done.rewards, done.terminated, done.truncated, infos
+
+    def stepper(self, *arrays: FloatArray) -> Any:
+        """Not offered: it is for environments of one world, which a GPU would only slow down."""
+        raise NotImplementedError("a batch on the GPU has no stepper(): call step()")
+
+    def _take(self, actions: Any) -> DeviceArray:
+        """Return the actions on the device, contiguous float32 of the right shape."""
+        array = _as_device_array(actions)
+        if array is None:
+            self._device_actions.copy_to_device(self.cast_actions(actions))
+            return self._device_actions
+        if array.dtype != np.float32 or tuple(array.shape) != self.action_shape:
+            raise ValueError(
+                f"actions on the device are {array.dtype} of shape {tuple(array.shape)}, wanted "
+                f"float32 of shape {self.action_shape}: (worlds, agents, 2 + message_size)"
+            )
+        if not array.is_c_contiguous():
+            raise ValueError("actions on the device are not contiguous: make them so first")
+        return array
+
+    def _wait(self, actions: DeviceArray) -> int:
+        """Return how many worlds' episodes are over, or raise what kept the step from being."""
+        bad, waiting, over = (int(number) for number in self._report.copy_to_host())
+        if bad == _NONE and waiting == _NONE:
+            return over
+        self._report.copy_to_device(_NOTHING)
+        if waiting != _NONE:
+            raise ResetNeeded(
+                f"step after the end of world {waiting}, and perhaps more: "
+                'call reset(options={"reset_mask": mask}) first'
+            )
+        e, i, k = (int(index) for index in np.unravel_index(bad, self.action_shape))
+        raise action_error((e, i, k), actions[e : e + 1].copy_to_host()[0, i, k])
+
+    def _begin(self, mask: DeviceArray, anew: bool) -> DeviceArray:
+        """Start an episode in the worlds of a mask; return every world's observations."""
+        self._launch(
+            _choose, self._device_world, mask, self._chosen, anew,
+            np.uint64(self.seed), SPLITS.index(self.split), self.first_world,
+        )  # fmt: skip
+        return self._pass(self._chosen).observations
+
+    def _pass(self, orders: DeviceArray) -> _Results:
+        """Do what each world is ordered to, which is no step, and return the results."""
+        self._launch_advance(self._device_actions, orders)
+        return self._turn()
+
+    def _turn(self) -> _Results:
+        """Return what the last pass wrote; the next one writes elsewhere."""
+        self._last, self._next = self._next, next(self._results)
+        return self._last
+
+    def _launch_advance(self, actions: DeviceArray, orders: DeviceArray) -> None:
+        self._launch(
+            _advance, *self._on_device, actions, *self._next.arrays(), orders, self._report
+        )
+
+    def _launch(self, kernel: Any, *arguments: Any) -> None:
+        kernel[-(-self.num_worlds // _THREADS), _THREADS](*arguments)
+
+    def _download(self) -> None:
+        """Bring the host's arrays up to date."""
+        for device, host in self._mirrored:
+            if host.size:
+                device.copy_to_host(host)
+
+    def _upload(self) -> None:
+        """Bring the device's arrays up to date."""
+        for device, host in self._mirrored:
+            if host.size:
+                device.copy_to_device(host)
+
+
+def check_device() -> None:
+    """Raise what keeps worlds from being stepped on a GPU, with what to do about it."""
+    if _CONFIG.ENABLE_CUDASIM:
+        if not _CONFIG.DISABLE_JIT:
+            raise RuntimeError(
+                "NUMBA_ENABLE_CUDASIM=1 simulates the GPU in plain Python: set NUMBA_DISABLE_JIT=1 "
+                "too"
+            )
+        return
+    if _CONFIG.DISABLE_JIT:
+        raise RuntimeError(
+            "device='cuda' compiles the worlds for the GPU, which NUMBA_DISABLE_JIT=1 forbids: "
+            "unset it, or set NUMBA_ENABLE_CUDASIM=1 too, to simulate"
+        )
+    if not cuda.is_available():
+        raise RuntimeError(
+            "device='cuda' found no GPU that it can use: check that `nvidia-smi` lists one and "
+            "that the extra is complete (pip install 'posse[cuda]'), or take device='cpu'. "
+            f"The driver says: {cuda.cuda_error() or 'nothing'}"
+        )
+
+
+def _as_device_array(array: Any) -> DeviceArray | None:
+    """Return an array that lies on the device as numba's, without a copy; None for any other."""
+    if getattr(array, "__cuda_ndarray__", False):  # numba's own; the simulator's too
+        return array
+    if hasattr(array, "__cuda_array_interface__"):
+        return cuda.as_cuda_array(array)
+    return None

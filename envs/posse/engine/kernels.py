@@ -1,0 +1,339 @@
+"""One world, stepped: the order in which everything happens in a control step.
+
+actions → faults → the target decides → physics (target first, then trackers by number) → the slot
+frame follows → contacts → sensing → radio → score → reward → end → observation.
+
+Only the kernels at the end loop over a batch; everything else is about one world, or about eight
+that are observed together.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.numeric import (
+    BoolArray,
+    FloatArray,
+    Numbers,
+    Record,
+    Records,
+    compiled,
+    fetch,
+    kernel,
+    parts_of,
+)
+from posse.rules.contact import meet
+from posse.rules.discs import MOST_IN_TEAM, PREPARED, find_gaps, lay_out, lay_out_constants, natural
+from posse.rules.faults import apply_faults
+from posse.rules.motion import motion
+from posse.rules.score import add_up, occupy
+from posse.rules.senses.radio import hear, send, share_fixes
+from posse.rules.senses.sensing import look
+from posse.rules.start import draw_start, rest
+from posse.rules.state import NEVER, beam_directions, config_record, slot_records
+from posse.rules.targets.target_motion import AGENT
+from posse.scenarios.scenario import Scenario
+from posse.signals.observation import observe_alone, observe_target
+from posse.signals.reward import write_reward
+from posse.signals.together import TOGETHER, lay_out_task, observe_together
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+
+
+@compiled
+def sense(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    scratch: FloatArray,
+) -> None:
+    """Let every tracker look for the target, then tell and hear."""
+    seeing = look(c, w, trackers, scratch)
+    if c.perfect_radio:
+        if seeing < c.num_trackers:  # else nobody has anything to hear
+            share_fixes(c, trackers)
+    else:
+        send(c, w, trackers, broadcast)
+        hear(c, w, trackers, heard, broadcast, heard_message, message)
+
+
+@compiled
+def observe(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    heard: Records,
+    heard_message: FloatArray,
+    scratch: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what every agent of a world observes, (rows, F), but for observe_together."""
+    observe_alone(c, w, trackers, heard, heard_message, scratch, observations)
+    if c.motion == AGENT:
+        observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
+
+
+@compiled(seldom=True)
+def begin(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+) -> None:
+    """Bring a world whose poses are set to the start of an episode, but for what is sensed."""
+    rest(c, w, trackers)
+    heard["step"][:] = -1
+    heard_message[:] = _ZERO
+    message[:] = _ZERO
+    broadcast["sent"][:] = 0
+
+
+@compiled
+def reward(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    weights: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+) -> None:
+    """Write the reward of every agent (rows,) and its terms (rows, K).
+
+    A target that is an agent gets the negative of the team's score.
+    """
+    for i in range(c.num_trackers):
+        rewards[i] = write_reward(c, w, trackers[i], weights, terms[i])
+    if c.motion == AGENT:
+        rewards[c.num_trackers] = -w.score
+        terms[c.num_trackers, :] = _ZERO
+
+
+@compiled
+def act(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    message: FloatArray,
+    actions: FloatArray,
+    scratch: FloatArray,
+) -> None:
+    """Move everything by a control step, and say what the actions say."""
+    apply_faults(c, w, trackers)
+    motion(c, w, trackers, obstacles, actions, scratch)
+    w.step += 1
+    slot = w.step % (c.radio_delay + 1)
+    for i in range(c.num_trackers):
+        works = trackers[i].broken_at == NEVER
+        for k in range(c.message_size):
+            message[slot, i, k] = actions[i, 2 + k] if works else _ZERO
+
+
+@compiled
+def end_step(c: Record, w: Record, trackers: Records, slots: Records) -> None:
+    """Add the step to the episode's sums, and see whether the episode is over."""
+    add_up(c, w, trackers, slots)
+    if c.terminate_on_contact:
+        for i in range(c.num_trackers):
+            if trackers[i].touching:
+                w.terminated = 1
+    w.over = w.terminated != 0 or w.step >= c.horizon
+
+
+@compiled
+def fetch_all(array: npt.NDArray[Any]) -> None:
+    """Have the processor bring an array that is soon to be written to into its cache."""
+    for offset in range(0, array.size * array.itemsize, LINE):
+        fetch(array, offset)
+
+
+STEP: Final = 0
+START: Final = 1
+START_FROM_POSES: Final = 2
+LOOK: Final = 3
+
+LINE: Final = 64
+"""Bytes in a line of the cache."""
+FETCHED: Final = MOST_IN_TEAM
+"""Up to this team size, what is fetched for a world has room in the first cache."""
+
+
+@compiled
+def advance_worlds(
+    first: int,
+    count: int,
+    config: Records,
+    slots: Records,
+    weights: FloatArray,
+    world: Records,
+    tracker: Records,
+    obstacle: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+    actions: FloatArray,
+    observations: FloatArray,
+    rewards: FloatArray,
+    terms: FloatArray,
+    flags: BoolArray,
+    orders: npt.NDArray[np.uint8],
+    scratch: FloatArray,
+) -> int:
+    """Do what worlds are ordered to, ``count`` from ``first`` on; return how many are over.
+
+    ================== =============================================================================
+    STEP               a control step; or, where the episode is over, the start of the next one
+    START              an episode drawn from the world's key
+    START_FROM_POSES   an episode from the poses that stand in the arrays
+    LOOK               nothing but the observations
+    ================== =============================================================================
+
+    At most TOGETHER worlds. Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K)
+    and flags (2, E): terminated, truncated. The scratch memory has been through :func:`prepare`.
+    """
+    c, over = config[0], 0
+    for e in range(first, first + count):
+        w, trackers, obstacles = world[e], tracker[e], obstacle[e]
+        if count > 1 and trackers.shape[0] <= FETCHED:
+            fetch_all(observations[e])  # written below, and after the last of these worlds
+        order = orders[e]
+        if order == STEP and w.over != 0:
+            w.episode += 1
+            order = START
+        if order == STEP:
+            act(c, w, trackers, obstacles, message[e], actions[e], scratch)
+        elif order != LOOK:
+            if order == START:
+                draw_start(c, w, trackers, obstacles)
+            begin(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e])
+        lay_out(c, w, trackers, obstacles, scratch)
+        find_gaps(c, scratch)
+        if order != LOOK:
+            meet(c, w, trackers, obstacles, scratch)
+            sense(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e], scratch)
+            occupy(c, w, trackers, slots, scratch)
+        if order == STEP:
+            end_step(c, w, trackers, slots)
+            reward(c, w, trackers, weights, rewards[e], terms[e])
+        else:
+            if order != LOOK:
+                w.held, w.score = 0, _ZERO
+            rewards[e, :] = _ZERO
+            terms[e, :, :] = _ZERO
+        flags[0, e] = w.terminated != 0
+        flags[1, e] = w.over != 0 and w.terminated == 0
+        over += w.over != 0
+        observe(c, w, trackers, obstacles, heard[e], heard_message[e], scratch, observations[e])
+    observe_together(c, world, tracker, first, count, message, scratch, observations)
+    return over
+
+
+@compiled
+def prepare(config: Records, beams: FloatArray, scratch: FloatArray) -> None:
+    """Write what is the same for all worlds to a thread's scratch memory."""
+    lay_out_constants(config[0], beams, scratch)
+    lay_out_task(config[0], scratch)
+
+
+def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., int]:
+    """Return the kernel that steps worlds of any scenario, or of the one whose tables these are.
+
+    The tables of one scenario (configuration, slots, beams) become constants in its code.
+    """
+    own_config, own_slots, own_beams = own or (None, None, None)
+
+    @kernel(short_loops=True)
+    def advance(
+        config: Records,
+        slots: Records,
+        beams: FloatArray,
+        weights: FloatArray,
+        world: Records,
+        tracker: Records,
+        obstacle: Records,
+        heard: Records,
+        broadcast: Records,
+        heard_message: FloatArray,
+        message: FloatArray,
+        actions: FloatArray,
+        observations: FloatArray,
+        rewards: FloatArray,
+        terms: FloatArray,
+        flags: BoolArray,
+        orders: npt.NDArray[np.uint8],
+        scratch: FloatArray,
+        thread: int,
+        turns: Numbers,
+    ) -> int:
+        c = config if own_config is None else own_config
+        offsets = slots if own_slots is None else own_slots
+        directions = beams if own_beams is None else own_beams
+        if scratch[PREPARED] == _ZERO:
+            prepare(c, directions, scratch)
+            scratch[PREPARED] = _ONE
+        over = 0
+        for first, end in parts_of(thread, turns):
+            for e in range(natural(first), end, TOGETHER):
+                over += advance_worlds(
+                    e, min(TOGETHER, end - e), c, offsets, weights, world, tracker, obstacle,
+                    heard, broadcast, heard_message, message,
+                    actions, observations, rewards, terms, flags, orders, scratch,
+                )  # fmt: skip
+        return over
+
+    return advance
+
+
+advance: Final = _stepping(None)
+"""Do what each world is ordered to, for the worlds of a thread; the one loop over a batch.
+
+See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are over.
+"""
+
+
+@functools.lru_cache(maxsize=64)
+def own_kernel(scenario: Scenario) -> Callable[..., int]:
+    """Return :data:`advance` for one scenario alone.
+
+    The scenario is part of the code: loops over trackers, slots and beams have known lengths, and
+    what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
+    compiled by itself, and kept on disk as any other.
+    """
+    return _stepping((config_record(scenario), slot_records(scenario), beam_directions(scenario)))
+
+
+@kernel
+def first_over(world: Records) -> int:
+    """Return the first world whose episode is over, or -1."""
+    for e in range(len(world)):
+        if world[e].over != 0:
+            return e
+    return -1
+
+
+@kernel
+def bad_action(actions: FloatArray) -> int:
+    """Return the flat position of the first action that is not a number in [-1, 1], or -1."""
+    flat = actions.reshape(-1)
+    bad = 0
+    for k in range(len(flat)):  # without a way out, so that many are looked at at once
+        bad += not ((flat[k] >= -_ONE) & (flat[k] <= _ONE))
+    for k in range(len(flat) if bad else 0):
+        if not (flat[k] >= -_ONE and flat[k] <= _ONE):
+            return k
+    return -1

@@ -1,0 +1,1 @@
+"""Eight numbers at a time, and what they compile to."""

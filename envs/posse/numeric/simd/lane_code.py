@@ -1,0 +1,265 @@
+"""What numba compiles :mod:`posse.numeric.simd.lanes` to: LLVM's vectors of eight."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any, Final
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.extending import models, register_model
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.templates import (
+    AbstractTemplate,
+    ConcreteTemplate,
+    infer_global,
+    signature,
+)
+
+from posse.numeric.simd.lanes import (
+    WIDTH,
+    bits,
+    choose,
+    eight,
+    fetch,
+    greater,
+    least,
+    lesser,
+    load,
+    load_fields,
+    lowest_bit,
+    root,
+    store,
+    store_fields,
+    tag,
+    tagged,
+    transpose,
+)
+
+_FLOATS: Final = ir.VectorType(ir.FloatType(), WIDTH)
+_BITS: Final = ir.VectorType(ir.IntType(1), WIDTH)
+_INTEGERS: Final = ir.VectorType(ir.IntType(32), WIDTH)
+
+
+class _LanesType(types.Type):
+    def __init__(self) -> None:
+        super().__init__(name="Lanes")
+
+    def can_convert_from(self, typingctx: Any, other: Any) -> Any:
+        """Take a plain number for eight of itself (numba's name for it)."""
+        return Conversion.safe if other == types.float32 else None
+
+
+class _MaskType(types.Type):
+    def __init__(self) -> None:
+        super().__init__(name="Mask")
+
+
+@register_model(_LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, of: Any) -> None:
+        super().__init__(manager, of, _FLOATS)
+
+
+@register_model(_MaskType)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, of: Any) -> None:
+        super().__init__(manager, of, _BITS)
+
+
+_LANES: Final = _LanesType()
+_MASK: Final = _MaskType()
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    nothing = ir.Constant(ir.VectorType(value.type, WIDTH), ir.Undefined)
+    first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(_INTEGERS, [0] * WIDTH))
+
+
+@lower_cast(types.float32, _LanesType)
+def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    return _spread(builder, value)
+
+
+def _declare(
+    function: Any, result: Any, arguments: tuple[Any, ...], emit: Callable[..., Any]
+) -> None:
+    """Tell numba what a function or an operator takes and gives, and which instructions it is."""
+
+    @infer_global(function)
+    class Template(ConcreteTemplate):
+        cases = (signature(result, *arguments),)
+
+    @lower_builtin(function, *arguments)
+    def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        return emit(builder, *values)
+
+
+def _pick(sign: str) -> Callable[..., Any]:
+    """Return what emits the choice of the second number where it compares so with the first."""
+
+    def emit(builder: Any, value: Any, other: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(sign, other, value), other, value)
+
+    return emit
+
+
+def _emit_root(builder: Any, value: Any) -> Any:
+    name = "llvm.sqrt.f32" if value.type == ir.FloatType() else "llvm.sqrt.v8f32"
+    kind = ir.FunctionType(value.type, [value.type])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [value])
+
+
+def _emit_tagged(builder: Any, value: Any, number: Any) -> Any:
+    kept = builder.and_(builder.bitcast(value, _INTEGERS), ir.Constant(_INTEGERS, [~63] * WIDTH))
+    put_in = _spread(builder, builder.trunc(number, ir.IntType(32)))
+    return builder.bitcast(builder.or_(kept, put_in), _FLOATS)
+
+
+def _emit_tag(builder: Any, value: Any) -> Any:
+    tags = builder.and_(builder.bitcast(value, _INTEGERS), ir.Constant(_INTEGERS, [63] * WIDTH))
+    return builder.sitofp(tags, _FLOATS)
+
+
+def _emit_least(builder: Any, value: Any) -> Any:
+    lesser_of = _pick("<")
+    for size in (4, 2, 1):  # the upper half comes to lie over the lower
+        places = [(k + size) % WIDTH for k in range(WIDTH)]
+        value = lesser_of(builder, value, _shuffle(builder, value, value, places))
+    return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+
+
+def _emit_bits(builder: Any, mask: Any) -> Any:
+    return builder.zext(builder.bitcast(mask, ir.IntType(WIDTH)), ir.IntType(64))
+
+
+def _emit_lowest_bit(builder: Any, number: Any) -> Any:
+    return builder.cttz(number, ir.Constant(ir.IntType(1), 1))  # undefined for 0
+
+
+def _shuffle(builder: Any, value: Any, other: Any, places: list[int]) -> Any:
+    return builder.shuffle_vector(value, other, ir.Constant(_INTEGERS, places))
+
+
+def _emit_transpose(builder: Any, *rows: Any) -> Any:
+    """Swap ever larger squares across the diagonal: of one number, two by two, four by four."""
+    for size in (1, 2, 4):
+        upper = [k if k & size == 0 else k - size + WIDTH for k in range(WIDTH)]
+        lower = [k + size if k & size == 0 else k + WIDTH for k in range(WIDTH)]
+        rows = tuple(
+            _shuffle(builder, rows[k], rows[k + size], upper)
+            if k & size == 0
+            else _shuffle(builder, rows[k - size], rows[k], lower)
+            for k in range(WIDTH)
+        )
+    return cgutils.pack_array(builder, rows, _FLOATS)
+
+
+_TWO: Final = (_LANES, _LANES)
+_declare(operator.add, _LANES, _TWO, lambda builder, a, b: builder.fadd(a, b))
+_declare(operator.sub, _LANES, _TWO, lambda builder, a, b: builder.fsub(a, b))
+_declare(operator.mul, _LANES, _TWO, lambda builder, a, b: builder.fmul(a, b))
+_declare(operator.truediv, _LANES, _TWO, lambda builder, a, b: builder.fdiv(a, b))
+_declare(operator.lt, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered("<", a, b))
+_declare(operator.le, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered("<=", a, b))
+_declare(operator.gt, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered(">", a, b))
+_declare(operator.ge, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered(">=", a, b))
+_declare(operator.eq, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered("==", a, b))
+_declare(operator.and_, _MASK, (_MASK, _MASK), lambda builder, a, b: builder.and_(a, b))
+_declare(operator.or_, _MASK, (_MASK, _MASK), lambda builder, a, b: builder.or_(a, b))
+_declare(eight, _LANES, (types.float32,), _spread)
+_declare(transpose, types.UniTuple(_LANES, WIDTH), (_LANES,) * WIDTH, _emit_transpose)
+_declare(tagged, _LANES, (_LANES, types.intp), _emit_tagged)
+_declare(tag, _LANES, (_LANES,), _emit_tag)
+_declare(least, types.float32, (_LANES,), _emit_least)
+_declare(bits, types.intp, (_MASK,), _emit_bits)
+_declare(lowest_bit, types.intp, (types.intp,), _emit_lowest_bit)
+for _number, _truth in ((types.float32, types.boolean), (_LANES, _MASK)):
+    _both = (_number, _number)
+    _declare(choose, _number, (_truth, *_both), lambda builder, m, a, b: builder.select(m, a, b))
+    _declare(lesser, _number, _both, _pick("<"))
+    _declare(greater, _number, _both, _pick(">"))
+    _declare(root, _number, (_number,), _emit_root)
+
+
+@infer_global(load)
+class _Load(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        array, _ = args
+        return signature(_LANES, array, types.intp)
+
+
+@infer_global(store)
+class _Store(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        array, _, _ = args
+        return signature(types.none, array, types.intp, _LANES)
+
+
+def _address(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), _FLOATS.as_pointer())
+
+
+@lower_builtin(load, types.Array, types.intp)
+def _lower_load(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    return builder.load(_address(context, builder, sig.args[0], *values), align=4)
+
+
+@lower_builtin(store, types.Array, types.intp, _LANES)
+def _lower_store(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    array, index, value = values
+    builder.store(value, _address(context, builder, sig.args[0], array, index), align=4)
+    return context.get_dummy_value()
+
+
+@infer_global(fetch)
+class _Fetch(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(types.none, args[0], types.intp)
+
+
+@lower_builtin(fetch, types.Array, types.intp)
+def _lower_fetch(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    array, offset = values
+    data = context.make_array(sig.args[0])(context, builder, array).data
+    first = builder.bitcast(data, ir.IntType(8).as_pointer())
+    address = builder.gep(first, [offset])
+    whole, name = ir.IntType(32), "llvm.prefetch.p0i8"
+    kind = ir.FunctionType(ir.VoidType(), [address.type, whole, whole, whole])
+    to_write, near, of_data = ir.Constant(whole, 1), ir.Constant(whole, 3), ir.Constant(whole, 1)
+    function = cgutils.get_or_insert_function(builder.module, kind, name)
+    builder.call(function, [address, to_write, near, of_data])
+    return context.get_dummy_value()
+
+
+@infer_global(load_fields)
+class _LoadFields(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(_LANES, args[0], types.intp)
+
+
+@infer_global(store_fields)
+class _StoreFields(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(types.none, args[0], types.intp, _LANES)
+
+
+def _field(builder: Any, record: Any, offset: Any) -> Any:
+    first = builder.bitcast(record, ir.IntType(8).as_pointer())
+    return builder.bitcast(builder.gep(first, [offset]), _FLOATS.as_pointer())
+
+
+@lower_builtin(load_fields, types.Record, types.intp)
+def _lower_load_fields(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    return builder.load(_field(builder, *values), align=4)
+
+
+@lower_builtin(store_fields, types.Record, types.intp, _LANES)
+def _lower_store_fields(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    record, offset, value = values
+    builder.store(value, _field(builder, record, offset), align=4)
+    return context.get_dummy_value()

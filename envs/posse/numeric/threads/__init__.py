@@ -1,0 +1,1 @@
+"""Work on many worlds, spread over threads."""

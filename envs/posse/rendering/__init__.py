@@ -1,0 +1,1 @@
+"""Pictures of a world: the window, and frames."""

@@ -1,0 +1,146 @@
+"""A surface to draw on in pixels, anti-aliased: drawn larger than it is shown, then averaged down.
+
+The only part of the drawing that knows pygame. It needs no display, so frames are drawn headless.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from functools import cache
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+
+import pygame
+import pygame.gfxdraw
+
+from posse.rendering.style import Colour
+
+_OVERSAMPLED: Final = 3
+_FARTHEST: Final = 30_000
+
+Point = Sequence[float] | npt.NDArray[np.float64]
+
+
+@cache
+def _font(size: int) -> pygame.font.Font:
+    """Return the typeface that pygame carries along, so that frames agree on every machine."""
+    pygame.font.init()
+    return pygame.font.Font(None, size)
+
+
+class Canvas:
+    """What a frame is drawn on. Coordinates and lengths are pixels of the finished frame.
+
+    Args:
+        size: Width and height, px.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.size = size
+        width, height = size
+        self._large = pygame.Surface((width * _OVERSAMPLED, height * _OVERSAMPLED), 0, 32)
+        self._frame = pygame.Surface(size, 0, 32)
+
+    def clip(self, box: tuple[int, int, int, int] | None) -> None:
+        """Draw only within (left, top, width, height) from now on; ``None``: everywhere."""
+        self._large.set_clip(None if box is None else tuple(v * _OVERSAMPLED for v in box))
+
+    def fill(self, colour: Colour) -> None:
+        """Fill all that the clip leaves open."""
+        self._large.fill(colour)
+
+    def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
+        """Fill a rectangle."""
+        k = _OVERSAMPLED
+        edges = [round(v * k) for v in (left, top, left + width, top + height)]
+        rect = (edges[0], edges[1], edges[2] - edges[0], edges[3] - edges[1])
+        pygame.draw.rect(self._large, colour, rect)
+
+    def disc(self, centre: Point, radius: float, colour: Colour) -> None:
+        """Fill a disc."""
+        place = self._place(centre)
+        if self._in_reach(place, radius):
+            pygame.draw.circle(self._large, colour, place, round(radius * _OVERSAMPLED))
+
+    def ring(self, centre: Point, radius: float, width: float, colour: Colour) -> None:
+        """Draw a circle whose line lies inside ``radius``."""
+        place = self._place(centre)
+        if self._in_reach(place, radius):
+            line = max(1, round(width * _OVERSAMPLED))
+            pygame.draw.circle(self._large, colour, place, round(radius * _OVERSAMPLED), line)
+
+    def line(
+        self, start: Point, end: Point, width: float, colour: Colour, opacity: float = 1.0
+    ) -> None:
+        """Draw a straight line with square ends, of an opacity in [0, 1]."""
+        (x0, y0), (x1, y1) = self._place(start), self._place(end)
+        length = math.hypot(x1 - x0, y1 - y0)
+        if length == 0 or not (self._is_near(x0, y0) and self._is_near(x1, y1)):
+            return
+        half = max(width * _OVERSAMPLED, 1.0) / 2 / length
+        dx, dy = (y1 - y0) * half, (x0 - x1) * half
+        corners = [(x0 + dx, y0 + dy), (x1 + dx, y1 + dy), (x1 - dx, y1 - dy), (x0 - dx, y0 - dy)]
+        if opacity >= 1:
+            pygame.draw.polygon(self._large, colour, corners)
+        else:
+            whole = [(round(x), round(y)) for x, y in corners]
+            pygame.gfxdraw.filled_polygon(self._large, whole, (*colour, round(255 * opacity)))
+
+    def dashes(self, start: Point, end: Point, width: float, dash: float, colour: Colour) -> None:
+        """Draw a broken line: strokes ``dash`` long, as far apart."""
+        (x0, y0), (x1, y1) = start, end
+        length = math.hypot(x1 - x0, y1 - y0)
+        for k in range(math.ceil(length / (2 * dash))):
+            a, b = 2 * k * dash / length, min(1.0, (2 * k + 1) * dash / length)
+            first = (x0 + a * (x1 - x0), y0 + a * (y1 - y0))
+            self.line(first, (x0 + b * (x1 - x0), y0 + b * (y1 - y0)), width, colour)
+
+    def polygon(self, corners: Sequence[Point] | npt.NDArray[np.float64], colour: Colour) -> None:
+        """Fill a polygon."""
+        pygame.draw.polygon(self._large, colour, [self._place(corner) for corner in corners])
+
+    def text(
+        self, text: str, place: tuple[float, float], size: float, colour: Colour, anchor: float = 0
+    ) -> float:
+        """Write a line; return its width, px.
+
+        ``place`` is the middle of its height at its left end (``anchor`` 0), its centre (0.5) or
+        its right end (1).
+        """
+        image = _font(round(size * _OVERSAMPLED)).render(text, True, colour)
+        width, height = image.get_size()
+        x, y = self._place(place)
+        self._large.blit(image, (round(x - anchor * width), round(y - height / 2)))
+        return width / _OVERSAMPLED
+
+    def finish(self) -> pygame.Surface:
+        """Return the frame; it holds until the next one is finished."""
+        pygame.transform.smoothscale(self._large, self.size, self._frame)
+        return self._frame
+
+    def _place(self, point: Point) -> tuple[float, float]:
+        return float(point[0]) * _OVERSAMPLED, float(point[1]) * _OVERSAMPLED
+
+    def _is_near(self, x: float, y: float) -> bool:
+        """Say whether a place is near enough to the canvas for pygame's 16-bit coordinates."""
+        return abs(x) < _FARTHEST and abs(y) < _FARTHEST
+
+    def _in_reach(self, place: tuple[float, float], radius: float) -> bool:
+        """Say whether any of a disc is on the canvas: far ones overflow pygame's integers."""
+        reach = radius * _OVERSAMPLED + 1
+        width, height = self._large.get_size()
+        x, y = place
+        return -reach < x < width + reach and -reach < y < height + reach
+
+
+def pixels(surface: pygame.Surface) -> npt.NDArray[np.uint8]:
+    """Return a copy of a surface as (H, W, 3) uint8."""
+    width, height = surface.get_size()
+    flat = np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8)
+    return flat.reshape(height, width, 3).copy()

@@ -1,0 +1,265 @@
+"""What a frame is made of, from the ground up: one function a layer, one list that orders them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from posse.rendering.camera import Camera
+from posse.rendering.history import Flash, Mark
+from posse.rendering.scene import Floats, Scene
+from posse.rendering.style import (
+    BROKEN,
+    CONTACT,
+    GRID,
+    GROUND,
+    INK,
+    LINK,
+    OBSTACLE,
+    OBSTACLE_RIM,
+    PAPER,
+    SENSING,
+    SENSING_RIM,
+    SLOT,
+    SLOT_FILLED,
+    TARGET,
+    TASK_COLOURS,
+    TRACKER,
+    TRACKER_RIM,
+    TRAIL,
+    WALL,
+    Colour,
+    mix,
+    pale,
+)
+
+if TYPE_CHECKING:
+    from posse.rendering.canvas import Canvas
+
+_LEAST_ROBOT: Final = 5.0  # points; robots are drawn no smaller, however far away
+_VIEW_SHOWN: Final = 1.5  # m; how far a field of view of unlimited range is drawn
+_GRID_STEP: Final = 2.0  # m
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """All that a layer may draw from, and what it draws on."""
+
+    scene: Scene
+    camera: Camera
+    canvas: Canvas
+    point: float
+    """Pixels in a point."""
+    trail: Sequence[Mark]
+    """Where the robots were, oldest first."""
+    flashes: Sequence[Flash]
+    """Contacts that began a moment ago."""
+
+    @property
+    def radius(self) -> float:
+        """Of a robot's disc, px."""
+        return max(self.scene.scenario.robot_radius * self.camera.scale, _LEAST_ROBOT * self.point)
+
+
+def _floor(d: Drawing) -> tuple[Floats, Floats]:
+    """Return two corners (2,) m of the floor: the arena, or as much of the plane as is in view."""
+    arena = d.scene.scenario.arena
+    if math.isfinite(arena):
+        return np.full(2, -arena / 2), np.full(2, arena / 2)
+    return d.camera.bounds()
+
+
+def ground(d: Drawing) -> None:
+    """Draw the floor."""
+    low, high = _floor(d)
+    (left, bottom), (right, top) = d.camera.project(low), d.camera.project(high)
+    d.canvas.box(left, top, right - left, bottom - top, GROUND)
+
+
+def grid(d: Drawing) -> None:
+    """Draw faint crosses two metres apart, by which the eye tells how far and how fast.
+
+    Lines would change every row of a film whose view moves; crosses keep its file small.
+    """
+    low, high = _floor(d)
+    arm = 4 * d.point
+    columns, rows = (
+        np.arange(math.ceil(a / _GRID_STEP), math.floor(b / _GRID_STEP) + 1) * _GRID_STEP
+        for a, b in zip(low, high, strict=True)
+    )
+    crosses = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    for x, y in d.camera.project(crosses):
+        d.canvas.line((x - arm, y), (x + arm, y), d.point, GRID)
+        d.canvas.line((x, y - arm), (x, y + arm), d.point, GRID)
+
+
+def walls(d: Drawing) -> None:
+    """Draw the walls of an arena, outside of where robots can be."""
+    arena = d.scene.scenario.arena
+    if not math.isfinite(arena):
+        return
+    thick = 3 * d.point
+    left, top = d.camera.project(np.array([-arena / 2, arena / 2])) - thick
+    side = arena * d.camera.scale + 2 * thick
+    for box in (
+        (left, top, side, thick),
+        (left, top + side - thick, side, thick),
+        (left, top, thick, side),
+        (left + side - thick, top, thick, side),
+    ):
+        d.canvas.box(*box, WALL)
+
+
+def sensing(d: Drawing) -> None:
+    """Tint what the target sensors cover, where their range or field of view is limited."""
+    s = d.scene.scenario
+    all_round = s.field_of_view >= 2 * math.pi - 1e-9
+    if math.isinf(s.sensing_range) and all_round:
+        return
+    reach = s.sensing_range if math.isfinite(s.sensing_range) else _VIEW_SHOWN
+    places = d.camera.project(d.scene.position)
+    if math.isfinite(s.arena):
+        left, top = d.camera.project(np.array([-s.arena / 2, s.arena / 2]))
+        side = s.arena * d.camera.scale
+        d.canvas.clip((round(left), round(top), round(side), round(side)))
+    for grow, colour in ((0.0, SENSING_RIM), (-d.point, SENSING)):
+        for i in np.flatnonzero(d.scene.senses):
+            radius = reach * d.camera.scale + grow
+            if all_round:
+                d.canvas.disc(places[i], radius, colour)
+            else:
+                corners = _sector(places[i], radius, d.scene.heading[i], s.field_of_view)
+                d.canvas.polygon(corners, colour)
+    d.canvas.clip(d.camera.viewport)
+
+
+def _sector(centre: Floats, radius: float, heading: Floats, angle: float) -> Floats:
+    """Return the corners (K, 2) of a sector of a disc about a heading, px."""
+    middle = math.atan2(heading[1], heading[0])
+    angles = np.linspace(middle - angle / 2, middle + angle / 2, max(3, math.ceil(angle / 0.08)))
+    rim = centre + radius * np.stack([np.cos(angles), -np.sin(angles)], axis=-1)
+    return np.concatenate([centre[None], rim])
+
+
+def obstacles(d: Drawing) -> None:
+    """Draw the discs that stand in the way."""
+    for x, y, radius in d.scene.obstacles:
+        place = d.camera.project(np.array([x, y]))
+        d.canvas.disc(place, radius * d.camera.scale, OBSTACLE_RIM)
+        d.canvas.disc(place, radius * d.camera.scale - d.point, OBSTACLE)
+
+
+def trails(d: Drawing) -> None:
+    """Draw where everyone has just been, fading with age."""
+    if len(d.trail) < 2:
+        return
+    places = d.camera.project(np.stack([mark.position for mark in d.trail]))
+    for k in range(1, len(d.trail)):
+        fresh = d.trail[k].freshness ** 1.5
+        for i in range(places.shape[1]):
+            target = i == places.shape[1] - 1
+            colour = TARGET if target else TRAIL
+            d.canvas.line(places[k - 1, i], places[k, i], 1.6 * d.point, colour, 0.8 * fresh)
+
+
+def frame(d: Drawing) -> None:
+    """Draw the line of the slot frame through the target, from the last slot to a metre ahead."""
+    behind = min(0.0, float(((d.scene.slots - d.scene.target) @ d.scene.frame).min()))
+    ends = d.scene.target + np.outer([behind, 1.0], d.scene.frame)
+    back, ahead = d.camera.project(ends)
+    d.canvas.dashes(ahead, back, d.point, 4 * d.point, SLOT)
+
+
+def slots(d: Drawing) -> None:
+    """Draw each slot as a circle of the tolerance, filled when it is occupied."""
+    radius = d.scene.scenario.tolerance * d.camera.scale
+    places = d.camera.project(d.scene.slots)
+    for place, occupied in zip(places, d.scene.occupied, strict=True):
+        if occupied:
+            d.canvas.disc(place, radius, SLOT_FILLED)
+        d.canvas.ring(place, radius, 1.5 * d.point, SLOT)
+
+
+def links(d: Drawing) -> None:
+    """Draw a line between trackers that hear each other, paler the longer ago the last word was."""
+    strength = np.triu(d.scene.links)
+    heard = np.argwhere(strength > 0)
+    if not len(heard):
+        return
+    # A large team has hundreds of links: together they are to weigh no more than a small team's.
+    weight = 0.5 * max(0.2, min(1.0, 12 / len(heard)))
+    places = d.camera.project(d.scene.position)
+    for i, j in heard.tolist():
+        d.canvas.line(places[i], places[j], d.point, LINK, weight * strength[i, j])
+
+
+def trackers(d: Drawing) -> None:
+    """Draw the trackers: grey wafers with a line for the heading, coloured by task if known.
+
+    One that does not have the target in its own sight is pale; one that is broken is crossed out.
+    """
+    scene, canvas, point, radius = d.scene, d.canvas, d.point, d.radius
+    places = d.camera.project(scene.position)
+    for i in sorted(range(len(places)), key=lambda i: not scene.broken[i]):
+        place, heading = places[i], scene.heading[i] * (1, -1)
+        if scene.broken[i]:
+            _wafer(d, place, heading, BROKEN, TRACKER)
+            arm = 0.7 * radius + point
+            for sign in (1, -1):
+                step = np.array([arm, sign * arm])
+                canvas.line(place - step, place + step, 1.6 * point, INK)
+            continue
+        colour = TRACKER
+        if scene.task is not None and 0 <= scene.task[i] < len(TASK_COLOURS):
+            colour = TASK_COLOURS[scene.task[i]]
+        if scene.limited_sight and not scene.sees[i]:
+            colour = pale(colour)
+        _wafer(d, place, heading, colour, TRACKER_RIM)
+        if scene.leads is not None and scene.leads[i]:
+            leader_mark(canvas, place - (0, radius + 4 * point), 5 * point)
+
+
+def _wafer(d: Drawing, place: Floats, heading: Floats, colour: Colour, rim: Colour) -> None:
+    radius, point = d.radius, d.point
+    d.canvas.disc(place, radius, rim)
+    d.canvas.disc(place, radius - 1.2 * point, colour)
+    d.canvas.line(place, place + heading * (radius + 3.5 * point), 1.8 * point, rim)
+
+
+def leader_mark(canvas: Canvas, tip: Floats, size: float) -> None:
+    """Draw the pointer that stands over a leader; ``tip`` is its lower end."""
+    x, y = tip
+    for grow, colour in ((1.2, PAPER), (0.0, INK)):
+        side = size + grow
+        canvas.polygon(
+            [(x, y + grow), (x - side, y - 1.5 * side), (x + side, y - 1.5 * side)], colour
+        )
+
+
+def target(d: Drawing) -> None:
+    """Draw the target, set apart by colour and a white rim."""
+    place, heading = d.camera.project(d.scene.target), d.scene.target_heading * (1, -1)
+    radius, point = d.radius, d.point
+    end = place + heading * (radius + 5 * point)
+    d.canvas.disc(place, radius + 2.5 * point, PAPER)
+    d.canvas.line(place, end + heading * point, 5 * point, PAPER)
+    d.canvas.disc(place, radius + point, TARGET)
+    d.canvas.line(place, end, 2.4 * point, TARGET)
+
+
+def flashes(d: Drawing) -> None:
+    """Draw a ring that widens and fades around each contact that has just begun."""
+    for flash in d.flashes:
+        place = d.camera.project(flash.position)
+        radius = d.radius + (3 + 9 * flash.age) * d.point
+        d.canvas.ring(place, radius, 2.2 * d.point, mix(CONTACT, GROUND, 1 - flash.age))
+
+
+LAYERS: Final[tuple[Callable[[Drawing], None], ...]] = (
+    ground, sensing, grid, frame, slots, obstacles, walls, trails, links, trackers, target, flashes,
+)  # fmt: skip
+"""Every layer, in the order in which they are drawn."""

@@ -1,0 +1,182 @@
+"""Pictures of a world: frames as arrays, or a window that follows it.
+
+The paper's own figures set the style: trackers are grey wafers with a line for the heading, the
+target is set apart. :mod:`posse.rendering.layers` lists what a frame is made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.rendering.camera import Camera
+from posse.rendering.history import History
+from posse.rendering.layers import LAYERS, Drawing
+from posse.rendering.legend import FOOTER, HEADER, footer, header
+from posse.rendering.scene import Scene, read_scene
+from posse.rendering.style import DESIGN_SIZE, PAPER
+from posse.scenarios.scenario import Scenario
+
+if TYPE_CHECKING:
+    from posse.engine.batch import Batch
+    from posse.rendering.window import Window
+
+RENDER_MODES: Final = ("human", "rgb_array")
+LEAST_SIZE: Final = 200
+"""Least width and height of a frame, px."""
+
+
+class Renderer:
+    """Draws one world of a batch, frame by frame.
+
+    A frame shows the present state, the trails that lead to it, and on the open plane a view that
+    follows the team; so it depends on the frames before it in the episode, and on nothing else: the
+    same states drawn in the same order give the same pixels.
+
+    Args:
+        scenario: Of the batches that are to be drawn.
+        mode: ``"rgb_array"``: frames are returned, no display is needed; ``"human"``: they appear
+            in a window, in real time.
+        size: Width and height of a frame, px.
+        title: Stands above the picture, beside the scenario's name; default: the name alone.
+
+    Raises:
+        ValueError: An unknown mode, or a size below :data:`LEAST_SIZE`.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        mode: str = "rgb_array",
+        size: tuple[int, int] = (640, 640),
+        title: str | None = None,
+    ) -> None:
+        if mode not in RENDER_MODES:
+            raise ValueError(f"unknown render mode {mode!r}; modes are: {', '.join(RENDER_MODES)}")
+        given = np.asarray(size)
+        if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
+            raise ValueError(
+                f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px"
+            )
+        # pygame is loaded by those who draw, not by everyone who imports the package.
+        from posse.rendering.canvas import Canvas
+
+        self.scenario = scenario
+        self.mode = mode
+        self.size = (int(size[0]), int(size[1]))
+        self.title = title
+        self._point = min(self.size) / DESIGN_SIZE
+        top, bottom = round(HEADER * self._point), round(FOOTER * self._point)
+        self._viewport = (0, top, self.size[0], self.size[1] - top - bottom)
+        self._canvas = Canvas(self.size)
+        self._camera = Camera(self._viewport, scenario.arena)
+        self._history = History()
+        self._window: Window | None = None
+        self._closed = False
+
+    @property
+    def closed(self) -> bool:
+        """Whether :meth:`close` was called, or the user closed the window."""
+        return self._closed
+
+    def follow(self, batch: Batch, world: int = 0) -> None:
+        """Take note of the present state without drawing it.
+
+        For films that show every other step: trails and view become the same as if all were drawn.
+
+        Raises:
+            ValueError: The batch is of another scenario, or has no such world.
+            ResetNeeded: The batch has not been reset.
+        """
+        self._note(self._read(batch, world, None))
+
+    def draw(
+        self,
+        batch: Batch,
+        world: int = 0,
+        annotations: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> npt.NDArray[np.uint8] | None:
+        """Draw a world as it stands.
+
+        Args:
+            batch: A batch of the renderer's scenario.
+            world: Place of the world in the batch.
+            annotations: What a policy tells of itself, each (E, N) integers: ``"task"``, by its
+                number in :data:`posse.rendering.style.TASKS`, colours the trackers; ``"leader"``,
+                the tracker that each one holds to be the leader, marks those that hold themselves so.
+
+        Returns:
+            A frame (H, W, 3) uint8 in the mode ``"rgb_array"``; ``None`` in the mode ``"human"``,
+            where nothing happens any more once the user has closed the window.
+
+        Raises:
+            ValueError: The batch is of another scenario, has no such world, or annotations do not
+                fit; or the renderer was closed and the mode is ``"rgb_array"``.
+            ResetNeeded: The batch has not been reset.
+        """
+        if self._closed:
+            if self.mode == "human":
+                return None
+            raise ValueError("this renderer was closed: make a new one")
+        scene = self._read(batch, world, annotations)
+        self._note(scene)
+        self._compose(scene)
+        frame = self._canvas.finish()
+        if self.mode == "rgb_array":
+            from posse.rendering.canvas import pixels
+
+            return pixels(frame)
+        if self._window is None:
+            from posse.rendering.window import Window
+
+            name = f"posse: {self.scenario.name}"
+            self._window = Window(self.size, name, 1 / self.scenario.control_step)
+        if not self._window.show(frame):
+            self.close()
+        return None
+
+    def project(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return where points (..., 2) m lie in the last frame, (..., 2) px: right, down."""
+        return self._camera.project(np.asarray(points, np.float64))
+
+    def close(self) -> None:
+        """Close the window, if there is one. May be called twice."""
+        self._closed = True
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def _read(
+        self, batch: Batch, world: int, annotations: Mapping[str, npt.ArrayLike] | None
+    ) -> Scene:
+        if batch.scenario != self.scenario:
+            raise ValueError(
+                f"a batch of {batch.scenario.name!r} does not fit a renderer of "
+                f"{self.scenario.name!r}: their scenarios must be equal in every setting"
+            )
+        return read_scene(batch, world, annotations)
+
+    def _note(self, scene: Scene) -> None:
+        time = self._history.note(scene)
+        if time is None:
+            self._camera.reset()
+        # Broken trackers stay behind: a view that held them would grow without end.
+        working = scene.position[~scene.broken]
+        points = np.vstack([working, scene.target, scene.target + scene.frame])
+        self._camera.follow(points, time or 0.0)
+
+    def _compose(self, scene: Scene) -> None:
+        canvas, point = self._canvas, self._point
+        canvas.fill(PAPER)
+        canvas.clip(self._viewport)
+        drawing = Drawing(
+            scene, self._camera, canvas, point, self._history.trail(), self._history.flashes()
+        )
+        for layer in LAYERS:
+            layer(drawing)
+        canvas.clip(None)
+        header(canvas, scene, self.title, point)
+        footer(canvas, scene, self._camera.scale, point)

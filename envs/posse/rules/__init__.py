@@ -1,0 +1,1 @@
+"""What happens to one world in a control step."""

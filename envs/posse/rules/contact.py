@@ -1,0 +1,249 @@
+"""Contact: a disc never passes into or through another, however fast it moves.
+
+Robots move one after the other, target first. Each move is swept along the chord of its arc and
+stops where the disc would meet another disc or a wall; a robot so blocked stands still until it
+heads elsewhere. A contact is counted once, when it begins, and by kind.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import (
+    FloatArray,
+    Lanes,
+    Record,
+    Records,
+    bits,
+    choose,
+    compiled,
+    greater,
+    least,
+    lesser,
+    load,
+    root,
+)
+from posse.rules.discs import BLOCK, EXCESS, FAR, GAP, INDEX, TOUCHING_GAP, X, Y, blocks
+from posse.rules.targets.target_motion import AGENT
+
+BLOCKING_GAP: Final = np.float32(0.0005)
+"""Width of the gap at which a move stops, m."""
+
+_SURELY_APART: Final = np.float32(0.01)  # m; far more than a touch and all rounding
+
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
+_TINY: Final = np.float32(1e-30)  # m²; a move so short meets nothing
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_BIT: Final = np.uint64(1)
+_NO_BITS: Final = np.uint64(0)
+_FIRST_WALL: Final = 60
+
+
+@compiled
+def free_share(
+    x: np.float32,
+    y: np.float32,
+    dx: np.float32,
+    dy: np.float32,
+    other_x: Lanes,
+    other_y: Lanes,
+    reach: Lanes,
+) -> Lanes:
+    """Return which share of a straight move, 0 to 1, a point makes before it is ``reach`` away.
+
+    From one other point, or from eight.
+    """
+    rx, ry = x - other_x, y - other_y
+    closing = rx * dx + ry * dy
+    gap = rx * rx + ry * ry - reach * reach
+    length = dx * dx + dy * dy
+    under_root = closing * closing - length * gap
+    until = (_ZERO - closing - root(greater(under_root, _ZERO))) / greater(length, _TINY)
+    share = choose(gap <= _ZERO, _ZERO, choose(under_root <= _ZERO, _ONE, lesser(_ONE, until)))
+    return choose(closing >= _ZERO, _ONE, share)
+
+
+@compiled
+def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.float32:
+    """Return which share of a move along one axis stays within ±bound."""
+    if dx > _ZERO and x + dx > bound:
+        return max(_ZERO, (bound - x) / dx)
+    if dx < _ZERO and x + dx < -bound:
+        return max(_ZERO, (-bound - x) / dx)
+    return _ONE
+
+
+@compiled
+def free_of_robots(
+    c: Record,
+    x: np.float32,
+    y: np.float32,
+    dx: np.float32,
+    dy: np.float32,
+    xs: int,
+    ys: int,
+    count: int,
+    s: FloatArray,
+) -> np.float32:
+    """Return the share of a robot's move that no other robot blocks.
+
+    Where ``count`` robots are stands in rows ``xs`` and ``ys`` of scratch memory. The robot may be
+    one of them: it does not close in on itself.
+    """
+    reach = c.radius + c.radius + BLOCKING_GAP
+    within = (reach + abs(dx) + abs(dy)) * _A_LITTLE_MORE
+    share = _ONE
+    for block in range(blocks(count)):
+        other_x, other_y = load(s, xs + BLOCK * block), load(s, ys + BLOCK * block)
+        rx, ry = x - other_x, y - other_y
+        if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < _ZERO)) != 0:
+            share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
+    return np.float32(share)
+
+
+@compiled
+def free_of_surroundings(
+    c: Record, obstacles: Records, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32
+) -> np.float32:
+    """Return the share of a robot's move that neither obstacles nor walls block."""
+    share = _ONE
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.radius + o.radius + BLOCKING_GAP))
+    if c.walled:
+        bound = c.half_arena - c.radius - BLOCKING_GAP
+        share = min(share, free_share_wall(x, dx, bound), free_share_wall(y, dy, bound))
+    return share
+
+
+@compiled
+def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
+    """Say whether a robot touches an obstacle or a wall."""
+    inner = c.half_arena - c.radius - TOUCHING_GAP
+    if c.walled and max(abs(robot.x), abs(robot.y)) >= inner:
+        return True
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy, reach = o.x - robot.x, o.y - robot.y, c.radius + o.radius + TOUCHING_GAP
+        if dx * dx + dy * dy <= reach * reach:
+            return True
+    return False
+
+
+@compiled
+def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
+    """Work out who touches whom, count the contacts that begin, and flag who is near to anything.
+
+    ``near`` marks robots that could touch something within the next control step; the others move
+    without a sweep. How near the discs are stands in ``s`` (:func:`posse.rules.discs.find_gaps`).
+    """
+    inner = c.half_arena - c.radius
+    smallest = w.least_gap
+    target_touching, target_near = _NO_BITS, False
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        wall = FAR
+        if c.walled:
+            wall = inner - max(abs(t.x), abs(t.y))
+        smallest = min(smallest, s[GAP + i], wall)
+        wall_near = wall <= c.tracker_speed * c.dt + TOUCHING_GAP
+        near = s[EXCESS + i] <= _ZERO or wall_near
+        if not near:
+            if t.near:
+                t.touching_trackers, t.touching_obstacles = _NO_BITS, _NO_BITS
+                t.near, t.touching, t.onsets = 0, 0, 0
+            continue
+        t.near, t.onsets = 1, 0
+        target_near = target_near or near_target(c, w, t)
+        if min(s[GAP + i], wall) > _SURELY_APART:
+            t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
+        elif meet_closely(c, w, t, obstacles, i, s):
+            target_touching |= _BIT << np.uint64(i)
+    w.touching = target_touching
+    # A scripted target keeps clear of obstacles and walls by itself (target_motion.safe_turn).
+    w.near = target_near or (c.motion == AGENT and c.walled != 0)
+    w.least_gap = smallest
+
+
+@compiled(seldom=True)
+def meet_closely(
+    c: Record, w: Record, t: Record, obstacles: Records, i: int, s: FloatArray
+) -> bool:
+    """Work out what a tracker that is near to something touches; say whether it is the target."""
+    touches_target = meet_target(c, w, t, i)
+    meet_trackers(c, w, t, i, s)
+    meet_surroundings(c, w, t, obstacles)
+    t.touching = touches_target or (t.touching_trackers | t.touching_obstacles) != _NO_BITS
+    return bool(touches_target)
+
+
+@compiled
+def near_target(c: Record, w: Record, t: Record) -> bool:
+    """Say whether a tracker and the target could touch within the next control step."""
+    reach = c.radius + c.radius + TOUCHING_GAP + (c.tracker_speed + c.target_speed) * c.dt
+    dx, dy = w.x - t.x, w.y - t.y
+    return bool(dx * dx + dy * dy <= reach * reach)
+
+
+@compiled
+def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
+    """Say whether tracker i touches the target, and count the contact if it begins."""
+    touch = c.radius + c.radius + TOUCHING_GAP
+    dx, dy = w.x - t.x, w.y - t.y
+    if dx * dx + dy * dy > touch * touch:
+        return False
+    if w.touching & (_BIT << np.uint64(i)) == _NO_BITS:
+        t.onsets += 1
+        w.contacts_target += 1
+    return True
+
+
+@compiled
+def meet_trackers(c: Record, w: Record, t: Record, i: int, s: FloatArray) -> None:
+    """Note which other trackers tracker i touches, and count the contacts that begin."""
+    touch = c.radius + c.radius + TOUCHING_GAP
+    touching = 0
+    for block in range(blocks(c.num_trackers)):
+        j = BLOCK * block
+        dx, dy = load(s, X + j) - t.x, load(s, Y + j) - t.y
+        other = load(s, INDEX + j) < np.float32(c.num_trackers)
+        touching |= bits((dx * dx + dy * dy <= touch * touch) & other) << j
+    now = np.uint64(touching) & ~(_BIT << np.uint64(i))
+    begun = now & ~t.touching_trackers
+    while begun != _NO_BITS:
+        first = begun & (~begun + _BIT)
+        begun ^= first
+        t.onsets += 1
+        if first > _BIT << np.uint64(i):
+            w.contacts_tracker += 1
+    t.touching_trackers = now
+
+
+@compiled
+def meet_surroundings(c: Record, w: Record, t: Record, obstacles: Records) -> None:
+    """Note which obstacles and walls a tracker touches, and count the contacts that begin."""
+    touching = _NO_BITS
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy, reach = o.x - t.x, o.y - t.y, c.radius + o.radius + TOUCHING_GAP
+        if dx * dx + dy * dy <= reach * reach:
+            touching |= _BIT << np.uint64(k)
+    if c.walled:
+        inner = c.half_arena - c.radius - TOUCHING_GAP
+        if t.x >= inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL)
+        if t.x <= -inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL + 1)
+        if t.y >= inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL + 2)
+        if t.y <= -inner:
+            touching |= _BIT << np.uint64(_FIRST_WALL + 3)
+    begun = touching & ~t.touching_obstacles
+    while begun != _NO_BITS:
+        begun &= begun - _BIT
+        t.onsets += 1
+        w.contacts_obstacle += 1
+    t.touching_obstacles = touching

@@ -1,0 +1,206 @@
+"""How actions become motion, for one world and one control step.
+
+Robots that nothing can touch within the step move each for itself, eight trackers at a time. The
+others move by physics steps, target first, then trackers by number, each move swept.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import (
+    FloatArray,
+    Lanes,
+    Record,
+    Records,
+    compiled,
+    eight,
+    lesser,
+    load,
+    store,
+    store_fields,
+)
+from posse.rules.contact import free_of_robots, free_of_surroundings
+from posse.rules.discs import BLOCK, FAR, OWN, ROW, blocks, columns, natural, store_rows
+from posse.rules.kinematics import approach, arc
+from posse.rules.state import NEVER, POSE
+from posse.rules.targets.target_motion import AGENT, target_turn_rate
+from posse.scenarios.formation import follow_heading
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_HALF: Final = np.float32(0.5)
+
+# Rows of scratch memory, of each tracker: what its action asks for, and, eight numbers each, where
+# it is after its move. What the target weighs up (posse.rules.targets) lies before them.
+_WANTED_SPEED: Final = OWN + 1 * ROW
+_WANTED_TURN: Final = OWN + 2 * ROW
+_NEW_POSE: Final = OWN + 3 * ROW
+_NEAR: Final = OWN + 7 * ROW  # those that something is near to: their numbers, and where they are
+_NEAR_X: Final = OWN + 8 * ROW
+_NEAR_Y: Final = OWN + 9 * ROW
+
+
+@compiled
+def move(robot: Record, time: np.float32) -> None:
+    """Move a robot that nothing is near to on its arc."""
+    dx, dy, robot.heading_cos, robot.heading_sin = arc(
+        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, time
+    )
+    robot.x += dx
+    robot.y += dy
+
+
+@compiled
+def move_swept(
+    c: Record, robot: Record, place: int, count: int, obstacles: Records, s: FloatArray
+) -> None:
+    """Move a robot that something is near to by a physics step, as far as nothing blocks.
+
+    Where the ``count`` robots are that may be in the way, itself in ``place``, stands in scratch
+    memory, and is kept up to date there.
+    """
+    dx, dy, robot.heading_cos, robot.heading_sin = arc(
+        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
+    )
+    x, y = robot.x, robot.y
+    share = lesser(
+        free_of_robots(c, x, y, dx, dy, _NEAR_X, _NEAR_Y, count, s),
+        free_of_surroundings(c, obstacles, x, y, dx, dy),
+    )
+    if share < _ONE:
+        dx, dy = dx * share, dy * share
+        robot.speed = _ZERO
+    robot.x += dx
+    robot.y += dy
+    s[_NEAR_X + place], s[_NEAR_Y + place] = robot.x, robot.y
+
+
+@compiled(seldom=True)
+def move_in_parts(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    s: FloatArray,
+) -> None:
+    """Move those that something is near to, by physics steps, the target first.
+
+    Whom nothing is near to is in nobody's way.
+    """
+    near = 0
+    for i in range(natural(c.num_trackers)):
+        t = trackers[i]
+        s[_NEAR + near], s[_NEAR_X + near], s[_NEAR_Y + near] = np.float32(i), t.x, t.y
+        near = natural(near + (t.near != 0))
+    s[_NEAR_X + near], s[_NEAR_Y + near] = w.x, w.y
+    store(s, _NEAR_X + near + 1, eight(FAR))
+    store(s, _NEAR_Y + near + 1, eight(FAR))
+    for _ in range(c.physics_steps):
+        if w.near != 0:
+            move_swept(c, w, near, near + 1, obstacles, s)
+        for k in range(near):
+            i = natural(int(s[_NEAR + k]))
+            t = trackers[i]
+            if t.broken_at == NEVER:
+                t.speed, t.turn_rate = command(
+                    c, t.speed, t.turn_rate, actions[i, 0], actions[i, 1]
+                )
+                move_swept(c, t, k, near + 1, obstacles, s)
+
+
+@compiled
+def command(
+    c: Record, speed: Lanes, turn_rate: Lanes, wanted_speed: Lanes, wanted_turn: Lanes
+) -> tuple[Lanes, Lanes]:
+    """Return speed and turn rate, brought towards what an action asks for within the limits."""
+    return (
+        approach(speed, _HALF * (wanted_speed + _ONE) * c.tracker_speed, c.speed_change),
+        approach(turn_rate, wanted_turn * c.tracker_turn_rate, c.turn_change),
+    )
+
+
+@compiled
+def lay_out_actions(c: Record, actions: FloatArray, s: FloatArray) -> None:
+    """Write which speeds and turn rates actions (rows, 2 + m) ask for to rows of scratch memory."""
+    for i in range(natural(c.num_trackers)):
+        s[_WANTED_SPEED + i], s[_WANTED_TURN + i] = actions[i, 0], actions[i, 1]
+
+
+@compiled
+def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: FloatArray) -> bool:
+    """Move the trackers that nothing is near to on their arcs; say whether there are others."""
+    n = natural(c.num_trackers)
+    for block in range(blocks(n)):
+        i = BLOCK * block
+        x, y, cosine, sine, speed, turn_rate, next_1, next_2 = columns(trackers, i, n, POSE)
+        for _ in range(parts):
+            speed, turn_rate = command(
+                c, speed, turn_rate, load(s, _WANTED_SPEED + i), load(s, _WANTED_TURN + i)
+            )
+            dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
+            x, y = x + dx, y + dy
+        store_rows(
+            x, y, cosine, sine, speed, turn_rate, next_1, next_2, _NEW_POSE + BLOCK * i, BLOCK, s
+        )
+    others = False
+    for i in range(n):
+        t = trackers[i]
+        if t.broken_at == NEVER:
+            if t.near == 0:
+                store_fields(t, POSE, load(s, _NEW_POSE + BLOCK * i))
+            else:
+                others = True
+    return others
+
+
+@compiled
+def command_target(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    scratch: FloatArray,
+) -> None:
+    """Set the target's speed and turn rate for the control step."""
+    w.speed = c.target_speed
+    if c.motion == AGENT:
+        action = actions[c.num_trackers]
+        w.speed = _HALF * (action[0] + _ONE) * c.target_speed
+        w.turn_rate = action[1] * c.target_turn_rate
+    else:
+        w.turn_rate = target_turn_rate(c, w, trackers, obstacles, scratch)
+
+
+@compiled
+def motion(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    scratch: FloatArray,
+) -> None:
+    """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
+
+    A robot that nothing can touch within the step moves on one arc, or on one for each physics step
+    where its speed changes only little by little; one that something is near to moves by physics
+    steps, each of them swept.
+    """
+    lay_out_actions(c, actions, scratch)
+    command_target(c, w, trackers, obstacles, actions, scratch)
+    parts, time = 1, c.dt
+    if c.whole_arcs == 0:
+        parts, time = int(c.physics_steps), c.physics_dt
+    if w.near == 0:
+        for _ in range(parts):
+            move(w, time)
+    if move_freely(c, trackers, parts, time, scratch) or w.near != 0:
+        move_in_parts(c, w, trackers, obstacles, actions, scratch)
+    w.frame_cos, w.frame_sin = follow_heading(
+        w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
+    )

@@ -1,0 +1,130 @@
+"""The score, and the sums that the metrics are worked out from.
+
+At each control step, score = occupied slots / working trackers, at most 1. A slot is occupied when
+a working tracker that touches nothing is within tolerance of it; who stands where is free.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import FloatArray, Record, Records, compiled
+from posse.rules.discs import (
+    BLOCK,
+    SLOT,
+    SLOT_DISTANCE,
+    SLOT_DISTANCE2,
+    blocks,
+    find_slots,
+    natural,
+)
+from posse.rules.senses.radio import connected
+from posse.rules.state import NEVER
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_BIT: Final = np.uint64(1)
+_NO_BITS: Final = np.uint64(0)
+
+
+@compiled
+def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
+    """Return a tracker's position in the slot frame, (ahead, left) of the target, m."""
+    dx, dy = t.x - w.x, t.y - w.y
+    return dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+
+
+@compiled
+def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArray) -> None:
+    """Work out who occupies which slot, and how far everyone is from a slot that is free.
+
+    Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
+    """
+    n = natural(c.num_trackers)
+    for block in range(blocks(n)):
+        find_slots(c, w, BLOCK * block, slots, _NO_BITS, s)
+    taken = _NO_BITS
+    occupied = 0
+    near2 = c.tolerance * c.tolerance
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        t.slot = -1
+        # Until all slots taken are known, the distance to the nearest one of all.
+        t.slot_progress = t.slot_distance
+        t.slot_distance = s[SLOT_DISTANCE + i]
+        if s[SLOT_DISTANCE2 + i] <= near2 and t.broken_at == NEVER and t.touching == 0:
+            best = int(s[SLOT + i])
+            bit = _BIT << np.uint64(best)
+            if taken & bit == _NO_BITS:
+                taken |= bit
+                occupied += 1
+                t.slot = best
+    for first in range(0, n if taken != _NO_BITS else 0, BLOCK):
+        last = min(first + BLOCK, n)
+        looking = False  # anyone for whom the nearest slot of all is another's
+        for i in range(first, last):
+            if trackers[i].slot < 0 and s[SLOT + i] >= _ZERO:
+                looking |= taken & (_BIT << np.uint64(s[SLOT + i])) != _NO_BITS
+        if looking:
+            find_slots(c, w, first, slots, taken, s)
+            for i in range(first, last):
+                t = trackers[i]
+                if t.slot < 0 and s[SLOT + i] >= _ZERO:
+                    t.slot_distance = s[SLOT_DISTANCE + i]
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        t.slot_progress -= t.slot_distance
+    w.score = _ZERO
+    if w.working > 0:
+        w.score = min(_ONE, np.float32(occupied) / np.float32(w.working))
+    w.held = w.held + 1 if w.working > 0 and occupied >= w.working else 0
+
+
+@compiled
+def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
+    """Say whether a tracker, straight on from its start at full speed, could be in a slot now."""
+    reach = c.tracker_speed * np.float32(w.step) * c.dt + c.tolerance
+    dx, dy = t.start_x - w.x, t.start_y - w.y
+    most = reach + c.slots_reach
+    if dx * dx + dy * dy > most * most:
+        return False
+    ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
+    for slot in range(c.num_trackers):
+        sx, sy = ahead - slots[slot].x, left - slots[slot].y
+        if sx * sx + sy * sy <= reach * reach:
+            return True
+    return False
+
+
+@compiled
+def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
+    """Add this step to the sums of the episode."""
+    w.score_sum += w.score
+    bound, error, effort, sight = 0, _ZERO, _ZERO, _ZERO
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            continue
+        if t.could_arrive == 0:
+            t.could_arrive = could_arrive(c, w, t, slots)
+        bound += t.could_arrive
+        error += t.slot_distance
+        v, turn = t.speed * c.per_speed, t.turn_rate * c.per_turn_rate
+        effort += v * v + turn * turn
+        sight += np.float32(t.sees)
+    w.error_sum += error
+    w.effort_sum += effort
+    w.sight_sum += sight
+    w.tracker_steps += np.float32(w.working)
+    if w.working > 0:
+        w.bound_sum += np.float32(bound) / np.float32(w.working)
+    if c.perfect_radio or connected(c, w, trackers):
+        w.connected_sum += _ONE
+    if w.held >= c.settle_steps:
+        begun = w.step - w.held + 1
+        if w.settled_at < 0:
+            w.settled_at = begun
+        if w.lost_at >= 0 and w.recovered_at < 0:
+            w.recovered_at = begun

@@ -1,0 +1,1 @@
+"""What trackers sense and hear: target sensor, sonar, radio."""

@@ -1,0 +1,141 @@
+"""The radio: what each tracker sends every control step, and what reaches the others.
+
+Each working tracker broadcasts its pose, speed, turn rate, its best fix of the target with the
+fix's time, and the policy's message. Range, delay and loss act on all of it alike.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import FloatArray, Record, Records, compiled
+from posse.rules.randomness import RADIO_LOSS, uniform
+from posse.rules.senses.sensing import take_fix
+from posse.rules.state import NEVER
+
+_ZERO: Final = np.float32(0.0)
+_ONE_BIT: Final = np.uint64(1)
+_NO_BITS: Final = np.uint64(0)
+
+
+@compiled
+def radio_works(c: Record, w: Record, t: Record) -> bool:
+    """Say whether a tracker can send and hear now."""
+    if t.broken_at != NEVER:
+        return False
+    return bool(w.step < t.radio_dead_from or w.step >= t.radio_dead_from + c.outage_steps)
+
+
+@compiled
+def share_fixes(c: Record, trackers: Records) -> None:
+    """A radio without limits, where nobody breaks: everyone takes the newest fix there is."""
+    best = 0
+    for i in range(1, c.num_trackers):
+        if trackers[i].fix_step > trackers[best].fix_step:
+            best = i
+    b = trackers[best]
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.fix_step < b.fix_step:
+            take_fix(
+                c, t, b.fix_step, b.fix_x, b.fix_y,
+                b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin,
+            )  # fmt: skip
+
+
+@compiled(seldom=True)
+def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
+    """Put what every tracker says now into the (D + 1, N) ring."""
+    slot = w.step % (c.radio_delay + 1)
+    for i in range(c.num_trackers):
+        t, b = trackers[i], broadcast[slot, i]
+        b.sent = radio_works(c, w, t)
+        b.x, b.y, b.heading_cos, b.heading_sin = t.x, t.y, t.heading_cos, t.heading_sin
+        b.speed, b.turn_rate = t.speed, t.turn_rate
+        b.fix_step, b.fix_x, b.fix_y = t.fix_step, t.fix_x, t.fix_y
+        b.fix_cos, b.fix_sin = t.fix_cos, t.fix_sin
+        b.fix_frame_cos, b.fix_frame_sin = t.fix_frame_cos, t.fix_frame_sin
+
+
+@compiled(seldom=True)
+def hear(
+    c: Record,
+    w: Record,
+    trackers: Records,
+    heard: Records,
+    broadcast: Records,
+    heard_message: FloatArray,
+    message: FloatArray,
+) -> None:
+    """Let every tracker hear what was sent ``radio_delay`` steps ago and reaches it."""
+    sent_at = w.step - c.radio_delay
+    if sent_at < 0:
+        return
+    slot = sent_at % (c.radio_delay + 1)
+    reach2 = c.radio_range * c.radio_range
+    n = c.num_trackers
+    for i in range(n):
+        t = trackers[i]
+        if not radio_works(c, w, t):
+            continue
+        for j in range(n):
+            b = broadcast[slot, j]
+            if j == i or b.sent == 0:
+                continue
+            dx, dy = b.x - t.x, b.y - t.y
+            if dx * dx + dy * dy > reach2:
+                continue
+            lossy = c.radio_loss > _ZERO
+            if lossy and uniform(w.key, w.step, RADIO_LOSS, i * n + j) < c.radio_loss:
+                continue
+            h = heard[i, j]
+            h.step = sent_at
+            h.x, h.y, h.heading_cos, h.heading_sin = b.x, b.y, b.heading_cos, b.heading_sin
+            h.speed, h.turn_rate = b.speed, b.turn_rate
+            for k in range(c.message_size):
+                heard_message[i, j, k] = message[slot, j, k]
+            if b.fix_step > t.fix_step:
+                take_fix(
+                    c, t, b.fix_step, b.fix_x, b.fix_y,
+                    b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin,
+                )  # fmt: skip
+
+
+@compiled(seldom=True)
+def connected(c: Record, w: Record, trackers: Records) -> bool:
+    """Say whether the working trackers are one radio graph, over any number of hops.
+
+    Not for a perfect radio, which always makes them one.
+    """
+    n = c.num_trackers
+    reach2 = c.radio_range * c.radio_range
+    waiting = _NO_BITS  # still to be reached
+    first = -1
+    for i in range(n):
+        if trackers[i].broken_at == NEVER:
+            if first < 0:
+                first = i
+            else:
+                waiting |= _ONE_BIT << np.uint64(i)
+    frontier = _NO_BITS
+    if first >= 0:
+        frontier = _ONE_BIT << np.uint64(first)
+    while frontier != _NO_BITS and waiting != _NO_BITS:
+        reached = _NO_BITS
+        for i in range(n):
+            if frontier & (_ONE_BIT << np.uint64(i)) == _NO_BITS:
+                continue
+            t = trackers[i]
+            if not radio_works(c, w, t):
+                continue
+            for j in range(n):
+                bit = _ONE_BIT << np.uint64(j)
+                if waiting & bit != _NO_BITS and radio_works(c, w, trackers[j]):
+                    dx, dy = trackers[j].x - t.x, trackers[j].y - t.y
+                    if dx * dx + dy * dy <= reach2:
+                        reached |= bit
+        waiting &= ~reached
+        frontier = reached
+    return bool(waiting == _NO_BITS)

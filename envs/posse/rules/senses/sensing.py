@@ -1,0 +1,193 @@
+"""What a tracker senses of the target by itself, if it is in sight, and the fix that this makes."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import (
+    FloatArray,
+    Lanes,
+    Record,
+    Records,
+    bits,
+    choose,
+    compiled,
+    eight,
+    greater,
+    lesser,
+    load,
+    root,
+    store_fields,
+)
+from posse.rules.discs import (
+    BLOCK,
+    OWN,
+    RADIUS,
+    ROW,
+    X,
+    Y,
+    blocks,
+    columns,
+    natural,
+    store_rows,
+)
+from posse.rules.randomness import SENSOR_NOISE, normal_pair
+from posse.rules.state import FIX, NEVER
+
+# Rows of scratch memory, of each tracker: when its last fix was, where it sees the target now, and
+# the fix that this makes, eight numbers each.
+_FIXED_AT: Final = OWN
+_SEEN_DX: Final = OWN + 1 * ROW
+_SEEN_DY: Final = OWN + 2 * ROW
+_NEW_FIX: Final = OWN + 3 * ROW
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_TINY: Final = np.float32(1e-9)
+_VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of the velocity
+
+
+@compiled
+def in_sight(
+    c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray
+) -> bool:
+    """Say whether a tracker's sensor has the target, which lies (dx, dy) from it.
+
+    In range, in the field of view, the sensor alive, and no obstacle across the line of sight.
+    """
+    d2 = dx * dx + dy * dy
+    if d2 > c.sensing_range * c.sensing_range:
+        return False
+    if w.step >= t.sensor_dead_from and w.step < t.sensor_dead_from + c.outage_steps:
+        return False
+    if c.all_round == 0:
+        along = dx * t.heading_cos + dy * t.heading_sin
+        if along < c.view_cosine * np.float32(math.sqrt(d2)):
+            return False
+    return not hidden(c, t, dx, dy, s)
+
+
+@compiled
+def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray) -> bool:
+    """Say whether an obstacle lies across the line from a tracker to what is (dx, dy) from it.
+
+    Eight at a time: which of them is across cannot be predicted.
+    """
+    d2 = dx * dx + dy * dy
+    first = natural(c.num_trackers) + 1
+    for block in range(blocks(c.num_obstacles)):
+        j = first + BLOCK * block
+        ox, oy, radius = load(s, X + j) - t.x, load(s, Y + j) - t.y, load(s, RADIUS + j)
+        along, across = ox * dx + oy * dy, ox * dy - oy * dx
+        meets = (along > _ZERO) & (along < d2) & (across * across < radius * radius * d2)
+        if bits(meets) != 0:
+            return True
+    return False
+
+
+@compiled
+def fix_velocity(
+    c: Record,
+    since: Lanes,
+    dx: Lanes,
+    dy: Lanes,
+    old_vx: Lanes,
+    old_vy: Lanes,
+) -> tuple[Lanes, Lanes]:
+    """Return the target's velocity from a fix that lies (dx, dy) from the one before.
+
+    ``since`` counts the control steps between them, ``old_vx`` and ``old_vy`` are the velocity that
+    was known. All are plain numbers, or lanes.
+    """
+    rate = _ONE / (since * c.dt)
+    vx, vy, keep = dx * rate, dy * rate, lesser(_ONE, c.smoothing * since)
+    vx, vy = old_vx + keep * (vx - old_vx), old_vy + keep * (vy - old_vy)
+    # No target is faster than a tracker (assumption ii), so noise that says so is cut.
+    speed2 = vx * vx + vy * vy
+    too_fast = speed2 > c.tracker_speed * c.tracker_speed
+    cut = choose(too_fast, c.tracker_speed / root(greater(speed2, _TINY)), _ONE)
+    return vx * cut, vy * cut
+
+
+@compiled
+def take_fix(
+    c: Record,
+    t: Record,
+    step: int,
+    x: np.float32,
+    y: np.float32,
+    heading_cos: np.float32,
+    heading_sin: np.float32,
+    frame_cos: np.float32,
+    frame_sin: np.float32,
+) -> None:
+    """Give a tracker a newer fix of the target, and a velocity from this and the one before."""
+    since = np.float32(step - t.fix_step)
+    if t.fix_step >= 0 and since * c.dt <= _VELOCITY_MEMORY:
+        t.fix_vx, t.fix_vy = fix_velocity(c, since, x - t.fix_x, y - t.fix_y, t.fix_vx, t.fix_vy)
+    else:
+        t.fix_vx, t.fix_vy = _ZERO, _ZERO
+    t.fix_step = step
+    t.fix_x, t.fix_y = x, y
+    t.fix_cos, t.fix_sin = heading_cos, heading_sin
+    t.fix_frame_cos, t.fix_frame_sin = frame_cos, frame_sin
+
+
+@compiled
+def look(c: Record, w: Record, trackers: Records, s: FloatArray) -> int:
+    """Let every tracker look for the target, and note the fix if it has it; return how many do.
+
+    Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
+    """
+    n = natural(c.num_trackers)
+    noisy = c.range_noise > _ZERO or c.bearing_noise > _ZERO
+    seeing = 0
+    for i in range(n):
+        t = trackers[i]
+        dx, dy = w.x - t.x, w.y - t.y
+        t.sees = t.broken_at == NEVER and in_sight(c, w, t, dx, dy, s)
+        seeing += t.sees
+        s[_FIXED_AT + i] = np.float32(t.fix_step)
+        if noisy and t.sees:
+            s[_SEEN_DX + i], s[_SEEN_DY + i] = measure(c, w, i, dx, dy)
+    if seeing == 0:
+        return 0
+    if w.detected_at < 0:
+        w.detected_at = w.step
+    for block in range(blocks(n)):
+        i = BLOCK * block
+        own_x, own_y, before = load(s, X + i), load(s, Y + i), load(s, _FIXED_AT + i)
+        dx, dy = w.x - own_x, w.y - own_y
+        if noisy:
+            dx, dy = load(s, _SEEN_DX + i), load(s, _SEEN_DY + i)
+        x, y = own_x + dx, own_y + dy
+        old_x, old_y, _, _, _, _, old_vx, old_vy = columns(trackers, i, n, FIX)
+        since = greater(np.float32(w.step) - before, _ONE)
+        vx, vy = fix_velocity(c, since, x - old_x, y - old_y, old_vx, old_vy)
+        fresh = (before >= _ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
+        store_rows(
+            x, y, eight(w.heading_cos), eight(w.heading_sin), eight(w.frame_cos),
+            eight(w.frame_sin), choose(fresh, vx, _ZERO), choose(fresh, vy, _ZERO),
+            _NEW_FIX + BLOCK * i, BLOCK, s,
+        )  # fmt: skip
+    for i in range(n):
+        t = trackers[i]
+        if t.sees:
+            t.fix_step = w.step
+            store_fields(t, FIX, load(s, _NEW_FIX + BLOCK * i))
+    return seeing
+
+
+@compiled
+def measure(
+    c: Record, w: Record, number: int, dx: np.float32, dy: np.float32
+) -> tuple[np.float32, np.float32]:
+    """Return where a tracker's sensor, which is not exact, has the target that is (dx, dy) away."""
+    first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
+    scale = _ONE + c.range_noise * first
+    turn = c.bearing_noise * second
+    cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
+    return scale * (dx * cosine - dy * sine), scale * (dx * sine + dy * cosine)

@@ -1,0 +1,299 @@
+"""What a batch of worlds is made of: records with a leading axis E, each field with its meaning.
+
+E = worlds, N = trackers, M = obstacles, D = radio delay in steps, m = message size. One world lies
+contiguously in memory, so that a core that steps it touches little else. The dtypes do not depend
+on any size: kernels compile once for all scenarios.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.numeric import FloatArray, Record, Records
+from posse.scenarios.formation import FORMATIONS, slot_offsets
+from posse.scenarios.scenario import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS, Scenario
+from posse.signals.reward import REWARD_TERMS
+
+SPLITS: Final = ("train", "validation", "test")
+NEVER: Final = np.int32(2**30)
+"""A control step that no episode reaches."""
+
+
+def _record(*fields: tuple[str, type]) -> np.dtype[Any]:
+    return np.dtype((np.record, np.dtype(list(fields), align=True)))
+
+
+def _offset(record: np.dtype[Any], name: str) -> int:
+    """Return how many bytes into a record a field begins."""
+    return next(at for field, (_, at, *_) in (record.fields or {}).items() if field == name)
+
+
+_F, _I, _U = np.float32, np.int32, np.uint64
+
+CONFIG: Final = _record(
+    ("num_trackers", _I), ("num_agents", _I), ("num_obstacles", _I), ("neighbours", _I),
+    ("message_size", _I), ("physics_steps", _I), ("horizon", _I), ("settle_steps", _I),
+    ("outage_steps", _I), ("break_from", _I), ("break_until", _I), ("forget_steps", _I),
+    ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("break_number", _I),
+    ("motion", _I),
+    ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
+    ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
+    ("dt", _F), ("physics_dt", _F),
+    ("tracker_speed", _F), ("tracker_turn_rate", _F), ("speed_change", _F), ("turn_change", _F),
+    ("target_speed", _F), ("target_turn_rate", _F), ("radius", _F),
+    ("tolerance", _F), ("frame_c", _F), ("frame_s", _F), ("slots_reach", _F),
+    ("half_arena", _F), ("obstacle_least", _F), ("obstacle_most", _F), ("obstacle_gap", _F),
+    ("start_least", _F), ("start_most", _F), ("target_extent", _F), ("safe_distance", _F),
+    ("sensing_range", _F), ("view_cosine", _F), ("range_noise", _F), ("bearing_noise", _F),
+    ("smoothing", _F), ("sonar_range", _F), ("beam_cosine", _F),
+    ("radio_range", _F), ("radio_loss", _F), ("sensor_outages", _F), ("radio_outages", _F),
+    ("formation_distance", _F), ("formation_spacing", _F),
+    ("acceleration_time", _F), ("turn_acceleration_time", _F),
+    ("per_speed", _F), ("per_turn_rate", _F),  # 1 / tracker_speed, 1 / tracker_turn_rate
+    ("told_sensing_range", _F), ("told_arena", _F),  # -1: boundless
+)  # fmt: skip
+"""A scenario as the kernels read it."""
+
+WORLD: Final = _record(
+    ("seed", _U),  # the user's
+    ("split", _I),  # index into SPLITS
+    ("index", np.int64),  # which world of the seed
+    ("episode", np.int64),  # which episode of the world
+    ("key", _U),  # of this episode's random draws
+    ("step", _I),  # control steps since the start
+    ("over", _I),  # 1: the episode has ended, the world must be reset
+    ("terminated", _I),
+    # the target
+    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
+    ("speed", _F), ("turn_rate", _F),
+    ("frame_cos", _F), ("frame_sin", _F),  # the slot frame, ψ
+    ("goal_cos", _F), ("goal_sin", _F),  # where a scripted target wants to head
+    ("weave_amplitude", _F), ("weave_rate", _F), ("weave_phase", _F),  # accelerating motion
+    ("pressed", _F),  # smart motion: for how long the team has kept station, s; < 0: it darts
+    ("touching", _U),  # trackers that touch the target, a bit each
+    ("near", _I),  # 1: something may touch the target in the next step
+    ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
+    ("breaks_left", _I),
+    # what the metrics are worked out from
+    ("working", _I),  # trackers that work
+    ("score", _F),  # of the present step
+    ("score_sum", np.float64), ("error_sum", np.float64), ("effort_sum", np.float64),
+    ("sight_sum", _F),
+    ("bound_sum", _F), ("tracker_steps", _F), ("connected_sum", _F),
+    ("held", _I),  # steps on end with every working tracker in a slot of its own
+    ("settled_at", _I), ("detected_at", _I), ("lost_at", _I), ("recovered_at", _I),
+    ("contacts_tracker", _I), ("contacts_obstacle", _I), ("contacts_target", _I),
+    ("least_gap", _F),
+)  # fmt: skip
+"""One world: its identity, its target, its clock, its sums."""
+
+TRACKER: Final = _record(
+    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
+    ("speed", _F), ("turn_rate", _F),
+    ("broken_at", _I),  # control step at which it broke, NEVER while it works
+    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
+    ("sensor_dead_from", _I), ("radio_dead_from", _I),  # outages, of outage_time each
+    ("sees", _I),  # 1: its sensor has the target now
+    ("near", _I),  # 1: something may touch it in the next step
+    ("touching", _I),  # 1: it touches anything
+    ("onsets", _I),  # contacts that began in this step
+    ("touching_trackers", _U), ("touching_obstacles", _U),  # a bit each; bits 60 to 63: walls
+    # its best fix of the target, seen or heard
+    ("fix_step", _I),  # when the fix was taken; -1: none yet
+    ("fix_x", _F), ("fix_y", _F), ("fix_cos", _F), ("fix_sin", _F),
+    ("fix_frame_cos", _F), ("fix_frame_sin", _F), ("fix_vx", _F), ("fix_vy", _F),
+    # the score's and the rewards' view
+    ("slot", _I),  # which slot it occupies, -1: none
+    ("slot_distance", _F),  # to the nearest slot that nobody else occupies
+    ("slot_progress", _F),  # by how much that shrank in this step
+    ("start_x", _F), ("start_y", _F),
+    ("could_arrive", _I),  # 1: it could stand in a slot by now, straight on at full speed
+)  # fmt: skip
+"""One tracker."""
+
+# Kernels read and write these of a tracker's fields eight at a time; what they do not change, they
+# write as they read it. From x on: pose, speed, turn rate, and two more. From fix_x on: the fix.
+POSE: Final = _offset(TRACKER, "x")
+FIX: Final = _offset(TRACKER, "fix_x")
+
+OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
+
+SLOT: Final = _record(("x", _F), ("y", _F))
+"""A slot's place in the slot frame; one table for all worlds."""
+
+HEARD: Final = _record(
+    ("step", _I),  # when it was sent; -1: never heard
+    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
+    ("speed", _F), ("turn_rate", _F),
+)  # fmt: skip
+"""What a tracker last heard of a team-mate: (E, receiver, sender)."""
+
+BROADCAST: Final = _record(
+    ("sent", _I),  # 0: its radio was silent
+    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
+    ("speed", _F), ("turn_rate", _F),
+    ("fix_step", _I),
+    ("fix_x", _F), ("fix_y", _F), ("fix_cos", _F), ("fix_sin", _F),
+    ("fix_frame_cos", _F), ("fix_frame_sin", _F),
+)  # fmt: skip
+"""What a tracker sent, kept until it has been heard: (E, D + 1, N), by step modulo D + 1."""
+
+
+@dataclass(frozen=True)
+class WorldArrays:
+    """Every array of a batch. With the scenario, they are its whole state."""
+
+    world: Records
+    """(E,) :data:`WORLD`."""
+    tracker: Records
+    """(E, N) :data:`TRACKER`."""
+    obstacle: Records
+    """(E, M) :data:`OBSTACLE`."""
+    heard: Records
+    """(E, N, N) :data:`HEARD`; (E, 0, 0) where the radio is perfect and nothing need be kept."""
+    broadcast: Records
+    """(E, D + 1, N) :data:`BROADCAST`; (E, 0, 0) where the radio is perfect."""
+    heard_message: FloatArray
+    """(E, N, N, m) float32."""
+    message: FloatArray
+    """(E, D + 1, N, m) float32."""
+
+    @classmethod
+    def allocate(cls, scenario: Scenario, num_worlds: int) -> WorldArrays:
+        """Return zeroed arrays for a number of worlds."""
+        n, m = scenario.num_trackers, scenario.message_size
+        kept = 0 if perfect_radio(scenario) else n
+        delay = scenario.radio_delay + 1
+        return cls(
+            world=np.zeros(num_worlds, WORLD),
+            tracker=np.zeros((num_worlds, n), TRACKER),
+            obstacle=np.zeros((num_worlds, scenario.num_obstacles), OBSTACLE),
+            heard=np.zeros((num_worlds, kept, kept), HEARD),
+            broadcast=np.zeros((num_worlds, delay if kept else 0, kept), BROADCAST),
+            heard_message=np.zeros((num_worlds, kept, kept, m), np.float32),
+            message=np.zeros((num_worlds, delay, n, m), np.float32),
+        )
+
+    def all(self) -> tuple[npt.NDArray[Any], ...]:
+        """Return the arrays in the order in which kernels take them."""
+        return (
+            self.world, self.tracker, self.obstacle,
+            self.heard, self.broadcast, self.heard_message, self.message,
+        )  # fmt: skip
+
+    def copy(self) -> WorldArrays:
+        """Return a copy that shares no memory."""
+        return WorldArrays(*(array.copy() for array in self.all()))
+
+    def write(self, other: WorldArrays) -> None:
+        """Overwrite these arrays with another's contents, in place."""
+        for mine, theirs in zip(self.all(), other.all(), strict=True):
+            mine[...] = theirs
+
+    @property
+    def bytes_per_world(self) -> int:
+        """Memory that one world takes, in bytes."""
+        return sum(array.nbytes for array in self.all()) // len(self.world)
+
+    def by_name(self) -> dict[str, npt.NDArray[Any]]:
+        """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
+        names: dict[str, npt.NDArray[Any]] = {}
+        for field in dataclasses.fields(self):
+            array = getattr(self, field.name)
+            if array.dtype.names is None:
+                names[field.name] = array.view()
+            else:
+                for part in array.dtype.names:
+                    names[f"{field.name}_{part}"] = array[part]
+        return names
+
+
+def perfect_radio(scenario: Scenario) -> bool:
+    """Say whether every tracker hears every other at once, always; what breaks falls silent."""
+    return (
+        math.isinf(scenario.radio_range)
+        and scenario.radio_delay == 0
+        and scenario.radio_loss == 0
+        and scenario.radio_outages == 0
+        and scenario.breaks == 0
+    )
+
+
+def slot_records(scenario: Scenario) -> Records:
+    """Return the slots as (N,) :data:`SLOT`."""
+    return np.array(slot_offsets(scenario), np.float32).view(SLOT).reshape(-1)
+
+
+def beam_directions(scenario: Scenario) -> FloatArray:
+    """Return cosine and sine of each sonar beam's direction in the robot's frame, (2, S)."""
+    angles = 2 * np.pi * np.arange(scenario.sonar_beams) / max(1, scenario.sonar_beams)
+    return np.stack([np.cos(angles), np.sin(angles)]).astype(np.float32)
+
+
+def config_record(scenario: Scenario) -> Records:
+    """Return the scenario as the kernels read it, an array of one :data:`CONFIG`."""
+    s = scenario
+    config = np.zeros(1, CONFIG)
+    c: Record = config[0]
+    c.num_trackers, c.num_agents, c.num_obstacles = s.num_trackers, s.num_agents, s.num_obstacles
+    c.neighbours, c.message_size = s.neighbours, s.message_size
+    c.physics_steps, c.horizon = s.physics_steps, s.horizon
+    c.settle_steps = max(1, round(s.settle_time / s.control_step))
+    c.outage_steps = max(1, round(s.outage_time / s.control_step))
+    c.break_from, c.break_until = (round(share * s.horizon) for share in s.break_window)
+    c.forget_steps = int(s.forget_after / s.control_step + 1e-6)
+    c.radio_delay, c.breaks = s.radio_delay, s.breaks
+    c.break_nearest = s.break_choice == BREAK_CHOICES[0]
+    c.break_number = s.break_number if s.break_choice == BREAK_CHOICES[2] else -1
+    c.motion = TARGET_MOTIONS.index(s.target_motion)
+    c.terminate_on_contact, c.walled = s.terminate_on_contact, math.isfinite(s.arena)
+    c.sonar_beams = s.sonar_beams
+    c.whole_arcs = s.whole_arcs
+    c.all_round = s.field_of_view >= 2 * math.pi - 1e-9
+    c.perfect_radio = perfect_radio(s)
+    c.dt, c.physics_dt = s.control_step, s.control_step / s.physics_steps
+    c.tracker_speed, c.tracker_turn_rate = s.tracker_speed, s.tracker_turn_rate
+    c.speed_change = min(s.tracker_acceleration * c.physics_dt, FAR)
+    c.turn_change = min(s.tracker_turn_acceleration * c.physics_dt, FAR)
+    c.target_speed, c.target_turn_rate = s.target_speed, s.target_turn_rate
+    c.radius = s.robot_radius
+    c.tolerance = s.tolerance
+    most = min(s.slot_turn_rate * s.control_step, math.pi / 2)
+    c.frame_c, c.frame_s = math.cos(most), math.sin(most)
+    c.slots_reach = max(math.hypot(x, y) for x, y in slot_offsets(s))
+    c.half_arena = min(s.arena / 2, FAR)
+    c.obstacle_least, c.obstacle_most = s.obstacle_radius
+    c.obstacle_gap = s.obstacle_gap
+    c.start_least, c.start_most = s.start_distance
+    c.safe_distance = s.robot_radius + SAFE_MARGIN
+    c.target_extent = s.target_extent
+    c.sensing_range = min(s.sensing_range, FAR)
+    c.view_cosine = math.cos(s.field_of_view / 2)
+    c.range_noise, c.bearing_noise = s.range_noise, s.bearing_noise
+    c.smoothing = 1.0
+    if s.velocity_smoothing > 0:
+        c.smoothing = 1 - math.exp(-s.control_step / s.velocity_smoothing)
+    c.sonar_range = s.sonar_range
+    c.beam_cosine = math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0
+    c.radio_range, c.radio_loss = min(s.radio_range, FAR), s.radio_loss
+    c.sensor_outages, c.radio_outages = s.sensor_outages, s.radio_outages
+    c.formation = FORMATIONS.index(s.formation)
+    c.formation_distance, c.formation_spacing = s.formation_distance, s.formation_spacing
+    c.acceleration_time = s.tracker_speed / s.tracker_acceleration
+    c.turn_acceleration_time = s.tracker_turn_rate / s.tracker_turn_acceleration
+    c.per_speed, c.per_turn_rate = 1 / s.tracker_speed, 1 / s.tracker_turn_rate
+    c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
+    c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
+    return config
+
+
+def reward_weights(scenario: Scenario) -> FloatArray:
+    """Return the weight of each reward term, in the order of their declaration, (K,) float32."""
+    weights = dict(scenario.reward_weights)
+    return np.array([weights.get(term.name, 0.0) for term in REWARD_TERMS], np.float32)

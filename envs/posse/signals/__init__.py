@@ -1,0 +1,1 @@
+"""What is told of a world: observations, rewards, metrics, the global state."""

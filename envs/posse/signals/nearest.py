@@ -1,0 +1,209 @@
+"""Which team-mates are nearest to eight trackers, a lane each.
+
+Up to eight of the nearest are found for all lanes at once: squared distances to eight team-mates
+are sorted and merged with the nearest so far, without a branch. That keeps a distance to five
+digits and six bits of whose it is; where two distances are nearer to each other than that can tell,
+the lane's list is made again, one by one and exactly. Longer lists are always made so.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import (
+    WIDTH,
+    FloatArray,
+    Lanes,
+    Mask,
+    choose,
+    compiled,
+    eight,
+    greater,
+    lesser,
+    root,
+    store,
+    tag,
+    tagged,
+)
+from posse.rules.discs import FAR, OWN, ROW, SHORTLIST, TEAM, blocks, natural, store_each
+from posse.signals.team import own_numbers, round_again, row_length, stride_of, way_behind
+
+LISTED: Final = OWN + 1 * ROW
+"""Where the lists stand in scratch memory: the nearest to each of the eight, a lane each, then the
+second nearest. Numbers of team-mates; four rows hold lists of the largest team. The first of the
+rows that are a module's own stays with who asks for the lists."""
+
+# The nearest so far, how far and who; which of the eight lists are beyond doubt.
+_SO_FAR: Final = SHORTLIST
+WHO: Final = SHORTLIST + 1 * ROW
+_CERTAIN: Final = SHORTLIST + 2 * ROW
+
+_CLOSER: Final = np.float32(1 - 2**-15)  # two tags and rounding change half of that
+_ABSENT: Final = FAR * FAR
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+
+_Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
+
+
+@compiled
+def list_nearest(n: int, places: int, i: int, count: int, across: int, s: FloatArray) -> None:
+    """List, from LISTED on, the nearest of a team of n to ``count`` trackers, the first of them i.
+
+    They are at most eight; what other lanes hold is of no use.
+    There are no more places than team-mates, and the team stands in its rows
+    (:func:`posse.signals.team.lay_out_team`).
+    """
+    together = places <= WIDTH
+    if together:
+        rank_eight(n, i, across, s)
+    for lane in range(count):
+        if not together or s[_CERTAIN + lane] == _ZERO:
+            list_exactly(n, places, i, natural(lane), across, s)
+
+
+@compiled
+def rank_eight(n: int, i: int, across: int, s: FloatArray) -> None:
+    """List the eight nearest team-mates of eight trackers, and say which lists are certain."""
+    last = WIDTH * (blocks(n - 1) - 1)
+    a, b, c, d, e, f, g, h = sort(eight_apart(n, i, last, False, across, s))
+    ninth = eight(_ABSENT)
+    for m in range(0, last, WIDTH):
+        others = sort(eight_apart(n, i, m, True, across, s))
+        a, b, c, d, e, f, g, h, least = merge((a, b, c, d, e, f, g, h), others)
+        ninth = lesser(ninth, least)
+    doubtful = (
+        as_near(a, b) | as_near(b, c) | as_near(c, d) | as_near(d, e)
+        | as_near(e, f) | as_near(f, g) | as_near(g, h) | as_near(h, ninth)
+    )  # fmt: skip
+    store(s, _CERTAIN, choose(doubtful, _ZERO, _ONE))
+    behind = own_numbers(i, across, s) + _ONE
+    lists = (
+        whose(n, behind, a), whose(n, behind, b), whose(n, behind, c), whose(n, behind, d),
+        whose(n, behind, e), whose(n, behind, f), whose(n, behind, g), whose(n, behind, h),
+    )  # fmt: skip
+    store_each(lists, LISTED, WIDTH, s)
+
+
+@compiled
+def as_near(one: Lanes, next_one: Lanes) -> Mask:
+    """Say whether somebody is so near to the next in order that tags cannot tell them apart."""
+    return (next_one * _CLOSER <= one) & (one < _ABSENT)
+
+
+@compiled
+def whose(n: int, behind: Lanes, distance: Lanes) -> Lanes:
+    """Return the numbers of those whose distances these are; ``behind``, of those next behind."""
+    return round_again(n, behind + tag(distance))
+
+
+@compiled
+def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: FloatArray) -> _Eight:
+    """Return how far the eight team-mates from m + 1 places behind eight trackers are, tagged.
+
+    Who is not there is too far to count.
+    """
+    return (
+        apart(n, i, m, all_there, across, s), apart(n, i, m + 1, all_there, across, s),
+        apart(n, i, m + 2, all_there, across, s), apart(n, i, m + 3, all_there, across, s),
+        apart(n, i, m + 4, all_there, across, s), apart(n, i, m + 5, all_there, across, s),
+        apart(n, i, m + 6, all_there, across, s), apart(n, i, m + 7, all_there, across, s),
+    )  # fmt: skip
+
+
+@compiled
+def apart(n: int, i: int, m: int, is_there: bool, across: int, s: FloatArray) -> Lanes:
+    """Return the squared distances to the team-mates m + 1 places behind, tagged with m.
+
+    Of who is not there anything is read, and may be no number.
+    """
+    dx, dy = way_behind(n, i, m, across, s)
+    least = choose(is_there or m < n - 1, _ZERO, _ABSENT)
+    # Last, what makes them numbers again to LLVM: it would not sort bits as fast.
+    return greater(least, tagged(dx * dx + dy * dy, m))
+
+
+@compiled
+def in_order(value: Lanes, other: Lanes) -> tuple[Lanes, Lanes]:
+    """Return the lesser and the greater, lane by lane."""
+    return lesser(value, other), greater(value, other)
+
+
+@compiled
+def sort(eight_of: _Eight) -> _Eight:
+    """Return eight in order, the least first, lane by lane (19 comparisons)."""
+    a, b, c, d, e, f, g, h = eight_of
+    (a, c), (b, d) = in_order(a, c), in_order(b, d)
+    (e, g), (f, h) = in_order(e, g), in_order(f, h)
+    (a, e), (b, f) = in_order(a, e), in_order(b, f)
+    (c, g), (d, h) = in_order(c, g), in_order(d, h)
+    (a, b), (c, d) = in_order(a, b), in_order(c, d)
+    (e, f), (g, h) = in_order(e, f), in_order(g, h)
+    (c, e), (d, f) = in_order(c, e), in_order(d, f)
+    (b, e), (d, g) = in_order(b, e), in_order(d, g)
+    (b, c), (d, e) = in_order(b, c), in_order(d, e)
+    f, g = in_order(f, g)
+    return a, b, c, d, e, f, g, h
+
+
+@compiled
+def merge(one: _Eight, other: _Eight) -> tuple[Lanes, ...]:
+    """Return the eight least of two eights in order, in order, and the least of the rest."""
+    a, b, c, d, e, f, g, h = one
+    i, j, k, l, m, n, o, p = other  # noqa: E741
+    least = lesser(
+        lesser(lesser(greater(a, p), greater(b, o)), lesser(greater(c, n), greater(d, m))),
+        lesser(lesser(greater(e, l), greater(f, k)), lesser(greater(g, j), greater(h, i))),
+    )
+    # First up, then down: three rounds of comparisons put that in order.
+    a, b, c, d = lesser(a, p), lesser(b, o), lesser(c, n), lesser(d, m)
+    e, f, g, h = lesser(e, l), lesser(f, k), lesser(g, j), lesser(h, i)
+    (a, e), (b, f) = in_order(a, e), in_order(b, f)
+    (c, g), (d, h) = in_order(c, g), in_order(d, h)
+    (a, c), (b, d) = in_order(a, c), in_order(b, d)
+    (e, g), (f, h) = in_order(e, g), in_order(f, h)
+    (a, b), (c, d) = in_order(a, b), in_order(c, d)
+    (e, f), (g, h) = in_order(e, f), in_order(g, h)
+    return a, b, c, d, e, f, g, h, least
+
+
+@compiled(seldom=True)
+def list_exactly(n: int, places: int, i: int, lane: int, across: int, s: FloatArray) -> None:
+    """List the nearest team-mates of the tracker in a lane, in order of exact distances."""
+    stride, row = stride_of(across), row_length(n, across)
+    own_number = natural(i + lane * (1 - across))
+    team = TEAM + natural(lane * across)
+    own = team + natural(stride * own_number)
+    filled = 0
+    for number in range(n):
+        at = team + natural(stride * number)
+        dx, dy = s[at] - s[own], s[at + row] - s[own + row]
+        hc, hs = s[own + 2 * row], s[own + 3 * row]
+        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
+        if number != own_number:
+            distance = root(ahead * ahead + left * left)
+            filled = keep_nearest(places, filled, number, distance, s)
+    for place in range(natural(places)):
+        s[LISTED + WIDTH * place + lane] = s[WHO + place]
+
+
+@compiled
+def keep_nearest(places: int, filled: int, number: int, distance: np.float32, s: FloatArray) -> int:
+    """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far.
+
+    Of those as near, who came first stays first. Who they are stands from WHO on.
+    """
+    if filled == places:
+        if distance >= s[_SO_FAR + places - 1]:
+            return filled
+        filled -= 1
+    spot = filled
+    while spot > 0 and s[_SO_FAR + spot - 1] > distance:
+        s[_SO_FAR + spot] = s[_SO_FAR + spot - 1]
+        s[WHO + spot] = s[WHO + spot - 1]
+        spot -= 1
+    s[_SO_FAR + spot] = distance
+    s[WHO + spot] = np.float32(number)
+    return filled + 1

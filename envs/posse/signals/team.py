@@ -1,0 +1,158 @@
+"""Eight observers at once, a lane each: their team laid out in rows, and what is written to all.
+
+The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or
+teams are large, the trackers of one (0). A row holds the team twice, one after the other, so that a
+team-mate lies as many places behind its observer, whoever that is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from posse.numeric import (
+    WIDTH,
+    FloatArray,
+    Lanes,
+    Records,
+    choose,
+    compiled,
+    eight,
+    load,
+    load_fields,
+    store,
+    transpose,
+)
+from posse.rules.discs import INDEX, TEAM, columns, natural
+from posse.rules.state import POSE
+
+
+@compiled
+def stride_of(across: int) -> int:
+    """Return how far one tracker lies from the next in a row of the team."""
+    return WIDTH if across else 1
+
+
+@compiled
+def row_length(n: int, across: int) -> int:
+    """Return how far one row of a team of n lies from the next.
+
+    The last block of a row may run over the end of what it holds; what is read from there is of
+    nobody, and must not count.
+    """
+    return natural(2 * n * stride_of(across) + WIDTH)
+
+
+@compiled
+def team_columns(tracker: Records, e: int, i: int, across: int, offset: int) -> tuple[Lanes, ...]:
+    """Return :func:`posse.rules.discs.columns` of eight trackers of (E, N), from world e's i."""
+    if across:
+        return transpose(
+            load_fields(tracker[e, i], offset),
+            load_fields(tracker[e + 1, i], offset),
+            load_fields(tracker[e + 2, i], offset),
+            load_fields(tracker[e + 3, i], offset),
+            load_fields(tracker[e + 4, i], offset),
+            load_fields(tracker[e + 5, i], offset),
+            load_fields(tracker[e + 6, i], offset),
+            load_fields(tracker[e + 7, i], offset),
+        )
+    return columns(tracker[e], i, tracker.shape[1], offset)
+
+
+@compiled
+def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
+    """Write the rows of the team of world e, or of eight worlds.
+
+    They hold x, y, heading (cosine, sine), speed and turn rate.
+    """
+    n = natural(tracker.shape[1])
+    stride, row = stride_of(across), row_length(n, across)
+    each = WIDTH // stride
+    # From the last block on: what fills it is overwritten by the others' second place.
+    for block in range((n + each - 1) // each - 1, -1, -1):
+        i = natural(each * block)
+        x, y, cosine, sine, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
+        for at in (TEAM + stride * i, TEAM + natural(stride * (i + n))):
+            store(s, at, x)
+            store(s, at + row, y)
+            store(s, at + 2 * row, cosine)
+            store(s, at + 3 * row, sine)
+            store(s, at + 4 * row, speed)
+            store(s, at + 5 * row, turn_rate)
+
+
+@compiled
+def own_numbers(i: int, across: int, s: FloatArray) -> Lanes:
+    """Return the numbers of the observers, of which the first is i."""
+    return eight(np.float32(i)) if across else load(s, INDEX + i)
+
+
+@compiled
+def round_again(n: int, number: Lanes) -> Lanes:
+    """Return numbers that were counted on past the last of a team of n as they are in it."""
+    return choose(number >= np.float32(n), number - np.float32(n), number)
+
+
+@compiled
+def number_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
+    """Return the numbers of the team-mates m + 1 places behind their observers."""
+    return round_again(n, own_numbers(i, across, s) + np.float32(m + 1))
+
+
+@compiled
+def way_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+    """Return how far the team-mates m + 1 places behind are away, in x and in y, m."""
+    stride, row = stride_of(across), row_length(n, across)
+    own = TEAM + natural(stride * i)
+    at = own + natural(stride * (m + 1))
+    return load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+
+
+@compiled
+def seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+    """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
+    row = row_length(n, across)
+    own = TEAM + natural(stride_of(across) * i)
+    dx, dy = way_behind(n, i, m, across, s)
+    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+    return dx * hc + dy * hs, dy * hc - dx * hs
+
+
+@compiled
+def write_rows(
+    rows: tuple[Lanes, ...],
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write eight numbers to each of ``count`` observations, from k on."""
+    a, b, c, d, f, g, h, j = rows
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    _write_row(a, 0, e, i, count, across, observations, k)
+    _write_row(b, 1, e, i, count, across, observations, k)
+    _write_row(c, 2, e, i, count, across, observations, k)
+    _write_row(d, 3, e, i, count, across, observations, k)
+    _write_row(f, 4, e, i, count, across, observations, k)
+    _write_row(g, 5, e, i, count, across, observations, k)
+    _write_row(h, 6, e, i, count, across, observations, k)
+    _write_row(j, 7, e, i, count, across, observations, k)
+
+
+@compiled
+def _write_row(
+    row: Lanes,
+    lane: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write eight numbers to one of ``count`` observations, if there are so many."""
+    if lane < count:
+        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+        store(o, k, row)

@@ -1,0 +1,192 @@
+"""What trackers observe of themselves, their target and their team: eight at once, a lane each.
+
+The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or the
+team is large, the trackers of one (0).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import (
+    WIDTH,
+    FloatArray,
+    Record,
+    Records,
+    choose,
+    compiled,
+    eight,
+    greater,
+    load,
+    root,
+    store,
+    transpose,
+)
+from posse.rules.discs import INDEX, MOST_IN_TEAM, OWN, TASK, natural, within_one
+from posse.rules.state import FIX, NEVER, POSE
+from posse.signals.mates import observe_mates
+from posse.signals.team import lay_out_team, team_columns, write_rows
+
+TOGETHER: Final = WIDTH
+"""Worlds that are observed together."""
+
+# Where in an observation its parts begin: own motion at 0, then the task, the target, the sonar,
+# and team-mates.
+TASK_AT: Final = 8
+TARGET_AT: Final = TASK_AT + 18
+SONAR_AT: Final = TARGET_AT + 12
+
+# Scratch memory, of the eight observers: which step it is, when the fix was, whether it sees the
+# target, touches anything, and works.
+_STEP: Final = OWN
+_FIXED_AT: Final = OWN + 1 * WIDTH
+_SEES: Final = OWN + 2 * WIDTH
+_TOUCHING: Final = OWN + 3 * WIDTH
+_WORKING: Final = OWN + 4 * WIDTH
+
+_NUMBER_AT: Final = np.float32(3)  # in the task's part: which tracker it is
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_MINUS_ONE: Final = np.float32(-1.0)
+_TINY: Final = np.float32(1e-9)
+
+
+@compiled
+def lay_out_task(c: Record, s: FloatArray) -> None:
+    """Write what every tracker of every world is told of its task to a row of scratch memory."""
+    for k in range(2 * WIDTH):
+        s[TASK + k] = _ZERO
+    s[TASK + c.formation] = _ONE
+    s[TASK + 4] = np.float32(c.num_trackers)
+    s[TASK + 5] = c.formation_distance
+    s[TASK + 6] = c.formation_spacing
+    s[TASK + 7] = c.tracker_speed
+    s[TASK + 8] = c.tracker_turn_rate
+    s[TASK + 9] = c.acceleration_time
+    s[TASK + 10] = c.turn_acceleration_time
+    s[TASK + 11] = c.tolerance
+    s[TASK + 12] = c.radius
+    s[TASK + 13] = c.dt
+    s[TASK + 14] = c.told_sensing_range
+    s[TASK + 15] = c.sonar_range
+
+
+@compiled
+def write_task(number: int, s: FloatArray, o: FloatArray) -> None:
+    """Write what a tracker is told of its task, but for the last two."""
+    store(o, TASK_AT, choose(load(s, INDEX) == _NUMBER_AT, np.float32(number), load(s, TASK)))
+    store(o, TASK_AT + WIDTH, load(s, TASK + WIDTH))
+
+
+@compiled
+def observe_own_and_target(
+    c: Record,
+    world: Records,
+    tracker: Records,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what observers know of themselves and of their target.
+
+    They are ``count`` trackers, the first of them i of world e.
+    """
+    for lane in range(count):
+        to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+        t, o = tracker[to, who], observations[to, who]
+        s[_STEP + lane] = np.float32(world[to].step)
+        s[_FIXED_AT + lane], s[_SEES + lane] = np.float32(t.fix_step), np.float32(t.sees)
+        s[_TOUCHING + lane] = np.float32(t.touching)
+        s[_WORKING + lane] = np.float32(t.broken_at == NEVER)
+        write_task(who, s, o)
+    own_x, own_y, hc, hs, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
+    own = transpose(
+        within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
+        load(s, _TOUCHING), load(s, _WORKING),
+    )  # fmt: skip
+    write_rows(own, e, i, count, across, observations, 0)
+    x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = team_columns(tracker, e, i, across, FIX)
+    dx, dy = x - own_x, y - own_y
+    distance = root(dx * dx + dy * dy)
+    per_metre = _ONE / greater(distance, _TINY)
+    ux, uy = dx * per_metre, dy * per_metre
+    fixed_at = load(s, _FIXED_AT)
+    known = fixed_at >= _ZERO
+    age = choose(known, (load(s, _STEP) - fixed_at) * c.dt, _MINUS_ONE)
+    ahead = choose(distance > _ZERO, within_one(ux * hc + uy * hs), _ONE)
+    ahead = choose(known, ahead, _ZERO)
+    left = choose(known, within_one(uy * hc - ux * hs), _ZERO)
+    heading_cos = choose(known, within_one(heading_x * hc + heading_y * hs), _ZERO)
+    heading_sin = choose(known, within_one(heading_y * hc - heading_x * hs), _ZERO)
+    frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
+    frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
+    # The end of the task and the first of the target; then its last, eight at once.
+    time_left = (np.float32(c.horizon) - load(s, _STEP)) * c.dt
+    fields = transpose(
+        eight(c.told_arena), time_left, choose(known, _ONE, _ZERO), load(s, _SEES), age,
+        choose(known, distance, _MINUS_ONE), ahead, left,
+    )  # fmt: skip
+    write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
+    fields = transpose(
+        ahead, left, heading_cos, heading_sin, frame_cos, frame_sin,
+        choose(known, vx * hc + vy * hs, _ZERO), choose(known, vy * hc - vx * hs, _ZERO),
+    )  # fmt: skip
+    write_rows(fields, e, i, count, across, observations, TARGET_AT + 4)
+
+
+@compiled
+def _observe_some(
+    c: Record,
+    world: Records,
+    tracker: Records,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what ``count`` trackers, the first of them i of world e, observe together."""
+    observe_own_and_target(c, world, tracker, e, i, count, across, s, observations)
+    if observes_mates(c):
+        k = SONAR_AT + natural(c.sonar_beams)
+        observe_mates(c, tracker, e, i, count, across, message, s, observations, k)
+
+
+@compiled
+def observes_mates(c: Record) -> bool:
+    """Say whether trackers observe where team-mates are now, not what they last heard of them."""
+    return bool(c.perfect_radio != 0 and c.neighbours > 0)
+
+
+@compiled
+def observe_together(
+    c: Record,
+    world: Records,
+    tracker: Records,
+    e: int,
+    worlds: int,
+    message: FloatArray,
+    s: FloatArray,
+    observations: FloatArray,
+) -> None:
+    """Write what trackers of ``worlds`` worlds, at most eight, from e on, observe together."""
+    n = natural(c.num_trackers)
+    if worlds == TOGETHER and n <= MOST_IN_TEAM:
+        if observes_mates(c):
+            lay_out_team(tracker, e, 1, s)
+        for i in range(n):
+            _observe_some(c, world, tracker, e, i, WIDTH, 1, message, s, observations)
+        return
+    for each in range(e, e + worlds):
+        if observes_mates(c):
+            lay_out_team(tracker, each, 0, s)
+        for i in range(0, n, WIDTH):
+            count = min(WIDTH, n - i)
+            _observe_some(c, world, tracker, each, i, count, 0, message, s, observations)

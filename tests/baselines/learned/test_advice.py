@@ -1,0 +1,105 @@
+"""Learned policies that listen to a scripted one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import posse
+from posse_baselines import Policy, PolicyError, load
+from posse_baselines.learned.advice import Advice, advised, check_adviser
+from posse_baselines.learned.encoding import Encoding
+from posse_baselines.learned.network import LearnedPolicy, Network
+from posse_baselines.policy import play
+
+DDCS = "ddcs-distributed"
+SAID = load(DDCS).message_size
+
+
+def listener(layout: posse.ObservationLayout, answer: tuple[float, float]) -> LearnedPolicy:
+    """Return a policy whose network gives one answer, whatever it is told."""
+    encoding = Encoding.of(layout, "slots")
+    size = encoding.size + 2
+    network = Network(
+        mean=np.zeros(size, np.float32),
+        scale=np.ones(size, np.float32),
+        limit=10.0,
+        weights=(np.zeros((2, size), np.float32),),
+        biases=(np.array(answer, np.float32),),
+        activation="tanh",
+        output="clip",
+    )
+    return LearnedPolicy(network, encoding, {"name": "mine"}, check_adviser(DDCS, load(DDCS)))
+
+
+def worlds(count: int = 6, first: int = 0) -> posse.Batch:
+    return posse.batch("field", count, message_size=SAID, first_world=first, horizon=80)
+
+
+def test_an_answer_of_zero_is_the_adviser_itself() -> None:
+    mine = play(worlds(), listener(worlds().layout, (0.0, 0.0)), seed=3)
+    ddcs = play(worlds(), load(DDCS), seed=3)
+    for name, values in ddcs.items():
+        np.testing.assert_array_equal(mine[name], values, err_msg=name)
+
+
+def test_an_answer_reaches_from_one_end_to_the_other_and_leaves_the_message() -> None:
+    proposals = np.array([[-1.0, 1.0, 0.3], [0.5, -0.25, -1.0]], np.float32)
+    answers = np.array([[1.0, -1.0], [0.125, 0.125]], np.float32)
+    expected = [[1.0, -1.0, 0.3], [0.75, 0.0, -1.0]]
+    np.testing.assert_array_equal(advised(proposals, answers), np.array(expected, np.float32))
+    np.testing.assert_array_equal(proposals[0], np.array([-1.0, 1.0, 0.3], np.float32))
+
+
+def test_a_file_keeps_the_adviser(tmp_path: Path) -> None:
+    policy = listener(worlds().layout, (0.1, -0.2))
+    policy.save(tmp_path / "mine.safetensors")
+    again = LearnedPolicy.from_file(tmp_path / "mine.safetensors")
+    assert again.adviser is not None
+    assert again.adviser.name == DDCS
+    assert again.message_size == SAID
+    first, second = play(worlds(), policy, seed=1), play(worlds(), again, seed=1)
+    np.testing.assert_array_equal(first["score"], second["score"])
+
+
+def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was() -> None:
+    rng = np.random.default_rng(0)
+    batch, alone = worlds(4), worlds(1, first=2)
+    policy = check_adviser(DDCS, load(DDCS))
+    advice, other = Advice(policy, batch), Advice(policy, alone)
+    advice.restart(batch.reset(seed=5), np.ones(4, np.bool_))
+    other.restart(alone.reset(seed=5), np.ones(1, np.bool_))
+    for step in range(40):
+        np.testing.assert_array_equal(advice.proposals[2], other.proposals[0])
+        answers = rng.uniform(-0.2, 0.2, (4, 5, 2)).astype(np.float32)
+        actions = advised(advice.proposals, answers)
+        alone_actions = advised(other.proposals, answers[2:3])
+        advice.follow(batch.step(actions)[0])
+        other.follow(alone.step(alone_actions)[0])
+        if step % 3 == 0:
+            mask = np.array([True, step % 2 == 0, False, False])
+            advice.restart(batch.reset(options={"reset_mask": mask}), mask)
+
+
+def test_who_cannot_advise() -> None:
+    with pytest.raises(PolicyError, match="no tracker can know"):
+        check_adviser("oracle", load("oracle"))
+
+    class Mute:
+        name, message_size, reads_state = "mute", 0, False
+        begin = act = restart = annotations = None
+
+    mute: Policy = Mute()  # type: ignore[assignment]
+    with pytest.raises(PolicyError, match="arrays"):
+        check_adviser("mute", mute)
+
+
+def test_a_file_that_listens_to_unknown_code_is_refused(tmp_path: Path) -> None:
+    policy = listener(worlds().layout, (0.0, 0.0))
+    assert policy.adviser is not None
+    policy.adviser.name = "os:system"
+    policy.save(tmp_path / "mine.safetensors")
+    with pytest.raises(PolicyError, match="os:system"):
+        LearnedPolicy.from_file(tmp_path / "mine.safetensors")

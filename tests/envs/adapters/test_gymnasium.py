@@ -1,0 +1,266 @@
+"""`posse/Team-v0` and `posse/Solo-v0`: other people's checkers, and what they do not look at."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, RecordVideo
+from tests.support.adapters import EVERYTHING, SOLO_SCENARIOS, f32, same
+
+import posse
+from posse.adapters.actions import MOTIONS
+from posse.adapters.gymnasium_env import SoloEnv, TeamEnv
+
+TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    *((TEAM, {"scenario": name}) for name in posse.scenario_names()),
+    *((SOLO, {"scenario": name}) for name in SOLO_SCENARIOS),
+    (TEAM, {"scenario": "smart", "discrete_actions": True}),
+    (SOLO, {"scenario": "smart", "discrete_actions": True}),
+    (TEAM, {"scenario": "radio", "message_size": 3}),
+    (TEAM, {"scenario": "constant", "num_trackers": 1}),
+]
+variants = pytest.mark.parametrize(
+    ("name", "settings"), VARIANTS, ids=lambda v: v if isinstance(v, str) else str(v["scenario"])
+)
+
+
+@pytest.fixture(autouse=True)
+def _no_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+
+
+def play(env: gymnasium.Env[Any, Any], steps: int, seed: int = 3) -> list[Any]:
+    env.action_space.seed(seed)
+    returned: list[Any] = []
+    over = False
+    for _ in range(steps):
+        if over:
+            returned.append(env.reset())
+        step = env.step(env.action_space.sample())
+        returned.append(step)
+        over = step[2] or step[3]
+    return returned
+
+
+@variants
+def test_gymnasium_finds_the_environment_sound(name: str, settings: dict[str, Any]) -> None:
+    env = gymnasium.make(name, **settings).unwrapped
+    # Drawing is the same for all: checked once, below.
+    check_env(env, skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", [TEAM, SOLO])
+def test_gymnasium_finds_the_drawing_sound(name: str) -> None:
+    check_env(gymnasium.make(name, scenario="smart").unwrapped)
+
+
+@variants
+def test_stable_baselines3_finds_the_environment_sound(name: str, settings: dict[str, Any]) -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    env = gymnasium.make(name, **settings)
+    # Stable-Baselines3's networks take vectors.
+    checker.check_env(FlattenObservation(env) if name == TEAM else env.unwrapped)
+
+
+@pytest.mark.parametrize("name", [TEAM, SOLO])
+def test_observations_lie_in_their_space_to_the_end(name: str) -> None:
+    for scenario in SOLO_SCENARIOS:
+        env = gymnasium.make(name, scenario=scenario, horizon=60)
+        env.reset(seed=1)
+        for observation, *_ in play(env, 130):
+            assert env.observation_space.contains(observation), scenario
+
+
+@pytest.mark.parametrize("name", [TEAM, SOLO])
+def test_the_same_seed_gives_the_same_episodes(name: str) -> None:
+    settings = {"scenario": "obstacles", "horizon": 30, "settle_time": 1.0}
+    first, second = (gymnasium.make(name, **settings) for _ in range(2))  # type: ignore[arg-type]
+    assert same(first.reset(seed=7), second.reset(seed=7))
+    game = play(first, 80)
+    assert same(game, play(second, 80))
+    assert not same(game, play(second, 80, seed=4))
+
+
+def test_a_team_is_the_first_world_of_a_batch() -> None:
+    env = gymnasium.make(TEAM, scenario="field", split="validation", first_world=5)
+    batch = posse.batch("field", 3, split="validation", first_world=5)
+    observation, _ = env.reset(seed=9)
+    batch_observations = batch.reset(seed=9)
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        assert np.array_equal(observation, batch_observations[0])
+        actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+        observation, reward, _, _, info = env.step(actions[0])
+        batch_observations, rewards, _, _, infos = batch.step(actions)
+        assert reward == pytest.approx(rewards[0].mean(), abs=1e-6)
+        assert info["score"] == infos["score"][0]
+        for term, values in infos["reward_terms"].items():
+            assert np.array_equal(info["reward_terms"][term], values[0])
+
+
+def test_a_solo_is_a_team_of_one() -> None:
+    solo = gymnasium.make(SOLO, scenario="smart")
+    team = gymnasium.make(TEAM, scenario="smart", num_trackers=1)
+    ours, theirs = solo.reset(seed=3)[0], team.reset(seed=3)[0]
+    for k in range(30):
+        assert np.array_equal(ours, theirs[0])
+        action = f32([np.cos(k), np.sin(k)])
+        ours, reward, _, _, info = solo.step(action)
+        theirs, team_reward, _, _, team_info = team.step(action[None])
+        assert reward == team_reward
+        for term, value in info["reward_terms"].items():
+            assert value == team_info["reward_terms"][term][0]
+
+
+def test_reset_goes_on_to_the_next_episode() -> None:
+    env, batch = gymnasium.make(TEAM), posse.batch("constant")
+    assert np.array_equal(env.reset(seed=2)[0], batch.reset(seed=2)[0])
+    assert np.array_equal(env.reset()[0], batch.reset()[0])
+
+
+def test_without_a_seed_environments_differ() -> None:
+    first, second = gymnasium.make(TEAM), gymnasium.make(TEAM)
+    assert not np.array_equal(first.reset()[0], second.reset()[0])
+    assert np.array_equal(gymnasium.make(TEAM, seed=4).reset()[0], second.reset(seed=4)[0])
+
+
+def test_it_starts_from_given_poses() -> None:
+    env = gymnasium.make(SOLO)
+    layout = env.unwrapped.layout  # type: ignore[attr-defined]
+    options = {"tracker_pose": [1.0, 2.0, 0.0], "target_pose": [4.0, 2.0, 0.5]}
+    views = layout.views(env.reset(seed=0, options=options)[0])
+    assert views["position"] == pytest.approx([1, 2])
+    assert views["target_range"] == pytest.approx(3)
+    assert views["target_heading"] == pytest.approx([np.cos(0.5), np.sin(0.5)])
+
+
+def test_the_end_is_told_with_every_metric() -> None:
+    for name in (TEAM, SOLO):
+        env = gymnasium.make(name, horizon=5, settle_time=0.3)
+        env.reset(seed=0)
+        *before, (_, _, terminated, truncated, info) = play(env, 5)
+        assert all("metrics" not in step[-1] for step in before)
+        assert (terminated, truncated) == (False, True)
+        assert list(info["metrics"]) == [metric.name for metric in posse.METRICS]
+        assert info["metrics"]["duration"] == pytest.approx(0.5)
+
+
+def test_contact_terminates_where_it_is_asked_for() -> None:
+    for name, action in ((TEAM, f32([[1, 0]])), (SOLO, f32([1, 0]))):
+        settings: dict[str, Any] = {"num_trackers": 1, "target_speed": 0.0}
+        env = gymnasium.make(name, terminate_on_contact=True, **settings)
+        env.reset(options={"tracker_pose": [[-1.0, 0, 0]], "target_pose": [0.0, 0, 0]})
+        ends = [env.step(action)[2:4] for _ in range(7)]
+        assert ends == [(False, False)] * 6 + [(True, False)]
+
+
+def test_info_says_who_is_broken() -> None:
+    env = gymnasium.make(
+        TEAM, scenario="leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4)
+    )
+    env.reset(seed=0)
+    working = [int(info["working"].sum()) for *_, info in play(env, 10)]
+    assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
+
+
+def test_a_discrete_action_is_one_of_the_motions() -> None:
+    plain, discrete = gymnasium.make(TEAM), gymnasium.make(TEAM, discrete_actions=True)
+    plain.reset(seed=0)
+    discrete.reset(seed=0)
+    for k in range(15):
+        chosen = (np.arange(5) + k) % 15
+        expected = plain.step(MOTIONS[chosen])
+        assert same(discrete.step(chosen), expected)
+    solo, number = gymnasium.make(SOLO, discrete_actions=True), np.int64(7)
+    solo.reset(seed=0)
+    reference = gymnasium.make(SOLO)
+    reference.reset(seed=0)
+    assert same(solo.step(number), reference.step(MOTIONS[7]))
+
+
+@pytest.mark.parametrize("replica", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])  # noqa: S301
+@pytest.mark.parametrize("name", [TEAM, SOLO])
+def test_a_copy_made_in_mid_episode_goes_on_alike(name: str, replica: Any) -> None:
+    settings = dict(EVERYTHING)
+    if name == SOLO:
+        settings.update(breaks=0)
+    env = gymnasium.make(name, **settings).unwrapped
+    env.reset(seed=3)
+    play(env, 5)
+    twin = replica(env)
+    assert same(play(env, 20), play(twin, 20))
+
+
+@pytest.mark.parametrize("name", [TEAM, SOLO])
+def test_what_is_returned_is_never_overwritten(name: str) -> None:
+    env = gymnasium.make(name, horizon=10, settle_time=0.5).unwrapped
+    returned: list[Any] = [env.reset(seed=0)]
+    kept = copy.deepcopy(returned)
+    over = False
+    for _ in range(25):
+        if over:
+            returned.append(env.reset())
+            kept.append(copy.deepcopy(returned[-1]))
+        step = env.step(env.action_space.sample())
+        returned.append(step)
+        kept.append(copy.deepcopy(step))
+        over = step[2] or step[3]
+    assert same(returned, kept)
+
+
+def test_episodes_are_counted_and_filmed(tmp_path: Path) -> None:
+    pytest.importorskip("moviepy")
+    inner = gymnasium.make(TEAM, render_mode="rgb_array", horizon=8, settle_time=0.5)
+    env = RecordEpisodeStatistics(
+        RecordVideo(
+            inner, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True
+        )
+    )
+    env.reset(seed=0)
+    steps = play(env, 8)
+    episode = steps[-1][-1]["episode"]
+    assert episode["l"] == 8
+    assert episode["r"] == pytest.approx(sum(step[1] for step in steps), abs=1e-5)
+    env.close()
+    assert [path.suffix for path in (tmp_path / "films").iterdir()] == [".mp4"]
+
+
+def test_a_picture_is_drawn() -> None:
+    env = gymnasium.make(SOLO, render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    assert isinstance(first, np.ndarray)
+    assert first.dtype == np.uint8
+    assert first.shape[2] == 3
+    for _ in range(10):
+        env.step(f32([1, 0]))
+    last = env.render()
+    assert isinstance(last, np.ndarray)
+    assert not np.array_equal(last, first)
+    env.close()
+
+
+def test_pictures_run_in_real_time() -> None:
+    assert gymnasium.make(TEAM).metadata["render_fps"] == 10
+    assert gymnasium.make(TEAM, control_step=0.05).metadata["render_fps"] == 20
+    assert TeamEnv.metadata["render_fps"] == 10
+
+
+def test_the_ids_can_be_written_down() -> None:
+    for name, cls in ((TEAM, TeamEnv), (SOLO, SoloEnv)):
+        env = gymnasium.make(name, scenario="smart", num_trackers=1)
+        assert type(env.unwrapped) is cls
+        assert env.spec is not None
+        assert json.loads(env.spec.to_json())["kwargs"] == {
+            "scenario": "smart", "num_trackers": 1,
+        }  # fmt: skip
+        assert gymnasium.make(env.spec).reset(seed=0)[0].shape == env.reset(seed=0)[0].shape

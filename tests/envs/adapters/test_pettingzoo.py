@@ -1,0 +1,374 @@
+"""The PettingZoo environments: PettingZoo's own tests, and what they do not look at."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pettingzoo
+import pytest
+from gymnasium.error import ResetNeeded
+from pettingzoo.test import (
+    api_test,
+    max_cycles_test,
+    parallel_api_test,
+    parallel_seed_test,
+    render_test,
+    seed_test,
+    state_test,
+)
+from tests.support.adapters import EVERYTHING, f32, same
+
+import posse
+from posse.adapters.actions import MOTIONS
+from posse.adapters.pettingzoo_env import TeamParallelEnv
+
+VARIANTS: list[dict[str, Any]] = [
+    *({"scenario": name} for name in posse.scenario_names()),
+    {"scenario": "smart", "target": "agent"},
+    {"scenario": "obstacles", "discrete_actions": True},
+    {"scenario": "field", "message_size": 2},
+    {"scenario": "constant", "num_trackers": 1},
+]
+variants = pytest.mark.parametrize(
+    "settings", VARIANTS, ids=lambda s: "-".join(map(str, s.values()))
+)
+
+
+def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
+    """Play with actions drawn from a seed; return everything that came back."""
+    rng = np.random.default_rng(seed)
+    returned: list[Any] = []
+    for _ in range(steps):
+        if not env.agents:
+            returned.append(env.reset())
+        actions = {
+            agent: rng.uniform(-1, 1, env.action_space(agent).shape).astype(np.float32)
+            for agent in env.agents
+        }
+        returned.append(env.step(actions))
+    return returned
+
+
+@variants
+def test_pettingzoo_finds_the_parallel_environment_sound(settings: dict[str, Any]) -> None:
+    parallel_api_test(posse.parallel_env(**settings, horizon=40), num_cycles=100)
+    parallel_seed_test(lambda: posse.parallel_env(**settings, horizon=40))
+
+
+@variants
+def test_pettingzoo_finds_the_environment_in_turns_sound(settings: dict[str, Any]) -> None:
+    api_test(posse.env(**settings, horizon=40), num_cycles=100)
+    seed_test(lambda: posse.env(**settings), num_cycles=20)
+
+
+@variants
+def test_the_state_lies_in_its_space(settings: dict[str, Any]) -> None:
+    short = {"horizon": 40, **settings}
+    state_test(posse.env(**short), posse.parallel_env(**short), num_cycles=50)
+
+
+def test_max_cycles_is_the_length_of_an_episode() -> None:
+    max_cycles_test(posse)
+    assert posse.parallel_env(max_cycles=4).scenario.horizon == 4
+
+
+def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    render_test(posse.env)
+    env = posse.parallel_env(render_mode="human")
+    env.reset(seed=0)
+    assert env.render() is None
+    env.close()
+    env.close()
+
+
+def test_nothing_is_drawn_without_a_mode() -> None:
+    env = posse.parallel_env()
+    env.reset(seed=0)
+    assert env.render() is None
+
+
+def test_agents_come_by_name_and_the_target_last() -> None:
+    env = posse.parallel_env("smart", target="agent", num_trackers=2)
+    assert env.possible_agents == ["tracker_0", "tracker_1", "target_0"]
+    observations, infos = env.reset(seed=0)
+    assert list(observations) == list(infos) == env.agents == env.possible_agents
+
+
+def test_a_target_that_is_an_agent_goes_where_it_wants() -> None:
+    ahead, circling = f32([1, 0]), f32([1, 1])
+    rest = {f"tracker_{i}": f32([-1, 0]) for i in range(5)}
+    places = []
+    for action in (ahead, circling):
+        env = posse.parallel_env("constant", target="agent")
+        env.reset(seed=1)
+        before = env.state_layout.views(env.state())
+        start = np.array([before["target_x"], before["target_y"]])
+        for _ in range(50):
+            _, rewards, *_ = env.step({**rest, "target_0": action})
+        after = env.state_layout.views(env.state())
+        places.append(np.hypot(*(np.array([after["target_x"], after["target_y"]]) - start)))
+        assert rewards["target_0"] == 0.0  # nobody holds a slot
+    assert places[0] == pytest.approx(0.6 * 5, rel=1e-4)
+    # ω = 1 rad/s at 0.6 m/s for 5 s: the chord of a circle of 0.6 m.
+    assert places[1] == pytest.approx(2 * 0.6 * abs(np.sin(2.5)), rel=1e-3)
+
+
+def test_observations_lie_in_their_spaces_to_the_end() -> None:
+    for name in posse.scenario_names():
+        env = posse.parallel_env(name, horizon=60)
+        env.reset(seed=5)
+        for observations, *_ in play(env, 130):
+            for agent, observation in observations.items():
+                assert env.observation_space(agent).contains(observation), (name, agent)
+
+
+def test_the_same_seed_gives_the_same_episodes() -> None:
+    first, second = posse.parallel_env(**EVERYTHING), posse.parallel_env(**EVERYTHING)
+    assert same(first.reset(seed=7), second.reset(seed=7))
+    games = play(first, 40), play(second, 40)
+    assert same(*games)
+    assert not same(play(first, 5), play(second, 5, seed=4))
+    first.reset(seed=8)
+    second.reset(seed=7)
+    assert not np.array_equal(first.state(), second.state())
+
+
+def test_the_same_seed_gives_the_same_episodes_in_another_process() -> None:
+    code = (
+        "import posse, numpy as np\n"
+        "env = posse.parallel_env('field', horizon=20, settle_time=1.0)\n"
+        "env.reset(seed=7)\n"
+        "for k in range(15):\n"
+        "    env.step({a: np.float32([np.sin(k + i), np.cos(k)])\n"
+        "              for i, a in enumerate(env.agents)})\n"
+        "print(env.state().tobytes().hex())\n"
+    )
+    results = {
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+        for _ in range(2)
+    }
+    namespace: dict[str, Any] = {}
+    exec(code.replace("print(env", "result = (env"), namespace)
+    assert results == {namespace["result"] + "\n"}
+
+
+def test_an_environment_is_the_first_world_of_a_batch() -> None:
+    for first_world in (0, 3):
+        env = posse.parallel_env("field", split="test", first_world=first_world)
+        batch = posse.batch("field", 2, seed=11, split="test", first_world=first_world)
+        ours, theirs = env.reset(seed=11)[0], batch.reset()
+        rng = np.random.default_rng(0)
+        for _ in range(30):
+            for i, agent in enumerate(env.agents):
+                assert np.array_equal(ours[agent], theirs[0, i])
+            actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+            ours, rewards, *_, infos = env.step(dict(zip(env.agents, actions[0], strict=True)))
+            theirs, batch_rewards, _, _, batch_infos = batch.step(actions)
+            assert list(rewards.values()) == batch_rewards[0].tolist()
+            for i, agent in enumerate(env.agents):
+                info = infos[agent]
+                assert info["score"] == batch_infos["score"][0]
+                for name, values in batch_infos["reward_terms"].items():
+                    assert info["reward_terms"][name] == values[0, i]
+
+
+def test_reset_goes_on_to_the_next_episode() -> None:
+    env, batch = posse.parallel_env("smart"), posse.batch("smart", 1, seed=2)
+    env.reset(seed=2)
+    batch.reset()
+    again, _ = env.reset()
+    assert np.array_equal(np.stack(list(again.values())), batch.reset()[0])
+
+
+def test_without_a_seed_environments_differ() -> None:
+    first, second = posse.parallel_env(), posse.parallel_env()
+    first.reset()
+    second.reset()
+    assert not np.array_equal(first.state(), second.state())
+    one, other = posse.parallel_env(seed=4), posse.parallel_env()
+    one.reset()
+    other.reset(seed=4)
+    assert np.array_equal(one.state(), other.state())
+
+
+def test_it_starts_from_given_poses() -> None:
+    env = posse.parallel_env("constant", num_trackers=2)
+    poses = [[1.0, 2.0, 0.5], [-3.0, 0.0, -1.0]]
+    observations, _ = env.reset(
+        seed=0, options={"tracker_pose": poses, "target_pose": [0.0, -1.0, 2.0]}
+    )
+    for agent, (x, y, heading) in zip(env.agents, poses, strict=True):
+        views = env.layout.views(observations[agent])
+        assert views["position"] == pytest.approx([x, y])
+        assert views["heading"] == pytest.approx([np.cos(heading), np.sin(heading)])
+    state = env.state_layout.views(env.state())
+    assert (state["target_x"], state["target_y"]) == pytest.approx((0.0, -1.0))
+
+
+def test_the_end_is_told_once_with_every_metric() -> None:
+    env = posse.parallel_env(horizon=6, settle_time=0.3)
+    env.reset(seed=0)
+    *before, last = play(env, 6)
+    for _, _, terminations, truncations, infos in before:
+        assert not any(terminations.values())
+        assert not any(truncations.values())
+        assert all("metrics" not in info for info in infos.values())
+    _, _, terminations, truncations, infos = last
+    assert not any(terminations.values())
+    assert all(truncations.values())
+    assert env.agents == []
+    for info in infos.values():
+        assert list(info["metrics"]) == [metric.name for metric in posse.METRICS]
+        scores = [step[-1]["tracker_0"]["score"] for step in (*before, last)]
+        assert info["metrics"]["score"] == pytest.approx(np.mean(scores))
+
+
+def test_contact_terminates_where_it_is_asked_for() -> None:
+    env = posse.parallel_env(
+        "constant", num_trackers=1, terminate_on_contact=True, target_speed=0.0
+    )
+    env.reset(options={"tracker_pose": [[-1.0, 0, 0]], "target_pose": [0.0, 0, 0]})
+    for _ in range(20):
+        *_, terminations, truncations, infos = env.step({"tracker_0": f32([1, 0])})
+        if not env.agents:
+            break
+    assert terminations == {"tracker_0": True}
+    assert truncations == {"tracker_0": False}
+    assert infos["tracker_0"]["metrics"]["target_contacts"] == 1
+
+
+def test_info_says_who_is_broken() -> None:
+    env = posse.parallel_env("leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4))
+    env.reset(seed=0)
+    working = [sum(info["working"] for info in infos.values()) for *_, infos in play(env, 10)]
+    assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
+
+
+def test_a_discrete_action_is_one_of_the_motions() -> None:
+    plain = posse.parallel_env("smart")
+    discrete = posse.parallel_env("smart", discrete_actions=True)
+    plain.reset(seed=0)
+    discrete.reset(seed=0)
+    assert discrete.action_space("tracker_0").n == len(MOTIONS) == 15  # type: ignore[attr-defined]
+    for k in range(15):
+        chosen = {agent: (k + i) % 15 for i, agent in enumerate(plain.agents)}
+        plain.step({agent: MOTIONS[number] for agent, number in chosen.items()})
+        discrete.step(chosen)
+        assert np.array_equal(plain.state(), discrete.state())
+    for number, motion in enumerate(MOTIONS):
+        assert tuple(motion) == (number // 5 - 1, (number % 5 - 2) / 2)
+
+
+def test_what_is_returned_is_never_overwritten() -> None:
+    env = posse.parallel_env(**EVERYTHING)
+    returned = [env.reset(seed=0)]
+    kept = copy.deepcopy(returned)
+    for _ in range(30):
+        step = play(env, 1)
+        returned.append(step)  # type: ignore[arg-type]
+        kept.append(copy.deepcopy(step))  # type: ignore[arg-type]
+    assert same(returned, kept)
+    state = env.state()
+    before = state.copy()
+    play(env, 1)
+    assert np.array_equal(state, before)
+
+
+@pytest.mark.parametrize("replica", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])  # noqa: S301
+def test_a_copy_made_in_mid_episode_goes_on_alike(replica: Any) -> None:
+    env = posse.parallel_env(**EVERYTHING)
+    env.reset(seed=3)
+    play(env, 5)
+    env.state()
+    twin = replica(env)
+    assert same(play(env, 20), play(twin, 20))
+    turns = posse.env(**EVERYTHING)
+    turns.reset(seed=3)
+    turns.step(np.zeros(2, np.float32))
+    twin_turns = replica(turns)
+    for each in (turns, twin_turns):
+        each.step(np.ones(2, np.float32))
+    assert turns.agent_selection == twin_turns.agent_selection == "tracker_2"
+
+
+def test_the_state_holds_what_decides_how_a_world_goes_on() -> None:
+    env = posse.parallel_env("field", message_size=1)
+    env.reset(seed=0)
+    play(env, 30)
+    views = env.state_layout.views(env.state())
+    arrays = env._world.batch.arrays
+    for name in ("x", "y", "heading_cos", "speed", "turn_rate", "fix_x"):
+        assert np.array_equal(views[f"tracker_{name}"], arrays.tracker[name][0])
+    assert np.array_equal(views["obstacle_radius"], arrays.obstacle["radius"][0])
+    assert views["target_frame_cos"] == arrays.world["frame_cos"][0]
+    assert views["time"] == pytest.approx(3.0)
+    assert (views["tracker_breaks_at"] >= 0).sum() == 1
+    # Two steps of delay: what was sent now, one and two steps ago, the newest first.
+    assert np.array_equal(views["sent_x"][0], arrays.tracker["x"][0])
+    now = views["sent_x"][0].copy(), views["message"][0].copy()
+    play(env, 1)
+    views = env.state_layout.views(env.state())
+    assert np.array_equal(views["sent_x"][1], now[0])
+    assert np.array_equal(views["message"][1], now[1])
+
+
+def test_the_state_has_no_memory_of_an_earlier_episode() -> None:
+    fresh, used = posse.parallel_env("field"), posse.parallel_env("field")
+    used.reset(seed=1)
+    play(used, 50)
+    fresh.reset(seed=2)
+    used.reset(seed=2)
+    assert np.array_equal(fresh.state(), used.state())
+
+
+def test_the_registry_makes_both_kinds() -> None:
+    parallel = pettingzoo.make("parallel", "posse/track-v0", scenario="smart", num_trackers=3)
+    assert isinstance(parallel, TeamParallelEnv)
+    assert len(parallel.possible_agents) == 3
+    assert isinstance(pettingzoo.make("aec", "posse/track-v0", max_cycles=5), pettingzoo.AECEnv)
+
+
+def test_turns_move_the_world_when_all_have_acted() -> None:
+    parallel, turns = posse.parallel_env("smart"), posse.env("smart")
+    parallel.reset(seed=0)
+    turns.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        before = turns.state()
+        actions = {a: rng.uniform(-1, 1, 2).astype(np.float32) for a in parallel.agents}
+        for agent in parallel.agents:
+            assert np.array_equal(turns.state(), before)
+            assert turns.agent_selection == agent
+            turns.step(actions[agent])
+        parallel.step(actions)
+        assert np.array_equal(turns.state(), parallel.state())
+
+
+def test_turns_need_a_reset() -> None:
+    env = posse.env(max_cycles=1)
+    with pytest.raises(ResetNeeded, match="before reset"):
+        env.step(np.zeros(2, np.float32))
+    env.reset()
+    for agent in env.agent_iter():
+        env.step(None if env.truncations[agent] else np.zeros(2, np.float32))
+    with pytest.raises(ResetNeeded, match="after the end"):
+        env.step(np.zeros(2, np.float32))
+
+
+def test_turns_refuse_a_bad_action_in_its_own_turn() -> None:
+    env = posse.env()
+    env.reset(seed=0)
+    env.step(np.zeros(2, np.float32))
+    with pytest.raises(ValueError, match=r"tracker_1: speed = 2\.0"):
+        env.step(f32([2, 0]))
+    assert env.agent_selection == "tracker_1"
+    env.step(f32([1, 0]))
+    assert env.agent_selection == "tracker_2"

@@ -1,0 +1,224 @@
+"""The vector environments agree with Gymnasium's own over single ones, infos included."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
+from tests.support.adapters import same
+
+import posse
+from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
+
+TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
+# Terminations (on contact) and truncations, at different times in different worlds, and breaks.
+BUSY: dict[str, Any] = {
+    "scenario": "constant", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True,
+    "arena": 10.0, "num_obstacles": 2, "obstacle_gap": 0.6, "start_distance": (1.0, 4.0),
+    "obstacle_radius": (0.4, 0.6),
+}  # fmt: skip
+MODES = list(AutoresetMode)
+modes = pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
+names = pytest.mark.parametrize("name", [TEAM, SOLO])
+E = 4
+
+
+def vector(name: str = TEAM, **settings: Any) -> TeamVectorEnv:
+    env = gymnasium.make_vec(
+        name, settings.pop("num_envs", E), vectorization_mode="vector_entry_point", **settings
+    )
+    assert isinstance(env, TeamVectorEnv)
+    return env
+
+
+def reset_where_it_ended(
+    env: VectorEnv[Any, Any, Any], mode: AutoresetMode, ended: Any
+) -> tuple[Any, Any] | None:
+    if mode is not AutoresetMode.DISABLED or not ended.any():
+        return None
+    return env.reset(options={"reset_mask": ended})
+
+
+@modes
+@names
+@pytest.mark.parametrize("discrete", [False, True])
+def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete: bool) -> None:
+    settings = {**BUSY, "discrete_actions": discrete}
+    if name == TEAM:
+        settings.update(breaks=1, break_window=(0.2, 0.4))
+    else:  # one alone runs into something only if it is fast
+        settings.update(tracker_speed=3.0)
+    ours = vector(name, autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv(
+        [
+            lambda i=i: gymnasium.make(name, first_world=i, **settings)  # type: ignore[misc]
+            for i in range(E)
+        ],
+        autoreset_mode=mode,
+    )
+    assert ours.single_observation_space == theirs.single_observation_space
+    assert ours.single_action_space == theirs.single_action_space
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    assert same(ours.reset(seed=6), theirs.reset(seed=[6] * E))
+    ours.action_space.seed(0)
+    terminations = truncations = 0
+    for _ in range(80):
+        actions = ours.action_space.sample()
+        mine: Any = ours.step(actions)
+        other: Any = theirs.step(actions)
+        for a, b in zip(mine[:4], other[:4], strict=True):
+            assert a.dtype == b.dtype
+            assert np.allclose(a, b, rtol=1e-12, atol=0)
+        assert same(mine[4], other[4])
+        terminations += mine[2].sum()
+        truncations += mine[3].sum()
+        ended = mine[2] | mine[3]
+        assert same(
+            reset_where_it_ended(ours, mode, ended),
+            reset_where_it_ended(theirs, mode, ended.copy()),
+        )
+    assert terminations > 0
+    assert truncations > 0
+
+
+@modes
+def test_it_agrees_where_all_episodes_end_at_once(mode: AutoresetMode) -> None:
+    settings: dict[str, Any] = {"horizon": 3, "settle_time": 0.1}
+    ours = vector(autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv(
+        [lambda i=i: gymnasium.make(TEAM, first_world=i, **settings) for i in range(E)],  # type: ignore[misc]
+        autoreset_mode=mode,
+    )
+    ours.reset(seed=6)
+    theirs.reset(seed=[6] * E)
+    for _ in range(3):
+        actions = ours.action_space.sample()
+        *_, truncated, infos = ours.step(actions)
+        assert same(infos, theirs.step(actions)[4])
+    assert truncated.all()
+
+
+@modes
+def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
+    for chosen in (mode, mode.value):
+        env = vector(autoreset_mode=chosen)
+        assert env.autoreset_mode is mode
+        assert env.metadata["autoreset_mode"] is mode
+    assert TeamVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+
+
+@modes
+def test_what_is_returned_is_never_overwritten(mode: AutoresetMode) -> None:
+    # Large enough for the memory of arrays that nobody holds to be used again.
+    env = vector(autoreset_mode=mode, num_envs=80, horizon=6, settle_time=0.3)
+    returned: list[Any] = [env.reset(seed=0)]
+    kept = copy.deepcopy(returned)
+    for _ in range(15):
+        step = env.step(env.action_space.sample())
+        returned.append(step)
+        kept.append(copy.deepcopy(step))
+        again = reset_where_it_ended(env, mode, step[2] | step[3])
+        returned.append(again)
+        kept.append(copy.deepcopy(again))
+    assert same(returned, kept)
+
+
+def test_a_mask_resets_only_its_worlds_and_is_left_alone() -> None:
+    env = vector(autoreset_mode=AutoresetMode.DISABLED)
+    env.reset(seed=0)
+    before, *_ = env.step(env.action_space.sample())
+    mask = np.array([False, True, False, True])
+    options = {"reset_mask": mask}
+    after, _ = env.reset(options=options)
+    assert options["reset_mask"] is mask
+    assert mask.tolist() == [False, True, False, True]
+    unchanged = [np.array_equal(a, b) for a, b in zip(before, after, strict=True)]
+    assert unchanged == [True, False, True, False]
+
+
+def test_the_same_seed_gives_the_same_worlds_whatever_their_number() -> None:
+    few, many = vector(num_envs=2), vector(num_envs=6, num_threads=2)
+    ours, theirs = few.reset(seed=1)[0], many.reset(seed=1)[0]
+    many.action_space.seed(0)
+    for _ in range(20):
+        assert np.array_equal(ours, theirs[:2])
+        actions = many.action_space.sample()
+        ours, theirs = few.step(actions[:2])[0], many.step(actions)[0]
+    assert not np.array_equal(theirs[0], theirs[1])
+
+
+def test_a_kernel_of_its_own_changes_nothing() -> None:
+    general, own = (vector(own_kernel=own_kernel, **BUSY) for own_kernel in (False, True))
+    assert own.batch.own_kernel
+    assert not general.batch.own_kernel
+    assert same(general.reset(seed=7), own.reset(seed=7))
+    own.action_space.seed(0)
+    for _ in range(60):
+        actions = own.action_space.sample()
+        assert same(general.step(actions)[:4], own.step(actions)[:4])
+
+
+def test_without_a_seed_environments_differ() -> None:
+    first, second = vector(), vector()
+    assert not np.array_equal(first.reset()[0], second.reset()[0])
+    assert np.array_equal(vector(seed=4).reset()[0], second.reset(seed=4)[0])
+
+
+@modes
+def test_a_copy_made_in_mid_episode_goes_on_alike(mode: AutoresetMode) -> None:
+    env = vector(autoreset_mode=mode, horizon=8, settle_time=0.5)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    twin = pickle.loads(pickle.dumps(env))  # noqa: S301
+    for _ in range(7):
+        actions = env.action_space.sample()
+        assert same(env.step(actions), twin.step(actions))
+
+
+def test_max_episode_steps_is_the_length_of_an_episode() -> None:
+    env = vector(max_episode_steps=3)
+    env.reset(seed=0)
+    truncated = [env.step(env.action_space.sample())[3].all() for _ in range(3)]
+    assert truncated == [False, False, True]
+
+
+@names
+def test_gymnasiums_wrappers_take_it(name: str) -> None:
+    env = NormalizeObservation(RecordEpisodeStatistics(vector(name, horizon=5, settle_time=0.3)))
+    observations, _ = env.reset(seed=0)
+    total = np.zeros(E)
+    for _ in range(5):
+        observations, rewards, _, _, infos = env.step(env.action_space.sample())
+        total += rewards
+    assert observations.shape == env.observation_space.shape
+    assert np.isfinite(observations).all()
+    assert infos["episode"]["l"].tolist() == [5] * E
+    assert infos["episode"]["r"] == pytest.approx(total)
+
+
+def test_every_world_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = vector(num_envs=2, render_mode="rgb_array")
+    env.reset(seed=0)
+    frames = env.render()
+    assert frames is not None
+    first, second = frames
+    assert first.shape == second.shape
+    assert not np.array_equal(first, second)
+    assert vector().render() is None
+    env.close()
+    env.close()
+
+
+def test_many_worlds_by_default_are_the_engines() -> None:
+    assert type(gymnasium.make_vec(TEAM, 3)) is TeamVectorEnv
+    assert type(gymnasium.make_vec(SOLO, 3)) is SoloVectorEnv
+    assert gymnasium.make_vec(TEAM, 3).num_envs == 3
+    assert posse.scenario_names()

@@ -1,0 +1,416 @@
+"""The batch: determinism, replays, resets, saving, and that nothing returned ever changes."""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from gymnasium.error import ResetNeeded
+from tests.support.reference import snapshot
+
+import posse
+
+NAMES = ["constant", "smart", "obstacles", "field", "leader-loss"]
+
+
+def actions_for(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
+    """Return actions that depend on the world's index and the step alone."""
+    e = batch.first_world + np.arange(batch.num_worlds)[:, None, None]
+    i = np.arange(batch.action_shape[1])[:, None]
+    k = np.arange(batch.action_shape[2])
+    angles = 1.7 * e + 2.3 * i + 3.1 * k + 0.21 * step * (1 + i)
+    return np.asarray(np.sin(angles), np.float32)
+
+
+def play(batch: posse.Batch, steps: int) -> list[npt.NDArray[Any]]:
+    """Return all that a batch gives out over a number of steps."""
+    out: list[npt.NDArray[Any]] = [batch.reset()]
+    for step in range(steps):
+        observations, rewards, terminated, truncated, infos = batch.step(actions_for(batch, step))
+        out += [observations, rewards, terminated, truncated, infos["score"]]
+    return out
+
+
+def assert_equal(one: list[npt.NDArray[Any]], other: list[npt.NDArray[Any]]) -> None:
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_world_is_the_same_in_every_batch(name: str, autoreset: str) -> None:
+    make: dict[str, Any] = {"seed": 3, "autoreset": autoreset, "horizon": 60, "num_trackers": 4}
+    whole = play(posse.batch(name, 33, **make), 140)
+    for first, count in ((0, 1), (17, 1), (5, 20)):
+        part = play(posse.batch(name, count, first_world=first, **make), 140)
+        assert_equal(part, [array[first : first + count] for array in whole])
+
+
+def test_the_number_of_threads_changes_nothing() -> None:
+    whole = play(posse.batch("field", 700, seed=3, num_threads=1), 40)
+    for threads in (2, 3, 7):
+        assert_equal(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [("smart", {}), ("field", {}), ("smart", {"num_trackers": 11, "num_neighbours": 3})],
+)
+def test_a_kernel_of_its_own_changes_nothing(name: str, more: dict[str, Any]) -> None:
+    make: dict[str, Any] = {"seed": 3, "horizon": 60, "num_threads": 1, **more}
+    whole = play(posse.batch(name, 40, **make), 140)
+    batch = posse.batch(name, 40, **make, own_kernel=True)
+    assert_equal(play(batch, 140), whole)
+    again = pickle.loads(pickle.dumps(batch))  # noqa: S301
+    assert again.own_kernel
+    for step in range(3):
+        actions = actions_for(batch, step)
+        assert_equal([again.step(actions)[0]], [batch.step(actions)[0]])
+
+
+def test_two_batches_in_two_python_threads_do_not_disturb_each_other() -> None:
+    expected = [play(posse.batch("field", 500, seed=seed), 25) for seed in (1, 2)]
+    got: dict[int, list[npt.NDArray[Any]]] = {}
+    threads = [
+        threading.Thread(
+            target=lambda s=seed: got.update({s: play(posse.batch("field", 500, seed=s), 25)})
+        )
+        for seed in (1, 2)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert_equal(got[1], expected[0])
+    assert_equal(got[2], expected[1])
+
+
+def test_seed_split_and_episode_each_make_other_worlds() -> None:
+    starts = [
+        posse.batch("constant", 50, seed=seed, split=split).reset()
+        for seed in (0, 1)
+        for split in ("train", "validation", "test")
+    ]
+    again = posse.batch("constant", 50, seed=0)
+    again.reset()
+    starts.append(again.reset())
+    places = np.concatenate([start[:, 0, :10] for start in starts])
+    assert len(np.unique(places, axis=0)) == len(places), "no world comes twice"
+
+
+def test_a_seed_given_to_reset_is_the_seed_of_the_batch() -> None:
+    given = posse.batch("field", 3, seed=9)
+    later = posse.batch("field", 3, seed=0)
+    later.reset()
+    later.step(actions_for(later, 0))
+    np.testing.assert_array_equal(later.reset(seed=9), given.reset())
+    np.testing.assert_array_equal(later.reset(), given.reset(), "and the next episode, too")
+
+
+def test_a_stepper_makes_the_batch_s_own_steps_and_takes_nothing_but_its_arrays() -> None:
+    batch, stepped = (posse.batch("field", 3, seed=5) for _ in range(2))
+    batch.reset()
+    stepped.reset()
+    rows = batch.observation_shape[:2]
+    shapes = batch.action_shape, batch.observation_shape, rows, (*rows, len(posse.REWARD_TERMS))
+    arrays = [np.zeros(shape, np.float32) for shape in shapes]
+    step = stepped.stepper(*arrays)
+    for k in range(20):
+        arrays[0][:] = actions_for(batch, k)
+        assert step() == 0
+        observations, rewards, _, _, infos = batch.step(arrays[0])
+        np.testing.assert_array_equal(arrays[1], observations)
+        np.testing.assert_array_equal(arrays[2], rewards)
+        for number, term in enumerate(posse.REWARD_TERMS):
+            np.testing.assert_array_equal(arrays[3][..., number], infos["reward_terms"][term.name])
+    locked = arrays[2].copy()
+    locked.setflags(write=False)
+    for place, name, wrong, said in (
+        (0, "actions", arrays[0].tolist(), "got list"),
+        (1, "observations", arrays[1][:2], "got float32 of shape \\(2, "),
+        (2, "rewards", arrays[2].astype(np.float64), "got float64"),
+        (2, "rewards", np.asfortranarray(arrays[2]), "with strides \\(4, 12\\)"),
+        (2, "rewards", locked, "not writable"),
+        (3, "terms", arrays[2], "shape \\(3, 5, 7\\), got float32 of shape \\(3, 5\\)"),
+    ):
+        given: list[Any] = [*arrays]
+        given[place] = wrong
+        with pytest.raises(ValueError, match=f"{name} must be .*{said}"):
+            stepped.stepper(*given)
+
+
+def test_autoreset_modes_play_the_same_episodes() -> None:
+    """One after the other, told apart only by when the next one begins."""
+    make: dict[str, Any] = {"seed": 4, "horizon": 20, "num_trackers": 3, "settle_time": 1.0}
+    episodes: dict[str, list[list[npt.NDArray[Any]]]] = {}
+    for mode in ("next_step", "same_step", "disabled"):
+        batch = posse.batch("field", 2, autoreset=mode, **make)
+        observations = batch.reset()
+        episodes[mode] = []
+        for _ in range(3):
+            seen = [observations]
+            for step in range(20):
+                observations, rewards, terminated, truncated, infos = batch.step(
+                    actions_for(batch, step)
+                )
+                last = step == 19
+                assert truncated.tolist() == [last] * 2
+                assert not terminated.any()
+                if last and mode == "same_step":
+                    assert infos["_final_obs"].all()
+                    seen += [infos["final_obs"], rewards]
+                else:
+                    seen += [observations, rewards]
+            seen.append(np.array(list(infos["metrics"].values())))
+            episodes[mode].append(seen)
+            if mode == "next_step":
+                observations, rewards, _, truncated, infos = batch.step(actions_for(batch, 99))
+                assert (rewards == 0).all()
+                assert not truncated.any()
+                assert "metrics" not in infos
+            elif mode == "disabled":
+                with pytest.raises(ResetNeeded, match="reset_mask"):
+                    batch.step(actions_for(batch, 0))
+                observations = batch.reset(options={"reset_mask": np.array([True, True])})
+    for mode in ("same_step", "disabled"):
+        for one, other in zip(episodes[mode], episodes["next_step"], strict=True):
+            assert_equal(one, other)
+
+
+def test_a_mask_resets_only_the_worlds_it_names() -> None:
+    batch = posse.batch("field", 4, autoreset="disabled")
+    batch.reset(seed=5)
+    for step in range(10):
+        observations = batch.step(actions_for(batch, step))[0]
+    mask = np.array([False, True, False, True])
+    given = mask.copy()
+    before = snapshot(batch)
+    after = batch.reset(options={"reset_mask": given})
+    np.testing.assert_array_equal(given, mask)
+    np.testing.assert_array_equal(after[~mask], observations[~mask])
+    for key, array in snapshot(batch).items():
+        np.testing.assert_array_equal(array[~mask], before[key][~mask], err_msg=key)
+    assert batch.state["world_step"].tolist() == [10, 0, 10, 0]
+    assert batch.state["world_episode"].tolist() == [0, 1, 0, 1]
+    again = posse.batch("field", 4)
+    again.reset(seed=5)
+    np.testing.assert_array_equal(again.reset()[mask], after[mask])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
+    batch = posse.batch(name, 3, seed=6, message_size=1)
+    batch.reset()
+    for step in range(25):
+        now = batch.step(actions_for(batch, step))[0]
+    saved = batch.save()
+    twin = pickle.loads(pickle.dumps(batch))  # noqa: S301
+    kept = pickle.loads(pickle.dumps(saved))  # noqa: S301
+    onward = [batch.step(actions_for(batch, step))[0] for step in range(25, 60)]
+    assert_equal([twin.step(actions_for(twin, step))[0] for step in range(25, 60)], onward)
+    for back in (saved, kept):
+        np.testing.assert_array_equal(batch.restore(back), now)
+        assert_equal([batch.step(actions_for(batch, step))[0] for step in range(25, 60)], onward)
+    fresh = posse.batch(name, 3, message_size=1)
+    np.testing.assert_array_equal(fresh.restore(saved), now)
+    assert_equal([fresh.step(actions_for(fresh, step))[0] for step in range(25, 60)], onward)
+    with pytest.raises(ValueError, match="does not fit"):
+        posse.batch(name, 2, message_size=1).restore(saved)
+    with pytest.raises(ValueError, match="does not fit"):
+        posse.batch(name, 3).restore(saved)
+
+
+@pytest.mark.parametrize("worlds", [2, 600])
+def test_what_is_returned_is_never_overwritten(worlds: int) -> None:
+    """Whoever holds an array, or a view of one, however small, keeps what he was given."""
+    batch = posse.batch("constant", worlds, horizon=15, autoreset="same_step", settle_time=1.0)
+    held: list[tuple[npt.NDArray[Any], npt.NDArray[Any]]] = []
+
+    def hold(array: npt.NDArray[Any]) -> None:
+        held.append((array, array.copy()))
+
+    hold(batch.reset(seed=7))
+    for step in range(50):
+        observations, rewards, terminated, truncated, infos = batch.step(actions_for(batch, step))
+        if step % 3:  # leave some to be recycled
+            hold(observations[:1, 0, 3:5])
+            hold(rewards)
+            hold(terminated)
+            hold(truncated)
+            hold(infos["score"])
+            hold(infos["reward_terms"]["slot"])
+            if "final_obs" in infos:
+                hold(infos["final_obs"])
+                hold(infos["_final_obs"])
+                hold(infos["metrics"]["score"])
+        if step % 10 == 5:
+            hold(batch.reset())
+        for array, copy in held:
+            np.testing.assert_array_equal(array, copy)
+
+
+def test_state_is_read_by_name_and_cannot_be_written() -> None:
+    batch = posse.batch("field", 2, message_size=1)
+    batch.reset()
+    state = batch.state
+    for key, array in state.items():
+        assert array.shape[0] == 2, key
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    batch.step(actions_for(batch, 0))
+    assert state["world_step"].tolist() == [1, 1], "it follows the worlds"
+
+
+WRONG: list[tuple[Any, str]] = [
+    (np.full((2, 5, 2), math.nan), "not a number"),
+    (np.full((2, 5, 2), math.inf), "not a number"),
+    (np.full((2, 5, 2), 1.001), "1.00"),
+    (np.full((2, 5, 2), -1.001), "-1.00"),
+    (np.zeros((5, 2)), "shape"),
+    (np.zeros((2, 5, 3)), "shape"),
+    (np.zeros((2, 5, 2), complex), "real numbers"),
+    (np.zeros((2, 5, 2), bool), "real numbers"),
+    ("fast", "real numbers"),
+    (None, "real numbers"),
+]
+
+
+@pytest.mark.parametrize(("actions", "word"), WRONG, ids=range(len(WRONG)))
+def test_bad_actions_are_refused_and_change_nothing(actions: Any, word: str) -> None:
+    batch = posse.batch("field", 2)
+    batch.reset(seed=8)
+    batch.step(actions_for(batch, 0))
+    before = snapshot(batch)
+    with pytest.raises(ValueError, match=word):
+        batch.step(actions)
+    for key, array in snapshot(batch).items():
+        np.testing.assert_array_equal(array, before[key])
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"poses": 1}, "tracker_pose"),
+        ({"target_pose": [0.0, 0.0]}, "shape"),
+        ({"tracker_pose": np.zeros((4, 3))}, "shape"),
+        ({"target_pose": [0.0, math.nan, 0.0]}, "finite"),
+        ({"target_pose": [1e6, 0.0, 0.0]}, "origin"),
+        ({"tracker_pose": np.zeros((5, 3))}, "apart"),
+        ({"reset_mask": [True]}, "reset_mask"),
+        ({"reset_mask": np.array([1, 0])}, "reset_mask"),
+    ],
+    ids=str,
+)
+def test_bad_options_are_refused_and_change_nothing(options: dict[str, Any], word: str) -> None:
+    batch = posse.batch("field", 2)
+    batch.reset(seed=9)
+    batch.step(actions_for(batch, 0))
+    before, twin = snapshot(batch), pickle.loads(pickle.dumps(batch))  # noqa: S301
+    with pytest.raises(ValueError, match=word):
+        batch.reset(seed=1, options=options)
+    for key, array in snapshot(batch).items():
+        np.testing.assert_array_equal(array, before[key], err_msg=key)
+    np.testing.assert_array_equal(
+        batch.step(actions_for(batch, 1))[0], twin.step(actions_for(batch, 1))[0]
+    )
+
+
+def test_a_refused_reset_leaves_the_seed() -> None:
+    batch = posse.batch("field", 2, seed=9)
+    batch.reset()
+    with pytest.raises(ValueError, match="apart"):
+        batch.reset(seed=1, options={"tracker_pose": np.zeros((5, 3))})
+    assert batch.seed == 9
+
+
+@pytest.mark.parametrize(
+    ("settings", "word"),
+    [
+        ({"num_worlds": 0}, "num_worlds"),
+        ({"num_worlds": 1.5}, "num_worlds"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 2**63}, "seed"),
+        ({"seed": "x"}, "seed"),
+        ({"split": "tests"}, "split"),
+        ({"first_world": -1}, "first_world"),
+        ({"autoreset": "always"}, "autoreset"),
+        ({"num_threads": 0}, "num_threads"),
+        ({"own_kernel": "yes"}, "own_kernel"),
+    ],
+    ids=str,
+)
+def test_a_batch_that_cannot_be_is_refused(settings: dict[str, Any], word: str) -> None:
+    with pytest.raises(ValueError, match=word):
+        posse.batch("constant", **settings)
+
+
+def test_step_before_reset_is_refused() -> None:
+    batch = posse.batch()
+    with pytest.raises(ResetNeeded, match="reset"):
+        batch.step(np.zeros(batch.action_shape))
+    with pytest.raises(ResetNeeded, match="reset_mask"):
+        posse.batch("constant", 2).reset(options={"reset_mask": np.array([True, False])})
+
+
+IN_ANOTHER_PROCESS = """
+import sys
+import numpy as np
+from tests.envs.engine.test_batch import here
+
+np.savez(sys.argv[3], *here(sys.argv[1], int(sys.argv[2])))
+"""
+
+
+def in_another_process(
+    tmp_path: Path, name: str, steps: int, **environment: str
+) -> list[npt.NDArray[Any]]:
+    root = Path(__file__).parents[3]
+    paths = [str(root), str(root / "envs"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    out = tmp_path / "out.npz"
+    subprocess.run(
+        [sys.executable, "-W", "error", "-c", IN_ANOTHER_PROCESS, name, str(steps), str(out)],
+        env={**os.environ, **environment, "PYTHONPATH": os.pathsep.join(paths)},
+        check=True,
+    )
+    with np.load(out) as arrays:
+        return [arrays[key] for key in arrays]
+
+
+# Eight worlds together and one alone: of the largest whole team, of one of which a few are chosen,
+# and of one of which many are.
+NINE: dict[str, dict[str, Any]] = {
+    "smart": {"num_trackers": 16, "num_neighbours": 15},
+    "constant": {"num_trackers": 10, "num_neighbours": 3},
+    "search": {"num_trackers": 11, "num_neighbours": 9},
+}
+
+
+def here(name: str, steps: int) -> list[npt.NDArray[Any]]:
+    make: dict[str, Any] = {"seed": 11, "horizon": 25, "message_size": 1, "settle_time": 1.0}
+    worlds = 9 if name in NINE else 2
+    return play(posse.batch(name, worlds, **make, **NINE.get(name, {})), steps)
+
+
+def test_another_process_plays_the_same_worlds(tmp_path: Path) -> None:
+    assert_equal(in_another_process(tmp_path, "field", 60), here("field", 60))
+
+
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [("accelerating", 30), ("field", 30), ("smart", 3), ("constant", 3), ("search", 3)],
+)
+def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_path: Path) -> None:
+    """For 30 steps, a new episode among them; and no index is out of bounds, which numpy sees."""
+    plain = in_another_process(tmp_path, name, steps, NUMBA_DISABLE_JIT="1")
+    for mine, theirs in zip(here(name, steps), plain, strict=True):
+        np.testing.assert_allclose(mine, theirs, atol=2e-4)

@@ -1,0 +1,497 @@
+"""Frames show what the worlds hold, the same ones each time, with a display and without."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from gymnasium.error import ResetNeeded
+
+import posse
+from posse.rendering.camera import Camera
+from posse.rendering.renderer import Renderer
+from posse.rendering.scene import read_scene
+from posse.rendering.style import CONTACT, INK, LINK, SLOT_FILLED, TARGET, TASK_COLOURS, TRACKER
+
+Frame = npt.NDArray[np.uint8]
+SIZE = (400, 360)
+
+
+def worlds(scenario: str = "constant", num_worlds: int = 1, **settings: Any) -> posse.Batch:
+    batch = posse.batch(scenario, num_worlds, seed=3, **settings)
+    batch.reset()
+    return batch
+
+
+def placed(
+    trackers: list[tuple[float, float, float]],
+    target: tuple[float, float, float] = (0, 0, 0),
+    scenario: str = "constant",
+    **settings: Any,
+) -> posse.Batch:
+    """One world that starts from given poses, (x, y, θ) each."""
+    batch = posse.batch(scenario, 1, seed=3, num_trackers=len(trackers), **settings)
+    batch.reset(options={"tracker_pose": trackers, "target_pose": target})
+    return batch
+
+
+def advance(batch: posse.Batch, steps: int = 1) -> None:
+    for _ in range(steps):
+        batch.step(np.full(batch.action_shape, 0.25, np.float32))
+
+
+def picture(renderer: Renderer, batch: posse.Batch, world: int = 0, **told: Any) -> Frame:
+    frame = renderer.draw(batch, world, **told)
+    assert frame is not None
+    return frame
+
+
+def colour_at(renderer: Renderer, frame: Frame, x: float, y: float) -> tuple[int, ...]:
+    column, row = renderer.project([x, y]).round().astype(int)
+    return tuple(frame[row, column].tolist())
+
+
+def like(shade: tuple[int, ...], colour: tuple[int, int, int]) -> bool:
+    """Whether a shade is the colour, to the rounding of averaging pixels."""
+    return bool(np.abs(np.subtract(shade, colour)).max() <= 3)
+
+
+def count(frame: Frame, colour: tuple[int, int, int]) -> int:
+    return int((np.abs(frame.astype(int) - colour).max(axis=-1) <= 3).sum())
+
+
+@pytest.mark.parametrize("scenario", posse.scenario_names())
+def test_every_scenario_is_drawn(scenario: str) -> None:
+    batch = worlds(scenario)
+    renderer = Renderer(batch.scenario, size=SIZE)
+    for _ in range(3):
+        frame = picture(renderer, batch)
+        assert frame.dtype == np.uint8
+        assert frame.shape == (360, 400, 3)
+        assert count(frame, TARGET) > 20
+        advance(batch)
+
+
+@pytest.mark.parametrize("num_trackers", [1, 30])
+def test_teams_of_any_size_are_drawn(num_trackers: int) -> None:
+    batch = worlds(num_trackers=num_trackers, formation="rows", start_distance=(4.0, 14.0))
+    renderer = Renderer(batch.scenario)
+    assert count(picture(renderer, batch), TRACKER) > 20 * num_trackers
+
+
+def test_the_same_states_give_the_same_frames() -> None:
+    films = []
+    for _ in range(2):
+        batch = worlds("field")
+        renderer = Renderer(batch.scenario, size=SIZE)
+        frames = []
+        for _ in range(12):
+            frames.append(picture(renderer, batch))
+            advance(batch)
+        films.append(np.stack(frames))
+    np.testing.assert_array_equal(films[0], films[1])
+    assert (films[0][0] != films[0][-1]).any()
+
+
+def test_a_moment_drawn_twice_looks_the_same() -> None:
+    batch = worlds("smart")
+    renderer = Renderer(batch.scenario, size=SIZE)
+    for _ in range(5):
+        first = picture(renderer, batch)
+        np.testing.assert_array_equal(first, picture(renderer, batch))
+        advance(batch, 3)
+
+
+def test_moments_followed_count_as_if_drawn() -> None:
+    drawn, followed = worlds("smart"), worlds("smart")
+    every, some = Renderer(drawn.scenario, size=SIZE), Renderer(drawn.scenario, size=SIZE)
+    for _ in range(25):
+        picture(every, drawn)
+        some.follow(followed)
+        advance(drawn)
+        advance(followed)
+    np.testing.assert_array_equal(picture(every, drawn), picture(some, followed))
+
+
+def test_a_new_episode_starts_from_a_clean_picture() -> None:
+    batch = worlds("smart")
+    used = Renderer(batch.scenario, size=SIZE)
+    for _ in range(30):
+        picture(used, batch)
+        advance(batch)
+    batch.reset()
+    advance(batch, 40)  # later than anything that was drawn of the episode before
+    fresh = Renderer(batch.scenario, size=SIZE)
+    np.testing.assert_array_equal(picture(used, batch), picture(fresh, batch))
+
+
+def test_going_back_in_time_starts_from_a_clean_picture() -> None:
+    batch = worlds("smart")
+    snapshot = batch.save()
+    used = Renderer(batch.scenario, size=SIZE)
+    for _ in range(30):
+        picture(used, batch)
+        advance(batch)
+    batch.restore(snapshot)
+    fresh = Renderer(batch.scenario, size=SIZE)
+    np.testing.assert_array_equal(picture(used, batch), picture(fresh, batch))
+
+
+@pytest.mark.parametrize("scenario", ["smart", "field", "radio"])
+def test_drawing_leaves_the_worlds_alone(scenario: str) -> None:
+    drawn, other = worlds(scenario, message_size=2), worlds(scenario, message_size=2)
+    renderer = Renderer(drawn.scenario, size=SIZE)
+    for _ in range(4):
+        picture(renderer, drawn)
+        advance(drawn)
+        advance(other)
+    for name, values in drawn.state.items():
+        np.testing.assert_array_equal(values, other.state[name], err_msg=name)
+
+
+def test_frames_are_never_overwritten() -> None:
+    batch = worlds()
+    renderer = Renderer(batch.scenario, size=SIZE)
+    first = picture(renderer, batch)
+    kept = first.copy()
+    advance(batch, 20)
+    picture(renderer, batch)
+    np.testing.assert_array_equal(first, kept)
+    assert first.flags.writeable
+
+
+def test_each_world_of_a_batch_is_its_own_picture() -> None:
+    batch = worlds("smart", 3)
+    alone = posse.batch("smart", 1, seed=3, first_world=2)
+    alone.reset()
+    of_many = picture(Renderer(batch.scenario, size=SIZE), batch, world=2)
+    np.testing.assert_array_equal(of_many, picture(Renderer(alone.scenario, size=SIZE), alone))
+    first = picture(Renderer(batch.scenario, size=SIZE), batch, world=0)
+    assert (of_many != first).any()
+
+
+# --- what lies where -----------------------------------------------------------------------------
+
+
+def test_robots_are_drawn_where_they_are() -> None:
+    # Up is +y, right is +x: tracker 0 lies right of the target, tracker 1 above it.
+    batch = placed([(5, 0, 1.57), (0, 5, 3.0)])
+    renderer = Renderer(batch.scenario, size=SIZE)
+    frame = picture(renderer, batch)
+    # Beside the centre, since the line of the heading begins there.
+    assert like(colour_at(renderer, frame, 5, -0.07), TRACKER)
+    assert like(colour_at(renderer, frame, 0.07, 5), TRACKER)
+    assert like(colour_at(renderer, frame, 0, 0), TARGET)
+    right, above, centre = renderer.project([(5, 0), (0, 5), (0, 0)])
+    assert right[0] > centre[0]
+    assert right[1] == pytest.approx(centre[1])
+    assert above[1] < centre[1]
+    assert above[0] == pytest.approx(centre[0])
+
+
+def test_a_robot_that_moves_changes_the_picture_where_it_was_and_is() -> None:
+    frames = {}
+    for x in (-4.0, -3.0):
+        # The third tracker keeps the view in place.
+        batch = placed([(x, 2, 0), (-6, -6, 0), (6, 6, 0)])
+        renderer = Renderer(batch.scenario, size=SIZE)
+        frames[x] = picture(renderer, batch)
+    changed = (frames[-4.0] != frames[-3.0]).any(axis=-1)
+    for x in (-4.0, -3.0):
+        column, row = renderer.project([x, 2.0]).round().astype(int)
+        assert changed[row - 1 : row + 2, column - 1 : column + 2].all()
+    # And nowhere else: there is no more of a difference than two robots and their headings.
+    rows, columns = np.nonzero(changed)
+    metres = np.abs(np.stack([columns, rows], -1) - renderer.project([-3.5, 2.0]))
+    assert metres.max() < renderer.project([1.1, 0])[0] - renderer.project([0, 0])[0]
+
+
+def test_the_heading_is_drawn() -> None:
+    ahead = np.zeros((2, 2))
+    for k, heading in enumerate((0.0, math.pi / 2)):
+        batch = placed([(4, 0, heading)])
+        renderer = Renderer(batch.scenario, size=SIZE)
+        frame = picture(renderer, batch)
+        for j, direction in enumerate((0.0, math.pi / 2)):
+            place = 4 + 0.2 * math.cos(direction), 0.2 * math.sin(direction)
+            ahead[k, j] = sum(colour_at(renderer, frame, *place))
+    assert (ahead.argmin(axis=1) == [0, 1]).all()  # the line is darker than the ground
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0, -2.5])
+def test_slots_are_filled_where_a_tracker_holds_them(heading: float) -> None:
+    # In the middle of the wedge's first slot, 1.2 m straight behind the target.
+    behind = (-1.2 * math.cos(heading), -1.2 * math.sin(heading), heading)
+    batch = placed([behind, (5, 5, 0)], (0, 0, heading))
+    renderer = Renderer(batch.scenario, size=SIZE)
+    frame = picture(renderer, batch)
+    scene = read_scene(batch)
+    np.testing.assert_allclose(scene.slots[0], behind[:2], atol=1e-5)
+    np.testing.assert_array_equal(scene.occupied, [True, False])
+    inside = scene.slots + 0.225 * np.array([-math.sin(heading), math.cos(heading)])
+    assert like(colour_at(renderer, frame, *inside[0]), SLOT_FILLED)
+    assert not like(colour_at(renderer, frame, *inside[1]), SLOT_FILLED)
+
+
+def test_obstacles_and_walls_are_drawn_where_they_are() -> None:
+    batch = worlds("obstacles")
+    renderer = Renderer(batch.scenario)
+    frame = picture(renderer, batch)
+    for x, y, radius in read_scene(batch).obstacles:
+        inside = sum(colour_at(renderer, frame, x, y))
+        outside = sum(colour_at(renderer, frame, x + radius + 0.3, y + 0.17))
+        assert inside < outside - 50
+    half = batch.scenario.arena / 2
+    for x, y in ((half, 0.3), (-half, 0.3), (0.3, half), (0.3, -half)):
+        # A wall stands outside of where robots can be.
+        outwards = 1.003
+        assert sum(colour_at(renderer, frame, x * outwards, y * outwards)) < 600
+
+
+def test_trails_show_where_a_tracker_was_and_fade() -> None:
+    batch = placed([(-6, 3, 0), (6, 6, 0)])
+    renderer = Renderer(batch.scenario, size=(640, 640))
+    for _ in range(50):
+        picture(renderer, batch)
+        batch.step(np.array([[[1, 0], [-1, 0]]], np.float32))
+    frame = picture(renderer, batch)
+    x = float(batch.state["tracker_x"][0, 0])
+    shades = [sum(colour_at(renderer, frame, x - back, 3)) for back in (0.5, 2.5, 4.5)]
+    assert shades[0] < shades[1] < shades[2] < 3 * 248
+
+
+def test_the_view_holds_every_working_robot_on_the_open_plane() -> None:
+    batch = worlds("smart")
+    renderer = Renderer(batch.scenario, size=SIZE)
+    for _ in range(200):
+        renderer.follow(batch)
+        scene = read_scene(batch)
+        place = renderer.project(np.vstack([scene.position, scene.target]))
+        assert (place > (0, 0)).all()
+        assert (place < SIZE).all()
+        advance(batch)
+
+
+def test_the_camera_moves_smoothly_and_settles() -> None:
+    camera = Camera((0, 0, 400, 400), math.inf)
+    points = np.array([[0.0, 0.0], [12.0, 5.0]])
+    camera.follow(points, 0.0)
+    start = camera.scale
+    steps = []
+    for _ in range(200):
+        before = np.append(camera.centre, math.log(camera.scale))
+        camera.follow(points / 2, 0.1)
+        steps.append(np.abs(np.append(camera.centre, math.log(camera.scale)) - before).max())
+    assert max(steps) < 0.5
+    assert steps[-1] < 1e-6
+    assert camera.scale > 1.5 * start
+    # A little more or less of spread does not change the scale: no breathing.
+    settled = camera.scale
+    for wobble in (1.02, 0.98, 1.02):
+        camera.follow(points / 2 * wobble, 0.1)
+        assert camera.scale == pytest.approx(settled, rel=1e-6)
+
+
+# --- what is told --------------------------------------------------------------------------------
+
+
+def test_links_are_drawn_between_trackers_that_hear_each_other() -> None:
+    poses = [(3.0, 0.0, 0.0), (5.0, 0.0, 0.0), (-9.0, 0.0, 0.0)]
+    limited: dict[str, Any] = {
+        "radio_range": 4.0,
+        "radio_delay": 0,
+        "radio_loss": 0.0,
+        "sensing_range": math.inf,
+    }
+    batch = placed(poses, scenario="radio", **limited)
+    scene = read_scene(batch)
+    np.testing.assert_array_equal(scene.links, [[0, 1, 0], [1, 0, 0], [0, 0, 0]])
+    renderer = Renderer(batch.scenario)
+    linked = np.array(colour_at(renderer, picture(renderer, batch), 4, 0))
+    assert np.abs(linked - LINK).sum() < np.abs(np.array((248, 249, 251)) - LINK).sum() - 100
+    perfect = placed(poses)
+    assert not read_scene(perfect).links.any()
+
+
+def test_links_fade_when_nothing_is_heard_any_more() -> None:
+    batch = placed(
+        [(3, 0, 0), (5, 0, math.pi / 2)], scenario="radio", radio_range=2.5, radio_loss=0.0
+    )
+    strength = []
+    for _ in range(30):
+        strength.append(read_scene(batch).links[0, 1])
+        batch.step(np.array([[[-1, 0], [1, 0]]], np.float32))
+    assert max(strength) == 1
+    falling = strength[strength.index(1) :]
+    assert falling == sorted(falling, reverse=True)
+    assert falling[-1] == 0
+    assert any(0 < value < 1 for value in falling)
+
+
+def test_tasks_colour_the_trackers_and_leaders_are_marked() -> None:
+    batch = placed([(3, 3, 0), (-3, 3, 0), (3, -3, 0), (-3, -3, 0)])
+    renderer = Renderer(batch.scenario)
+    plain = picture(renderer, batch)
+    told = {"task": [[0, 1, 2, 3]], "leader": [[2, 2, 2, 2]]}
+    frame = picture(renderer, batch, annotations=told)
+    for (x, y), colour in zip(((3, 3), (-3, 3), (3, -3), (-3, -3)), TASK_COLOURS, strict=True):
+        assert like(colour_at(renderer, frame, x, y - 0.07), colour)
+        assert like(colour_at(renderer, plain, x, y - 0.07), TRACKER)
+    # The mark stands over the leader, and over nobody else.
+    above = renderer.project([[3, 3], [-3, 3], [3, -3], [-3, -3]]) - (0, 20)
+    inked = [
+        like(tuple(frame[row, column].tolist()), INK) for column, row in above.round().astype(int)
+    ]
+    assert inked == [False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("told", "wrong"),
+    [
+        ({"task": [0, 1]}, r"task.*shape \(2,\).*wanted integers of shape \(1, 2\)"),
+        ({"leader": [[0.5, 1.0]]}, "leader.*float64.*wanted integers"),
+    ],
+)
+def test_annotations_that_do_not_fit_are_named(told: dict[str, Any], wrong: str) -> None:
+    batch = placed([(3, 3, 0), (-3, 3, 0)])
+    with pytest.raises(ValueError, match=wrong):
+        Renderer(batch.scenario).draw(batch, annotations=told)
+
+
+def test_contacts_flash_and_the_flash_goes_out() -> None:
+    batch = placed([(3, 0, 0), (3.5, 0, math.pi)])
+    renderer = Renderer(batch.scenario)
+    reddest = []
+    for k in range(25):
+        frame = picture(renderer, batch)
+        reddest.append(int((np.abs(frame.astype(int) - CONTACT).sum(axis=-1) < 90).sum()))
+        # Into each other, then still.
+        batch.step(np.array([[[1, 0], [1, 0]]] if k < 5 else [[[-1, 0], [-1, 0]]], np.float32))
+    assert int(batch.state["world_contacts_tracker"][0]) > 0
+    assert reddest[0] == 0
+    assert max(reddest) > 20
+    assert reddest[-1] == 0
+
+
+def test_a_broken_tracker_is_crossed_out() -> None:
+    batch = worlds("leader-loss", break_window=(0.0, 0.01))
+    renderer = Renderer(batch.scenario)
+    advance(batch, 8)
+    scene = read_scene(batch)
+    assert scene.broken.sum() == 1
+    frame = picture(renderer, batch)
+    for k, broken in enumerate(scene.broken):
+        x, y = scene.position[k]
+        assert like(colour_at(renderer, frame, x, y), INK) == broken
+
+
+def test_a_tracker_without_the_target_in_sight_is_pale() -> None:
+    batch = placed([(3, 0, 0), (8, 0, 0)], scenario="radio", sensing_range=4.0)
+    renderer = Renderer(batch.scenario)
+    frame = picture(renderer, batch)
+    sees, blind = (colour_at(renderer, frame, x, -0.07) for x in (3, 8))
+    assert like(sees, TRACKER)
+    assert sum(blind) > sum(sees) + 100
+
+
+# --- opening and closing -------------------------------------------------------------------------
+
+
+def test_importing_the_package_does_not_load_pygame() -> None:
+    code = "import sys, posse, posse.rendering.renderer; print('pygame' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False"]
+
+
+def test_frames_need_no_display() -> None:
+    code = (
+        "import posse, pygame; from posse.rendering.renderer import Renderer;"
+        "b = posse.batch('smart'); b.reset(); print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "(640, 640, 3) False"
+
+
+def test_a_window_shows_the_frame_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
+    import pygame
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    batch = worlds()
+    window, array = Renderer(batch.scenario, "human", SIZE), Renderer(batch.scenario, size=SIZE)
+    try:
+        assert window.draw(batch) is None
+        surface = pygame.display.get_surface()
+        assert surface is not None
+        shown = pygame.surfarray.array3d(surface).swapaxes(0, 1)
+        np.testing.assert_array_equal(shown, array.draw(batch))
+    finally:
+        window.close()
+    assert not pygame.display.get_init()
+    assert window.closed
+    window.close()
+
+
+@pytest.mark.parametrize("event", ["QUIT", "KEYDOWN"])
+def test_a_window_that_the_user_closes_stays_closed(
+    event: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import pygame
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    batch = worlds()
+    renderer = Renderer(batch.scenario, "human", SIZE)
+    renderer.draw(batch)
+    assert not renderer.closed
+    settings = {"key": pygame.K_ESCAPE} if event == "KEYDOWN" else {}
+    pygame.event.post(pygame.event.Event(getattr(pygame, event), settings))
+    renderer.draw(batch)
+    assert renderer.closed
+    assert not pygame.display.get_init()
+    assert renderer.draw(batch) is None
+    assert not pygame.display.get_init()
+
+
+def test_without_a_display_the_error_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
+    batch = worlds()
+    with pytest.raises(RuntimeError, match=r"no window can be opened.*render_mode='rgb_array'"):
+        Renderer(batch.scenario, "human").draw(batch)
+
+
+def test_a_closed_renderer_says_so() -> None:
+    batch = worlds()
+    renderer = Renderer(batch.scenario)
+    renderer.close()
+    with pytest.raises(ValueError, match="closed: make a new one"):
+        renderer.draw(batch)
+
+
+@pytest.mark.parametrize("mode", ["ansi", "", None])
+def test_an_unknown_mode_is_named(mode: Any) -> None:
+    with pytest.raises(ValueError, match=f"unknown render mode {mode!r}.*human, rgb_array"):
+        Renderer(posse.get_scenario("smart"), mode)
+
+
+@pytest.mark.parametrize("size", [(100, 400), (400,), (400.0, 400)])
+def test_an_impossible_size_is_named(size: Any) -> None:
+    with pytest.raises(ValueError, match=r"size=.*at least 200 px"):
+        Renderer(posse.get_scenario("smart"), size=size)
+
+
+def test_what_cannot_be_drawn_is_named() -> None:
+    batch = posse.batch("smart", 2)
+    renderer = Renderer(batch.scenario)
+    with pytest.raises(ResetNeeded, match="call reset"):
+        renderer.draw(batch)
+    batch.reset()
+    for world in (2, -1):
+        with pytest.raises(ValueError, match=f"world={world} is not in the batch.*0 to 1"):
+            renderer.draw(batch, world)
+    other = worlds("constant")
+    with pytest.raises(ValueError, match="'constant' does not fit a renderer of 'smart'"):
+        renderer.draw(other)

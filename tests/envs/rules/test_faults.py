@@ -1,0 +1,139 @@
+"""Faults: who breaks and when, and what a broken tracker still does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.support.reference import NEVER, snapshot
+
+import posse
+
+WINDOW = (0.3, 0.7)
+
+
+def broken(batch: posse.Batch) -> np.ndarray:
+    return np.asarray(batch.state["tracker_broken_at"] != NEVER)
+
+
+@pytest.mark.parametrize("number", [1, 3, 4])
+def test_drawn_trackers_break_at_drawn_times(number: int) -> None:
+    batch = posse.batch(
+        num_worlds=300, breaks=number, break_choice="drawn", break_window=WINDOW, horizon=100,
+        autoreset="disabled",
+    )  # fmt: skip
+    batch.reset(seed=1)
+    for step in range(1, 101):
+        batch.step(np.zeros(batch.action_shape))
+        count = broken(batch).sum(axis=1)
+        assert (batch.state["world_working"] == 5 - count).all()
+        if step <= 30:
+            assert (count == 0).all()
+    at = batch.state["tracker_broken_at"]
+    assert ((at != NEVER).sum(axis=1) == number).all()
+    times = at[at != NEVER]
+    assert times.min() >= 30
+    assert times.max() < 70
+    assert abs(times.mean() - 49.5) < 4 * 40 / math.sqrt(12 * len(times))
+    each = (at != NEVER).mean(axis=0)
+    assert np.abs(each - number / 5).max() < 4 * math.sqrt(0.25 / 300), "no number is spared"
+
+
+def test_the_nearest_to_the_target_breaks() -> None:
+    batch = posse.batch("leader-loss", 100, break_window=WINDOW, horizon=100, autoreset="disabled")
+    batch.reset(seed=2)
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        before, was_broken = snapshot(batch), broken(batch)
+        batch.step(rng.uniform(-1, 1, batch.action_shape))
+        away = np.hypot(
+            before["tracker_x"] - before["world_x"][:, None],
+            before["tracker_y"] - before["world_y"][:, None],
+        )
+        for e in np.flatnonzero((broken(batch) & ~was_broken).any(axis=1)):
+            new = np.flatnonzero(broken(batch)[e] & ~was_broken[e])
+            assert new.tolist() == [np.where(was_broken[e], np.inf, away[e]).argmin()]
+            assert 30 <= before["world_step"][e] < 70
+    assert (broken(batch).sum(axis=1) == 1).all()
+
+
+def test_several_leaders_break_one_after_the_other_within_the_window() -> None:
+    batch = posse.batch(
+        "leader-loss", 100, breaks=3, break_window=(0.2, 0.6), autoreset="disabled", horizon=100
+    )
+    batch.reset(seed=3)
+    for _ in range(100):
+        batch.step(np.zeros(batch.action_shape))
+    times = np.sort(batch.state["tracker_broken_at"], axis=1)
+    assert (times[:, 3:] == NEVER).all()
+    assert (times[:, 0] >= 20).all()
+    assert (np.diff(times[:, :3], axis=1) >= 1).all(), "one at a time"
+    assert (times[:, 2] <= 62).all(), "the window is not left, but for a step each"
+    assert np.ptp(times[:, 0]) > 25, "the first is drawn from all of the window"
+
+
+def test_a_given_tracker_breaks_at_a_given_time() -> None:
+    batch = posse.batch(
+        "leader-loss", 20, break_choice="given", break_number=3, break_window=(0.3, 0.3),
+        autoreset="disabled", horizon=100,
+    )  # fmt: skip
+    batch.reset(seed=3)
+    for _ in range(100):
+        batch.step(np.zeros(batch.action_shape))
+    expected = np.full((20, 5), NEVER)
+    expected[:, 3] = 30
+    np.testing.assert_array_equal(batch.state["tracker_broken_at"], expected)
+
+
+def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
+    batch = posse.batch(
+        "leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled"
+    )
+    batch.reset(seed=4)
+    twin = posse.batch(
+        "leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled"
+    )
+    twin.reset(seed=4)
+    rng = np.random.default_rng(4)
+    for step in range(1, 60):
+        actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+        others = actions.copy()
+        others[broken(batch)] = rng.uniform(-1, 1, 3)
+        before = snapshot(batch)
+        observations, *_ = batch.step(actions)
+        np.testing.assert_array_equal(observations, twin.step(others)[0])
+        views = batch.layout.views(observations)
+        np.testing.assert_array_equal(views["working"] == 0, broken(batch))
+        if step < 8:
+            continue
+        for key in ("x", "y", "heading_cos", "heading_sin"):
+            np.testing.assert_array_equal(
+                batch.state[f"tracker_{key}"][broken(batch)],
+                before[f"tracker_{key}"][broken(batch)],
+            )
+        assert (views["speed"][broken(batch)] == 0).all()
+        assert (views["turn_rate"][broken(batch)] == 0).all()
+        assert (views["target_seen"][broken(batch)] == 0).all()
+        # Its team-mates hear no more of it: what they have grows older, then is dropped.
+        number = np.flatnonzero(broken(batch)[0])[0]
+        mate = 0 if number else 1
+        heard = views["neighbour_number"][0, mate] == number
+        silent = step - 6
+        if silent * 0.1 <= batch.scenario.forget_after + 1e-6:
+            assert views["neighbour_age"][0, mate][heard] == pytest.approx(0.1 * silent)
+        else:
+            assert not heard.any()
+
+
+def test_it_stays_in_the_team_and_in_the_way() -> None:
+    batch = posse.batch(num_trackers=2, breaks=1, break_window=(0.0, 0.0), autoreset="disabled")
+    batch.reset(
+        options={"target_pose": [3.0, 0.0, math.pi / 2], "tracker_pose": [[1, 0, 0], [0, 0, 0]]}
+    )
+    for _ in range(20):
+        observations, *_ = batch.step([[[1.0, 0.0], [1.0, 0.0]]])
+    assert observations.shape[1] == 2
+    assert broken(batch).tolist() == [[True, False]]
+    assert batch.state["tracker_x"][0, 1] == pytest.approx(0.7, abs=0.001)
+    assert batch.state["world_contacts_tracker"][0] == 1

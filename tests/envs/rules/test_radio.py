@@ -1,0 +1,195 @@
+"""The radio: range, delay, loss, outages; what is relayed and when."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.reference import CASES, Senses, case_name, radio_alive, record
+
+import posse
+
+
+@pytest.mark.parametrize("case", CASES, ids=case_name)
+def test_fixes_and_what_was_heard_equal_an_independent_working(case: Any) -> None:
+    recording = record(*case)
+    s, senses = recording.scenario, Senses(recording.scenario)
+    n = s.num_trackers
+    heard = 0
+    for step, state in enumerate(recording.states):
+        senses.follow(state, recording.actions[step - 1] if step else None)
+        assert state["tracker_sees"].astype(bool).tolist() == senses.sees
+        for i, fix in enumerate(senses.fixes):
+            assert state["tracker_fix_step"][i] == fix.step
+            if fix.step >= 0:
+                t = {k: complex(state[f"tracker_fix_{k[0]}"][i], state[f"tracker_fix_{k[1]}"][i])
+                     for k in (("x", "y"), ("cos", "sin"), ("vx", "vy"))}  # fmt: skip
+                assert t["x", "y"] == pytest.approx(fix.place, abs=1e-4)
+                assert t["cos", "sin"] == pytest.approx(fix.heading, abs=1e-5)
+                assert t["vx", "vy"] == pytest.approx(fix.velocity, abs=2e-3)
+        if "heard_step" in state and state["heard_step"].shape == (n, n):
+            for i in range(n):
+                for j in range(n):
+                    words = senses.heard.get((i, j))
+                    assert state["heard_step"][i, j] == (words.step if words else -1)
+                    if words:
+                        heard += 1
+                        place = complex(state["heard_x"][i, j], state["heard_y"][i, j])
+                        assert place == pytest.approx(words.place, abs=1e-6)
+                        np.testing.assert_array_equal(
+                            state["heard_message"][i, j], words.message.astype(np.float32)
+                        )
+    assert heard > 0 or state["heard_step"].size == 0
+
+
+@pytest.mark.parametrize("delay", [0, 1, 4])
+def test_what_is_said_arrives_after_exactly_the_delay(delay: int) -> None:
+    batch = posse.batch(num_trackers=2, radio_delay=delay, radio_range=1e4, message_size=1)
+    batch.reset(seed=0)
+    for step in range(1, 12):
+        said = step / 100
+        actions = np.full(batch.action_shape, said, np.float32)
+        observations = batch.step(actions)[0]
+        mates = batch.layout.views(observations)
+        if step >= delay:
+            # What was sent at the start, before anything could be said, holds zeros.
+            expected = (step - delay) / 100
+            np.testing.assert_allclose(mates["neighbour_message"][0], expected)
+            np.testing.assert_allclose(mates["neighbour_age"][0], delay * 0.1, atol=1e-6)
+        else:
+            assert (mates["neighbour_number"] == -1).all()
+
+
+def test_the_range_ends_where_it_should() -> None:
+    batch = posse.batch(num_trackers=3, radio_range=5.0)
+    batch.reset(
+        options={
+            "target_pose": [10.0, 10.0, 0.0],
+            "tracker_pose": [[0, 0, 0], [4.999, 0, 0], [0.0, -5.001, 0]],
+        }
+    )
+    assert (batch.state["heard_step"][0] >= 0).tolist() == [
+        [False, True, False],
+        [True, False, False],
+        [False, False, False],
+    ]
+
+
+def test_losses_have_their_rate_and_are_independent() -> None:
+    batch = posse.batch(
+        num_worlds=200, num_trackers=4, radio_loss=0.3, radio_range=1e4, horizon=100
+    )
+    batch.reset(seed=1)
+    arrived = []
+    for step in range(1, 60):
+        batch.step(np.full(batch.action_shape, -1.0))
+        arrived.append(batch.state["heard_step"] == step)
+    off = ~np.eye(4, dtype=bool)
+    got = np.array(arrived)[..., off].astype(float)  # (steps, worlds, links)
+    error = math.sqrt(0.21 / got.size)
+    assert abs(got.mean() - 0.7) < 4 * error
+    assert np.abs(got.mean(axis=(0, 1)) - 0.7).max() < 5 * math.sqrt(0.21 / (got.size / 12))
+    flat = got.reshape(-1, 12)
+    between_links = np.corrcoef(flat.T) - np.eye(12)
+    assert np.abs(between_links).max() < 5 / math.sqrt(len(flat))
+    between_steps = np.corrcoef(got[1:].ravel(), got[:-1].ravel())[0, 1]
+    between_worlds = np.corrcoef(got[:, 1:].ravel(), got[:, :-1].ravel())[0, 1]
+    assert max(abs(between_steps), abs(between_worlds)) < 5 / math.sqrt(got.size)
+
+
+def test_an_outage_is_silent_both_ways() -> None:
+    batch = posse.batch(
+        num_worlds=50, num_trackers=3, radio_outages=0.5, outage_time=2.0, horizon=80
+    )
+    batch.reset(seed=2)
+    silent = 0
+    for step in range(1, 80):
+        batch.step(np.full(batch.action_shape, -1.0))
+        dead_from = batch.state["tracker_radio_dead_from"]
+        alive = (step < dead_from) | (step >= dead_from + 20)
+        link = alive[:, :, None] & alive[:, None, :] & ~np.eye(3, dtype=bool)
+        np.testing.assert_array_equal(batch.state["heard_step"] == step, link)
+        silent += int((~alive).sum())
+    assert silent > 500
+
+
+def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
+    """A chain of four out of which only the first sees; each hop takes the delay and a step."""
+    batch = posse.batch(
+        num_trackers=4, sensing_range=3.0, radio_range=4.5, radio_delay=2, target_speed=0.0,
+        start_distance=(1.0, 16.0),
+    )  # fmt: skip
+    batch.reset(
+        options={
+            "target_pose": [0, 0, 0],
+            "tracker_pose": [[2, 0, 0], [6, 0, 0], [10, 0, 0], [14, 0, 0]],
+        }
+    )
+    stay = np.tile([-1.0, 0.0], (1, 4, 1))
+    for step in range(1, 14):
+        observations = batch.step(stay)[0]
+        fixes = batch.state["tracker_fix_step"][0]
+        # Said at step k, a fix is heard at k + 2, and passed on with the next broadcast, k + 3.
+        assert fixes.tolist() == [
+            max(-1, step - lag) if step >= lag else -1 for lag in (0, 2, 5, 8)
+        ]
+        views = batch.layout.views(observations)
+        known = fixes >= 0
+        np.testing.assert_allclose(
+            views["target_age"][0][known], 0.1 * (step - fixes[known]), atol=1e-6
+        )
+        np.testing.assert_allclose(views["target_range"][0][known], 2 + 4 * np.flatnonzero(known))
+        assert views["target_seen"][0].tolist() == [1, 0, 0, 0]
+
+
+@pytest.mark.parametrize("name", ["constant", "accelerating", "smart", "search", "leader-loss"])
+def test_a_radio_without_limits_is_one_with_a_huge_range(name: str) -> None:
+    """The engine has a shorter way for a perfect radio; it makes no difference but rounding."""
+    without = posse.batch(name, 6, message_size=2, horizon=120, range_noise=0.02)
+    huge = posse.batch(name, 6, message_size=2, horizon=120, range_noise=0.02, radio_range=1e5)
+    np.testing.assert_allclose(without.reset(seed=3), huge.reset(seed=3), rtol=1e-5, atol=2e-5)
+    rng = np.random.default_rng(3)
+    for _ in range(120):
+        actions = rng.uniform(-1, 1, without.action_shape)
+        for mine, theirs in zip(without.step(actions)[:4], huge.step(actions)[:4], strict=True):
+            np.testing.assert_allclose(
+                np.asarray(mine, np.float32), np.asarray(theirs, np.float32), rtol=1e-5, atol=2e-5
+            )
+
+
+@pytest.mark.parametrize("name", ["field", "smart"])
+def test_a_message_changes_nothing_in_the_world(name: str) -> None:
+    quiet = posse.batch(name, 8, horizon=60)
+    talking = posse.batch(name, 8, horizon=60, message_size=3)
+    quiet.reset(seed=4)
+    talking.reset(seed=4)
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        actions = rng.uniform(-1, 1, talking.action_shape).astype(np.float32)
+        quiet.step(actions[..., :2])
+        talking.step(actions)
+        for key, value in quiet.state.items():
+            if "message" not in key:
+                np.testing.assert_array_equal(value, talking.state[key], err_msg=key)
+
+
+def test_the_graph_is_connected_over_hops() -> None:
+    chain = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0]]
+    for middle, share in ((4.0, 1.0), (3.5, 0.0)):
+        chain[1][0] = middle
+        batch = posse.batch(num_trackers=3, radio_range=4.2, start_distance=(1.0, 20.0))
+        batch.reset(options={"target_pose": [0, -9, 0], "tracker_pose": chain})
+        for _ in range(3):
+            batch.step(np.tile([-1.0, 0.0], (1, 3, 1)))
+        assert batch.metrics()["time_connected"][0] == share
+
+
+def test_radio_alive_is_told_apart_in_the_reference_itself() -> None:
+    recording = record("field", ())
+    alive = [
+        [radio_alive(recording.scenario, state, i) for i in range(5)] for state in recording.states
+    ]
+    assert not np.all(alive)
+    assert np.any(alive)

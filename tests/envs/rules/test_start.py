@@ -1,0 +1,145 @@
+"""How episodes start: what is drawn, and that nothing stands in anything."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+from tests.support.reference import free_gaps, one_world, snapshot
+
+import posse
+
+
+@pytest.mark.parametrize("name", posse.scenario_names())
+@pytest.mark.parametrize(
+    "overrides",
+    [{}, {"num_trackers": 30, "breaks": 0}, {"num_trackers": 1, "breaks": 0},
+     {"target_motion": "agent"}],
+    ids=["", "thirty", "one", "agent"],
+)  # fmt: skip
+def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(
+    name: str, overrides: dict[str, Any]
+) -> None:
+    if overrides.get("num_trackers") == 30 and math.isinf(posse.get_scenario(name).arena):
+        overrides = {**overrides, "start_distance": (1.5, 5.0)}
+    batch = posse.batch(name, 60, **overrides)
+    s = batch.scenario
+    batch.reset(seed=1)
+    state = snapshot(batch)
+    least, most = s.start_distance
+    for e in range(60):
+        world = one_world(state, e)
+        gaps = free_gaps(s, world)
+        gaps[:, s.num_trackers] = np.inf  # the target, for which start_distance counts
+        assert gaps.min() > 0.19, "START_CLEARANCE"
+        away = np.hypot(
+            world["tracker_x"] - world["world_x"], world["tracker_y"] - world["world_y"]
+        )
+        assert away.min() >= least - 1e-4
+        assert away.max() <= most + 1e-4
+        assert max(abs(world["world_x"]), abs(world["world_y"])) <= s.target_extent
+
+
+def test_distance_bearing_and_heading_are_uniform() -> None:
+    batch = posse.batch(num_worlds=1000)
+    batch.reset(seed=2)
+    state = snapshot(batch)
+    offset = (
+        state["tracker_x"] - state["world_x"][:, None]
+        + 1j * (state["tracker_y"] - state["world_y"][:, None])
+    )  # fmt: skip
+    heading = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
+    course = state["world_heading_cos"] + 1j * state["world_heading_sin"]
+    for shares in (
+        (np.abs(offset) - 4) / 6,
+        (np.angle(offset) + math.pi) / (2 * math.pi),
+        (np.angle(heading) + math.pi) / (2 * math.pi),
+        (np.angle(course) + math.pi) / (2 * math.pi),
+        (state["world_x"] + 10) / 20,
+        (state["world_y"] + 10) / 20,
+    ):
+        # Trackers that would overlap are drawn anew: a little less than uniform.
+        assert stats.kstest(shares.ravel(), "uniform").statistic < 0.035
+    assert abs(np.corrcoef(np.angle(heading).ravel(), np.angle(offset).ravel())[0, 1]) < 0.05
+
+
+@pytest.mark.parametrize("name", ["obstacles", "field"])
+def test_obstacles_leave_their_gap_between_them_and_to_the_walls(name: str) -> None:
+    batch = posse.batch(name, 200)
+    s = batch.scenario
+    batch.reset(seed=3)
+    state = snapshot(batch)
+    centres = state["obstacle_x"].astype(float) + 1j * state["obstacle_y"]
+    radii = state["obstacle_radius"].astype(float)
+    count = s.num_obstacles
+    gaps = np.abs(centres[:, :, None] - centres[:, None]) - radii[:, :, None] - radii[:, None]
+    gaps[:, np.arange(count), np.arange(count)] = np.inf
+    assert gaps.min() >= s.obstacle_gap - 1e-4
+    farthest = np.maximum(np.abs(centres.real), np.abs(centres.imag)) + radii
+    assert farthest.max() <= s.arena / 2 - s.obstacle_gap + 1e-4
+    assert radii.min() >= s.obstacle_radius[0]
+    assert radii.max() <= s.obstacle_radius[1]
+    assert stats.kstest((radii.ravel() - 0.4) / 0.4, "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"num_trackers": 64},
+        {"num_trackers": 12, "start_distance": (9.0, 9.8)},
+        {"arena": math.inf, "num_obstacles": 0, "num_trackers": 11, "start_distance": (0.6, 1.8)},
+        {"num_obstacles": 10, "num_trackers": 20},
+        {"num_obstacles": 10, "target_turn_rate": 0.5},
+        {"arena": 5.5, "num_obstacles": 0, "start_distance": (1.0, 5.0)},
+        {"arena": 40.0, "num_obstacles": 40, "num_trackers": 64},
+    ],
+    ids=str,
+)
+def test_what_validation_lets_pass_can_be_placed(overrides: dict[str, Any]) -> None:
+    scenario = posse.get_scenario("obstacles", **overrides)
+    batch = posse.batch(scenario, 100)
+    batch.reset(seed=4)
+    state = snapshot(batch)
+    for e in range(100):
+        gaps = free_gaps(scenario, one_world(state, e))
+        gaps[:, scenario.num_trackers] = np.inf  # the target, for which start_distance counts
+        assert gaps.min() > 0.19
+
+
+def test_a_start_from_given_poses() -> None:
+    batch = posse.batch(num_worlds=2, num_trackers=2)
+    trackers = np.array([[[4, 0, 1], [0, 5, -2]], [[-4, 1, 3], [2, 5, 0.5]]], float)
+    target = np.array([1.0, 2.0, 0.25])
+    batch.reset(seed=0, options={"tracker_pose": trackers, "target_pose": target})
+    state = snapshot(batch)
+    np.testing.assert_allclose(state["tracker_x"], trackers[..., 0])
+    np.testing.assert_allclose(state["tracker_y"], trackers[..., 1])
+    np.testing.assert_allclose(state["tracker_heading_cos"], np.cos(trackers[..., 2]), atol=1e-7)
+    np.testing.assert_allclose(state["tracker_heading_sin"], np.sin(trackers[..., 2]), atol=1e-7)
+    for name in ("heading", "frame"):
+        np.testing.assert_allclose(state[f"world_{name}_cos"], math.cos(0.25))
+        np.testing.assert_allclose(state[f"world_{name}_sin"], math.sin(0.25))
+    assert (state["world_x"] == 1.0).all()
+    assert (state["tracker_sees"] == 1).all()
+    for key in ("tracker_speed", "world_step", "world_score_sum", "world_contacts_tracker"):
+        assert (state[key] == 0).all()
+
+
+def test_poses_change_the_poses_and_no_other_draw() -> None:
+    drawn = posse.batch("field", 4)
+    given = posse.batch("field", 4)
+    drawn.reset(seed=5)
+    state = snapshot(drawn)
+    heading = np.arctan2(state["world_heading_sin"], state["world_heading_cos"])
+    given.reset(
+        seed=5,
+        options={"target_pose": np.stack([state["world_x"], state["world_y"], heading], axis=-1)},
+    )
+    for key, value in snapshot(given).items():
+        np.testing.assert_allclose(value, state[key], atol=1e-5, err_msg=key)
+    actions = np.random.default_rng(0).uniform(-1, 1, drawn.action_shape)
+    for _ in range(20):
+        np.testing.assert_allclose(drawn.step(actions)[0], given.step(actions)[0], atol=1e-3)

@@ -1,0 +1,163 @@
+"""How the target moves: constant, accelerating, and what keeps it from walls and obstacles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from tests.support.reference import snapshot
+
+import posse
+
+Complexes = npt.NDArray[np.complex128]
+FAR_AWAY: dict[str, Any] = {"num_trackers": 1, "start_distance": (300.0, 400.0)}
+
+
+def follow(
+    batch: posse.Batch, steps: int, trackers: str = "rest"
+) -> tuple[Complexes, Complexes, npt.NDArray[np.float64]]:
+    """Return places, headings (steps + 1, E) and turn rates (steps, E) of the targets."""
+    rng = np.random.default_rng(0)
+    places, courses, turns = [], [], []
+    views = None
+    for step in range(steps + 1):
+        state = snapshot(batch)
+        places.append(state["world_x"].astype(float) + 1j * state["world_y"])
+        courses.append(state["world_heading_cos"].astype(float) + 1j * state["world_heading_sin"])
+        if step:
+            turns.append(state["world_turn_rate"].astype(float))
+        actions = np.tile([-1.0, 0.0], (*batch.action_shape[:2], 1))
+        if trackers == "chase":
+            actions = rng.uniform(-1, 1, batch.action_shape)
+            if views is not None:
+                bearing = views["target_bearing"]
+                actions[..., 1] = np.clip(2 * np.arctan2(bearing[..., 1], bearing[..., 0]), -1, 1)
+                actions[..., 0] = 1.0
+        views = batch.layout.views(batch.step(actions)[0])
+    return np.array(places), np.array(courses), np.array(turns)
+
+
+def test_constant_goes_straight_at_its_speed() -> None:
+    batch = posse.batch("constant", 20, **FAR_AWAY)
+    batch.reset(seed=1)
+    places, courses, turns = follow(batch, 300)
+    steps = np.arange(301)[:, None]
+    np.testing.assert_allclose(places, places[0] + 0.06 * steps * courses[0], atol=2e-3)
+    assert (np.abs(turns) < 1e-5).all()
+
+
+@pytest.mark.parametrize("limit", [0.3, 1.0, 3.0])
+def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
+    batch = posse.batch("accelerating", 200, target_turn_rate=limit, **FAR_AWAY)
+    batch.reset(seed=2)
+    places, courses, turns = follow(batch, 400)
+    assert np.abs(turns).max() <= limit
+    np.testing.assert_allclose(np.abs(courses), 1.0, atol=1e-6)
+    # Continuous: each step is an arc of V dt, along the mean of the headings at its ends.
+    moves, middle = np.diff(places, axis=0), courses[1:] + courses[:-1]
+    swing = np.angle(courses[1:] / courses[:-1])
+    chord = 0.06 * np.sinc(swing / (2 * math.pi))
+    np.testing.assert_allclose(moves, chord * middle / np.abs(middle), atol=1e-5)
+    np.testing.assert_allclose(swing, turns * 0.1, atol=1e-5)
+    # The turn rate is a sine of a drawn amplitude, rate and phase.
+    state = snapshot(batch)
+    time = 0.1 * np.arange(400)[:, None]
+    wave = state["world_weave_amplitude"] * np.sin(
+        state["world_weave_rate"] * time + state["world_weave_phase"]
+    )
+    np.testing.assert_allclose(turns, wave, atol=2e-4 * max(1.0, limit))
+    assert state["world_weave_amplitude"].min() >= 0.4 * limit
+    assert state["world_weave_amplitude"].max() <= 0.9 * limit
+    assert (np.abs(turns).max(axis=0) > 0.3 * limit).all(), "every one of them turns"
+    assert (turns.max(axis=0) > 0).all()
+    assert (turns.min(axis=0) < 0).all()
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"target_turn_rate": 20.0, "control_step": 1.0},
+        {"target_turn_rate": 5.0, "control_step": 0.5, "physics_step": 0.1},
+    ],
+    ids=str,
+)
+def test_a_long_control_step_keeps_the_goal_a_unit_vector(overrides: dict[str, Any]) -> None:
+    batch = posse.batch("accelerating", 50, horizon=100, **FAR_AWAY, **overrides)
+    batch.reset(seed=3)
+    _, courses, turns = follow(batch, 60)
+    state = snapshot(batch)
+    np.testing.assert_allclose(
+        np.hypot(state["world_goal_cos"], state["world_goal_sin"]), 1, atol=1e-5
+    )
+    np.testing.assert_allclose(np.abs(courses), 1.0, atol=1e-6)
+    assert np.abs(turns).max() <= overrides["target_turn_rate"]
+
+
+def room(batch: posse.Batch, places: Complexes) -> float:
+    """Return the least free width that a target ever had to a wall or an obstacle."""
+    s, state = batch.scenario, snapshot(batch)
+    walls = s.arena / 2 - s.robot_radius - np.maximum(np.abs(places.real), np.abs(places.imag))
+    least = float(walls.min())
+    for k in range(s.num_obstacles):
+        centre = state["obstacle_x"][:, k] + 1j * state["obstacle_y"][:, k]
+        gaps = np.abs(places - centre) - state["obstacle_radius"][:, k] - s.robot_radius
+        least = min(least, float(gaps.min()))
+    return least
+
+
+@pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
+@pytest.mark.parametrize("name", ["search", "obstacles", "field"])
+def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, motion: str) -> None:
+    batch = posse.batch(name, 300, target_motion=motion, horizon=600, num_trackers=2, breaks=0)
+    batch.reset(seed=4)
+    places, courses, turns = follow(batch, 595)
+    assert room(batch, places) > 0.09, "SAFE_MARGIN, rounding aside"
+    limit, step = batch.scenario.target_turn_rate, batch.scenario.target_speed * 0.1
+    assert np.abs(turns).max() <= limit * (1 + 1e-6)
+    moved = np.abs(np.diff(places, axis=0))
+    assert moved.max() <= step + 1e-5
+    tracker = batch.state["tracker_x"][:, :, None] + 1j * batch.state["tracker_y"][:, :, None]
+    away = np.abs(places.T[:, None] - tracker).min(axis=1).T  # the trackers rest
+    np.testing.assert_allclose(moved[away[1:] > 0.5], step, atol=1e-3 * limit)
+    assert np.abs(np.angle(courses[1:] / courses[:-1])).max() <= 0.1 * limit + 1e-5
+
+
+@pytest.mark.parametrize("turn", [0.3, 4.0])
+def test_the_safeguard_holds_for_wide_and_narrow_turners(turn: float) -> None:
+    batch = posse.batch(
+        "obstacles", 200, target_turn_rate=turn, arena=24.0, num_obstacles=8, num_trackers=2,
+        target_motion="accelerating",
+    )  # fmt: skip
+    batch.reset(seed=5)
+    places, _, _ = follow(batch, 500)
+    assert room(batch, places) > 0.09
+
+
+@pytest.mark.parametrize("motion", ["accelerating", "smart"])
+def test_a_target_that_is_blocked_by_trackers_does_not_end_in_a_wall(motion: str) -> None:
+    batch = posse.batch("obstacles", 100, target_motion=motion, num_trackers=8)
+    batch.reset(seed=6)
+    places, _, _ = follow(batch, 400, "chase")
+    assert room(batch, places) > 0.05
+    assert (batch.state["world_contacts_target"] > 0).any()
+
+
+def test_a_target_in_an_arena_still_gets_about() -> None:
+    batch = posse.batch("search", 100, num_trackers=1)
+    batch.reset(seed=7)
+    places, _, _ = follow(batch, 590)
+    reach = np.abs(places - places[0]).max(axis=0)
+    assert np.median(reach) > 4.0, "the safeguard does not leave it circling on the spot"
+
+
+def test_an_agent_moves_as_it_is_told() -> None:
+    batch = posse.batch(target_motion="agent", num_trackers=1)
+    batch.reset(options={"target_pose": [0, 0, 0], "tracker_pose": [[9, 9, 0]]})
+    batch.step([[[-1.0, 0.0], [0.5, -0.5]]])
+    assert batch.state["world_speed"][0] == pytest.approx(0.45)
+    assert batch.state["world_turn_rate"][0] == pytest.approx(-0.5)
+    heading = math.atan2(batch.state["world_heading_sin"][0], batch.state["world_heading_cos"][0])
+    assert heading == pytest.approx(-0.05, abs=1e-6)

@@ -1,0 +1,86 @@
+"""Slots: where they are, that they can be followed, and the frame that carries them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.support.reference import one_world, slots, snapshot
+
+import posse
+from posse.scenarios.formation import FORMATIONS, slot_offsets
+
+
+@pytest.mark.parametrize("formation", FORMATIONS)
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 5, 8, 13, 64])
+def test_slots_are_where_their_definition_says_and_apart(formation: str, number: int) -> None:
+    scenario = posse.get_scenario("constant", num_trackers=number, formation=formation)
+    places = np.array([complex(*offset) for offset in slot_offsets(scenario)])
+    np.testing.assert_allclose(places, slots(scenario), atol=1e-12)
+    between = np.abs(places[:, None] - places[None, :]) + np.diag(np.full(number, np.inf))
+    assert between.min() > 2 * scenario.tolerance
+    if number > 1:
+        assert between.min() == pytest.approx(scenario.formation_spacing, rel=1e-6) or (
+            formation == "ring"
+        )
+    assert np.abs(places).min() >= scenario.formation_distance - 1e-12
+    if formation != "ring":
+        assert places.real.max() <= -scenario.formation_distance + 1e-12, "behind the target"
+        np.testing.assert_allclose(sorted(places.imag), sorted(-places.imag), atol=1e-9) if (
+            number % 2
+        ) else None
+
+
+def test_the_paper_s_wedge_has_one_leader_ahead_and_two_wings() -> None:
+    places = slots(posse.get_scenario("constant"))
+    assert places[0] == pytest.approx(-1.2)
+    assert np.abs(np.diff(places[[2, 0, 1]])) == pytest.approx([1.2, 1.2])
+    assert np.abs(np.diff(places[[4, 2]])) == pytest.approx([1.2])
+    assert places.real.argmax() == 0, "the leader is ahead of its followers"
+
+
+@pytest.mark.parametrize("formation", FORMATIONS)
+@pytest.mark.parametrize("motion", ["accelerating", "smart", "agent"])
+def test_every_slot_can_be_followed_without_reversing(formation: str, motion: str) -> None:
+    batch = posse.batch(
+        num_worlds=4, formation=formation, target_motion=motion, num_trackers=8, horizon=300
+    )
+    s = batch.scenario
+    batch.reset(seed=1)
+    places, rate = slots(s), s.slot_turn_rate
+    before = snapshot(batch)
+    turned = 0.0
+    rng = np.random.default_rng(1)
+    for k in range(300):
+        if k % 20 == 0:
+            actions = rng.choice([-1.0, 1.0], batch.action_shape)
+            actions[:, -1, 0] = 1.0
+        batch.step(actions)
+        after = snapshot(batch)
+        for e in range(4):
+            a, b = one_world(before, e), one_world(after, e)
+            frames = [complex(w["world_frame_cos"], w["world_frame_sin"]) for w in (a, b)]
+            heading = complex(b["world_heading_cos"], b["world_heading_sin"])
+            turn = float(np.angle(frames[1] / frames[0]))
+            # The frame turns towards the heading, at its limit until it is there.
+            error = float(np.angle(heading / frames[0]))
+            wanted = max(-rate * 0.1, min(rate * 0.1, error))
+            if abs(error) < 3.1:
+                assert turn == pytest.approx(wanted, abs=2e-6)
+            turned = max(turned, abs(turn))
+            if motion != "agent":
+                # The velocity of every slot: never faster than a tracker, never backwards.
+                carried = s.target_speed * heading + 1j * turn / 0.1 * places * frames[1]
+                assert (np.abs(carried) <= s.tracker_speed).all()
+                assert ((carried * np.conj(heading)).real >= -1e-5).all()
+        before = after
+    assert turned == pytest.approx(rate * 0.1, rel=1e-3), "the limit was reached"
+
+
+def test_the_slot_turn_rate_is_the_one_designed() -> None:
+    s = posse.get_scenario("constant", tracker_speed=1.0, target_speed=0.6)
+    farthest = abs(complex(-1.2 - 2 * 1.2 * math.sqrt(0.5), 2 * 1.2 * math.sqrt(0.5)))
+    assert s.slot_turn_rate == pytest.approx(0.8 * 0.4 / farthest)
+    slow = s.replace(target_speed=0.1)
+    assert slow.slot_turn_rate == pytest.approx(0.1 / farthest)

@@ -1,0 +1,76 @@
+"""Every metric, against an independent working from the states."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.reference import CASES, Episode, case_name, record
+
+import posse
+
+
+@pytest.mark.parametrize("case", CASES, ids=case_name)
+def test_every_metric_equals_an_independent_working(case: Any) -> None:
+    recording = record(*case)
+    episode = Episode(recording.scenario)
+    for state in recording.states:
+        episode.follow(state)
+    expected = episode.metrics()
+    reported = recording.infos[-1]["metrics"]
+    assert list(reported) == [metric.name for metric in posse.METRICS]
+    assert set(expected) == set(reported)
+    for name, value in expected.items():
+        assert reported[name].shape == (1,)
+        assert float(reported[name][0]) == pytest.approx(value, abs=1e-3, nan_ok=True), name
+
+
+def test_the_recordings_show_what_they_should() -> None:
+    """Else the comparison above compares nothing."""
+    seen: dict[str, list[float]] = {metric.name: [] for metric in posse.METRICS}
+    for case in CASES:
+        for name, value in record(*case).infos[-1]["metrics"].items():
+            seen[name].append(float(value[0]))
+    for name in ("settling_time", "recovery_time"):
+        assert any(math.isfinite(value) for value in seen[name]), name
+        assert any(math.isnan(value) for value in seen[name]), name
+    for name in ("tracker_contacts", "obstacle_contacts", "target_contacts"):
+        assert max(seen[name]) > 0, name
+    for name in ("time_in_sight", "time_connected", "score", "bound"):
+        assert max(seen[name]) > 0, name
+        assert min(seen[name]) < 1, name
+
+
+def test_detection_is_when_the_target_first_came_into_sight() -> None:
+    batch = posse.batch(num_trackers=2, sensing_range=3.0, target_speed=0.0, horizon=40)
+    batch.reset(options={"target_pose": [0, 0, 0], "tracker_pose": [[4.05, 0, np.pi], [8, 0, 0]]})
+    for _ in range(39):
+        batch.step([[[1.0, 0.0], [-1.0, 0.0]]])
+    assert batch.metrics()["detection_time"][0] == pytest.approx(1.1)
+
+
+def test_what_is_in_sight_at_the_start_is_detected_at_once() -> None:
+    batch = posse.batch()
+    batch.reset()
+    batch.step(np.zeros(batch.action_shape))
+    assert batch.metrics()["detection_time"][0] == 0.0
+
+
+def test_metrics_arrive_when_episodes_end_and_say_for_which() -> None:
+    batch = posse.batch(num_worlds=3, horizon=5, settle_time=0.2)
+    batch.reset(seed=0)
+    batch.step(np.zeros(batch.action_shape))
+    batch.reset(options={"reset_mask": np.array([False, True, False])})
+    for step in range(2, 6):
+        infos = batch.step(np.zeros(batch.action_shape))[-1]
+        assert ("metrics" in infos) == (step == 5)
+    assert infos["_metrics"].tolist() == [True, False, True]
+    np.testing.assert_allclose(infos["metrics"]["duration"][[0, 2]], 0.5)
+
+
+def test_each_metric_is_documented() -> None:
+    for metric in posse.METRICS:
+        assert metric.meaning.endswith(".")
+        assert metric.unit

@@ -1,0 +1,225 @@
+"""The observation: every field against an independent working, its bounds, its layout."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.support.reference import (
+    CASES,
+    Senses,
+    case_name,
+    headings,
+    observation,
+    one_world,
+    positions,
+    record,
+    snapshot,
+    sonar,
+)
+
+import posse
+
+
+@pytest.mark.parametrize("case", CASES, ids=case_name)
+def test_every_field_equals_an_independent_working(case: Any) -> None:
+    recording = record(*case)
+    s, senses = recording.scenario, Senses(recording.scenario)
+    for step, state in enumerate(recording.states):
+        senses.follow(state, recording.actions[step - 1] if step else None)
+        if step % 6 and step not in (1, 2):
+            continue
+        views = recording.batch.layout.views(recording.observations[step])
+        for i in range(s.num_trackers):
+            told = views["neighbour_number"][0, i]
+            expected = observation(s, state, i, senses, told)
+            assert set(expected) == set(views)
+            for name, value in expected.items():
+                off = 2e-3 if name in ("target_velocity", "sonar") else 2e-4
+                np.testing.assert_allclose(
+                    views[name][0, i], value, atol=off, rtol=1e-4, err_msg=f"{name}, step {step}"
+                )
+
+
+def test_what_the_target_agent_is_given() -> None:
+    batch = posse.batch("obstacles", 6, target_motion="agent", num_trackers=4, num_neighbours=6)
+    s = batch.scenario
+    observations = batch.reset(seed=2)
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        views = batch.layout.views(observations)
+        state = snapshot(batch)
+        for e in range(6):
+            world = one_world(state, e)
+            mine = {name: view[e, 4] for name, view in views.items()}
+            p, h = positions(world), headings(world)
+            assert mine["number"] == -1
+            assert mine["target_known"] == 0
+            assert mine["target_age"] == mine["target_range"] == -1
+            assert mine["max_speed"] == np.float32(s.target_speed)
+            assert mine["max_turn_rate"] == np.float32(s.target_turn_rate)
+            assert mine["acceleration_time"] == 0, "an agent's limits act at once"
+            np.testing.assert_allclose(mine["sonar"], sonar(s, world, 4), atol=2e-3)
+            away = (p[:4] - p[4]) / h[4]
+            at = mine["neighbour_bearing"][:4] @ [1, 1j] * mine["neighbour_range"][:4]
+            order = [int(number) for number in mine["neighbour_number"][:4]]
+            assert sorted(order) == [0, 1, 2, 3]
+            np.testing.assert_allclose(at, away[order], atol=1e-4)
+            assert (np.diff(mine["neighbour_range"][:4]) >= 0).all(), "nearest first"
+            assert mine["neighbour_number"][4:].tolist() == [-1, -1]
+            assert mine["neighbour_range"][4:].tolist() == [-1, -1]
+            assert (mine["neighbour_heading"][4:] == 0).all()
+        observations = batch.step(rng.uniform(-1, 1, batch.action_shape))[0]
+
+
+def test_the_target_agent_feels_a_wall() -> None:
+    batch = posse.batch(target_motion="agent", num_trackers=1, arena=10.0, start_distance=(1, 9))
+    batch.reset(options={"target_pose": [4.5, 0, 0], "tracker_pose": [[0, 0, 0]]})
+    for _ in range(10):
+        observations = batch.step([[[-1.0, 0.0], [1.0, 0.0]]])[0]
+    assert batch.state["world_x"][0] == pytest.approx(4.85, abs=1e-3)
+    assert batch.layout.views(observations)["touching"][0].tolist() == [0.0, 1.0]
+
+
+EXTREMES = st.sampled_from(
+    [
+        {},
+        {"range_noise": 0.3, "bearing_noise": 0.5},
+        {"num_trackers": 1},
+        {"num_trackers": 2, "num_neighbours": 7},
+        {"num_trackers": 14, "num_neighbours": 4, "message_size": 2},
+        {"tracker_speed": 50.0, "horizon": 30},
+        {"forget_after": 0.17, "radio_delay": 1},
+        {"target_motion": "agent"},
+        {"sonar_beams": 0},
+        {"velocity_smoothing": 2.0},
+        {"breaks": 1, "break_choice": "drawn", "break_window": (0.0, 1.0)},
+        {"field_of_view": 1.0, "sensor_outages": 1.0, "radio_outages": 1.0, "outage_time": 1.0},
+    ]
+)
+
+
+@hypothesis.settings(derandomize=True, max_examples=60, deadline=None)
+@given(
+    name=st.sampled_from(posse.scenario_names()),
+    overrides=EXTREMES,
+    seed=st.integers(0, 2**40),
+    actions=st.sampled_from(["random", "extreme", "straight"]),
+)
+def test_bounds_are_true(name: str, overrides: dict[str, Any], seed: int, actions: str) -> None:
+    settings = {"horizon": 80, "start_distance": (2.0, 8.0), **overrides}
+    if overrides.get("num_trackers") == 1:
+        settings["breaks"] = 0
+    batch = posse.batch(name, 4, **settings)
+    low, high = batch.layout.bounds()
+    assert np.isfinite(low).all()
+    assert np.isfinite(high).all()
+    assert (low <= high).all()
+    rng = np.random.default_rng(seed)
+    observations = batch.reset(seed=seed)
+    for _ in range(batch.scenario.horizon + 2):
+        assert (observations >= low).all()
+        assert (observations <= high).all()
+        if actions == "straight":
+            chosen = np.tile([1.0, 0.0] + [1.0] * batch.scenario.message_size, (4, 1))
+            chosen = np.broadcast_to(chosen[:, None], batch.action_shape)
+        elif actions == "extreme":
+            chosen = rng.choice([-1.0, 1.0], batch.action_shape)
+        else:
+            chosen = rng.uniform(-1, 1, batch.action_shape)
+        observations = batch.step(chosen)[0]
+
+
+@pytest.mark.parametrize("name", posse.scenario_names())
+def test_bounds_are_true_to_the_horizon(name: str) -> None:
+    batch = posse.batch(name, 3)
+    low, high = batch.layout.bounds()
+    observations = batch.reset(seed=5)
+    turn = np.random.default_rng(5).uniform(-0.2, 0.2, batch.action_shape)
+    turn[..., 0] = 1.0
+    for _ in range(batch.scenario.horizon + 1):
+        assert ((observations >= low) & (observations <= high)).all()
+        observations = batch.step(turn)[0]
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 8, 12, 13, 40, 64])
+@pytest.mark.parametrize("name", ["constant", "radio"])
+def test_one_to_sixty_four_trackers_nearest_first(name: str, number: int) -> None:
+    batch = posse.batch(name, 2, num_trackers=number, num_neighbours=5, start_distance=(2.0, 8.0))
+    twelve = posse.batch(name, 2, num_trackers=12, num_neighbours=5)
+    assert batch.layout.size == twelve.layout.size, "the layout does not depend on N"
+    batch.reset(seed=6)
+    for _ in range(5):
+        observations = batch.step(np.zeros(batch.action_shape))[0]
+    assert observations.shape == (2, number, batch.layout.size)
+    views = batch.layout.views(observations)
+    filled = views["neighbour_number"] >= 0
+    ranges = np.where(filled, views["neighbour_range"], np.inf)
+    assert (ranges[..., 1:] >= ranges[..., :-1]).all()
+    if name == "constant":
+        assert (filled.sum(axis=-1) == min(5, number - 1)).all()
+        place = positions(one_world(snapshot(batch), 0))[:number]
+        away = np.abs(place[:, None] - place[None, :]) + np.diag(np.full(number, np.inf))
+        for i in range(number):
+            nearest = np.sort(away[i])[: min(5, number - 1)]
+            np.testing.assert_allclose(ranges[0, i][filled[0, i]], nearest, atol=1e-5)
+    assert (views["neighbour_age"][~filled] == -1).all()
+    assert (views["neighbour_range"][~filled] == -1).all()
+    assert (views["neighbour_bearing"][~filled] == 0).all()
+
+
+@pytest.mark.parametrize("name", posse.scenario_names())
+def test_views_share_memory_and_flatten_is_their_inverse(name: str) -> None:
+    batch = posse.batch(name, 2, message_size=2)
+    layout, observations = batch.layout, batch.reset(seed=7)
+    views = layout.views(observations)
+    assert all(np.shares_memory(view, observations) for view in views.values())
+    np.testing.assert_array_equal(layout.flatten(views), observations)
+    marks = np.arange(observations.size, dtype=np.float32).reshape(observations.shape)
+    covered = np.concatenate([view.ravel() for view in layout.views(marks).values()])
+    np.testing.assert_array_equal(np.sort(covered), marks.ravel())
+    for field in layout.fields:
+        if not field.of_neighbour:
+            at = layout.offsets[field.name]
+            part = observations[..., at : at + field.size]
+            np.testing.assert_array_equal(
+                part.squeeze(-1) if field.size == 1 else part, views[field.name]
+            )
+
+
+def test_layout_errors() -> None:
+    layout = posse.batch().layout
+    with pytest.raises(ValueError, match="last axis"):
+        layout.views(np.zeros((2, layout.size + 1)))
+    views = layout.views(np.zeros((2, layout.size)))
+    with pytest.raises(ValueError, match="speed"):
+        layout.flatten({name: view for name, view in views.items() if name != "speed"})
+    with pytest.raises(ValueError, match="heading"):
+        layout.flatten({**views, "heading": np.zeros((2, 3))})
+
+
+def test_an_unknown_target_is_marked_by_sentinels() -> None:
+    batch = posse.batch("search", sensing_range=0.5, start_distance=(6.0, 9.0))
+    views = batch.layout.views(batch.reset(seed=8))
+    for field in batch.layout.fields:
+        if field.name.startswith("target_") and field.unknown is not None:
+            assert (views[field.name] == field.unknown).all(), field.name
+    assert (views["target_known"] == 0).all()
+
+
+def test_fields_are_declared_once_with_unit_range_and_meaning() -> None:
+    fields = posse.observation_fields("field", message_size=3)
+    assert len({field.name for field in fields}) == len(fields)
+    for field in fields:
+        assert field.unit in ("1", "m", "s", "m/s", "rad/s")
+        assert math.isfinite(field.low)
+        assert math.isfinite(field.high)
+        assert field.low <= field.high
+        assert field.meaning
+        if field.unknown is not None:
+            assert field.low <= field.unknown <= field.high

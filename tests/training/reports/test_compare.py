@@ -1,0 +1,201 @@
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import posse
+from posse.scenarios.named import _BY_NAME
+from posse_baselines import PolicyError
+from posse_baselines.learned.encoding import Encoding
+from posse_baselines.learned.network import LearnedPolicy, Network
+from posse_training.cli import main
+from posse_training.reports import sweeps
+from posse_training.reports.compare import Settings, compare
+from posse_training.reports.contenders import read_contenders
+from posse_training.reports.statistics import difference_over_seeds
+from posse_training.reports.sweeps import BOUND, SWEEPS, Sweep, play_sweeps
+from posse_training.runs.settings import SettingsError
+
+
+def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
+    names = ("idle", "pursuit")
+    settings = Settings(names, ("constant",), episodes=20, out=tmp_path, figures=False)
+    rows = compare(settings).rows
+    scores = {}
+    for name in names:
+        with (tmp_path / f"constant-{name}.csv").open(newline="") as file:
+            scores[name] = np.array([float(row["score"]) for row in csv.DictReader(file)])
+    assert rows[0]["difference"] is None
+    gap = scores["pursuit"] - scores["idle"]
+    assert rows[1]["difference"].value == pytest.approx(gap.mean())
+    assert rows[1]["improvement"].value == pytest.approx(((gap > 0) + 0.5 * (gap == 0)).mean())
+    assert rows[1]["difference"].count == 20
+    written = json.loads((tmp_path / "summary.json").read_text())
+    assert written["comparison"][1]["score"]["value"] == pytest.approx(scores["pursuit"].mean())
+    assert (written["seed"], written["split"]) == (7, "test")
+
+
+def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None:
+    for named, message in (
+        ("idel", "unknown policy 'idel'"),
+        ("mine=", "'mine=' is no group of policies"),
+        ("mine=idle,,pursuit", "is no group of policies"),
+        ("idle=pursuit", "two policies are called 'idle'"),
+    ):
+        with pytest.raises(PolicyError, match=message):
+            compare(Settings(("idle", named), ("constant",), out=tmp_path))
+    with pytest.raises(PolicyError, match="nobody to compare"):
+        compare(Settings((), ("constant",), out=tmp_path))
+    with pytest.raises(posse.ScenarioError, match="unknown scenario 'konstant'"):
+        compare(Settings(("idle",), ("constant", "konstant"), out=tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
+    assert main([*arguments, "--no-figures", "--out", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line for line in lines if " pursuit " in line)
+    assert "constant" in row, "no cell is broken where lines have no end"
+    assert row.count("]") == 5, "five estimates with their intervals"
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_comparison_replaces_the_one_before_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "summary.json").write_text("[]")  # of somebody else
+    first = Settings(("idle", "pursuit"), ("constant",), 2, out=tmp_path, sweep_episodes=0)
+    compare(first)
+    before = {path.name for path in tmp_path.iterdir()}
+    assert {"constant-pursuit.csv", "constant-pursuit.json", "profile.png"} <= before
+    with pytest.raises(SettingsError, match="episodes=0"):
+        compare(replace(first, episodes=0))
+    assert {path.name for path in tmp_path.iterdir()} == before
+    compare(replace(first, policies=("idle",), figures=False))
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "notes.txt", "summary.json", "constant-idle.csv", "constant-idle.json",
+    }  # fmt: skip
+
+
+def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
+    again = files[0].replace("0.safetensors", "again.safetensors")
+    learned(0).save(Path(again))
+    found = read_contenders((*files[:2], again, f"mine={files[2]}"))
+    assert [contender.label for contender in found] == ["any-0", "any-1", again, "mine"]
+    found = read_contenders((files[0], f"any-0={files[1]}"))
+    assert [contender.label for contender in found] == [files[0], "any-0"]
+
+
+def learned(seed: int, trained: str = "train") -> LearnedPolicy:
+    """A network of any numbers, for the layout of ``constant``."""
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "plain")
+    weight = np.random.default_rng(seed).normal(size=(2, encoding.size)).astype(np.float32)
+    network = Network(
+        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
+        (weight / np.float32(8),), (np.array([0.5, 0], np.float32),), "tanh", "clip",
+    )  # fmt: skip
+    return LearnedPolicy(network, encoding, {"name": f"any-{seed}", "trained_splits": [trained]})
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[str]:
+    paths = [tmp_path / f"{seed}.safetensors" for seed in range(3)]
+    for seed, path in enumerate(paths):
+        learned(seed).save(path)
+    return [str(path) for path in paths]
+
+
+def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> None:
+    group = f"mine={','.join(files)}"
+    settings = Settings(
+        ("pursuit", group), ("constant",), episodes=15, out=tmp_path / "out", figures=False
+    )
+    found = compare(settings)
+    assert [(row["policy"], row["seeds"]) for row in found.rows] == [("pursuit", 1), ("mine", 3)]
+    scores = []
+    for k in (1, 2, 3):
+        with (tmp_path / "out" / f"constant-mine-{k}.csv").open(newline="") as file:
+            scores.append([float(row["score"]) for row in csv.DictReader(file)])
+    assert len({tuple(row) for row in scores}) == 3
+    reference = found.plays["constant", "pursuit"]["score"]
+    assert found.rows[1]["difference"] == difference_over_seeds(scores, reference)
+    better = np.array(scores) > reference
+    assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
+
+
+def test_who_cannot_play_is_left_out_with_a_line(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario = replace(posse.get_scenario("constant"), sonar_beams=4)
+    _BY_NAME["few-beams"] = scenario
+    try:
+        command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
+        options = ["--episodes", "2", "--no-figures", "--out", str(tmp_path / "out")]
+        assert main([*command, *options]) == 0
+    finally:
+        del _BY_NAME["few-beams"]
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "left out: any-0 on few-beams:" in shown
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    left_out = [(row["what"], row["policy"]) for row in summary["left_out"]]
+    assert left_out == [("few-beams", "any-0")]
+    played = [(row["scenario"], row["policy"]) for row in summary["comparison"]]
+    assert played == [("few-beams", "pursuit"), ("constant", "any-0"), ("constant", "pursuit")]
+    # The one to compare with did not play: there is no difference to anybody else in its place.
+    assert summary["comparison"][0]["difference"] is None
+    assert summary["comparison"][2]["difference"] is not None
+
+
+def test_a_split_that_was_trained_on_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    learned(1, "test").save(tmp_path / "mine.safetensors")
+    options = ["--scenarios", "constant", "--no-figures", "--out", str(tmp_path)]
+    assert main(["compare", str(tmp_path / "mine.safetensors"), *options]) == 2
+    assert "was trained on the split 'test'" in capsys.readouterr().err
+
+
+class TestSweeps:
+    @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
+    def test_every_value_is_possible_and_the_own_one_is_among_them(self, sweep: Sweep) -> None:
+        for value in sweep.values:
+            assert getattr(sweep.at(value), sweep.setting) == value
+        assert sweep.own in sweep.values
+        assert sweep.at(sweep.values[0]) != sweep.at(sweep.values[-1])
+
+    def test_points_are_scores_at_their_settings(self) -> None:
+        from posse_training import evaluate
+
+        sweep = Sweep("size", "constant", "num_trackers", (3, 12), "trackers")
+        left_out: list[tuple[str, str, str]] = []
+        points = play_sweeps(
+            read_contenders(("idle", "pursuit")), 4, 5, "validation",
+            lambda *told: left_out.append(told), (sweep,),
+        )  # fmt: skip
+        assert [(p.value, p.policy) for p in points] == [
+            (size, policy) for size in (3, 12) for policy in ("idle", "pursuit", BOUND)
+        ]
+        alone = evaluate(
+            "pursuit", "constant", 4, 5, split="validation", num_trackers=12, progress=False
+        )
+        assert points[4].score.value == pytest.approx(alone["score"].mean())
+        assert points[5].score.value == pytest.approx(alone["bound"].mean())
+        assert left_out == []
+
+
+def test_figures_are_drawn_with_the_oracle_beside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = tuple(replace(sweep, values=sweep.values[:1]) for sweep in SWEEPS)
+    monkeypatch.setattr(sweeps.play_sweeps, "__defaults__", (few,))
+    options = ["--scenarios", "constant", "--episodes", "3", "--sweep-episodes", "2"]
+    assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
+    names = {"profile", "scenarios", "team-size", "radio-loss", "target-speed", "recovery"}
+    assert {path.stem for path in tmp_path.glob("*.png")} == names
+    assert {path.stem for path in tmp_path.glob("*.svg")} == names
+    assert "oracle" in capsys.readouterr().out
+    with (tmp_path / "sweeps.csv").open(newline="") as file:
+        assert {row["policy"] for row in csv.DictReader(file)} == {"pursuit", "oracle", BOUND}

@@ -1,0 +1,68 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import posse
+from posse_training.reports.reproduce import (
+    EXPERIMENTS,
+    Floats,
+    Recording,
+    Settings,
+    draw_starts,
+    reproduce,
+    settling_times,
+)
+
+
+def recording(relative: Floats, speeds: Floats) -> Recording:
+    """Return a recording of one world whose trackers move so relative to a target that runs on."""
+    steps = len(relative)
+    target = np.zeros((steps, 1, 3))
+    target[:, 0, 0] = -0.05 * np.arange(steps)
+    trackers = np.zeros((steps, 1, relative.shape[1], 3))
+    trackers[..., :2] = relative[:, None] + target[:, :, None, :2]
+    return Recording(np.arange(steps) * 0.1, trackers, target, speeds[:, None], 0.15)
+
+
+def test_settling_time_of_a_known_approach() -> None:
+    time = np.arange(81) * 0.1
+    gap = np.exp(-time)  # within 0.1 m of the last value from t = -ln(0.1 + e^-8)
+    relative = np.stack([np.stack([gap, 0 * gap], -1), np.zeros((81, 2))], axis=1)
+    still = np.full((81, 2), 0.5)
+    expected = np.ceil(-np.log(0.1 + np.exp(-8.0)) * 10) / 10
+    assert settling_times(recording(relative, still), 0.1)[0] == pytest.approx(expected)
+    # A speed that is still off later settles later, however well the places are held.
+    fast = still.copy()
+    fast[:50, 1] = 0.7
+    assert settling_times(recording(relative, fast), 0.1)[0] == pytest.approx(5.0)
+
+
+def test_a_team_that_still_moves_at_the_end_has_not_settled() -> None:
+    relative = np.zeros((81, 1, 2))
+    relative[:, 0, 0] = 0.05 * np.arange(81)
+    assert np.isnan(settling_times(recording(relative, np.ones((81, 1))), 0.1)[0])
+
+
+def test_starts_are_the_figures() -> None:
+    scenario = posse.get_scenario("paper-centralized")
+    trackers, targets = draw_starts(scenario, 20, seed=3)
+    assert trackers.shape == (20, 5, 3)
+    assert (trackers[..., 0] > targets[:, None, 0]).all()
+    np.testing.assert_array_equal(targets[:, 2], np.pi)
+    few, _ = draw_starts(scenario, 5, seed=3)
+    np.testing.assert_array_equal(few, trackers[:5])
+
+
+def test_figures_and_numbers_of_every_experiment_are_written(tmp_path: Path) -> None:
+    rows = reproduce(Settings(out=tmp_path, starts=5))
+    written = json.loads((tmp_path / "settling.json").read_text())
+    assert written["experiments"] == rows
+    for experiment in EXPERIMENTS:
+        for kind in ("frames", "curves"):
+            assert (tmp_path / f"{experiment.name}-{kind}.png").stat().st_size > 10_000
+            assert (tmp_path / f"{experiment.name}-{kind}.svg").read_text().startswith("<?xml")
+    by_model = {row["model"]: row for row in rows}
+    assert by_model["centralized"]["settled"] >= 4
+    assert by_model["distributed"]["settled"] >= 4

@@ -1,0 +1,237 @@
+"""The batch under TorchRL: same numbers, TorchRL's names, parts of it reset at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import torch
+from tensordict import TensorDictBase
+from tests.support.cuda_cases import run_in_simulator
+from torchrl.envs.utils import check_env_specs
+
+import posse
+from posse_training.torchrl.env import PosseEnv
+
+WORLDS = 6
+SHORT: dict[str, Any] = {"horizon": 12, "settle_time": 0.5}
+
+
+def some_actions(shape: tuple[int, ...], steps: int) -> npt.NDArray[np.float32]:
+    draws = np.random.default_rng(3).uniform(-1, 1, (steps, *shape))
+    return draws.astype(np.float32)
+
+
+def act(carried: TensorDictBase, actions: npt.NDArray[np.float32]) -> TensorDictBase:
+    return carried.set(("agents", "action"), torch.from_numpy(actions))
+
+
+@pytest.mark.parametrize("scenario", ["constant", "field"])
+def test_specs_hold(scenario: str) -> None:
+    check_env_specs(PosseEnv(scenario, WORLDS, **SHORT), seed=1)
+
+
+def test_specs_hold_where_the_target_is_an_agent() -> None:
+    env = PosseEnv("constant", WORLDS, target_motion="agent", num_trackers=3, **SHORT)
+    check_env_specs(env, seed=1)
+    assert env.group_map == {
+        "agents": ["tracker_0", "tracker_1", "tracker_2"],
+        "target": ["target_0"],
+    }
+
+
+def test_the_action_spec_has_room_for_the_message() -> None:
+    env = PosseEnv("constant", WORLDS, message_size=3)
+    assert env.full_action_spec["agents", "action"].shape == (WORLDS, 5, 5)
+
+
+def test_steps_equal_those_of_the_batch() -> None:
+    env = PosseEnv("field", WORLDS, seed=5)
+    batch = posse.batch("field", WORLDS, seed=5, autoreset="disabled")
+    carried, expected = env.reset(), batch.reset()
+    np.testing.assert_array_equal(carried["agents", "observation"].numpy(), expected)
+    assert not carried["score"].any()
+    for actions in some_actions(batch.action_shape, 40):
+        observations, rewards, terminated, truncated, infos = batch.step(actions)
+        following, carried = env.step_and_maybe_reset(act(carried, actions))
+        now = following["next"]
+        np.testing.assert_array_equal(now["agents", "observation"].numpy(), observations)
+        np.testing.assert_array_equal(now["agents", "reward"].squeeze(-1).numpy(), rewards)
+        np.testing.assert_array_equal(now["terminated"].squeeze(-1).numpy(), terminated)
+        np.testing.assert_array_equal(now["truncated"].squeeze(-1).numpy(), truncated)
+        np.testing.assert_array_equal(now["score"].squeeze(-1).numpy(), infos["score"])
+
+
+def test_rows_of_a_target_that_is_an_agent_come_last() -> None:
+    settings: dict[str, Any] = {"target_motion": "agent", "num_trackers": 3}
+    env = PosseEnv("constant", WORLDS, seed=5, **settings)
+    batch = posse.batch("constant", WORLDS, seed=5, **settings)
+    carried, _ = env.reset(), batch.reset()
+    actions = some_actions(batch.action_shape, 1)[0]
+    observations, rewards, *_ = batch.step(actions)
+    carried.set(("target", "action"), torch.from_numpy(actions[:, 3:]))
+    now = env.step(act(carried, actions[:, :3]))["next"]
+    np.testing.assert_array_equal(now["agents", "observation"].numpy(), observations[:, :3])
+    np.testing.assert_array_equal(now["target", "observation"].numpy(), observations[:, 3:])
+    np.testing.assert_array_equal(now["agents", "reward"].squeeze(-1).numpy(), rewards[:, :3])
+    np.testing.assert_array_equal(now["target", "reward"].squeeze(-1).numpy(), rewards[:, 3:])
+
+
+def test_what_was_returned_is_never_overwritten() -> None:
+    env = PosseEnv("constant", 300)  # large enough for the engine to use memory again
+    carried = env.reset()
+    kept, copies = [], []
+    for actions in some_actions(env.batch.action_shape, 12):
+        following, carried = env.step_and_maybe_reset(act(carried, actions))
+        kept.append(following["next", "agents", "observation"])
+        copies.append(kept[-1].clone())
+        del following
+    for tensor, copy in zip(kept, copies, strict=True):
+        assert torch.equal(tensor, copy)
+
+
+def test_no_copy_on_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = PosseEnv("constant", WORLDS)
+    carried = env.reset()
+    returned = []
+    step = env.batch.step
+
+    def remember(actions: npt.ArrayLike) -> object:
+        outcome = step(actions)
+        returned.append(outcome)
+        return outcome
+
+    monkeypatch.setattr(env.batch, "step", remember)
+    following = env.step(act(carried, some_actions(env.batch.action_shape, 1)[0]))
+    observations, rewards, *_ = returned[0]
+    now = following["next", "agents"]
+    assert now["observation"].data_ptr() == observations.ctypes.data
+    assert now["reward"].data_ptr() == rewards.ctypes.data
+
+
+def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
+    env = PosseEnv("field", WORLDS)
+    carried = env.reset()
+    for actions in some_actions(env.batch.action_shape, 5):
+        _, carried = env.step_and_maybe_reset(act(carried, actions))
+    before = carried["agents", "observation"].clone()
+    state = {name: array.copy() for name, array in env.batch.state.items()}
+    marks = torch.tensor([False, True, False, True, True, False])
+    after = env.reset(carried.set("_reset", marks[:, None]))["agents", "observation"]
+    assert torch.equal(after[~marks], before[~marks])
+    assert (after[marks] != before[marks]).flatten(1).any(1).all()
+    for name, array in env.batch.state.items():
+        np.testing.assert_array_equal(array[~marks.numpy()], state[name][~marks.numpy()])
+    assert env.batch.worlds["episode"].tolist() == [0, 1, 0, 1, 1, 0]
+
+
+def test_the_horizon_truncates_and_a_contact_terminates() -> None:
+    env = PosseEnv("constant", 64, terminate_on_contact=True, start_distance=(1.0, 2.5), **SHORT)
+    rollout = env.rollout(12, break_when_any_done=False)
+    now = rollout["next"]
+    assert now["terminated"].any()
+    assert now["truncated"].any()
+    assert not (now["terminated"] & now["truncated"]).any()
+    assert torch.equal(now["done"], now["terminated"] | now["truncated"])
+    assert now["truncated"][:, -1].logical_or(now["terminated"].any(dim=1)).all()
+
+
+def test_a_rollout_goes_on_with_the_next_episode() -> None:
+    env = PosseEnv("constant", WORLDS, seed=2, **SHORT)
+    batch = posse.batch("constant", WORLDS, seed=2, **SHORT)
+    rollout = env.rollout(12 + 12 + 2, break_when_any_done=False)
+    done = torch.zeros(26, dtype=torch.bool)
+    done[[11, 23]] = True
+    assert torch.equal(rollout["next", "done"].squeeze(-1), done.expand(WORLDS, -1))
+    observation = rollout["agents", "observation"]
+    next_observation = rollout["next", "agents", "observation"]
+    assert torch.equal(observation[:, 1:][:, ~done[:-1]], next_observation[:, :-1][:, ~done[:-1]])
+    batch.reset()
+    for step in (12, 24):
+        np.testing.assert_array_equal(observation[:, step].numpy(), batch.reset())
+
+
+def test_a_seed_gives_the_worlds_of_that_seed_from_the_start() -> None:
+    env = PosseEnv("constant", WORLDS, seed=1)
+    env.reset()
+    env.reset()
+    env.set_seed(9)
+    seeded = env.reset()["agents", "observation"].numpy()
+    np.testing.assert_array_equal(seeded, posse.batch("constant", WORLDS, seed=9).reset())
+    following = env.reset()["agents", "observation"].numpy()  # the next episode, not the same again
+    assert (following != seeded).any()
+
+
+def test_start_poses_can_be_given() -> None:
+    env = PosseEnv("constant", WORLDS)
+    env.reset(options={"target_pose": [1.0, 2.0, 0.5]})
+    np.testing.assert_array_equal(env.batch.state["world_x"], np.full(WORLDS, 1.0, np.float32))
+
+
+def test_settings_reach_the_batch() -> None:
+    env = PosseEnv("constant", 1, seed=4, first_world=17, split="test", num_trackers=3)
+    batch = posse.batch("constant", 20, seed=4, split="test", num_trackers=3)
+    np.testing.assert_array_equal(
+        env.reset()["agents", "observation"].numpy(), batch.reset()[17:18]
+    )
+
+
+def test_a_choice_of_autoreset_is_refused() -> None:
+    with pytest.raises(TypeError, match=r"autoreset='same_step'.*leave it out"):
+        PosseEnv("constant", WORLDS, autoreset="same_step")
+
+
+def test_a_step_of_some_worlds_alone_is_refused() -> None:
+    env = PosseEnv("constant", 64, terminate_on_contact=True, start_distance=(1.0, 2.5), **SHORT)
+    with pytest.raises(NotImplementedError, match="break_when_any_done=False"):
+        env.rollout(12, break_when_all_done=True, break_when_any_done=False)
+
+
+def test_a_bad_action_is_refused_and_changes_nothing() -> None:
+    env = PosseEnv("constant", WORLDS)
+    carried = env.reset()
+    before = env.batch.worlds.copy()
+    actions = some_actions(env.batch.action_shape, 1)[0]
+    actions[2, 1, 0] = 1.5
+    with pytest.raises(ValueError, match=r"actions\[2, 1, 0\] = 1.5"):
+        env.step(act(carried, actions))
+    np.testing.assert_array_equal(env.batch.worlds, before)
+
+
+# Importing TorchRL's collectors defines classes by an old interface of its own.
+@pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
+def test_a_collector_gathers_whole_batches() -> None:
+    from torchrl.collectors import Collector
+
+    env = PosseEnv("constant", WORLDS, seed=8, **SHORT)
+    batch = posse.batch("constant", WORLDS, seed=8, **SHORT)
+
+    def policy(carried: TensorDictBase) -> TensorDictBase:
+        return act(carried, np.ones(env.batch.action_shape, np.float32))
+
+    collector = Collector(
+        env,
+        policy,
+        frames_per_batch=8 * WORLDS,
+        total_frames=16 * WORLDS,
+        trust_policy=True,  # a plain function, with nothing to adapt
+        auto_register_policy_transforms=False,  # there are none, and it asks for an answer
+    )
+    parts: list[Any] = [part.clone() for part in collector]
+    data: Any = torch.cat(parts, dim=1)
+    collector.shutdown()
+    assert data.batch_size == (WORLDS, 16)
+    batch.reset()
+    for step in range(12):
+        observations, *_ = batch.step(np.ones(batch.action_shape, np.float32))
+        np.testing.assert_array_equal(
+            data["next", "agents", "observation"][:, step].numpy(), observations
+        )
+    assert data["next", "truncated"].squeeze(-1)[:, 11].all()
+
+
+def test_over_the_gpu_engine_in_the_simulator() -> None:
+    run_in_simulator(Path(__file__).parents[2] / "support" / "torchrl_simulated.py")

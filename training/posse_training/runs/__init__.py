@@ -1,0 +1,1 @@
+"""Training runs: settings, checkpoints, export, shipping."""

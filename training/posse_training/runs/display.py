@@ -1,0 +1,149 @@
+"""What is seen of a training while it runs: a live display, or lines where there is no terminal."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Final
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.panel import Panel
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from posse_training.runs.settings import TrainSettings
+
+_BARS: Final = "▁▂▃▄▅▆▇█"
+_WIDTH: Final = 40
+
+
+class Display:
+    """Shows progress, time left, and the policy's score on validation worlds beside another's.
+
+    Args:
+        settings: Of the training.
+        console: Where to show it.
+    """
+
+    def __init__(self, settings: TrainSettings, console: Console) -> None:
+        self._settings = settings
+        self._console = console
+        self._started = time.monotonic()
+        self._from_steps = 0
+        self._steps = 0
+        self._training_score: float | None = None
+        self._curve: list[dict[str, float]] = []
+        self._beside: float | None = None
+        self._note = ""
+        self._live: Live | None = None
+
+    def __enter__(self) -> Display:
+        if self._console.is_terminal:
+            self._live = Live(
+                get_renderable=self._render, console=self._console, refresh_per_second=4
+            )
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def note(self, text: str) -> None:
+        """Say what is going on."""
+        self._note = text
+        if self._live is None:
+            self._console.print(text)
+
+    def begin(self, steps: int, curve: list[dict[str, float]]) -> None:
+        """Take note that learning begins, or goes on after ``steps`` steps."""
+        self._started = time.monotonic()
+        self._from_steps = self._steps = steps
+        self._curve = list(curve)
+        self._note = ""
+
+    def beside(self, score: float | None) -> None:
+        """Show another policy's score on the same worlds."""
+        self._beside = score
+
+    def progress(self, steps: int, training_score: float | None) -> None:
+        """Show how far it is, and the mean score of the latest episodes played in training."""
+        self._steps = steps
+        self._training_score = training_score
+
+    def evaluated(self, point: dict[str, float]) -> None:
+        """Show a score on validation worlds."""
+        self._curve.append(point)
+        if self._live is None:
+            self._console.print(self._line(point))
+
+    def _line(self, point: dict[str, float]) -> str:
+        line = (
+            f"{int(point['steps']):>12,} steps  score {point['score']:.3f} "
+            f"[{point['low']:.3f}, {point['high']:.3f}]"
+        )
+        if self._beside is not None:
+            line += f"  ({self._settings.beside} {self._beside:.3f})"
+        rate = self.rate
+        return line + (f"  {rate:,.0f} steps/s, {_clock(self.time_left)} left" if rate else "")
+
+    @property
+    def rate(self) -> float:
+        """Steps a second since learning began."""
+        elapsed = time.monotonic() - self._started
+        return (self._steps - self._from_steps) / elapsed if elapsed > 0 else 0.0
+
+    @property
+    def time_left(self) -> float:
+        """Seconds until all steps are done, at the present rate."""
+        left = max(0, self._settings.steps - self._steps)
+        return left / self.rate if self.rate else float("inf")
+
+    def _render(self) -> RenderableType:
+        s = self._settings
+        table = Table.grid(padding=(0, 2))
+        table.add_column(style="bold")
+        table.add_column()
+        table.add_row(
+            "steps",
+            f"{self._steps:,} of {s.steps:,}   {self.rate:,.0f} a second   "
+            f"{_clock(self.time_left)} left",
+        )
+        table.add_row("", ProgressBar(total=s.steps, completed=self._steps, width=_WIDTH))
+        if self._training_score is not None:
+            table.add_row("training score", f"{self._training_score:.3f}")
+        if self._curve:
+            last, best = self._curve[-1], max(p["score"] for p in self._curve)
+            table.add_row(
+                "validation score",
+                f"{last['score']:.3f} [{last['low']:.3f}, {last['high']:.3f}]   best {best:.3f}",
+            )
+            scores = [p["score"] for p in self._curve[-_WIDTH:]]
+            table.add_row("", Text(sparkline(scores, self._beside), style="cyan"))
+        if s.beside is not None and self._beside is not None:
+            table.add_row(s.beside, f"{self._beside:.3f}")
+        if self._note:
+            table.add_row("", self._note)
+        title = f"{s.algorithm} on {s.scenario}, seed {s.seed}"
+        return Panel(Group(table), title=title, expand=False)
+
+
+def sparkline(scores: list[float], beside: float | None = None) -> str:
+    """Return scores as a row of bars, the tallest being the best score, or ``beside`` if higher."""
+    top = max([*scores, beside or 0.0, 1e-9])
+    return "".join(_BARS[min(7, max(0, int(8 * score / top)))] for score in scores)
+
+
+def _clock(seconds: float) -> str:
+    if seconds == float("inf"):
+        return "unknown time"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

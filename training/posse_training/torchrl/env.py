@@ -1,0 +1,179 @@
+"""A batch of worlds as one TorchRL environment: the batch's natural form for TorchRL users.
+
+TorchRL steps batches and resets parts of them, which is what the engine does, so the adapter only
+names things. E = worlds, N = trackers, F = observation length, m = message size::
+
+    TensorDict (E,)
+        ("agents", "observation")       (E, N, F) float32
+        ("agents", "action")            (E, N, 2 + m) float32 in [-1, 1]
+        ("agents", "reward")            (E, N, 1) float32
+        "score"                         (E, 1) float32, of the present step; 0 at the start
+        "done", "terminated", "truncated"   (E, 1) bool
+
+Where the target is an agent too, it has a group of its own, ``"target"``, with N = 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Binary, Bounded, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+import posse
+from posse.adapters.actions import agent_names
+
+TRACKERS: Final = "agents"
+"""The group of the trackers, by the name that TorchRL's multi-agent examples use."""
+TARGET: Final = "target"
+"""The group of a target that is an agent."""
+
+
+class PosseEnv(EnvBase):
+    """A batch of E worlds of one scenario, ``batch_size=[E]``.
+
+    Worlds whose episodes end are reset by TorchRL (rollouts and collectors do so by themselves), a
+    part of the batch at a time. On the CPU the tensors share the memory of the engine's arrays,
+    which are never overwritten while a tensor holds them; on a GPU, whose engine overwrites its
+    arrays, they are copied there.
+
+    Args:
+        scenario: A scenario, or the name of one.
+        num_worlds: E, at least 1.
+        device: Where tensors live. On ``"cuda"`` the worlds do too, and nothing goes by way of the
+            host: it needs the extra ``cuda``. For any other device than the CPU, the worlds are
+            stepped there, and each step costs a copy each way.
+        settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
+            and any setting of the scenario. The mode of automatic resets is not among them.
+
+    Attributes:
+        batch: The engine, for its layout, its state and its metrics.
+        group_map: The agents' names by group.
+
+    Raises:
+        TypeError: ``autoreset`` among the settings.
+        ValueError: As :func:`posse.batch`.
+    """
+
+    def __init__(
+        self,
+        scenario: str | posse.Scenario = "constant",
+        num_worlds: int = 1,
+        *,
+        device: torch.device | str = "cpu",
+        **settings: Any,
+    ) -> None:
+        if "autoreset" in settings:
+            raise TypeError(
+                f"autoreset={settings['autoreset']!r} cannot be chosen: TorchRL resets the worlds "
+                "that are done by itself; leave it out"
+            )
+        engine = "cuda" if torch.device(device).type == "cuda" else "cpu"
+        self.batch = posse.batch(
+            scenario, num_worlds, autoreset="disabled", device=engine, **settings
+        )
+        super().__init__(device=device, batch_size=(num_worlds,))
+        trackers = self.batch.scenario.num_trackers
+        names = agent_names(self.batch.scenario)
+        self._rows = {TRACKERS: slice(0, trackers)}
+        if len(names) > trackers:
+            self._rows[TARGET] = slice(trackers, None)
+        self.group_map = {group: names[rows] for group, rows in self._rows.items()}
+        self._seed: int | None = None
+        self._make_specs()
+
+    def _make_specs(self) -> None:
+        worlds, rows, width = self.batch.action_shape
+        low, high = (
+            torch.from_numpy(bound).expand(worlds, rows, -1) for bound in self.batch.layout.bounds()
+        )
+        observation = Composite(shape=(worlds,))
+        action = Composite(shape=(worlds,))
+        reward = Composite(shape=(worlds,))
+        for group, part in self._rows.items():
+            count = len(self.group_map[group])
+            observation[group] = Composite(
+                observation=Bounded(low[:, part], high[:, part], dtype=torch.float32),
+                shape=(worlds, count),
+            )
+            action[group] = Composite(
+                action=Bounded(-1.0, 1.0, (worlds, count, width), dtype=torch.float32),
+                shape=(worlds, count),
+            )
+            reward[group] = Composite(
+                reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count)
+            )
+        observation["score"] = Bounded(0.0, 1.0, (worlds, 1), dtype=torch.float32)
+        flag = Binary(1, (worlds, 1), dtype=torch.bool)
+        self.observation_spec = observation.to(self.device)
+        self.action_spec = action.to(self.device)
+        self.reward_spec = reward.to(self.device)
+        self.done_spec = Composite(
+            done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(worlds,)
+        ).to(self.device)
+
+    def _set_seed(self, seed: int | None) -> None:
+        """Have the next reset of all worlds start over from episode 0 of a seed."""
+        self._seed = seed
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
+        """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
+
+        ``seed`` and ``options`` (start poses) may be given to :meth:`reset` as they are to
+        :meth:`posse.Batch.reset`.
+        """
+        options = dict(kwargs.get("options") or {})
+        marks = None if tensordict is None else tensordict.get("_reset", None)
+        if marks is not None and not bool(marks.all()):
+            options["reset_mask"] = self._array(marks.reshape(self.batch.num_worlds))
+            seed = kwargs.get("seed")
+        else:
+            seed = kwargs.get("seed", self._seed)
+            self._seed = None
+        observations = self.batch.reset(seed=seed, options=options)
+        return self._pack(observations)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        if tensordict.get("_step", None) is not None:
+            raise NotImplementedError(
+                "the worlds of a PosseEnv are stepped together, none can wait for the others: "
+                "use rollout(..., break_when_any_done=False), which resets those that are done, "
+                "and not break_when_all_done=True"
+            )
+        actions = [tensordict.get((group, "action")) for group in self._rows]
+        together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
+        observations, rewards, *_ = self.batch.step(self._array(together.detach()))
+        packed = self._pack(observations)
+        each = self._tensor(rewards).unsqueeze(-1)
+        for group, part in self._rows.items():
+            packed.set((group, "reward"), each[:, part])
+        return packed
+
+    def _pack(self, observations: Any) -> TensorDict:
+        """Return all but the rewards under TorchRL's names."""
+        each = self._tensor(observations)
+        packed = TensorDict({}, batch_size=self.batch_size, device=self.device)
+        for group, part in self._rows.items():
+            size = (*self.batch_size, len(self.group_map[group]))
+            packed.set(group, TensorDict({"observation": each[:, part]}, batch_size=size))
+        terminated = self._tensor(self.batch.terminated).unsqueeze(-1)
+        truncated = self._tensor(self.batch.truncated).unsqueeze(-1)
+        packed.set("score", self._tensor(self.batch.score).unsqueeze(-1))
+        packed.set("done", terminated | truncated)
+        packed.set("terminated", terminated)
+        packed.set("truncated", truncated)
+        return packed
+
+    def _tensor(self, array: Any) -> torch.Tensor:
+        """Return an array of the engine as a tensor on the device."""
+        if isinstance(array, np.ndarray):
+            return torch.from_numpy(array).to(self.device)
+        # The engine's next step but one overwrites it.
+        return torch.as_tensor(array, device=self.device).clone()
+
+    def _array(self, tensor: torch.Tensor) -> Any:
+        """Return a tensor as the engine takes it."""
+        return tensor.contiguous() if tensor.device.type == "cuda" else tensor.cpu().numpy()
