@@ -106,7 +106,7 @@ class Renderer:
             world: Place of the world in the batch.
             annotations: What a policy tells of itself, each (E, N) integers: ``"task"``, by its
                 number in :data:`posse.rendering.style.TASKS`, colours the trackers; ``"leader"``,
-                the tracker that each one holds to be the leader, marks those that hold themselves so.
+                the one that each tracker takes for the leader, marks those that take themselves.
 
         Returns:
             A frame (H, W, 3) uint8 in the mode ``"rgb_array"``; ``None`` in the mode ``"human"``,

@@ -3,9 +3,9 @@
 The fields come in five blocks, all declared here: own motion, the task and the target, which
 :mod:`posse.signals.together` writes; the sonar (:mod:`posse.rules.senses.sonar`); and team-mates,
 where they are now (:mod:`posse.signals.mates`) or as they were heard of, which stands here, with
-all that a target is given that is an agent. Directions are cosine and sine; *ego* means the robot's own frame,
-x ahead and y to the left; the *common frame* is the one that the team agreed on at the start.
-A quantity that is not known holds the field's ``unknown`` value.
+all that a target is given that is an agent. Directions are cosine and sine; *ego* means the
+robot's own frame, x ahead and y to the left; the *common frame* is the one that the team agreed on
+at the start. A quantity that is not known holds the field's ``unknown`` value.
 """
 
 from __future__ import annotations
@@ -270,8 +270,7 @@ def observe_alone(
     s: FloatArray,
     observations: FloatArray,
 ) -> None:
-    """Write what each tracker of a world is given, (rows, F), but for
-    :mod:`posse.signals.together`.
+    """Write what :mod:`posse.signals.together` does not write of observations, (rows, F).
 
     Where every disc is stands in ``s``.
     """

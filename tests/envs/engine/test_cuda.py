@@ -24,7 +24,7 @@ from tests.support.cuda_cases import (
 
 import posse
 
-HERE = Path(__file__).parent
+SUPPORT = Path(__file__).parents[2] / "support"
 
 
 def test_the_cases_hold_what_they_are_for() -> None:
@@ -39,7 +39,7 @@ def test_the_cases_hold_what_they_are_for() -> None:
 def test_in_the_simulator(tmp_path: Path) -> None:
     for case in CASES:
         np.savez(tmp_path / case, **play(make(case, "cpu")))  # type: ignore[arg-type]
-    run_in_simulator(HERE / "cuda_simulated.py", POSSE_TEST_EXPECTED=str(tmp_path))
+    run_in_simulator(SUPPORT / "cuda_simulated.py", POSSE_TEST_EXPECTED=str(tmp_path))
 
 
 def complaint(**environment: str) -> str:

@@ -411,7 +411,8 @@ def test_importing_the_package_does_not_load_pygame() -> None:
 def test_frames_need_no_display() -> None:
     code = (
         "import posse, pygame; from posse.rendering.renderer import Renderer;"
-        "b = posse.batch('smart'); b.reset(); print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
+        "b = posse.batch('smart'); b.reset();"
+        "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "(640, 640, 3) False"
