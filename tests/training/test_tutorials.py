@@ -80,7 +80,7 @@ def test_add_scenario(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
 def test_reward_term(tmp_path: Path) -> None:
     """The term is put where the tutorial says, in a copy of the package, and nowhere else."""
     shutil.copytree(ROOT / "envs" / "posse", tmp_path / "posse")
-    file = tmp_path / "posse" / "reward.py"
+    file = tmp_path / "posse" / "signals" / "reward.py"
     source, end = file.read_text(), "\n\nREWARD_TERMS: Final"
     assert source.count(end) == 1
     term = (TUTORIALS / "steady_term.txt").read_text()
