@@ -468,6 +468,7 @@ class Episode:
     _start: Complexes | None = None
     _arrived: npt.NDArray[np.bool_] | None = None
     _touch: npt.NDArray[np.bool_] | None = None
+    _touched: bool = False
     _lost_at: int | None = None
     _working: int = 0
     _held_from: int | None = None
@@ -541,6 +542,7 @@ class Episode:
         turn = state["tracker_turn_rate"].astype(np.float64) / s.tracker_turn_rate
         for name, value in (
             ("score", self.score),
+            ("safe_score", 0.0 if self._touched else self.score),
             ("bound", (self._arrived & alive).sum() / count),
             ("error", distance[alive].sum()),
             ("effort", (v**2 + turn**2)[alive].sum()),
@@ -554,7 +556,7 @@ class Episode:
         n = self.scenario.num_trackers
         assert self._touch is not None
         begun = touch & ~self._touch
-        self._touch = touch
+        self._touch, self._touched = touch, self._touched or bool(touch.any())
         self.onsets = begun.sum(axis=1).astype(np.float64)
         self.contacts["tracker"] += int(begun[:, :n].sum()) // 2
         self.contacts["target"] += int(begun[:, n].sum())
@@ -582,6 +584,7 @@ class Episode:
             recovery = (self._recovered_at - self._lost_at) * s.control_step
         return {
             "score": sums["score"] / self._steps,
+            "safe_score": sums["safe_score"] / self._steps,
             "bound": sums["bound"] / self._steps,
             "detection_time": time(self._detected_at),
             "settling_time": time(self._settled_at),
@@ -591,6 +594,7 @@ class Episode:
             "tracker_contacts": self.contacts["tracker"],
             "obstacle_contacts": self.contacts["obstacle"],
             "target_contacts": self.contacts["target"],
+            "contact_free": float(not self._touched),
             "least_gap": self._least,
             "control_effort": sums["effort"] / sums["tracker_steps"],
             "time_connected": sums["connected"] / self._steps,

@@ -2,6 +2,7 @@
 
 At each control step, score = occupied slots / working trackers, at most 1. A slot is occupied when
 a working tracker that touches nothing is within tolerance of it; who stands where is free.
+The safe score counts a step only while no tracker has touched anything since the episode began.
 """
 
 from __future__ import annotations
@@ -102,6 +103,8 @@ def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
 def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
     """Add this step to the sums of the episode."""
     w.score_sum += w.score
+    if w.contacts_tracker + w.contacts_obstacle + w.contacts_target == 0:
+        w.safe_score_sum += w.score
     bound, error, effort, sight = 0, _ZERO, _ZERO, _ZERO
     for i in range(c.num_trackers):
         t = trackers[i]

@@ -130,6 +130,7 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
     w.working = c.num_trackers
     w.score = _ZERO
     w.score_sum = 0.0
+    w.safe_score_sum = 0.0
     w.error_sum = 0.0
     w.effort_sum = 0.0
     w.sight_sum, w.bound_sum, w.tracker_steps, w.connected_sum = _ZERO, _ZERO, _ZERO, _ZERO

@@ -83,7 +83,8 @@ WORLD: Final = _record(
     # what the metrics are worked out from
     ("working", _I),  # trackers that work
     ("score", _F),  # of the present step
-    ("score_sum", np.float64), ("error_sum", np.float64), ("effort_sum", np.float64),
+    ("score_sum", np.float64), ("safe_score_sum", np.float64),
+    ("error_sum", np.float64), ("effort_sum", np.float64),
     ("sight_sum", _F),
     ("bound_sum", _F), ("tracker_steps", _F), ("connected_sum", _F),
     ("held", _I),  # steps on end with every working tracker in a slot of its own

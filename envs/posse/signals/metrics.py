@@ -65,6 +65,12 @@ def score(s: Scenario, w: Records) -> _Column:
 
 
 @metric("1")
+def safe_score(s: Scenario, w: Records) -> _Column:
+    """The score, where every step counts 0 from the first contact of any tracker on."""
+    return _per_step(w["safe_score_sum"], w)
+
+
+@metric("1")
 def bound(s: Scenario, w: Records) -> _Column:
     """What the score could have been at most: every tracker straight to a slot, then in place."""
     return _per_step(w["bound_sum"], w)
@@ -116,6 +122,13 @@ def obstacle_contacts(s: Scenario, w: Records) -> _Column:
 def target_contacts(s: Scenario, w: Records) -> _Column:
     """Contacts of a tracker with the target."""
     return np.asarray(w["contacts_target"], np.float64)
+
+
+@metric("1")
+def contact_free(s: Scenario, w: Records) -> _Column:
+    """1 if no tracker touched anything, else 0; the mean is the share of contact-free episodes."""
+    contacts = w["contacts_tracker"] + w["contacts_obstacle"] + w["contacts_target"]
+    return np.asarray(contacts == 0, np.float64)
 
 
 @metric("m")

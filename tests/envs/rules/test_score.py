@@ -98,6 +98,32 @@ def test_who_touches_anything_occupies_nothing() -> None:
     assert infos["score"][0] == pytest.approx(0.6)
 
 
+def test_the_safe_score_counts_no_step_from_the_first_contact_on() -> None:
+    """The leader runs into the target that it follows, falls back, and is in its slot again."""
+    batch = posse.batch(horizon=80, autoreset="disabled")
+    in_place(batch)
+    actions = np.tile([FOLLOW, 0.0], (1, 5, 1))
+    scores: list[float] = []
+    touches: list[bool] = []
+    for step in range(1, 81):
+        place = positions(one_world(snapshot(batch), 0))
+        if step > 5:
+            fallen_back = (place[5] - place[0]).real >= 1.2
+            actions[0, 0, 0] = 1.0 if not any(touches) else FOLLOW if fallen_back else -0.6
+        infos = batch.step(actions)[-1]
+        scores.append(float(infos["score"][0]))
+        touches.append(bool(batch.state["tracker_touching"].any()))
+    first = touches.index(True)
+    assert 5 < first < 40
+    assert scores[first] == pytest.approx(0.8)
+    assert scores[-1] == 1.0
+    assert not touches[-1]
+    metrics = infos["metrics"]
+    assert metrics["score"][0] == pytest.approx(sum(scores) / 80)
+    assert metrics["safe_score"][0] == pytest.approx(sum(scores[:first]) / 80)
+    assert metrics["contact_free"][0] == 0.0
+
+
 def test_the_broken_one_is_not_counted_and_the_others_recover() -> None:
     batch = posse.batch(breaks=1, break_window=(0.5, 0.5), horizon=100, autoreset="disabled")
     in_place(batch)

@@ -38,9 +38,12 @@ def test_the_recordings_show_what_they_should() -> None:
         assert any(math.isnan(value) for value in seen[name]), name
     for name in ("tracker_contacts", "obstacle_contacts", "target_contacts"):
         assert max(seen[name]) > 0, name
-    for name in ("time_in_sight", "time_connected", "score", "bound"):
+    for name in ("time_in_sight", "time_connected", "score", "bound", "contact_free"):
         assert max(seen[name]) > 0, name
         assert min(seen[name]) < 1, name
+    pairs = list(zip(seen["safe_score"], seen["score"], strict=True))
+    assert any(0 < safe < score for safe, score in pairs), "contact in mid-episode"
+    assert any(0 < safe == score for safe, score in pairs), "no contact"
 
 
 def test_detection_is_when_the_target_first_came_into_sight() -> None:
