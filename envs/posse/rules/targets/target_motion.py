@@ -60,11 +60,11 @@ _WORTH: Final = OWN  # a row of scratch memory: what each direction is worth
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
 _LOYALTY: Final = np.float32(0.5)  # s; going back on its choice has to be worth twice that
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
-_PATIENCE: Final = np.float32(3.0)  # s of station keeping that provoke a dart
+PATIENCE: Final = np.float32(3.0)  # s of station keeping that provoke a dart
 _STATION_MARGIN: Final = np.float32(1.0)  # m beyond the farthest slot that count as near
 _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
 _DANGER: Final = np.float32(0.6)  # a tracker this near provokes a dart, x formation_distance
-_DART_TIME: Final = np.float32(1.3 * math.pi)  # a dart lasts 1.3 times as long as an about-turn
+DART_TURN: Final = np.float32(1.3 * math.pi)  # rad; a dart lasts as long as turning so far
 _DART_MOMENTS: Final = 6  # at which a dart is looked at beforehand
 _DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
 _DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
@@ -131,8 +131,8 @@ def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatA
         return
     pressure = team_pressure(c, w, trackers)
     w.pressed = max(_ZERO, w.pressed + pressure * past)
-    if w.pressed >= _PATIENCE:
-        w.pressed = -_DART_TIME / c.target_turn_rate
+    if w.pressed >= PATIENCE:
+        w.pressed = -DART_TURN / c.target_turn_rate
         plan_dart(c, w, trackers, obstacles)
     else:
         plan_escape(c, w, trackers, obstacles, s)
@@ -243,7 +243,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
     the best one moves them farthest from where they stand around the target, and does not lead
     into one of them.
     """
-    moment = _DART_TIME / (c.target_turn_rate * np.float32(_DART_MOMENTS))
+    moment = DART_TURN / (c.target_turn_rate * np.float32(_DART_MOMENTS))
     clear = c.radius + c.radius + _CLEARANCE
     best = np.float32(-1e9)
     for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):

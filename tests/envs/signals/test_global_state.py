@@ -1,0 +1,138 @@
+"""The state vector: equal vectors and equal draws go on alike, whatever the arrays hold beside."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import hypothesis
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import posse
+from posse.rules.state import WorldArrays
+from posse.signals.global_state import StateLayout
+
+DRAWS: Final = ("world_seed", "world_split", "world_index", "world_episode", "world_key")
+FOLLOWS: Final = (
+    # from poses: contacts, and who is near to what (test_contact)
+    "world_touching", "world_near", "tracker_touching", "tracker_touching_trackers",
+    "tracker_touching_obstacles", "tracker_near",
+    "tracker_onsets",  # counted anew where anything is near, and 0 elsewhere
+    # from poses, the slot frame and contacts: who occupies which slot (test_score)
+    "tracker_slot", "tracker_slot_distance",
+    # from the times of faults, from time and contacts
+    "world_working", "world_over", "world_terminated",
+)  # fmt: skip
+"""What the vector leaves out because it follows from the rest, and the engine keeps."""
+
+
+def junk(array: npt.NDArray[Any], rng: np.random.Generator) -> npt.NDArray[Any]:
+    return rng.integers(1, 40, array.shape).astype(array.dtype)
+
+
+def disturb(scenario: posse.Scenario, arrays: WorldArrays, rng: np.random.Generator) -> set[str]:
+    """Overwrite all that the state vector does not hold; return the names of what was."""
+    layout = StateLayout(scenario)
+    vector, disturbed = layout.vector(arrays), set()
+    for name, array in arrays.by_name().items():
+        if name in DRAWS or name in FOLLOWS or array.size == 0:
+            continue
+        before = array.copy()
+        array[...] = junk(array, rng)
+        if np.array_equal(layout.vector(arrays), vector):
+            disturbed.add(name)
+        else:
+            array[...] = before
+    # Of what was never heard or sent, the vector holds no more than that.
+    for name, record, absent in (
+        ("heard", arrays.heard, arrays.heard["step"] < 0),
+        ("broadcast", arrays.broadcast, arrays.broadcast["sent"] == 0),
+    ):
+        for field in (record.dtype.names or ())[1:]:
+            array = arrays.by_name()[f"{name}_{field}"]
+            array[absent] = junk(array, rng)[absent]
+    np.testing.assert_array_equal(layout.vector(arrays), vector)
+    return disturbed
+
+
+def drive(batch: posse.Batch, rng: np.random.Generator) -> npt.NDArray[np.float32]:
+    """Head for the target at random speeds, so that it is pressed, and talk."""
+    state = batch.state
+    dx = state["world_x"][:, None] - state["tracker_x"]
+    dy = state["world_y"][:, None] - state["tracker_y"]
+    c, s = state["tracker_heading_cos"], state["tracker_heading_sin"]
+    actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+    n = batch.scenario.num_trackers
+    actions[:, :n, 0] = np.maximum(actions[:, :n, 0], actions[:, :1, 0])
+    actions[:, :n, 1] = np.clip(np.arctan2(dy * c - dx * s, dx * c + dy * s), -1, 1)
+    return actions
+
+
+@hypothesis.settings(derandomize=True, max_examples=40, deadline=None)
+@given(
+    name=st.sampled_from(posse.scenario_names()),
+    target_motion=st.sampled_from(["constant", "accelerating", "smart", "smart", "agent"]),
+    num_trackers=st.integers(2, 10),
+    near=st.booleans(),
+    radio_delay=st.integers(0, 3),
+    radio_range=st.sampled_from([np.inf, 3.0]),
+    message_size=st.integers(0, 2),
+    breaks=st.integers(0, 1),
+    break_choice=st.sampled_from(["nearest", "drawn"]),
+    outages=st.sampled_from([0.0, 0.5]),
+    acceleration=st.sampled_from([np.inf, 2.0]),
+    steps=st.integers(0, 60),
+    seed=st.integers(0, 2**20),
+)
+def test_equal_states_with_equal_draws_go_on_alike(
+    name: str,
+    near: bool,
+    outages: float,
+    acceleration: float,
+    steps: int,
+    seed: int,
+    **settings: Any,
+) -> None:
+    place: dict[str, Any] = {"start_distance": (0.7, 3.0)} if near else {}
+    try:
+        scenario = posse.get_scenario(
+            name, horizon=70, outage_time=1.0, sensor_outages=outages, radio_outages=outages,
+            tracker_acceleration=acceleration, **place, **settings,
+        )  # fmt: skip
+    except posse.ScenarioError:
+        return
+    one, other = (posse.batch(scenario, 8, seed=seed) for _ in range(2))
+    one.reset()
+    rng = np.random.default_rng(seed)
+    for _ in range(steps):
+        one.step(drive(one, rng))
+    other.restore(one.save())
+    disturbed = disturb(scenario, other.arrays, rng)
+    assert {"world_score_sum", "world_held", "tracker_start_x"} <= disturbed
+    for _ in range(30):  # some of them into the next episode
+        actions = drive(one, rng)
+        for mine, theirs in zip(one.step(actions)[:4], other.step(actions)[:4], strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+
+
+def test_a_smart_target_s_patience_is_in_the_state_within_its_bounds() -> None:
+    """It grows while the team keeps station, up to 3 s; a dart is that of 1.3 π at ω_t, 2 rad/s."""
+    batch = posse.batch("smart", 64, start_distance=(0.7, 3.0))
+    layout = StateLayout(batch.scenario)
+    low, high = layout.bounds()
+    at = layout.offsets["pressed"]
+    batch.reset(seed=0)
+    rng = np.random.default_rng(0)
+    values = []
+    for _ in range(150):
+        batch.step(drive(batch, rng))
+        vector = layout.vector(batch.arrays)
+        assert ((vector >= low) & (vector <= high)).all()
+        values.append(vector[:, at])
+    assert np.min(values) == pytest.approx(-1.3 * np.pi / 2.0)
+    assert (np.array(values) > 0).any()
+    assert high[at] == 3.0
+    assert low[at] == pytest.approx(-1.3 * np.pi / 2.0, rel=0.01)
