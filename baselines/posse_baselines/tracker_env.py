@@ -13,13 +13,13 @@ from posse import ObservationLayout, Scenario, ScenarioError
 from posse.adapters.actions import ActionReader, single_action_space
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.adapters.spaces import box
-from posse.numeric import FloatArray
+from posse.numeric import FloatArray, OwnArrays
 from posse.signals.reward import name_terms
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
 
-class TrackerEnv(gymnasium.Env[Any, Any]):
+class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
     """One tracker among scripted (or learned) team-mates.
 
     **Observation**: ``Box`` (F,) float32, what this tracker is given, the messages of its

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.adapters import out_of_band
 
 import posse
 from posse_baselines import (
@@ -42,6 +43,25 @@ def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[list[Any], li
         done.append(actions)
         observations, *_ = batch.step(actions)
     return seen, done
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_game_that_was_pickled_out_of_band_goes_on_alike(name: str) -> None:
+    policy = load(name)
+    batch = batch_for(policy, "field", 2)
+    observations, memory = batch.reset(seed=1), begin(policy, batch)
+    for _ in range(5):
+        actions, memory = policy.act(observations, memory)
+        observations, *_ = batch.step(actions)
+    game, seen = (policy, batch, memory), observations
+    ends = []
+    for policy, batch, memory in (out_of_band(game), game):
+        observations, memory = seen, policy.restart(memory, np.array([True, False]))
+        for _ in range(5):
+            actions, memory = policy.act(observations, memory)
+            observations, *_ = batch.step(actions)
+        ends.append(observations)
+    np.testing.assert_array_equal(ends[0], ends[1])
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from tests.support.adapters import out_of_band, same
 
 import posse
 import posse_baselines
@@ -39,6 +40,16 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
         assert info["score"] == pytest.approx(float(infos["score"][0]))
     assert truncated
     assert info["metrics"]["score"] == pytest.approx(float(infos["metrics"]["score"][0]))
+
+
+def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
+    env = TrackerEnv("smart", seed=5, **SHORT)
+    env.reset()
+    twin = out_of_band(env)
+    for _ in range(5):
+        action = env.action_space.sample()
+        assert same(env.step(action), twin.step(action))
+    assert same(env.reset(seed=1), twin.reset(seed=1))
 
 
 def test_the_learners_action_moves_its_tracker_and_no_other() -> None:

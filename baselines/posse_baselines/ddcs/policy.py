@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, Records
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse.rules.state import beam_directions, slot_records
 from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs.controller import decide_all
@@ -34,7 +34,7 @@ _MOST_DISCS: Final = 32
 
 
 @dataclass
-class _Minds:
+class _Minds(OwnArrays):
     """The memory of a team in each of E worlds."""
 
     layout: ObservationLayout
@@ -51,7 +51,7 @@ class _Minds:
     """(E, N, GRID²): own step + 1 at which a place was looked at last; (E, N, 0) without need."""
 
 
-class DDCS(BasePolicy):
+class DDCS(OwnArrays, BasePolicy):
     """Three layers, four tasks, from observations and messages alone.
 
     Args:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray, Numbers, compiled, kernel, worlds_of
+from posse.numeric import FloatArray, Numbers, OwnArrays, compiled, kernel, worlds_of
 from posse_baselines.learned.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
 from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import PolicyError
@@ -212,7 +212,7 @@ def _encode_rows(
         encode_row(rows[r], columns, unknown, offsets, slots, with_features, s, out[r])
 
 
-class Encoder:
+class Encoder(OwnArrays):
     """An encoding at work on the observations of one layout.
 
     Raises:

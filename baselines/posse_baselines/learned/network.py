@@ -25,7 +25,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, Numbers, compiled, kernel, worlds_of
+from posse.numeric import BoolArray, FloatArray, Numbers, OwnArrays, compiled, kernel, worlds_of
 from posse_baselines.learned.advice import MOTION, Adviser, advised, check_adviser
 from posse_baselines.learned.encoding import Encoder, Encoding, encode_row
 from posse_baselines.learned.features import SCRATCH
@@ -51,7 +51,7 @@ _ONE: Final = np.float32(1.0)
 
 
 @dataclass(frozen=True)
-class Network:
+class Network(OwnArrays):
     """A feed-forward network with its input normalisation.
 
     x = clip((input - mean) * scale, ±limit); then layers of weight (out, in) and bias (out,), with
@@ -187,7 +187,7 @@ def _act(
                     out[j] = min(max(out[j], -_ONE), _ONE)
 
 
-class LearnedPolicy(BasePolicy):
+class LearnedPolicy(OwnArrays, BasePolicy):
     """A policy that was learned, as numbers.
 
     Args:
@@ -261,16 +261,16 @@ class LearnedPolicy(BasePolicy):
         """
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)
-        scratch = np.empty((MOST_THREADS, SCRATCH + 2 * max(self.network.sizes)), np.float32)
         thoughts = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        return layout, num_worlds, encoder, scratch, thoughts
+        return layout, num_worlds, encoder, thoughts
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F)."""
-        layout, num_worlds, encoder, scratch, thoughts = memory
+        layout, num_worlds, encoder, thoughts = memory
         observations = check_observations(self, observations, num_worlds, layout)
         trackers = observations.shape[1]
         actions = np.empty((num_worlds, trackers, 2 + message_size_of(layout)), np.float32)
+        scratch = np.empty((MOST_THREADS, SCRATCH + 2 * max(self.network.sizes)), np.float32)
         proposals = actions[..., :0]
         if self.adviser is not None:
             proposals, thoughts = self.adviser.act(observations, thoughts)
@@ -285,7 +285,7 @@ class LearnedPolicy(BasePolicy):
         )  # fmt: skip
         if self.adviser is not None:
             actions = advised(proposals, actions[..., :MOTION])
-        return actions, (layout, num_worlds, encoder, scratch, thoughts)
+        return actions, (layout, num_worlds, encoder, thoughts)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Return the memory with the adviser's begun anew; the network remembers nothing."""

@@ -17,6 +17,7 @@ from posse.numeric import (
     BoolArray,
     FloatArray,
     Numbers,
+    OwnArrays,
     Record,
     Records,
     compiled,
@@ -94,7 +95,7 @@ class OracleSettings:
 
 
 @dataclass
-class _OracleMemory:
+class _OracleMemory(OwnArrays):
     batch: Batch
     config: Records
     slots: Records

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray, Numbers, Record, Records, compiled, kernel, worlds_of
+from posse.numeric import (
+    FloatArray,
+    Numbers,
+    OwnArrays,
+    Record,
+    Records,
+    compiled,
+    kernel,
+    worlds_of,
+)
 from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.parallel import over_worlds
 from posse_baselines.policy import (
@@ -23,6 +33,13 @@ _KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
 _STOP: Final = 0.9  # distance from the target at which it stops, m
 
 
+@dataclass(frozen=True)
+class _PursuitMemory(OwnArrays):
+    layout: ObservationLayout
+    num_worlds: int
+    offsets: Records
+
+
 class Pursuit(BasePolicy):
     """Velocity pursuit without a formation: the naive team."""
 
@@ -31,15 +48,15 @@ class Pursuit(BasePolicy):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory: the layout, the number of worlds, where the fields are."""
         check_fits(self, layout)
-        return layout, num_worlds, offsets_of(layout)
+        return _PursuitMemory(layout, num_worlds, offsets_of(layout))
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions straight at the last fix of the target; in a circle without one."""
-        layout, num_worlds, offsets = memory
-        observations = check_observations(self, observations, num_worlds, layout)
-        num_trackers = observations.shape[1]
-        actions = np.zeros((num_worlds, num_trackers, 2 + message_size_of(layout)), np.float32)
-        over_worlds(pursue_all, (offsets, observations, actions), num_worlds, num_trackers)
+        m: _PursuitMemory = memory
+        observations = check_observations(self, observations, m.num_worlds, m.layout)
+        num_worlds, num_trackers = observations.shape[:2]
+        actions = np.zeros((num_worlds, num_trackers, 2 + message_size_of(m.layout)), np.float32)
+        over_worlds(pursue_all, (m.offsets, observations, actions), num_worlds, num_trackers)
         return actions, memory
 
 

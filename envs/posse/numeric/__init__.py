@@ -4,7 +4,7 @@ Arrays and records, lanes (eight numbers at a time), the decorators that compile
 many worlds over threads. Knows nothing of worlds: every other room may import it.
 """
 
-from posse.numeric.arrays import BoolArray, FloatArray, Record, Records
+from posse.numeric.arrays import BoolArray, FloatArray, OwnArrays, Record, Records
 from posse.numeric.compiling import UNCOMPILED, compiled, direct, kernel
 from posse.numeric.simd.lanes import (
     WIDTH,
@@ -38,6 +38,7 @@ __all__ = [
     "Lanes",
     "Mask",
     "Numbers",
+    "OwnArrays",
     "Record",
     "Records",
     "all_at_once",

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Record, Records
+from posse.numeric import FloatArray, OwnArrays, Record, Records
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.scenario import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS, Scenario
 from posse.signals.reward import REWARD_TERMS
@@ -147,7 +147,7 @@ BROADCAST: Final = _record(
 
 
 @dataclass(frozen=True)
-class WorldArrays:
+class WorldArrays(OwnArrays):
     """Every array of a batch. With the scenario, they are its whole state."""
 
     world: Records

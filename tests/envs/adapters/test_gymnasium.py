@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, RecordVideo
-from tests.support.adapters import EVERYTHING, SOLO_SCENARIOS, f32, same
+from tests.support.adapters import EVERYTHING, SOLO_SCENARIOS, f32, out_of_band, same
 
 import posse
 from posse.adapters.actions import MOTIONS
@@ -187,7 +187,10 @@ def test_a_discrete_action_is_one_of_the_motions() -> None:
     assert same(solo.step(number), reference.step(MOTIONS[7]))
 
 
-@pytest.mark.parametrize("replica", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])  # noqa: S301
+@pytest.mark.parametrize(
+    "replica",
+    [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), out_of_band],  # noqa: S301
+)
 @pytest.mark.parametrize("name", [TEAM, SOLO])
 def test_a_copy_made_in_mid_episode_goes_on_alike(name: str, replica: Any) -> None:
     settings = dict(EVERYTHING)

@@ -21,7 +21,7 @@ from pettingzoo.test import (
     seed_test,
     state_test,
 )
-from tests.support.adapters import EVERYTHING, f32, same
+from tests.support.adapters import EVERYTHING, f32, out_of_band, same
 
 import posse
 from posse.adapters.actions import MOTIONS
@@ -282,7 +282,10 @@ def test_what_is_returned_is_never_overwritten() -> None:
     assert np.array_equal(state, before)
 
 
-@pytest.mark.parametrize("replica", [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e))])  # noqa: S301
+@pytest.mark.parametrize(
+    "replica",
+    [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), out_of_band],  # noqa: S301
+)
 def test_a_copy_made_in_mid_episode_goes_on_alike(replica: Any) -> None:
     env = posse.parallel_env(**EVERYTHING)
     env.reset(seed=3)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
-from tests.support.adapters import same
+from tests.support.adapters import out_of_band, same
 
 import posse
 from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
@@ -172,14 +172,16 @@ def test_without_a_seed_environments_differ() -> None:
 
 
 @modes
-def test_a_copy_made_in_mid_episode_goes_on_alike(mode: AutoresetMode) -> None:
+@pytest.mark.parametrize("replica", [lambda e: pickle.loads(pickle.dumps(e)), out_of_band])  # noqa: S301
+def test_a_copy_made_in_mid_episode_goes_on_alike(mode: AutoresetMode, replica: Any) -> None:
     env = vector(autoreset_mode=mode, horizon=8, settle_time=0.5)
     env.reset(seed=0)
     env.step(env.action_space.sample())
-    twin = pickle.loads(pickle.dumps(env))  # noqa: S301
+    twin = replica(env)
     for _ in range(7):
         actions = env.action_space.sample()
         assert same(env.step(actions), twin.step(actions))
+    assert same(env.reset(seed=1), twin.reset(seed=1))
 
 
 def test_max_episode_steps_is_the_length_of_an_episode() -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from gymnasium.error import ResetNeeded
+from tests.support.adapters import out_of_band
 from tests.support.reference import snapshot
 
 import posse
@@ -214,11 +215,13 @@ def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
     for step in range(25):
         now = batch.step(actions_for(batch, step))[0]
     saved = batch.save()
-    twin = pickle.loads(pickle.dumps(batch))  # noqa: S301
+    twin, beside = pickle.loads(pickle.dumps(batch)), out_of_band(batch)  # noqa: S301
     kept = pickle.loads(pickle.dumps(saved))  # noqa: S301
     onward = [batch.step(actions_for(batch, step))[0] for step in range(25, 60)]
-    assert_equal([twin.step(actions_for(twin, step))[0] for step in range(25, 60)], onward)
-    for back in (saved, kept):
+    for copy in (twin, beside):
+        assert_equal([copy.step(actions_for(copy, step))[0] for step in range(25, 60)], onward)
+    np.testing.assert_array_equal(beside.reset(seed=1), twin.reset(seed=1))
+    for back in (saved, kept, out_of_band(saved)):
         np.testing.assert_array_equal(batch.restore(back), now)
         assert_equal([batch.step(actions_for(batch, step))[0] for step in range(25, 60)], onward)
     fresh = posse.batch(name, 3, message_size=1)
