@@ -107,6 +107,18 @@ def test_a_bad_action_is_named_and_changes_nothing(where: str, bad: float) -> No
     assert batch.state["world_step"].tolist() == [2, 2, 2]
 
 
+@pytest.mark.parametrize("where", ["host", "device"])
+def test_an_action_just_outside_is_the_bound_s(where: str) -> None:
+    one, other = make("smart", "cuda"), make("smart", "cuda")
+    one.reset()
+    other.reset()
+    bounds = np.sign(actions_for(one, 0))
+    given = bounds * np.float32(1 + 1e-6)
+    told = cuda.to_device(given) if where == "device" else given
+    np.testing.assert_array_equal(on_host(one.step(told)[0]), on_host(other.step(bounds)[0]))
+    np.testing.assert_array_equal(on_host(told), bounds * np.float32(1 + 1e-6))
+
+
 def test_actions_may_lie_on_the_device() -> None:
     one, other = make("smart", "cuda"), make("smart", "cuda")
     one.reset()

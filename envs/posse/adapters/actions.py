@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from posse.engine.kernels import bad_action
+from posse.engine.kernels import TO_CLIP, bad_action
 from posse.numeric import FloatArray, direct
 from posse.scenarios.scenario import Scenario, ScenarioError
 
@@ -96,7 +96,10 @@ class ActionReader:
             except (KeyError, TypeError, ValueError, BufferError):
                 pass
             else:
-                if self._first_bad(self.read) < 0:
+                position = self._first_bad(self.read)
+                if position == TO_CLIP:
+                    np.clip(self.read, -1, 1, out=self.read)
+                if position < 0:
                     return
         self._by_agent_slowly(actions)
 
@@ -111,7 +114,10 @@ class ActionReader:
             raise ValueError(f"action has shape {array.shape}, wanted {self._shape}")
         if array.dtype is _FLOAT32 and not self._discrete:
             self._plane[...] = array
-            if self._first_bad(self.read) < 0:
+            position = self._first_bad(self.read)
+            if position == TO_CLIP:
+                np.clip(self.read, -1, 1, out=self.read)
+            if position < 0:
                 return
         if not (self._discrete and array.dtype.kind in "iu"):
             for agent, row in zip(self._agents, array, strict=True):
@@ -179,7 +185,7 @@ class ActionReader:
                 f"action of {agents[i]}: {part} = {kernel[0, i, k]} is not a number in [-1, 1]: "
                 "scale or clip the policy's output first"
             )
-        return kernel
+        return np.clip(kernel, -1, 1) if position == TO_CLIP else kernel
 
 
 def _as_array(action: npt.ArrayLike, subject: str) -> npt.NDArray[Any]:

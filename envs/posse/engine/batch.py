@@ -21,6 +21,7 @@ from posse.engine.kernels import (
     START,
     START_FROM_POSES,
     STEP,
+    TO_CLIP,
     advance,
     bad_action,
     first_over,
@@ -323,7 +324,8 @@ class Batch:
 
         Args:
             actions: (E, rows, 2 + message_size) numbers in [-1, 1]: the speed (-1 is 0, 1 the
-                greatest), the turn rate (1 is the greatest to the left), the message.
+                greatest), the turn rate (1 is the greatest to the left), the message. Up to 1e-6
+                outside, as rounding may carry them, they are taken for the bound.
 
         Returns:
             observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
@@ -422,7 +424,7 @@ class Batch:
         if position >= 0:
             e, i, k = np.unravel_index(position, array.shape)
             raise action_error((int(e), int(i), int(k)), array[e, i, k])
-        return array
+        return np.clip(array, -1, 1) if position == TO_CLIP else array
 
     def cast_actions(self, actions: npt.ArrayLike) -> FloatArray:
         """Return the actions as contiguous float32, or raise if their type or shape is wrong."""

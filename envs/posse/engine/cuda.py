@@ -20,7 +20,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.engine.batch import Batch, Snapshot, action_error
-from posse.engine.kernels import LOOK, START, STEP, advance_worlds, prepare
+from posse.engine.kernels import LOOK, MOST_ACTION, START, STEP, advance_worlds, prepare
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.discs import SIZE_FOR_ONE
 from posse.rules.state import SPLITS, WorldArrays
@@ -56,10 +56,17 @@ _OVER: Final = 2
 _NONE: Final = 2**62
 _NOTHING: Final = np.array([_NONE, _NONE, 0], np.int64)
 
+_ONE: Final = np.float32(1.0)
+
 
 @cuda.jit  # type: ignore[untyped-decorator]
-def _check(world: Records, actions: FloatArray, report: DeviceArray, disabled: bool) -> None:
-    """Report actions that are not in [-1, 1] and, with autoreset disabled, worlds that are over."""
+def _check(
+    world: Records, actions: FloatArray, clipped: FloatArray, report: DeviceArray, disabled: bool
+) -> None:
+    """Clip actions, which rounding may have carried out of [-1, 1], and write them to ``clipped``.
+
+    Report those farther out and, with autoreset disabled, worlds that are over.
+    """
     e = cuda.grid(1)
     if e == 0:
         report[_OVER] = 0
@@ -69,7 +76,10 @@ def _check(world: Records, actions: FloatArray, report: DeviceArray, disabled: b
         rows, width = actions.shape[1], actions.shape[2]
         for i in range(rows):
             for k in range(width):
-                if not (actions[e, i, k] >= -1.0 and actions[e, i, k] <= 1.0):
+                action = actions[e, i, k]
+                if action >= -MOST_ACTION and action <= MOST_ACTION:
+                    clipped[e, i, k] = min(max(action, -_ONE), _ONE)
+                else:
                     cuda.atomic.min(report, _BAD_ACTION, (e * rows + i) * width + k)
 
 
@@ -300,7 +310,7 @@ class CudaBatch(Batch):
         Args:
             actions: (E, rows, 2 + message_size) numbers in [-1, 1]. A contiguous float32 array on
                 the device (a torch tensor, or anything else with ``__cuda_array_interface__``) is
-                taken as it is; anything else is copied there.
+                read where it is; anything else is copied there.
             check: Whether to look for actions that are not in [-1, 1] and for episodes that ended,
                 which waits for the device. ``False``, in the mode "next_step": the step is only
                 queued, actions are taken as they are, and ``infos`` holds no metrics. The other
@@ -318,13 +328,14 @@ class CudaBatch(Batch):
         """
         if not self._started:
             raise ResetNeeded("step before reset: call reset() first")
-        array = self._take(actions)
+        given = array = self._take(actions)
         waits = check or self.autoreset != "next_step"
         if waits:
             disabled = self.autoreset == "disabled"
-            self._launch(_check, self._device_world, array, self._report, disabled)
+            array = self._device_actions
+            self._launch(_check, self._device_world, given, array, self._report, disabled)
         self._launch_advance(array, self._all_step)
-        over = self._wait(array) if waits else 0
+        over = self._wait(given) if waits else 0
         done = self._turn()
         infos: dict[str, Any] = {"score": done.score, "reward_terms": dict(done.reward_terms)}
         observations = done.observations

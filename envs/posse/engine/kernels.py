@@ -326,14 +326,25 @@ def first_over(world: Records) -> int:
     return -1
 
 
+MOST_ACTION: Final = np.float32(1 + 1e-6)
+"""Actions up to this are taken for the bound, 1: no more than rounding carried them past it."""
+IN_BOX: Final = -1
+TO_CLIP: Final = -2
+
+
 @kernel
 def bad_action(actions: FloatArray) -> int:
-    """Return the flat position of the first action that is not a number in [-1, 1], or -1."""
+    """Return the flat position of the first action that is no number in [-1, 1], even to rounding.
+
+    :data:`IN_BOX` if there is none; :data:`TO_CLIP` if some lie outside by rounding.
+    """
     flat = actions.reshape(-1)
-    bad = 0
+    outside = 0
     for k in range(len(flat)):  # without a way out, so that many are looked at at once
-        bad += not ((flat[k] >= -_ONE) & (flat[k] <= _ONE))
-    for k in range(len(flat) if bad else 0):
-        if not (flat[k] >= -_ONE and flat[k] <= _ONE):
+        outside += not ((flat[k] >= -_ONE) & (flat[k] <= _ONE))
+    if outside == 0:
+        return IN_BOX
+    for k in range(len(flat)):
+        if not (flat[k] >= -MOST_ACTION and flat[k] <= MOST_ACTION):
             return k
-    return -1
+    return TO_CLIP

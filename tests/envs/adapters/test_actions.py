@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
+from tests.support.adapters import same
 
 import posse
 from posse.adapters.actions import ActionReader, agent_names
@@ -47,6 +49,56 @@ def test_any_form_of_the_same_numbers_is_the_same_action(form: Any) -> None:
     by_row.by_row(form(VALUES))
     assert np.array_equal(by_agent.read[0], VALUES)
     assert np.array_equal(by_row.read[0], VALUES)
+
+
+OUTSIDE = 1 + 1e-6  # as far as rounding may carry an action
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_what_rounding_carried_outside_is_taken_for_the_bound(kind: Any) -> None:
+    names = agent_names(get_scenario("smart", num_trackers=3))
+    array = np.array([[OUTSIDE, -OUTSIDE], [-OUTSIDE, 0.5], [OUTSIDE, 0.0]], kind)
+    given = frozen(array)
+    for form in (FORMS["float32"], FORMS["list"]):
+        by_agent, by_row = reader(), reader()
+        by_agent.by_agent({name: form(row) for name, row in zip(names, given, strict=True)})
+        by_row.by_row(form(given))
+        for read in (by_agent, by_row):
+            assert read.read[0].tolist() == [[1, -1], [-1, 0.5], [1, 0]]
+        assert np.array_equal(reader().one("tracker_0", form(given[0])), [1, -1])
+        far = np.array([[0, 0], [0, 1 + 1.2e-6], [0, 0]], kind)
+        with pytest.raises(ValueError, match=r"tracker_1: turn rate = 1\.00000"):
+            by_row.by_row(form(far))
+        with pytest.raises(ValueError, match=r"tracker_1: turn rate = 1\.00000"):
+            by_agent.by_agent({name: form(row) for name, row in zip(names, far, strict=True)})
+
+
+BOUNDS = np.sign(VALUES + 0.1)
+
+
+@pytest.mark.parametrize(
+    ("make", "actions"),
+    [
+        (lambda: posse.batch("smart", num_trackers=3), lambda a: a[None]),
+        (lambda: posse.parallel_env("smart", num_trackers=3),
+         lambda a: {f"tracker_{i}": a[i] for i in range(3)}),
+        (lambda: gymnasium.make("posse/Team-v0", scenario="smart", num_trackers=3).unwrapped,
+         lambda a: a),
+        (lambda: gymnasium.make("posse/Solo-v0", scenario="smart").unwrapped, lambda a: a[0]),
+        (lambda: gymnasium.make_vec("posse/Team-v0", 1, scenario="smart", num_trackers=3),
+         lambda a: a[None]),
+        (lambda: gymnasium.make_vec("posse/Solo-v0", 1, scenario="smart"), lambda a: a[:1]),
+    ],
+    ids=["batch", "parallel", "team", "solo", "team vector", "solo vector"],
+)  # fmt: skip
+def test_a_step_from_just_outside_is_the_bound_s(make: Any, actions: Any) -> None:
+    one, other = make(), make()
+    one.reset(seed=0)
+    other.reset(seed=0)
+    given = frozen(BOUNDS * np.float32(OUTSIDE))
+    assert same(one.step(actions(given))[:4], other.step(actions(BOUNDS))[:4])
+    with pytest.raises(ValueError, match=r"1\.00000\d* is not a number in \[-1, 1\]"):
+        one.step(actions(BOUNDS * np.float32(1 + 1.2e-6)))
 
 
 def test_actions_are_read_by_name_and_not_by_order() -> None:

@@ -90,7 +90,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
             *batch._fixed, actions, observations, rewards, terms, flags, infos["score"], orders,
             report,
         ),
-        cuda._check: (batch.worlds, actions, report, True),
+        cuda._check: (batch.worlds, actions, actions.copy(), report, True),
         cuda._choose: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
     }  # fmt: skip
     for kernel, arguments in kernels.items():
