@@ -25,7 +25,19 @@ from posse.numeric import (
     load,
     root,
 )
-from posse.rules.discs import BLOCK, EXCESS, FAR, GAP, INDEX, TOUCHING_GAP, X, Y, blocks
+from posse.rules.discs import (
+    BLOCK,
+    EXCESS,
+    FAR,
+    GAP,
+    INDEX,
+    RADIUS,
+    TOUCHING_GAP,
+    X,
+    Y,
+    blocks,
+    natural,
+)
 from posse.rules.targets.target_motion import AGENT
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -163,8 +175,9 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
         elif meet_closely(c, w, t, obstacles, i, s):
             target_touching |= _BIT << np.uint64(i)
     w.touching = target_touching
-    # A scripted target keeps clear of obstacles and walls by itself (target_motion.safe_turn).
-    w.near = target_near or (c.motion == AGENT and c.walled != 0)
+    w.near = target_near
+    if c.walled and not target_near:
+        w.near = c.motion == AGENT or target_near_surroundings(c, w, s)
     w.least_gap = smallest
 
 
@@ -186,6 +199,27 @@ def near_target(c: Record, w: Record, t: Record) -> bool:
     reach = c.radius + c.radius + TOUCHING_GAP + (c.tracker_speed + c.target_speed) * c.dt
     dx, dy = w.x - t.x, w.y - t.y
     return bool(dx * dx + dy * dy <= reach * reach)
+
+
+@compiled
+def target_near_surroundings(c: Record, w: Record, s: FloatArray) -> bool:
+    """Say whether the target could touch an obstacle or a wall within the next control step.
+
+    Where the obstacles are stands in scratch memory (:func:`posse.rules.discs.lay_out`).
+    """
+    # A scripted target seldom comes so near: only where trackers held it (target_motion.way_out),
+    # or where it is so fast that a control step takes it across the free width that it keeps.
+    way = TOUCHING_GAP + c.target_speed * c.dt
+    if c.half_arena - c.radius - max(abs(w.x), abs(w.y)) <= way:
+        return True
+    first = natural(c.num_trackers) + 1
+    for block in range(blocks(c.num_obstacles)):
+        k = first + BLOCK * block
+        dx, dy, reach = load(s, X + k) - w.x, load(s, Y + k) - w.y, load(s, RADIUS + k)
+        reach = reach + (c.radius + way)
+        if bits(dx * dx + dy * dy <= reach * reach) != 0:
+            return True
+    return False
 
 
 @compiled

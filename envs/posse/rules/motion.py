@@ -167,13 +167,13 @@ def command_target(
     scratch: FloatArray,
 ) -> None:
     """Set the target's speed and turn rate for the control step."""
-    w.speed = c.target_speed
     if c.motion == AGENT:
         action = actions[c.num_trackers]
         w.speed = _HALF * (action[0] + _ONE) * c.target_speed
         w.turn_rate = action[1] * c.target_turn_rate
     else:
         w.turn_rate = target_turn_rate(c, w, trackers, obstacles, scratch)
+        w.speed = c.target_speed
 
 
 @compiled

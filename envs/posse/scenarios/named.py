@@ -30,6 +30,7 @@ _SCENARIOS: Final = (
     ),
     Scenario(
         name="search",
+        version=2,
         target_motion="accelerating",
         tracker_turn_rate=1.2,
         target_turn_rate=1.2,
@@ -39,6 +40,7 @@ _SCENARIOS: Final = (
     ),
     Scenario(
         name="obstacles",
+        version=2,
         target_motion="smart",
         tracker_turn_rate=1.8,
         target_turn_rate=1.8,
@@ -70,6 +72,7 @@ _SCENARIOS: Final = (
     ),
     Scenario(
         name="field",
+        version=2,
         target_motion="smart",
         tracker_turn_rate=1.5,
         target_turn_rate=1.5,

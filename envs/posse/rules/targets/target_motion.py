@@ -2,8 +2,10 @@
 
 Each motion sets a goal heading; one steering law turns the target to it within its turn limit. In
 an arena the goal is mirrored near walls (the smart target looks ahead instead), and a safeguard
-keeps the target from obstacles and walls exactly: it only ever takes a turn that leaves one of its
-two turning circles free, so that it can always go on turning for ever without touching anything.
+keeps the target from obstacles and walls: it only takes a turn that leaves one of its two turning
+circles free, so that it can always go on turning for ever without touching anything. Trackers that
+hold it fast, so that it turns on the spot, can leave it without a free circle: then it turns to the
+wider side until one is free, and what is in its way stops it (posse.rules.contact).
 """
 
 from __future__ import annotations
@@ -318,7 +320,10 @@ def has_free_circle(
 
 @compiled(seldom=True)
 def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
-    """Return ``turn`` if a free turning circle remains after it, else the turn along a free one."""
+    """Return ``turn`` if a free turning circle remains after it, else the turn along a free one.
+
+    Where there is none, the turn that leads to one.
+    """
     dx, dy, hc, hs = w.heading_cos, w.heading_sin, w.heading_cos, w.heading_sin
     x, y = w.x, w.y
     for _ in range(c.physics_steps):
@@ -330,8 +335,37 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
         return turn
     # The circle it follows stays free but for rounding, which must not make it change sides.
     x, y, hc, hs = w.x, w.y, w.heading_cos, w.heading_sin
-    side = _ONE
-    if turn < _ZERO or not has_free_circle(c, obstacles, x, y, hc, hs, _ONE, _ROUNDING):
-        right = has_free_circle(c, obstacles, x, y, hc, hs, -_ONE, _ROUNDING)
-        side = -_ONE if right else _ONE
+    left = has_free_circle(c, obstacles, x, y, hc, hs, _ONE, _ROUNDING)
+    right = has_free_circle(c, obstacles, x, y, hc, hs, -_ONE, _ROUNDING)
+    if left and (turn >= _ZERO or not right):
+        side = _ONE
+    elif right:
+        side = -_ONE
+    else:
+        side = way_out(c, w, obstacles)
     return np.float32(side * c.target_turn_rate)
+
+
+@compiled(seldom=True)
+def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
+    """Return to which side (+1 left, -1 right) to turn where neither turning circle is free."""
+    if w.speed == _ZERO:
+        # Blocked in the last step. To and fro it could stay so for ever; turning on the same way,
+        # it comes to every heading there is.
+        return _ONE if w.turn_rate >= _ZERO else -_ONE
+    radius = c.target_speed / c.target_turn_rate
+    aside_x, aside_y = -radius * w.heading_sin, radius * w.heading_cos
+    left = width_around(c, obstacles, w.x + aside_x, w.y + aside_y)
+    right = width_around(c, obstacles, w.x - aside_x, w.y - aside_y)
+    return _ONE if left >= right else -_ONE
+
+
+@compiled
+def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) -> np.float32:
+    """Return how far the nearest obstacle or wall is from a place, m."""
+    width = c.half_arena - max(abs(x), abs(y))
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy = o.x - x, o.y - y
+        width = min(width, np.float32(math.sqrt(dx * dx + dy * dy)) - o.radius)
+    return np.float32(width)

@@ -1,0 +1,221 @@
+"""Discs are solid: whatever a team does, none is ever inside another or a wall.
+
+Nor is a scripted target that trackers held until it had no room to turn; and it gets away again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+import posse
+from posse.scenarios.formation import FORMATIONS
+from posse.scenarios.scenario import TARGET_MOTIONS, ScenarioError
+
+Floats = npt.NDArray[np.float64]
+Complexes = npt.NDArray[np.complex128]
+
+TOLERANCE = 1e-4  # m
+
+
+# ------------------------------------------------------------------------------------ oracle
+
+
+def points(batch: posse.Batch, name: str, x: str = "x", y: str = "y") -> Complexes:
+    """Return x + iy of what the state calls ``name``, in float64."""
+    state = batch.state
+    return np.asarray(state[f"{name}_{x}"].astype(np.float64) + 1j * state[f"{name}_{y}"])
+
+
+def headings(batch: posse.Batch, name: str) -> Complexes:
+    return points(batch, name, "heading_cos", "heading_sin")
+
+
+def depth(batch: posse.Batch) -> Floats:
+    """Return how far the deepest disc of each world is inside another or a wall, (E,) m."""
+    s = batch.scenario
+    robots = np.concatenate([points(batch, "tracker"), points(batch, "world")[:, None]], axis=1)
+    apart = np.abs(robots[:, :, None] - robots[:, None, :])
+    apart[:, np.arange(s.num_trackers + 1), np.arange(s.num_trackers + 1)] = np.inf
+    deepest = 2 * s.robot_radius - apart.min(axis=(1, 2))
+    if math.isfinite(s.arena):
+        reach = np.maximum(np.abs(robots.real), np.abs(robots.imag)).max(axis=1)
+        deepest = np.maximum(deepest, reach + s.robot_radius - s.arena / 2)
+    if s.num_obstacles:
+        apart = np.abs(robots[:, :, None] - points(batch, "obstacle")[:, None, :])
+        widths = batch.state["obstacle_radius"].astype(np.float64)[:, None, :] + s.robot_radius
+        deepest = np.maximum(deepest, (widths - apart).max(axis=(1, 2)))
+    return np.asarray(deepest)
+
+
+# ------------------------------------------------------------------------------------ teams
+
+
+class Team:
+    """Everybody at full speed: at the target, or in front of it side by side; now and then away.
+
+    How far in front, and how wide, is drawn for each world.
+
+    Args:
+        batch: What it plays.
+        crowds: Whether it goes in front of the target.
+        stays: For how long at a time, s.
+        leaves: For how long it then keeps away, s.
+    """
+
+    def __init__(
+        self, batch: posse.Batch, seed: int, *, crowds: bool, stays: float, leaves: float
+    ) -> None:
+        n, step = batch.scenario.num_trackers, batch.scenario.control_step
+        self.batch = batch
+        self.rng = np.random.default_rng(seed)
+        ahead = self.rng.uniform(0.0, 0.8, (batch.num_worlds, 1))
+        aside = self.rng.uniform(0.0, 1.2, (batch.num_worlds, 1)) * np.linspace(-1, 1, n)
+        self.goal = crowds * (ahead + 1j * aside)
+        self.stays, self.period = stays / step, (stays + leaves) / step
+        self.step = 0
+
+    def play(self) -> None:
+        """Take one control step; a target that is an agent does as it likes."""
+        batch, s, n = self.batch, self.batch.scenario, self.batch.scenario.num_trackers
+        trackers, target = points(batch, "tracker"), points(batch, "world")
+        goal = target[:, None] + headings(batch, "world")[:, None] * self.goal
+        if self.step % self.period >= self.stays:
+            goal = 2 * trackers - target[:, None]
+        bearing = np.angle((goal - trackers) / headings(batch, "tracker"))
+        actions = self.rng.uniform(-1, 1, batch.action_shape)
+        actions[:, :n, 0] = 1.0
+        actions[:, :n, 1] = np.clip(bearing / (s.control_step * s.tracker_turn_rate), -1, 1)
+        batch.step(actions)
+        self.step += 1
+
+
+# ------------------------------------------------------------------------------------ properties
+
+
+CROWDED: dict[str, Any] = {
+    "num_obstacles": 8, "obstacle_gap": 0.5, "obstacle_radius": (0.3, 0.6), "num_trackers": 8,
+    "start_distance": (1.0, 8.0), "horizon": 1000,
+}  # fmt: skip
+
+
+@st.composite
+def scenarios(draw: st.DrawFn) -> posse.Scenario:
+    """Draw a scenario: mostly a small arena with much in it, now and then the open plane."""
+
+    def one_of(*values: Any) -> Any:
+        return draw(st.sampled_from(values))
+
+    radius, fastest = draw(st.floats(0.05, 0.3)), draw(st.floats(0.8, 4.0))
+    walled = one_of(True, True, True, False)
+    physics_step, least = one_of(0.05, 0.02, 0.1, 0.2), one_of(0.3, 0.2, 0.5)
+    try:
+        return posse.Scenario(
+            name="drawn",
+            num_trackers=one_of(8, 6, 10, 2, 1),
+            tracker_speed=fastest,
+            tracker_turn_rate=draw(st.floats(1.0, 5.0)),
+            tracker_acceleration=one_of(math.inf, math.inf, 3.0),
+            robot_radius=radius,
+            target_motion=one_of(*TARGET_MOTIONS),
+            target_speed=fastest * one_of(0.6, 0.3, 0.9),
+            target_turn_rate=draw(st.floats(0.4, 4.0)),
+            formation=one_of(*FORMATIONS),
+            control_step=one_of(2, 1, 4) * physics_step,
+            physics_step=physics_step,
+            horizon=1000,
+            arena=draw(st.floats(8.0, 18.0)) if walled else math.inf,
+            num_obstacles=one_of(8, 5, 0) if walled else 0,
+            obstacle_radius=(least, least + one_of(0.3, 0.0)),
+            obstacle_gap=one_of(0.5, 0.0, 1.0),
+            start_distance=(2 * radius + 0.3, one_of(8.0, 4.0)),
+        )
+    except ScenarioError:
+        assume(False)
+        raise
+
+
+@settings(derandomize=True, max_examples=50, deadline=None)
+@given(
+    scenario=scenarios(),
+    crowds=st.booleans(),
+    stays=st.sampled_from([4.0, 10.0]),
+    leaves=st.sampled_from([4.0, 0.0]),
+    seed=st.integers(0, 1000),
+)
+@example(
+    scenario=posse.get_scenario("obstacles", target_turn_rate=0.6, arena=16.0, **CROWDED),
+    crowds=True, stays=4.0, leaves=4.0, seed=7,
+)  # fmt: skip
+@example(
+    scenario=posse.get_scenario("field", arena=20.0, target_turn_rate=0.8, obstacle_gap=0.6),
+    crowds=True, stays=10.0, leaves=4.0, seed=7,
+)  # fmt: skip
+def test_no_disc_is_ever_inside_another_or_a_wall(
+    scenario: posse.Scenario, crowds: bool, stays: float, leaves: float, seed: int
+) -> None:
+    batch = posse.Batch(scenario, 200, seed=seed)
+    batch.reset()
+    team = Team(batch, seed, crowds=crowds, stays=stays, leaves=leaves)
+    for _ in range(200):
+        team.play()
+        assert depth(batch).max() <= TOLERANCE
+
+
+def tight_spots(batch: posse.Batch, rng: np.random.Generator) -> Complexes:
+    """Return for each world a place beside an obstacle and near something else, or nan, (E,)."""
+    s, centres = batch.scenario, points(batch, "obstacle")
+    radii = batch.state["obstacle_radius"].astype(np.float64) + s.robot_radius
+    spots = np.full(batch.num_worlds, np.nan + 0j)
+    for _ in range(200):
+        k = rng.integers(s.num_obstacles, size=(batch.num_worlds, 1))
+        away = np.take_along_axis(radii, k, 1) + rng.uniform(0.001, 0.05, k.shape)
+        bearing = np.exp(2j * np.pi * rng.uniform(size=k.shape))
+        place = np.take_along_axis(centres, k, 1) + away * bearing
+        wall = s.arena / 2 - s.robot_radius - np.maximum(np.abs(place.real), np.abs(place.imag))
+        gaps = np.sort(np.concatenate([np.abs(centres - place) - radii, wall], axis=1), axis=1)
+        tight = (gaps[:, 0] > 0.0005) & (gaps[:, 1] < 0.2)
+        spots[tight] = place[tight, 0]
+    return spots
+
+
+@pytest.mark.parametrize(
+    ("motion", "turn", "arena"),
+    [("constant", 0.6, 16.0), ("accelerating", 1.2, 12.0), ("smart", 1.8, 12.0)],
+)
+def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(
+    motion: str, turn: float, arena: float
+) -> None:
+    """Put, as trackers that hold it can, where and how it would never go by itself."""
+    batch = posse.batch(
+        "obstacles", 1000, target_motion=motion, target_turn_rate=turn, arena=arena,
+        **{**CROWDED, "num_trackers": 1},
+    )  # fmt: skip
+    batch.reset(seed=3)
+    rng = np.random.default_rng(3)
+    spots, course = tight_spots(batch, rng), np.exp(2j * np.pi * rng.uniform(size=1000))
+    chosen = np.isfinite(spots) & (np.abs(points(batch, "tracker")[:, 0] - spots) > 0.5)
+    assert chosen.sum() > 50
+    world = batch.arrays.world
+    world["x"][chosen], world["y"][chosen] = spots[chosen].real, spots[chosen].imag
+    world["heading_cos"][chosen], world["heading_sin"][chosen] = (
+        course[chosen].real, course[chosen].imag,
+    )  # fmt: skip
+    world["near"][chosen] = 1
+    rest = np.tile([-1.0, 0.0], (1000, 1, 1))
+    standing, longest = np.zeros(1000, np.int64), 0
+    for _ in range(300):
+        before = points(batch, "world")
+        batch.step(rest)
+        assert depth(batch).max() <= TOLERANCE
+        after = points(batch, "world")
+        alone = np.abs(points(batch, "tracker")[:, 0] - after) > 0.5
+        standing = np.where(alone & (np.abs(after - before) < 1e-3), standing + 1, 0)
+        longest = max(longest, int(standing.max()))
+    assert 5 < longest <= 2 * math.pi / turn / 0.1, "no longer than a turn on the spot takes"
