@@ -24,7 +24,7 @@ demo: $(BASE) ## Watch teams at work; installs the base packages only, no torch
 	$(BIN)/python -m $(DEMO)
 
 test: lint ## Everything that must pass: lint, types, tests, docs
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist worksteal
 	$(BIN)/mkdocs build --strict --quiet
 
 lint: $(FULL) ## Style and types
