@@ -46,7 +46,7 @@ from posse.rules.state import (
     reward_weights,
     slot_records,
 )
-from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.scenarios.scenario import SAFE_MARGIN, Scenario, ScenarioError
 from posse.signals.metrics import episode_metrics
 from posse.signals.observation import ObservationLayout
 from posse.signals.reward import REWARD_TERMS, TermsByName
@@ -54,6 +54,8 @@ from posse.signals.reward import REWARD_TERMS, TermsByName
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _RECYCLED_FROM: Final = 1 << 16
 """Bytes from which an array's memory is worth keeping for the next step."""
+_ROUNDING: Final = 1e-3
+"""By how much a turning circle may be too wide for its room, m: float32 has rounded the pose."""
 _FLOAT32: Final = np.dtype(np.float32)
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
@@ -271,7 +273,8 @@ class Batch:
 
         Raises:
             ValueError: An unknown option, or one of a wrong shape, not finite, or that puts robots
-                inside each other, an obstacle or a wall. Nothing is changed.
+                inside each other, an obstacle or a wall, or leaves a scripted target no room to
+                turn. Nothing is changed.
         """
         options = dict(options or {})
         chosen = self.check_reset(seed, options)
@@ -294,6 +297,8 @@ class Batch:
                 )
             try:
                 self._check_overlap(chosen)
+                if "target_pose" in poses:
+                    self._check_room_to_turn(chosen)
             except ValueError:
                 if before is not None:
                     self._arrays.write(before)
@@ -537,6 +542,32 @@ class Batch:
             dy = obstacle["y"] - robots[:, i, 1:]
             if (np.hypot(dx, dy) <= obstacle["radius"] + s.robot_radius).any():
                 raise ValueError(f"{name} would start in an obstacle: move it")
+
+    def _check_room_to_turn(self, chosen: BoolArray) -> None:
+        """Raise if neither turning circle of a scripted target is free."""
+        s, world, obstacle = self.scenario, self._arrays.world[chosen], self._arrays.obstacle
+        if math.isinf(s.arena) or s.target_motion == "agent" or s.target_speed == 0:
+            return
+        radius = s.target_speed / s.target_turn_rate
+        needed = radius + s.robot_radius + SAFE_MARGIN
+        x, y = world["x"].astype(np.float64), world["y"].astype(np.float64)
+        room = np.full(len(world), -np.inf)
+        for side in (radius, -radius):
+            centre_x, centre_y = x - side * world["heading_sin"], y + side * world["heading_cos"]
+            free = s.arena / 2 - np.maximum(np.abs(centre_x), np.abs(centre_y))
+            for o in obstacle[chosen].T:
+                away = np.hypot(o["x"] - centre_x, o["y"] - centre_y) - o["radius"]
+                free = np.minimum(free, away)
+            room = np.maximum(room, free)
+        if (room < needed - _ROUNDING).any():
+            e = int(room.argmin())
+            heading = math.atan2(world["heading_sin"][e], world["heading_cos"][e])
+            raise ValueError(
+                f"target_pose ({x[e]:.4g}, {y[e]:.4g}, {heading:.4g}) leaves the target no room to "
+                f"turn: a disc of {needed:.3g} m about the centre of its left or right turning "
+                f"circle must be clear of obstacles and walls, {max(0.0, room[e]):.3g} m are: move "
+                "it or turn it"
+            )
 
 
 def _write_poses(records: Records, poses: npt.NDArray[np.float64], chosen: BoolArray) -> None:

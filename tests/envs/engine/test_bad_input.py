@@ -296,6 +296,29 @@ def test_a_bad_reset_changes_nothing(kind: str, arguments: dict[str, Any], messa
     assert np.array_equal(env.state(), other.state())
 
 
+@pytest.mark.parametrize("kind", ["parallel", "turns", "team", "solo", "team vector"])
+def test_a_target_without_room_to_turn_is_refused_and_changes_nothing(kind: str) -> None:
+    made = [MAKERS[kind]("search", num_trackers=1, start_distance=(2.0, 4.0)) for _ in range(2)]
+    env, twin = ((e if kind in ("parallel", "turns") else e.unwrapped) for e in made)
+    env.reset(seed=0)
+    twin.reset(seed=0)
+    facing_the_wall = {"target_pose": [9.5, 1.0, 0.0], "tracker_pose": [[0.0, 0.0, 0.0]]}
+    with pytest.raises(
+        ValueError,
+        match=r"target_pose \(9\.5, 1, 0\) leaves the target no room to turn: a disc of 0\.75 m .*"
+        r"0\.5 m are: move it or turn it",
+    ):
+        env.reset(options=facing_the_wall)
+    for one in (env, twin):
+        one.reset()
+    if kind == "team vector":
+        assert np.array_equal(env.batch.worlds["x"], twin.batch.worlds["x"])
+    else:
+        assert np.array_equal(env.state(), twin.state())
+    along_the_wall = {**facing_the_wall, "target_pose": [9.5, 1.0, np.pi / 2]}
+    env.reset(options=along_the_wall)
+
+
 def test_a_bad_vector_reset() -> None:
     env = gymnasium.make_vec(TEAM, 2)
     with pytest.raises(ResetNeeded, match="without reset_mask"):

@@ -309,6 +309,7 @@ def test_bad_actions_are_refused_and_change_nothing(actions: Any, word: str) -> 
         ({"target_pose": [0.0, math.nan, 0.0]}, "finite"),
         ({"target_pose": [1e6, 0.0, 0.0]}, "origin"),
         ({"tracker_pose": np.zeros((5, 3))}, "apart"),
+        ({"target_pose": [11.5, 0.0, 0.0]}, "no room to turn"),
         ({"reset_mask": [True]}, "reset_mask"),
         ({"reset_mask": np.array([1, 0])}, "reset_mask"),
     ],

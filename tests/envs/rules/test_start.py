@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from scipy import stats
-from tests.support.reference import free_gaps, one_world, snapshot
+from tests.support.reference import free_gaps, obstacles, one_world, positions, snapshot
 
 import posse
 
@@ -143,3 +145,32 @@ def test_poses_change_the_poses_and_no_other_draw() -> None:
     actions = np.random.default_rng(0).uniform(-1, 1, drawn.action_shape)
     for _ in range(20):
         np.testing.assert_allclose(drawn.step(actions)[0], given.step(actions)[0], atol=1e-3)
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(
+    x=st.floats(-9.7, 9.7), y=st.floats(-9.7, 9.7), heading=st.floats(-4.0, 4.0),
+    motion=st.sampled_from(["accelerating", "agent"]),
+)  # fmt: skip
+def test_a_target_starts_where_it_has_room_to_turn_and_nowhere_else(
+    x: float, y: float, heading: float, motion: str
+) -> None:
+    batch = posse.batch("obstacles", num_trackers=1, target_motion=motion)
+    batch.reset(seed=6)
+    state = one_world(snapshot(batch), 0)
+    centres, radii = obstacles(state)
+    place, reach = complex(x, y), 0.6 / 1.8 + 0.15 + 0.1
+    room = []
+    for side in (1j, -1j):
+        centre = place + side * 0.6 / 1.8 * np.exp(1j * heading)
+        walls = 10 - max(abs(centre.real), abs(centre.imag))
+        room.append(min(walls, float((np.abs(centres - centre) - radii).min())) - reach)
+    gaps = np.abs(centres - place) - radii - 0.15
+    assume(abs(max(room)) > 2e-3 and gaps.min() > 1e-3)
+    assume(abs(positions(state)[0] - place) > 0.5)
+    options = {"target_pose": [x, y, heading]}
+    if motion == "agent" or max(room) > 0:
+        batch.reset(seed=6, options=options)
+    else:
+        with pytest.raises(ValueError, match="no room to turn"):
+            batch.reset(seed=6, options=options)
