@@ -49,14 +49,13 @@ class Settings:
 
 @kernel(short_loops=True)
 def one_part(  # type: ignore[no-untyped-def]
-    part, config, slots, beams, weights, worlds, trackers, obstacles, heard, broadcast,
-    heard_message, message, actions, observations, rewards, terms, scratch,
-):  # fmt: skip
+    part, tables, worlds, actions, results, scratch
+):
     """Do one part of a step in every world."""
-    world.prepare(config, beams, scratch)
-    c = config[0]
-    for e in range(len(worlds)):
-        w, t, o = worlds[e], trackers[e], obstacles[e]
+    world.prepare(tables, scratch)
+    c, observations = tables.config[0], results.observations
+    for e in range(len(worlds.world)):
+        w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         if part == 0:
             motion.motion(c, w, t, o, actions[e], scratch)
             continue
@@ -66,20 +65,18 @@ def one_part(  # type: ignore[no-untyped-def]
             contact.meet(c, w, t, o, scratch)
         elif part == 3:
             w.step += 1
-            world.sense(c, w, t, heard[e], broadcast[e], heard_message[e], message[e], scratch)
+            world.sense(c, worlds, e, scratch)
         elif part == 4:
-            score.occupy(c, w, t, slots, scratch)
+            score.occupy(c, w, t, tables.slots, scratch)
         elif part == 5:
-            score.add_up(c, w, t, slots)
+            score.add_up(c, w, t, tables.slots)
         elif part == 6:
-            world.reward(c, w, t, weights, rewards[e], terms[e])
+            world.reward(c, w, t, tables.weights, results.rewards[e], results.terms[e])
         elif part == 7:
-            world.observe(c, w, t, o, heard[e], heard_message[e], scratch, observations[e])
+            world.observe(c, worlds, e, scratch, observations[e])
             begun = e % together.TOGETHER + 1
-            if begun == together.TOGETHER or e == len(worlds) - 1:
-                together.observe_together(
-                    c, worlds, trackers, e + 1 - begun, begun, message, scratch, observations
-                )
+            if begun == together.TOGETHER or e == len(worlds.world) - 1:
+                together.observe_together(c, worlds, e + 1 - begun, begun, scratch, observations)
 
 
 def best(call: Callable[[], object], seconds: float) -> float:
@@ -112,8 +109,9 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     rewards = np.empty(batch.observation_shape[:2], np.float32)
     terms = np.empty((*rewards.shape, len(posse.REWARD_TERMS)), np.float32)
     advance = batch.stepper(actions, observations, rewards, terms)
-    scratch = survey.new_scratch()
-    arguments = (*batch._fixed, actions, observations, rewards, terms, scratch)
+    flags = np.empty((2, batch.num_worlds), np.bool_)
+    results = world.Results(observations, rewards, terms, flags)
+    arguments = (batch._tables, batch.arrays, actions, results, survey.new_scratch())
     costs = {"step": best(advance, seconds) / agents * 1e9}
     snapshot = batch.save()
     for number, name in enumerate(PARTS):

@@ -22,10 +22,12 @@ from posse.engine.kernels import (
     START_FROM_POSES,
     STEP,
     TO_CLIP,
+    Results,
     advance,
     bad_action,
     first_over,
     own_kernel,
+    tables_of,
 )
 from posse.numeric import (
     BoolArray,
@@ -41,10 +43,6 @@ from posse.rules.discs import new_scratch
 from posse.rules.state import (
     SPLITS,
     WorldArrays,
-    beam_directions,
-    config_record,
-    reward_weights,
-    slot_records,
 )
 from posse.scenarios.scenario import SAFE_MARGIN, Scenario, ScenarioError
 from posse.signals.metrics import episode_metrics
@@ -168,25 +166,20 @@ class Batch:
     def _prepare(self) -> None:
         """Set what follows from the rest, and is not pickled."""
         scenario, (num_worlds, rows, size) = self.scenario, self.observation_shape
-        self._config = config_record(scenario)
-        self._tables = (self._config, slot_records(scenario), beam_directions(scenario))
-        self._weights = reward_weights(scenario)
+        self._tables = tables_of(scenario)
         self._observations = _Recycler((num_worlds, rows, size))
         self._rewards = _Recycler((num_worlds, rows))
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
         self._untyped: Callable[..., int] = own_kernel(scenario) if self.own_kernel else advance
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
-        # What every call of the kernel begins with.
-        self._fixed = (*self._tables, self._weights, *self._arrays.all())
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
         self._scratch = [new_scratch() for _ in range(threads)]
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (
-            "_config", "_tables", "_weights", "_fixed",
-            "_observations", "_rewards", "_terms", "_score",
+            "_tables", "_observations", "_rewards", "_terms", "_score",
             "_scratch", "_orders", "_kernel", "_untyped",
         )  # fmt: skip
         return {k: v for k, v in self.__dict__.items() if k not in derived}
@@ -345,11 +338,9 @@ class Batch:
         """
         self._check_running()
         checked = self.check_actions(actions)
-        observations = self._observations.take()
-        rewards, terms = self._rewards.take(), self._terms.take()
-        flags = self._new_flags()
-        over = self._run(self._orders, checked, observations, rewards, terms, flags)
-        terminated, truncated = flags
+        results = self._new_results()
+        over = self._run(self._orders, checked, results)
+        observations, rewards, terms, (terminated, truncated) = results
         infos: dict[str, Any] = {
             "score": self._score.copy(),
             "reward_terms": TermsByName(terms),
@@ -393,7 +384,8 @@ class Batch:
         ):
             _check_array(name, array, shape)
         arguments = (
-            *self._fixed, actions, observations, rewards, terms, self._new_flags(), self._orders,
+            self._tables, self._arrays, actions,
+            Results(observations, rewards, terms, self._new_flags()), self._orders,
             self._scratch[0], 0, all_at_once(self.num_worlds),
         )  # fmt: skip
         kernel = self._kernel
@@ -445,26 +437,24 @@ class Batch:
             )
         return np.ascontiguousarray(array)
 
-    def _run(
-        self,
-        orders: npt.NDArray[np.uint8],
-        actions: FloatArray,
-        observations: FloatArray,
-        rewards: FloatArray,
-        terms: FloatArray,
-        flags: BoolArray,
-    ) -> int:
+    def _run(self, orders: npt.NDArray[np.uint8], actions: FloatArray, results: Results) -> int:
         """Have the kernel do what each world is ordered to, spread over the threads.
 
         Returns how many worlds' episodes are over.
         """
         kernel, scratch = self._kernel, self._scratch
-        arguments = (*self._fixed, actions, observations, rewards, terms, flags, orders)
+        arguments = (self._tables, self._arrays, actions, results, orders)
 
         def work(thread: int, turns: Numbers) -> int:
             return kernel(*arguments, scratch[thread], thread, turns)
 
         return sum(by_turns(work, self.num_worlds, len(scratch)))
+
+    def _new_results(self) -> Results:
+        """Return room for what a pass over the worlds writes."""
+        return Results(
+            self._observations.take(), self._rewards.take(), self._terms.take(), self._new_flags()
+        )
 
     def _new_flags(self) -> BoolArray:
         """Return room for what a step says of episodes' ends: terminated, truncated, (2, E)."""
@@ -472,13 +462,12 @@ class Batch:
 
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
         """Start an episode in the chosen worlds; return every world's observations."""
-        observations = self._observations.take()
+        results = self._new_results()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         actions = np.empty(self.action_shape, np.float32)  # not read
-        rewards, terms = self._rewards.take(), self._terms.take()
-        self._run(orders, actions, observations, rewards, terms, self._new_flags())
+        self._run(orders, actions, results)
         self._kernel = direct(self._untyped)  # by now there is one
-        return observations
+        return results.observations
 
     def _check_mask(self, mask: npt.ArrayLike | None) -> BoolArray:
         if mask is None:

@@ -20,7 +20,16 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.engine.batch import Batch, Snapshot, action_error
-from posse.engine.kernels import LOOK, MOST_ACTION, START, STEP, advance_worlds, prepare
+from posse.engine.kernels import (
+    LOOK,
+    MOST_ACTION,
+    START,
+    STEP,
+    Results,
+    Tables,
+    advance_worlds,
+    prepare,
+)
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.discs import SIZE_FOR_ONE
 from posse.rules.state import SPLITS, WorldArrays
@@ -85,40 +94,24 @@ def _check(
 
 @cuda.jit  # type: ignore[untyped-decorator]
 def _advance(
-    config: Records,
-    slots: Records,
-    beams: FloatArray,
-    weights: FloatArray,
-    world: Records,
-    tracker: Records,
-    obstacle: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
+    tables: Tables,
+    worlds: WorldArrays,
     actions: FloatArray,
-    observations: FloatArray,
-    rewards: FloatArray,
-    terms: FloatArray,
-    flags: BoolArray,
+    results: Results,
     score: FloatArray,
     orders: npt.NDArray[np.uint8],
     report: DeviceArray,
 ) -> None:
     """Do what each world is ordered to; nothing at all where there is something to complain of."""
     e = cuda.grid(1)
-    if e < len(world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
+    if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
         scratch = cuda.local.array(SIZE_FOR_ONE, numba.float32)
         if _SIMULATED:
             scratch[:] = 0.0  # numpy would warn of what lies in lanes that nobody looks at
-        prepare(config, beams, scratch)
-        over = advance_worlds(
-            e, 1, config, slots, weights, world, tracker, obstacle,
-            heard, broadcast, heard_message, message,
-            actions, observations, rewards, terms, flags, orders, scratch,
-        )  # fmt: skip
-        flags[2, e] = over
-        score[e] = world[e].score
+        prepare(tables, scratch)
+        over = advance_worlds(e, 1, tables, worlds, actions, results, orders, scratch)
+        results.flags[2, e] = over
+        score[e] = worlds.world[e].score
         if over:
             cuda.atomic.add(report, _OVER, 1)
 
@@ -149,7 +142,7 @@ def _choose(
                 w.episode += 1
 
 
-class _Results:
+class _DeviceResults:
     """What one pass over the worlds writes, on the device."""
 
     def __init__(self, observation_shape: tuple[int, int, int]) -> None:
@@ -162,9 +155,9 @@ class _Results:
         self.terminated, self.truncated, self.over = (self.flags[k] for k in range(3))
         self.reward_terms = {t.name: self.terms[:, :, k] for k, t in enumerate(REWARD_TERMS)}
 
-    def arrays(self) -> tuple[DeviceArray, ...]:
-        """Return the arrays in the order in which the kernel takes them."""
-        return self.observations, self.rewards, self.terms, self.flags, self.score
+    def arrays(self) -> Results:
+        """Return the arrays that the kernels of a CPU write, too."""
+        return Results(self.observations, self.rewards, self.terms, self.flags)
 
 
 class CudaBatch(Batch):
@@ -199,11 +192,8 @@ class CudaBatch(Batch):
     def _prepare(self) -> None:
         """Put the batch onto the device; the host's arrays are a mirror, up to date on demand."""
         super()._prepare()
-        self._on_device = tuple(cuda.to_device(array) for array in self._fixed)
-        self._mirrored = list(
-            zip(self._on_device[-len(self._arrays.all()) :], self._arrays.all(), strict=True)
-        )
-        self._device_world = self._mirrored[0][0]
+        self._device_tables: Any = Tables(*map(cuda.to_device, self._tables))
+        self._device_arrays: Any = WorldArrays(*map(cuda.to_device, self._arrays))
         self._device_actions = cuda.device_array(self.action_shape, np.float32)
         self._all_step = cuda.to_device(np.full(self.num_worlds, STEP, np.uint8))
         self._all_look = cuda.to_device(np.full(self.num_worlds, LOOK, np.uint8))
@@ -211,13 +201,15 @@ class CudaBatch(Batch):
         self._report = cuda.to_device(_NOTHING)
         # In the mode "same_step" a step may take two sets.
         count = 4 if self.autoreset == "same_step" else 2
-        self._results = itertools.cycle([_Results(self.observation_shape) for _ in range(count)])
+        self._results = itertools.cycle(
+            [_DeviceResults(self.observation_shape) for _ in range(count)]
+        )
         self._last, self._next = next(self._results), next(self._results)
 
     def __getstate__(self) -> dict[str, Any]:
         self._download()
         device = (
-            "_on_device", "_mirrored", "_device_world", "_device_actions", "_all_step", "_all_look",
+            "_device_tables", "_device_arrays", "_device_actions", "_all_step", "_all_look",
             "_chosen", "_report", "_results", "_last", "_next",
         )  # fmt: skip
         return {k: v for k, v in super().__getstate__().items() if k not in device}
@@ -234,7 +226,7 @@ class CudaBatch(Batch):
     @property
     def worlds(self) -> Records:
         """The worlds' records, (E,) :data:`posse.rules.state.WORLD`, as now, on the host."""
-        records: Records = self._device_world.copy_to_host()
+        records: Records = self._device_arrays.world.copy_to_host()
         return records
 
     @property
@@ -333,7 +325,7 @@ class CudaBatch(Batch):
         if waits:
             disabled = self.autoreset == "disabled"
             array = self._device_actions
-            self._launch(_check, self._device_world, given, array, self._report, disabled)
+            self._launch(_check, self._device_arrays.world, given, array, self._report, disabled)
         self._launch_advance(array, self._all_step)
         over = self._wait(given) if waits else 0
         done = self._turn()
@@ -384,38 +376,42 @@ class CudaBatch(Batch):
     def _begin(self, mask: DeviceArray, anew: bool) -> DeviceArray:
         """Start an episode in the worlds of a mask; return every world's observations."""
         self._launch(
-            _choose, self._device_world, mask, self._chosen, anew,
+            _choose, self._device_arrays.world, mask, self._chosen, anew,
             np.uint64(self.seed), SPLITS.index(self.split), self.first_world,
         )  # fmt: skip
         return self._pass(self._chosen).observations
 
-    def _pass(self, orders: DeviceArray) -> _Results:
+    def _pass(self, orders: DeviceArray) -> _DeviceResults:
         """Do what each world is ordered to, which is no step, and return the results."""
         self._launch_advance(self._device_actions, orders)
         return self._turn()
 
-    def _turn(self) -> _Results:
+    def _turn(self) -> _DeviceResults:
         """Return what the last pass wrote; the next one writes elsewhere."""
         self._last, self._next = self._next, next(self._results)
         return self._last
 
     def _launch_advance(self, actions: DeviceArray, orders: DeviceArray) -> None:
+        done = self._next
         self._launch(
-            _advance, *self._on_device, actions, *self._next.arrays(), orders, self._report
-        )
+            _advance, self._device_tables, self._device_arrays, actions, done.arrays(), done.score,
+            orders, self._report,
+        )  # fmt: skip
 
     def _launch(self, kernel: Any, *arguments: Any) -> None:
+        if _SIMULATED:
+            arguments = tuple(map(_as_in_a_kernel, arguments))
         kernel[-(-self.num_worlds // _THREADS), _THREADS](*arguments)
 
     def _download(self) -> None:
         """Bring the host's arrays up to date."""
-        for device, host in self._mirrored:
+        for device, host in zip(self._device_arrays, self._arrays, strict=True):
             if host.size:
                 device.copy_to_host(host)
 
     def _upload(self) -> None:
         """Bring the device's arrays up to date."""
-        for device, host in self._mirrored:
+        for device, host in zip(self._device_arrays, self._arrays, strict=True):
             if host.size:
                 device.copy_to_device(host)
 
@@ -440,6 +436,18 @@ def check_device() -> None:
             "that the extra is complete (pip install 'posse[cuda]'), or take device='cpu'. "
             f"The driver says: {cuda.cuda_error() or 'nothing'}"
         )
+
+
+def _as_in_a_kernel(argument: Any) -> Any:
+    """Return an argument as the simulated kernel takes it: the simulator forgets arrays in tuples.
+
+    There, an array's fields are attributes of its elements.
+    """
+    if not isinstance(argument, tuple):
+        return argument
+    from numba.cuda.simulator.cudadrv.devicearray import FakeWithinKernelCUDAArray
+
+    return type(argument)(*map(FakeWithinKernelCUDAArray, argument))
 
 
 def _as_device_array(array: Any) -> DeviceArray | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,14 @@ from posse.rules.score import add_up, occupy
 from posse.rules.senses.radio import hear, send, share_fixes
 from posse.rules.senses.sensing import look
 from posse.rules.start import draw_start, rest
-from posse.rules.state import NEVER, beam_directions, config_record, slot_records
+from posse.rules.state import (
+    NEVER,
+    WorldArrays,
+    beam_directions,
+    config_record,
+    reward_weights,
+    slot_records,
+)
 from posse.rules.targets.target_motion import AGENT
 from posse.scenarios.scenario import Scenario
 from posse.signals.observation import observe_alone, observe_target
@@ -46,42 +53,55 @@ _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 
 
+class Tables(NamedTuple):
+    """What is the same for all worlds of a batch."""
+
+    config: Records
+    """(1,) :data:`posse.rules.state.CONFIG`."""
+    slots: Records
+    """(N,) :data:`posse.rules.state.SLOT`."""
+    beams: FloatArray
+    """(2, S) cosine and sine of the sonar's beams."""
+    weights: FloatArray
+    """(K,) weight of each reward term."""
+
+
+class Results(NamedTuple):
+    """What a pass over the worlds writes."""
+
+    observations: FloatArray
+    """(E, rows, F)."""
+    rewards: FloatArray
+    """(E, rows)."""
+    terms: FloatArray
+    """(E, rows, K)."""
+    flags: BoolArray
+    """(2, E): terminated, truncated."""
+
+
 @compiled
-def sense(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
-    scratch: FloatArray,
-) -> None:
-    """Let every tracker look for the target, then tell and hear."""
+def sense(c: Record, worlds: WorldArrays, e: int, scratch: FloatArray) -> None:
+    """Let every tracker of world e look for the target, then tell and hear."""
+    w, trackers = worlds.world[e], worlds.tracker[e]
     seeing = look(c, w, trackers, scratch)
     if c.perfect_radio:
         if seeing < c.num_trackers:  # else nobody has anything to hear
             share_fixes(c, trackers)
     else:
+        broadcast, message = worlds.broadcast[e], worlds.message[e]
         send(c, w, trackers, broadcast)
-        hear(c, w, trackers, heard, broadcast, heard_message, message)
+        hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
 
 
 @compiled
 def observe(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    heard: Records,
-    heard_message: FloatArray,
-    scratch: FloatArray,
-    observations: FloatArray,
+    c: Record, worlds: WorldArrays, e: int, scratch: FloatArray, observations: FloatArray
 ) -> None:
-    """Write what every agent of a world observes, (rows, F), but for observe_together."""
-    observe_alone(c, w, trackers, heard, heard_message, scratch, observations)
+    """Write what every agent of world e observes, (rows, F), but for observe_together."""
+    w, trackers = worlds.world[e], worlds.tracker[e]
+    observe_alone(c, w, trackers, worlds.heard[e], worlds.heard_message[e], scratch, observations)
     if c.motion == AGENT:
-        observe_target(c, w, trackers, obstacles, scratch, observations[c.num_trackers])
+        observe_target(c, w, trackers, worlds.obstacle[e], scratch, observations[c.num_trackers])
 
 
 @compiled(seldom=True)
@@ -123,18 +143,11 @@ def reward(
 
 
 @compiled
-def act(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    message: FloatArray,
-    actions: FloatArray,
-    scratch: FloatArray,
-) -> None:
-    """Move everything by a control step, and say what the actions say."""
+def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, scratch: FloatArray) -> None:
+    """Move everything in world e by a control step, and say what the actions say."""
+    w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
-    motion(c, w, trackers, obstacles, actions, scratch)
+    motion(c, w, trackers, worlds.obstacle[e], actions, scratch)
     w.step += 1
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
@@ -176,21 +189,10 @@ FETCHED: Final = MOST_IN_TEAM
 def advance_worlds(
     first: int,
     count: int,
-    config: Records,
-    slots: Records,
-    weights: FloatArray,
-    world: Records,
-    tracker: Records,
-    obstacle: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
+    tables: Tables,
+    worlds: WorldArrays,
     actions: FloatArray,
-    observations: FloatArray,
-    rewards: FloatArray,
-    terms: FloatArray,
-    flags: BoolArray,
+    results: Results,
     orders: npt.NDArray[np.uint8],
     scratch: FloatArray,
 ) -> int:
@@ -203,97 +205,99 @@ def advance_worlds(
     LOOK               nothing but the observations
     ================== =============================================================================
 
-    At most TOGETHER worlds. Writes observations (E, rows, F), rewards (E, rows), terms (E, rows, K)
-    and flags (2, E): terminated, truncated. The scratch memory has been through :func:`prepare`.
+    At most TOGETHER worlds. The scratch memory has been through :func:`prepare`.
     """
-    c, over = config[0], 0
+    c, over = tables.config[0], 0
     for e in range(first, first + count):
-        w, trackers, obstacles = world[e], tracker[e], obstacle[e]
+        w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
+        observations, flags = results.observations[e], results.flags
+        rewards, terms = results.rewards[e], results.terms[e]
         if count > 1 and trackers.shape[0] <= FETCHED:
-            fetch_all(observations[e])  # written below, and after the last of these worlds
+            fetch_all(observations)  # written below, and after the last of these worlds
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
             order = START
         if order == STEP:
-            act(c, w, trackers, obstacles, message[e], actions[e], scratch)
+            act(c, worlds, e, actions[e], scratch)
         elif order != LOOK:
             if order == START:
                 draw_start(c, w, trackers, obstacles)
-            begin(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e])
+            begin(
+                c, w, trackers, worlds.heard[e], worlds.broadcast[e],
+                worlds.heard_message[e], worlds.message[e],
+            )  # fmt: skip
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
         if order != LOOK:
             meet(c, w, trackers, obstacles, scratch)
-            sense(c, w, trackers, heard[e], broadcast[e], heard_message[e], message[e], scratch)
-            occupy(c, w, trackers, slots, scratch)
+            sense(c, worlds, e, scratch)
+            occupy(c, w, trackers, tables.slots, scratch)
         if order == STEP:
-            end_step(c, w, trackers, slots)
-            reward(c, w, trackers, weights, rewards[e], terms[e])
+            end_step(c, w, trackers, tables.slots)
+            reward(c, w, trackers, tables.weights, rewards, terms)
         else:
             if order != LOOK:
                 w.held, w.score = 0, _ZERO
-            rewards[e, :] = _ZERO
-            terms[e, :, :] = _ZERO
+            rewards[:] = _ZERO
+            terms[:, :] = _ZERO
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe(c, w, trackers, obstacles, heard[e], heard_message[e], scratch, observations[e])
-    observe_together(c, world, tracker, first, count, message, scratch, observations)
+        observe(c, worlds, e, scratch, observations)
+    observe_together(c, worlds, first, count, scratch, results.observations)
     return over
 
 
 @compiled
-def prepare(config: Records, beams: FloatArray, scratch: FloatArray) -> None:
+def prepare(tables: Tables, scratch: FloatArray) -> None:
     """Write what is the same for all worlds to a thread's scratch memory."""
-    lay_out_constants(config[0], beams, scratch)
-    lay_out_task(config[0], scratch)
+    lay_out_constants(tables.config[0], tables.beams, scratch)
+    lay_out_task(tables.config[0], scratch)
 
 
-def _stepping(own: tuple[Records, Records, FloatArray] | None) -> Callable[..., int]:
+def tables_of(scenario: Scenario) -> Tables:
+    """Return the tables of a scenario."""
+    return Tables(
+        config_record(scenario),
+        slot_records(scenario),
+        beam_directions(scenario),
+        reward_weights(scenario),
+    )
+
+
+def _stepping(own: Tables | None) -> Callable[..., int]:
     """Return the kernel that steps worlds of any scenario, or of the one whose tables these are.
 
-    The tables of one scenario (configuration, slots, beams) become constants in its code.
+    Its configuration, slots and beams become constants in the code.
     """
-    own_config, own_slots, own_beams = own or (None, None, None)
+    own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
     @kernel(short_loops=True)
     def advance(
-        config: Records,
-        slots: Records,
-        beams: FloatArray,
-        weights: FloatArray,
-        world: Records,
-        tracker: Records,
-        obstacle: Records,
-        heard: Records,
-        broadcast: Records,
-        heard_message: FloatArray,
-        message: FloatArray,
+        tables: Tables,
+        worlds: WorldArrays,
         actions: FloatArray,
-        observations: FloatArray,
-        rewards: FloatArray,
-        terms: FloatArray,
-        flags: BoolArray,
+        results: Results,
         orders: npt.NDArray[np.uint8],
         scratch: FloatArray,
         thread: int,
         turns: Numbers,
     ) -> int:
-        c = config if own_config is None else own_config
-        offsets = slots if own_slots is None else own_slots
-        directions = beams if own_beams is None else own_beams
+        used = Tables(
+            tables.config if own_config is None else own_config,
+            tables.slots if own_slots is None else own_slots,
+            tables.beams if own_beams is None else own_beams,
+            tables.weights,
+        )
         if scratch[PREPARED] == _ZERO:
-            prepare(c, directions, scratch)
+            prepare(used, scratch)
             scratch[PREPARED] = _ONE
         over = 0
         for first, end in parts_of(thread, turns):
             for e in range(natural(first), end, TOGETHER):
-                over += advance_worlds(
-                    e, min(TOGETHER, end - e), c, offsets, weights, world, tracker, obstacle,
-                    heard, broadcast, heard_message, message,
-                    actions, observations, rewards, terms, flags, orders, scratch,
-                )  # fmt: skip
+                count = min(TOGETHER, end - e)
+                over += advance_worlds(e, count, used, worlds, actions, results, orders, scratch)
         return over
 
     return advance
@@ -314,7 +318,7 @@ def own_kernel(scenario: Scenario) -> Callable[..., int]:
     what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
     compiled by itself, and kept on disk as any other.
     """
-    return _stepping((config_record(scenario), slot_records(scenario), beam_directions(scenario)))
+    return _stepping(tables_of(scenario))
 
 
 @kernel

@@ -7,15 +7,13 @@ on any size: kernels compile once for all scenarios.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, OwnArrays, Record, Records
+from posse.numeric import FloatArray, Record, Records
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.scenario import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS, Scenario
 from posse.signals.reward import REWARD_TERMS
@@ -146,8 +144,7 @@ BROADCAST: Final = _record(
 """What a tracker sent, kept until it has been heard: (E, D + 1, N), by step modulo D + 1."""
 
 
-@dataclass(frozen=True)
-class WorldArrays(OwnArrays):
+class WorldArrays(NamedTuple):
     """Every array of a batch. With the scenario, they are its whole state."""
 
     world: Records
@@ -181,38 +178,38 @@ class WorldArrays(OwnArrays):
             message=np.zeros((num_worlds, delay, n, m), np.float32),
         )
 
-    def all(self) -> tuple[npt.NDArray[Any], ...]:
-        """Return the arrays in the order in which kernels take them."""
-        return (
-            self.world, self.tracker, self.obstacle,
-            self.heard, self.broadcast, self.heard_message, self.message,
-        )  # fmt: skip
-
     def copy(self) -> WorldArrays:
         """Return a copy that shares no memory."""
-        return WorldArrays(*(array.copy() for array in self.all()))
+        return WorldArrays(*(array.copy() for array in self))
 
     def write(self, other: WorldArrays) -> None:
         """Overwrite these arrays with another's contents, in place."""
-        for mine, theirs in zip(self.all(), other.all(), strict=True):
+        for mine, theirs in zip(self, other, strict=True):
             mine[...] = theirs
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Unpickled out of band, arrays would be read-only, at any address.
+        return _copied, tuple(self)
 
     @property
     def bytes_per_world(self) -> int:
         """Memory that one world takes, in bytes."""
-        return sum(array.nbytes for array in self.all()) // len(self.world)
+        return sum(array.nbytes for array in self) // len(self.world)
 
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
         names: dict[str, npt.NDArray[Any]] = {}
-        for field in dataclasses.fields(self):
-            array = getattr(self, field.name)
+        for name, array in zip(self._fields, self, strict=True):
             if array.dtype.names is None:
-                names[field.name] = array.view()
+                names[name] = array.view()
             else:
                 for part in array.dtype.names:
-                    names[f"{field.name}_{part}"] = array[part]
+                    names[f"{name}_{part}"] = array[part]
         return names
+
+
+def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
+    return WorldArrays(*arrays).copy()
 
 
 def perfect_radio(scenario: Scenario) -> bool:

@@ -25,7 +25,7 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.discs import INDEX, MOST_IN_TEAM, OWN, TASK, natural, within_one
-from posse.rules.state import FIX, NEVER, POSE
+from posse.rules.state import FIX, NEVER, POSE, WorldArrays
 from posse.signals.mates import observe_mates
 from posse.signals.team import lay_out_team, team_columns, write_rows
 
@@ -142,21 +142,19 @@ def observe_own_and_target(
 @compiled
 def _observe_some(
     c: Record,
-    world: Records,
-    tracker: Records,
+    worlds: WorldArrays,
     e: int,
     i: int,
     count: int,
     across: int,
-    message: FloatArray,
     s: FloatArray,
     observations: FloatArray,
 ) -> None:
     """Write what ``count`` trackers, the first of them i of world e, observe together."""
-    observe_own_and_target(c, world, tracker, e, i, count, across, s, observations)
+    observe_own_and_target(c, worlds.world, worlds.tracker, e, i, count, across, s, observations)
     if observes_mates(c):
         k = SONAR_AT + natural(c.sonar_beams)
-        observe_mates(c, tracker, e, i, count, across, message, s, observations, k)
+        observe_mates(c, worlds.tracker, e, i, count, across, worlds.message, s, observations, k)
 
 
 @compiled
@@ -167,26 +165,18 @@ def observes_mates(c: Record) -> bool:
 
 @compiled
 def observe_together(
-    c: Record,
-    world: Records,
-    tracker: Records,
-    e: int,
-    worlds: int,
-    message: FloatArray,
-    s: FloatArray,
-    observations: FloatArray,
+    c: Record, worlds: WorldArrays, first: int, count: int, s: FloatArray, observations: FloatArray
 ) -> None:
-    """Write what trackers of ``worlds`` worlds, at most eight, from e on, observe together."""
+    """Write what trackers of ``count`` worlds, at most eight, observe together."""
     n = natural(c.num_trackers)
-    if worlds == TOGETHER and n <= MOST_IN_TEAM:
+    if count == TOGETHER and n <= MOST_IN_TEAM:
         if observes_mates(c):
-            lay_out_team(tracker, e, 1, s)
+            lay_out_team(worlds.tracker, first, 1, s)
         for i in range(n):
-            _observe_some(c, world, tracker, e, i, WIDTH, 1, message, s, observations)
+            _observe_some(c, worlds, first, i, WIDTH, 1, s, observations)
         return
-    for each in range(e, e + worlds):
+    for e in range(first, first + count):
         if observes_mates(c):
-            lay_out_team(tracker, each, 0, s)
+            lay_out_team(worlds.tracker, e, 0, s)
         for i in range(0, n, WIDTH):
-            count = min(WIDTH, n - i)
-            _observe_some(c, world, tracker, each, i, count, 0, message, s, observations)
+            _observe_some(c, worlds, e, i, min(WIDTH, n - i), 0, s, observations)

@@ -215,8 +215,8 @@ def test_bad_actions_of_vector_environments() -> None:
         with pytest.raises(ValueError, match=message):
             env.step(actions)
     for mine, other in zip(
-        env.batch.arrays.all(),  # type: ignore[attr-defined]
-        state.arrays.all(),
+        env.batch.arrays,  # type: ignore[attr-defined]
+        state.arrays,
         strict=True,
     ):
         assert np.array_equal(mine, other)

@@ -75,6 +75,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
     import numba.cuda.dispatcher  # only now: it looks for a driver
 
     from posse.engine import cuda
+    from posse.engine.kernels import Results
 
     device = SimpleNamespace(compute_capability=(9, 0))
     monkeypatch.setattr(numba.cuda.dispatcher, "get_current_device", lambda: device)
@@ -87,8 +88,8 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
     actions = np.zeros(batch.action_shape, np.float32)
     kernels = {
         cuda._advance: (
-            *batch._fixed, actions, observations, rewards, terms, flags, infos["score"], orders,
-            report,
+            batch._tables, batch.arrays, actions, Results(observations, rewards, terms, flags),
+            infos["score"], orders, report,
         ),
         cuda._check: (batch.worlds, actions, actions.copy(), report, True),
         cuda._choose: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
