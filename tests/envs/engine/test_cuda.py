@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -101,7 +102,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
             kernel.py_func, signature, device=False, abi="numba", cc=(9, 0)
         )
         assert ".entry" in assembly
-        assert "call" not in assembly
+        assert not re.search(r"^\s*(@\S+\s+)?call", assembly, re.MULTILINE)
         if out := os.environ.get("POSSE_TEST_ASSEMBLY"):
             Path(out, f"{kernel.py_func.__name__}.ptx").write_text(assembly)
 
