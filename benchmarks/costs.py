@@ -22,9 +22,11 @@ from rich.table import Table
 
 import posse
 from posse.engine import kernels as world
+from posse.engine.scratch import SCRATCH
 from posse.numeric import kernel
 from posse.rules import contact, motion, score
 from posse.rules import discs as survey
+from posse.rules.scratch import new_scratch
 from posse.signals import together
 
 PARTS = (
@@ -49,9 +51,10 @@ class Settings:
 
 @kernel(short_loops=True)
 def one_part(  # type: ignore[no-untyped-def]
-    part, tables, worlds, actions, results, scratch
+    part, tables, worlds, actions, results, memory
 ):
     """Do one part of a step in every world."""
+    scratch = memory[0]
     world.prepare(tables, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
@@ -111,7 +114,7 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     advance = batch.stepper(actions, observations, rewards, terms)
     flags = np.empty((2, batch.num_worlds), np.bool_)
     results = world.Results(observations, rewards, terms, flags)
-    arguments = (batch._tables, batch.arrays, actions, results, survey.new_scratch())
+    arguments = (batch._tables, batch.arrays, actions, results, new_scratch(SCRATCH))
     costs = {"step": best(advance, seconds) / agents * 1e9}
     snapshot = batch.save()
     for number, name in enumerate(PARTS):

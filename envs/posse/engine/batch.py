@@ -29,6 +29,7 @@ from posse.engine.kernels import (
     own_kernel,
     tables_of,
 )
+from posse.engine.scratch import SCRATCH
 from posse.numeric import (
     BoolArray,
     FloatArray,
@@ -39,7 +40,7 @@ from posse.numeric import (
     direct,
     threads_for,
 )
-from posse.rules.discs import new_scratch
+from posse.rules.scratch import new_scratch
 from posse.rules.state import (
     SPLITS,
     WorldArrays,
@@ -175,7 +176,7 @@ class Batch:
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
-        self._scratch = [new_scratch() for _ in range(threads)]
+        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (

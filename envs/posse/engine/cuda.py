@@ -30,8 +30,8 @@ from posse.engine.kernels import (
     advance_worlds,
     prepare,
 )
+from posse.engine.scratch import SCRATCH_FOR_ONE
 from posse.numeric import BoolArray, FloatArray, Records
-from posse.rules.discs import SIZE_FOR_ONE
 from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios.scenario import Scenario
 from posse.signals.metrics import episode_metrics
@@ -105,11 +105,11 @@ def _advance(
     """Do what each world is ordered to; nothing at all where there is something to complain of."""
     e = cuda.grid(1)
     if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
-        scratch = cuda.local.array(SIZE_FOR_ONE, numba.float32)
+        scratch = cuda.local.array(1, SCRATCH_FOR_ONE)
         if _SIMULATED:
-            scratch[:] = 0.0  # numpy would warn of what lies in lanes that nobody looks at
-        prepare(tables, scratch)
-        over = advance_worlds(e, 1, tables, worlds, actions, results, orders, scratch)
+            scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
+        prepare(tables, scratch[0])
+        over = advance_worlds(e, 1, tables, worlds, actions, results, orders, scratch[0])
         results.flags[2, e] = over
         score[e] = worlds.world[e].score
         if over:

@@ -28,7 +28,7 @@ from posse.numeric import (
     parts_of,
 )
 from posse.rules.contact import meet
-from posse.rules.discs import MOST_IN_TEAM, PREPARED, find_gaps, lay_out, lay_out_constants, natural
+from posse.rules.discs import find_gaps, lay_out, lay_out_constants, natural
 from posse.rules.faults import apply_faults
 from posse.rules.motion import motion
 from posse.rules.score import add_up, occupy
@@ -47,6 +47,7 @@ from posse.rules.targets.target_motion import AGENT
 from posse.scenarios.scenario import Scenario
 from posse.signals.observation import observe_alone, observe_target
 from posse.signals.reward import write_reward
+from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.together import TOGETHER, lay_out_task, observe_together
 
 _ZERO: Final = np.float32(0.0)
@@ -80,7 +81,7 @@ class Results(NamedTuple):
 
 
 @compiled
-def sense(c: Record, worlds: WorldArrays, e: int, scratch: FloatArray) -> None:
+def sense(c: Record, worlds: WorldArrays, e: int, scratch: Record) -> None:
     """Let every tracker of world e look for the target, then tell and hear."""
     w, trackers = worlds.world[e], worlds.tracker[e]
     seeing = look(c, w, trackers, scratch)
@@ -95,7 +96,7 @@ def sense(c: Record, worlds: WorldArrays, e: int, scratch: FloatArray) -> None:
 
 @compiled
 def observe(
-    c: Record, worlds: WorldArrays, e: int, scratch: FloatArray, observations: FloatArray
+    c: Record, worlds: WorldArrays, e: int, scratch: Record, observations: FloatArray
 ) -> None:
     """Write what every agent of world e observes, (rows, F), but for observe_together."""
     w, trackers = worlds.world[e], worlds.tracker[e]
@@ -143,7 +144,7 @@ def reward(
 
 
 @compiled
-def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, scratch: FloatArray) -> None:
+def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, scratch: Record) -> None:
     """Move everything in world e by a control step, and say what the actions say."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
@@ -194,7 +195,7 @@ def advance_worlds(
     actions: FloatArray,
     results: Results,
     orders: npt.NDArray[np.uint8],
-    scratch: FloatArray,
+    scratch: Record,
 ) -> int:
     """Do what worlds are ordered to, ``count`` from ``first`` on; return how many are over.
 
@@ -250,7 +251,7 @@ def advance_worlds(
 
 
 @compiled
-def prepare(tables: Tables, scratch: FloatArray) -> None:
+def prepare(tables: Tables, scratch: Record) -> None:
     """Write what is the same for all worlds to a thread's scratch memory."""
     lay_out_constants(tables.config[0], tables.beams, scratch)
     lay_out_task(tables.config[0], scratch)
@@ -280,7 +281,7 @@ def _stepping(own: Tables | None) -> Callable[..., int]:
         actions: FloatArray,
         results: Results,
         orders: npt.NDArray[np.uint8],
-        scratch: FloatArray,
+        scratch: Records,
         thread: int,
         turns: Numbers,
     ) -> int:
@@ -290,14 +291,15 @@ def _stepping(own: Tables | None) -> Callable[..., int]:
             tables.beams if own_beams is None else own_beams,
             tables.weights,
         )
-        if scratch[PREPARED] == _ZERO:
-            prepare(used, scratch)
-            scratch[PREPARED] = _ONE
+        s = scratch[0]
+        if s.prepared[0] == _ZERO:
+            prepare(used, s)
+            s.prepared[0] = _ONE
         over = 0
         for first, end in parts_of(thread, turns):
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
-                over += advance_worlds(e, count, used, worlds, actions, results, orders, scratch)
+                over += advance_worlds(e, count, used, worlds, actions, results, orders, s)
         return over
 
     return advance

@@ -25,19 +25,7 @@ from posse.numeric import (
     load,
     root,
 )
-from posse.rules.discs import (
-    BLOCK,
-    EXCESS,
-    FAR,
-    GAP,
-    INDEX,
-    RADIUS,
-    TOUCHING_GAP,
-    X,
-    Y,
-    blocks,
-    natural,
-)
+from posse.rules.discs import BLOCK, FAR, TOUCHING_GAP, blocks, natural
 from posse.rules.targets.target_motion import AGENT
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -95,21 +83,20 @@ def free_of_robots(
     y: np.float32,
     dx: np.float32,
     dy: np.float32,
-    xs: int,
-    ys: int,
+    xs: FloatArray,
+    ys: FloatArray,
     count: int,
-    s: FloatArray,
 ) -> np.float32:
     """Return the share of a robot's move that no other robot blocks.
 
-    Where ``count`` robots are stands in rows ``xs`` and ``ys`` of scratch memory. The robot may be
-    one of them: it does not close in on itself.
+    The places of ``count`` robots are in ``xs`` and ``ys``. The robot may be one of them: it does
+    not close in on itself.
     """
     reach = c.radius + c.radius + BLOCKING_GAP
     within = (reach + abs(dx) + abs(dy)) * _A_LITTLE_MORE
     share = _ONE
     for block in range(blocks(count)):
-        other_x, other_y = load(s, xs + BLOCK * block), load(s, ys + BLOCK * block)
+        other_x, other_y = load(xs, BLOCK * block), load(ys, BLOCK * block)
         rx, ry = x - other_x, y - other_y
         if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < _ZERO)) != 0:
             share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
@@ -146,7 +133,7 @@ def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
 
 
 @compiled
-def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
+def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Work out who touches whom, count the contacts that begin, and flag who is near to anything.
 
     ``near`` marks robots that could touch something within the next control step; the others move
@@ -160,9 +147,9 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
         wall = FAR
         if c.walled:
             wall = inner - max(abs(t.x), abs(t.y))
-        smallest = min(smallest, s[GAP + i], wall)
+        smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= c.tracker_speed * c.dt + TOUCHING_GAP
-        near = s[EXCESS + i] <= _ZERO or wall_near
+        near = s.excess[i] <= _ZERO or wall_near
         if not near:
             if t.near:
                 t.touching_trackers, t.touching_obstacles = _NO_BITS, _NO_BITS
@@ -170,7 +157,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
             continue
         t.near, t.onsets = 1, 0
         target_near = target_near or near_target(c, w, t)
-        if min(s[GAP + i], wall) > _SURELY_APART:
+        if min(s.gap[i], wall) > _SURELY_APART:
             t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
         elif meet_closely(c, w, t, obstacles, i, s):
             target_touching |= _BIT << np.uint64(i)
@@ -182,9 +169,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatAr
 
 
 @compiled(seldom=True)
-def meet_closely(
-    c: Record, w: Record, t: Record, obstacles: Records, i: int, s: FloatArray
-) -> bool:
+def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
     """Work out what a tracker that is near to something touches; say whether it is the target."""
     touches_target = meet_target(c, w, t, i)
     meet_trackers(c, w, t, i, s)
@@ -202,7 +187,7 @@ def near_target(c: Record, w: Record, t: Record) -> bool:
 
 
 @compiled
-def target_near_surroundings(c: Record, w: Record, s: FloatArray) -> bool:
+def target_near_surroundings(c: Record, w: Record, s: Record) -> bool:
     """Say whether the target could touch an obstacle or a wall within the next control step.
 
     Where the obstacles are stands in scratch memory (:func:`posse.rules.discs.lay_out`).
@@ -215,7 +200,7 @@ def target_near_surroundings(c: Record, w: Record, s: FloatArray) -> bool:
     first = natural(c.num_trackers) + 1
     for block in range(blocks(c.num_obstacles)):
         k = first + BLOCK * block
-        dx, dy, reach = load(s, X + k) - w.x, load(s, Y + k) - w.y, load(s, RADIUS + k)
+        dx, dy, reach = load(s.x, k) - w.x, load(s.y, k) - w.y, load(s.radius, k)
         reach = reach + (c.radius + way)
         if bits(dx * dx + dy * dy <= reach * reach) != 0:
             return True
@@ -236,14 +221,14 @@ def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
 
 
 @compiled
-def meet_trackers(c: Record, w: Record, t: Record, i: int, s: FloatArray) -> None:
+def meet_trackers(c: Record, w: Record, t: Record, i: int, s: Record) -> None:
     """Note which other trackers tracker i touches, and count the contacts that begin."""
     touch = c.radius + c.radius + TOUCHING_GAP
     touching = 0
     for block in range(blocks(c.num_trackers)):
         j = BLOCK * block
-        dx, dy = load(s, X + j) - t.x, load(s, Y + j) - t.y
-        other = load(s, INDEX + j) < np.float32(c.num_trackers)
+        dx, dy = load(s.x, j) - t.x, load(s.y, j) - t.y
+        other = load(s.index, j) < np.float32(c.num_trackers)
         touching |= bits((dx * dx + dy * dy <= touch * touch) & other) << j
     now = np.uint64(touching) & ~(_BIT << np.uint64(i))
     begun = now & ~t.touching_trackers

@@ -28,42 +28,10 @@ from posse.numeric import (
     store,
     transpose,
 )
+from posse.rules.scratch import DISCS, ROBOTS
 from posse.rules.state import POSE
-from posse.scenarios.scenario import MAX_TRACKERS
 
 BLOCK: Final = WIDTH
-
-# Rows of scratch memory: where each begins. 64 trackers, the target and 60 obstacles fit a row, and
-# a length that is no power of two keeps rows apart in the processor's cache.
-ROW: Final = 136
-X: Final = 0  # common frame, m
-Y: Final = 1 * ROW
-RADIUS: Final = 2 * ROW
-INDEX: Final = 3 * ROW  # 0, 1, 2, …
-BEAM_COS: Final = 4 * ROW
-BEAM_SIN: Final = 5 * ROW
-READING: Final = 6 * ROW
-TASK: Final = 7 * ROW  # what every tracker is told of its task
-PREPARED: Final = 8 * ROW - 1  # not 0 once what is the same for all worlds stands there
-GAP: Final = 8 * ROW  # of each tracker: free width to the nearest disc, m
-EXCESS: Final = 9 * ROW  # of each tracker: not above 0 if anything is near
-SLOT: Final = 10 * ROW  # of each tracker: the nearest slot, or the nearest that is free
-SLOT_DISTANCE: Final = 11 * ROW  # and how far it is, m
-SLOT_DISTANCE2: Final = 12 * ROW  # the same squared, m²
-HEARD2: Final = 13 * ROW  # within which the sonar has it, the square, and a little more, m²
-OWN: Final = 14 * ROW  # ten rows whose meaning is their module's own
-SHORTLIST: Final = 24 * ROW  # and three for a list of the nearest
-
-# Then the rows of a team (posse.signals.team), which is there twice, and room for the last block:
-# of eight worlds, if it is small, or of one.
-TEAM: Final = 27 * ROW
-TEAM_ROWS: Final = 6
-MOST_IN_TEAM: Final = 16
-"""Up to this team size, the teams of eight worlds fit there."""
-
-SIZE: Final = TEAM + TEAM_ROWS * (2 * MOST_IN_TEAM * BLOCK + BLOCK)
-SIZE_FOR_ONE: Final = TEAM + TEAM_ROWS * (2 * MAX_TRACKERS + BLOCK)
-"""Where memory is short: the team of one world fits."""
 
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
@@ -75,11 +43,6 @@ _MINUS_ONE: Final = np.float32(-1.0)
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 _BIT: Final = np.uint64(1)
 _NO_BITS: Final = np.uint64(0)
-
-
-def new_scratch() -> FloatArray:
-    """Return scratch memory for one thread and one scenario, SIZE numbers."""
-    return np.zeros(SIZE, np.float32)
 
 
 @compiled
@@ -99,20 +62,21 @@ def blocks(count: int) -> int:
 
 
 @compiled
-def lay_out_constants(c: Record, beams: FloatArray, s: FloatArray) -> None:
+def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
     """Write what is the same for all worlds.
 
     The directions of the sonar's beams (2, S), of which those that fill a block point nowhere, what
     counts the places of a row, and the robots' radius.
     """
-    for k in range(ROW):
-        s[INDEX + k] = np.float32(k)
-        s[RADIUS + k] = c.radius
-        s[HEARD2 + k] = heard_within2(c, c.radius)
+    for k in range(ROBOTS):
+        s.index[k] = np.float32(k)
+    for k in range(DISCS):
+        s.radius[k] = c.radius
+        s.heard2[k] = heard_within2(c, c.radius)
     count = beams.shape[1]
     for k in range(BLOCK * blocks(count)):
-        s[BEAM_COS + k] = beams[0, k] if k < count else _ZERO
-        s[BEAM_SIN + k] = beams[1, k] if k < count else _ZERO
+        s.beam_cos[k] = beams[0, k] if k < count else _ZERO
+        s.beam_sin[k] = beams[1, k] if k < count else _ZERO
 
 
 @compiled
@@ -152,48 +116,47 @@ def store_rows(
     f: Lanes,
     g: Lanes,
     h: Lanes,
+    row: FloatArray,
     at: int,
-    stride: int,
-    s: FloatArray,
 ) -> None:
-    """Write what :func:`columns` gives back as it stands in records, ``stride`` apart."""
-    store_each(transpose(a, b, c, d, e, f, g, h), at, stride, s)
+    """Write what :func:`columns` gives back as it stands in records, eight numbers each."""
+    store_each(transpose(a, b, c, d, e, f, g, h), row, at)
 
 
 @compiled
-def store_each(rows: tuple[Lanes, ...], at: int, stride: int, s: FloatArray) -> None:
-    """Write eight lanes, ``stride`` apart."""
-    a, b, c, d, e, f, g, h = rows
-    store(s, at, a)
-    store(s, at + stride, b)
-    store(s, at + 2 * stride, c)
-    store(s, at + 3 * stride, d)
-    store(s, at + 4 * stride, e)
-    store(s, at + 5 * stride, f)
-    store(s, at + 6 * stride, g)
-    store(s, at + 7 * stride, h)
+def store_each(lanes: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
+    """Write eight lanes, one after the other."""
+    a, b, c, d, e, f, g, h = lanes
+    store(row, at, a)
+    store(row, at + WIDTH, b)
+    store(row, at + 2 * WIDTH, c)
+    store(row, at + 3 * WIDTH, d)
+    store(row, at + 4 * WIDTH, e)
+    store(row, at + 5 * WIDTH, f)
+    store(row, at + 6 * WIDTH, g)
+    store(row, at + 7 * WIDTH, h)
 
 
 @compiled
-def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
+def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Write where every disc is: trackers, then the target, then obstacles."""
     n = natural(c.num_trackers)
     for block in range(blocks(n + 1)):
         j = BLOCK * block
         x, y, _, _, _, _, _, _ = columns(trackers, j, n, POSE)
-        number = load(s, INDEX + j)
+        number = load(s.index, j)
         tracker, target = number < np.float32(n), number == np.float32(n)
-        store(s, X + j, choose(tracker, x, choose(target, w.x, FAR)))
-        store(s, Y + j, choose(tracker, y, choose(target, w.y, FAR)))
+        store(s.x, j, choose(tracker, x, choose(target, w.x, FAR)))
+        store(s.y, j, choose(tracker, y, choose(target, w.y, FAR)))
     count = num_discs(c)
     if count > n + 1:
         for k in range(natural(c.num_obstacles)):
             o = obstacles[k]
             j = n + 1 + k
-            s[X + j], s[Y + j], s[RADIUS + j] = o.x, o.y, o.radius
-            s[HEARD2 + j] = heard_within2(c, o.radius)
-        store(s, X + count, eight(FAR))
-        store(s, Y + count, eight(FAR))
+            s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
+            s.heard2[j] = heard_within2(c, o.radius)
+        store(s.x, count, eight(FAR))
+        store(s.y, count, eight(FAR))
 
 
 @compiled
@@ -209,7 +172,7 @@ def within_one(value: Lanes) -> Lanes:
 
 
 @compiled
-def find_gaps(c: Record, s: FloatArray) -> None:
+def find_gaps(c: Record, s: Record) -> None:
     """Write each tracker's free width to the nearest disc, and whether one is near (EXCESS ≤ 0).
 
     Near is what could be touched within the next control step.
@@ -221,43 +184,43 @@ def find_gaps(c: Record, s: FloatArray) -> None:
     margin = TOUCHING_GAP + c.tracker_speed * c.dt
     for block in range(blocks(n)):
         i = BLOCK * block
-        x, y, number = load(s, X + i), load(s, Y + i), load(s, INDEX + i)
+        x, y, number = load(s.x, i), load(s.y, i), load(s.index, i)
         # Robots are all of one size: what is nearest is so without a square root for each.
         nearest2 = eight(FAR)
         for j in range(n):
-            dx, dy = x - s[X + j], y - s[Y + j]
+            dx, dy = x - s.x[j], y - s.y[j]
             # That is j: to read it is faster than to convert it.
-            d2 = choose(number == s[INDEX + j], FAR, dx * dx + dy * dy)
+            d2 = choose(number == s.index[j], FAR, dx * dx + dy * dy)
             nearest2 = lesser(nearest2, d2)
-        dx, dy = x - s[X + n], y - s[Y + n]
+        dx, dy = x - s.x[n], y - s.y[n]
         d2 = dx * dx + dy * dy
         excess = lesser(nearest2 - tracker_reach * tracker_reach, d2 - target_reach * target_reach)
         least = root(lesser(nearest2, d2)) - robots
         for j in range(n + 1, num_discs(c)):
-            dx, dy = x - s[X + j], y - s[Y + j]
-            gap = root(dx * dx + dy * dy) - (c.radius + s[RADIUS + j])
+            dx, dy = x - s.x[j], y - s.y[j]
+            gap = root(dx * dx + dy * dy) - (c.radius + s.radius[j])
             least, excess = lesser(least, gap), lesser(excess, gap - margin)
-        store(s, GAP + i, least)
-        store(s, EXCESS + i, excess)
+        store(s.gap, i, least)
+        store(s.excess, i, excess)
 
 
 @compiled
 def find_slots(
-    c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: FloatArray
+    c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: Record
 ) -> None:
     """Write, of eight trackers from ``first`` on, the nearest slot that is not in ``taken``.
 
     That is a set, a bit each; -1: all are.
     """
-    dx, dy = load(s, X + first) - w.x, load(s, Y + first) - w.y
+    dx, dy = load(s.x, first) - w.x, load(s.y, first) - w.y
     ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
     nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
     for slot in range(natural(c.num_trackers)):
         if taken & (_BIT << np.uint64(slot)) == _NO_BITS:
             dx, dy = ahead - slots[slot].x, left - slots[slot].y
             d2 = dx * dx + dy * dy
-            nearest = choose(d2 < nearest2, s[INDEX + slot], nearest)
+            nearest = choose(d2 < nearest2, s.index[slot], nearest)
             nearest2 = lesser(nearest2, d2)
-    store(s, SLOT + first, nearest)
-    store(s, SLOT_DISTANCE2 + first, nearest2)
-    store(s, SLOT_DISTANCE + first, root(nearest2))
+    store(s.slot, first, nearest)
+    store(s.slot_distance2, first, nearest2)
+    store(s.slot_distance, first, root(nearest2))

@@ -23,7 +23,7 @@ from posse.numeric import (
     store_fields,
 )
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import BLOCK, FAR, OWN, ROW, blocks, columns, natural, store_rows
+from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
 from posse.rules.kinematics import approach, arc
 from posse.rules.state import NEVER, POSE
 from posse.rules.targets.target_motion import AGENT, target_turn_rate
@@ -32,15 +32,6 @@ from posse.scenarios.formation import follow_heading
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
-
-# Rows of scratch memory, of each tracker: what its action asks for, and, eight numbers each, where
-# it is after its move. What the target weighs up (posse.rules.targets) lies before them.
-_WANTED_SPEED: Final = OWN + 1 * ROW
-_WANTED_TURN: Final = OWN + 2 * ROW
-_NEW_POSE: Final = OWN + 3 * ROW
-_NEAR: Final = OWN + 7 * ROW  # those that something is near to: their numbers, and where they are
-_NEAR_X: Final = OWN + 8 * ROW
-_NEAR_Y: Final = OWN + 9 * ROW
 
 
 @compiled
@@ -55,7 +46,7 @@ def move(robot: Record, time: np.float32) -> None:
 
 @compiled
 def move_swept(
-    c: Record, robot: Record, place: int, count: int, obstacles: Records, s: FloatArray
+    c: Record, robot: Record, place: int, count: int, obstacles: Records, s: Record
 ) -> None:
     """Move a robot that something is near to by a physics step, as far as nothing blocks.
 
@@ -67,7 +58,7 @@ def move_swept(
     )
     x, y = robot.x, robot.y
     share = lesser(
-        free_of_robots(c, x, y, dx, dy, _NEAR_X, _NEAR_Y, count, s),
+        free_of_robots(c, x, y, dx, dy, s.near_x, s.near_y, count),
         free_of_surroundings(c, obstacles, x, y, dx, dy),
     )
     if share < _ONE:
@@ -75,7 +66,7 @@ def move_swept(
         robot.speed = _ZERO
     robot.x += dx
     robot.y += dy
-    s[_NEAR_X + place], s[_NEAR_Y + place] = robot.x, robot.y
+    s.near_x[place], s.near_y[place] = robot.x, robot.y
 
 
 @compiled(seldom=True)
@@ -85,7 +76,7 @@ def move_in_parts(
     trackers: Records,
     obstacles: Records,
     actions: FloatArray,
-    s: FloatArray,
+    s: Record,
 ) -> None:
     """Move those that something is near to, by physics steps, the target first.
 
@@ -94,16 +85,16 @@ def move_in_parts(
     near = 0
     for i in range(natural(c.num_trackers)):
         t = trackers[i]
-        s[_NEAR + near], s[_NEAR_X + near], s[_NEAR_Y + near] = np.float32(i), t.x, t.y
+        s.near[near], s.near_x[near], s.near_y[near] = np.float32(i), t.x, t.y
         near = natural(near + (t.near != 0))
-    s[_NEAR_X + near], s[_NEAR_Y + near] = w.x, w.y
-    store(s, _NEAR_X + near + 1, eight(FAR))
-    store(s, _NEAR_Y + near + 1, eight(FAR))
+    s.near_x[near], s.near_y[near] = w.x, w.y
+    store(s.near_x, near + 1, eight(FAR))
+    store(s.near_y, near + 1, eight(FAR))
     for _ in range(c.physics_steps):
         if w.near != 0:
             move_swept(c, w, near, near + 1, obstacles, s)
         for k in range(near):
-            i = natural(int(s[_NEAR + k]))
+            i = natural(int(s.near[k]))
             t = trackers[i]
             if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
@@ -124,14 +115,14 @@ def command(
 
 
 @compiled
-def lay_out_actions(c: Record, actions: FloatArray, s: FloatArray) -> None:
+def lay_out_actions(c: Record, actions: FloatArray, s: Record) -> None:
     """Write which speeds and turn rates actions (rows, 2 + m) ask for to rows of scratch memory."""
     for i in range(natural(c.num_trackers)):
-        s[_WANTED_SPEED + i], s[_WANTED_TURN + i] = actions[i, 0], actions[i, 1]
+        s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
 
 
 @compiled
-def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: FloatArray) -> bool:
+def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers that nothing is near to on their arcs; say whether there are others."""
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
@@ -139,19 +130,17 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: F
         x, y, cosine, sine, speed, turn_rate, next_1, next_2 = columns(trackers, i, n, POSE)
         for _ in range(parts):
             speed, turn_rate = command(
-                c, speed, turn_rate, load(s, _WANTED_SPEED + i), load(s, _WANTED_TURN + i)
+                c, speed, turn_rate, load(s.wanted_speed, i), load(s.wanted_turn, i)
             )
             dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
             x, y = x + dx, y + dy
-        store_rows(
-            x, y, cosine, sine, speed, turn_rate, next_1, next_2, _NEW_POSE + BLOCK * i, BLOCK, s
-        )
+        store_rows(x, y, cosine, sine, speed, turn_rate, next_1, next_2, s.new_pose, BLOCK * i)
     others = False
     for i in range(n):
         t = trackers[i]
         if t.broken_at == NEVER:
             if t.near == 0:
-                store_fields(t, POSE, load(s, _NEW_POSE + BLOCK * i))
+                store_fields(t, POSE, load(s.new_pose, BLOCK * i))
             else:
                 others = True
     return others
@@ -164,7 +153,7 @@ def command_target(
     trackers: Records,
     obstacles: Records,
     actions: FloatArray,
-    scratch: FloatArray,
+    scratch: Record,
 ) -> None:
     """Set the target's speed and turn rate for the control step."""
     if c.motion == AGENT:
@@ -183,7 +172,7 @@ def motion(
     trackers: Records,
     obstacles: Records,
     actions: FloatArray,
-    scratch: FloatArray,
+    scratch: Record,
 ) -> None:
     """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
 

@@ -11,16 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, Records, compiled
-from posse.rules.discs import (
-    BLOCK,
-    SLOT,
-    SLOT_DISTANCE,
-    SLOT_DISTANCE2,
-    blocks,
-    find_slots,
-    natural,
-)
+from posse.numeric import Record, Records, compiled
+from posse.rules.discs import BLOCK, blocks, find_slots, natural
 from posse.rules.senses.radio import connected
 from posse.rules.state import NEVER
 
@@ -38,7 +30,7 @@ def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
 
 
 @compiled
-def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArray) -> None:
+def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -> None:
     """Work out who occupies which slot, and how far everyone is from a slot that is free.
 
     Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
@@ -54,9 +46,9 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
         t.slot = -1
         # Until all slots taken are known, the distance to the nearest one of all.
         t.slot_progress = t.slot_distance
-        t.slot_distance = s[SLOT_DISTANCE + i]
-        if s[SLOT_DISTANCE2 + i] <= near2 and t.broken_at == NEVER and t.touching == 0:
-            best = int(s[SLOT + i])
+        t.slot_distance = s.slot_distance[i]
+        if s.slot_distance2[i] <= near2 and t.broken_at == NEVER and t.touching == 0:
+            best = int(s.slot[i])
             bit = _BIT << np.uint64(best)
             if taken & bit == _NO_BITS:
                 taken |= bit
@@ -66,14 +58,14 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: FloatArra
         last = min(first + BLOCK, n)
         looking = False  # anyone for whom the nearest slot of all is another's
         for i in range(first, last):
-            if trackers[i].slot < 0 and s[SLOT + i] >= _ZERO:
-                looking |= taken & (_BIT << np.uint64(s[SLOT + i])) != _NO_BITS
+            if trackers[i].slot < 0 and s.slot[i] >= _ZERO:
+                looking |= taken & (_BIT << np.uint64(s.slot[i])) != _NO_BITS
         if looking:
             find_slots(c, w, first, slots, taken, s)
             for i in range(first, last):
                 t = trackers[i]
-                if t.slot < 0 and s[SLOT + i] >= _ZERO:
-                    t.slot_distance = s[SLOT_DISTANCE + i]
+                if t.slot < 0 and s.slot[i] >= _ZERO:
+                    t.slot_distance = s.slot_distance[i]
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot_progress -= t.slot_distance

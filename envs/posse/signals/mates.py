@@ -28,17 +28,11 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.discs import MOST_IN_TEAM, OWN, ROW, TEAM, natural, within_one
+from posse.rules.discs import natural, within_one
 from posse.rules.state import POSE
-from posse.signals.nearest import LISTED, list_nearest
-from posse.signals.team import number_behind, row_length, seen_at, stride_of, write_rows
-
-# Scratch memory: how eight team-mates turn; where in an observation each belongs; of a team that is
-# observed as a whole, how far each mate is, and how many are nearer.
-_TURN_RATES: Final = OWN
-_START: Final = OWN + WIDTH
-_DISTANCE: Final = OWN + 1 * ROW
-_PLACE: Final = OWN + 2 * ROW
+from posse.signals.nearest import list_nearest
+from posse.signals.scratch import MOST_IN_TEAM
+from posse.signals.team import number_behind, seen_at, stride_of, write_rows
 
 MATE: Final = 9
 """Numbers that are observed of a team-mate, what it said apart."""
@@ -58,7 +52,7 @@ def observe_mates(
     count: int,
     across: int,
     message: FloatArray,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
@@ -92,22 +86,22 @@ def _write_the_rest(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
 
 
 @compiled
-def _find_places(n: int, i: int, across: int, s: FloatArray) -> None:
+def _find_places(n: int, i: int, across: int, s: Record) -> None:
     """Write how far each team-mate is from its observers, and how many are nearer.
 
     Or as near, and of a lower number.
     """
     for m in range(n - 1):
-        ahead, left = seen_at(n, i, m, across, s)
+        ahead, left = seen_at(i, m, across, s)
         distance = root(ahead * ahead + left * left)
         number, place = number_behind(n, i, m, across, s), eight(_ZERO)
         for q in range(m):
-            other, whose = load(s, _DISTANCE + WIDTH * q), number_behind(n, i, q, across, s)
+            other, whose = load(s.distance, WIDTH * q), number_behind(n, i, q, across, s)
             nearer = (other < distance) | ((other == distance) & (whose < number))
             place = place + choose(nearer, _ONE, _ZERO)
-            store(s, _PLACE + WIDTH * q, load(s, _PLACE + WIDTH * q) + choose(nearer, _ZERO, _ONE))
-        store(s, _DISTANCE + WIDTH * m, distance)
-        store(s, _PLACE + WIDTH * m, place)
+            store(s.place, WIDTH * q, load(s.place, WIDTH * q) + choose(nearer, _ZERO, _ONE))
+        store(s.distance, WIDTH * m, distance)
+        store(s.place, WIDTH * m, place)
 
 
 @compiled
@@ -117,25 +111,25 @@ def _observe_whole_team(
     i: int,
     count: int,
     across: int,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
     """Write every team-mate of observers from k on: each has a place."""
     n, size = natural(c.num_trackers), np.float32(MATE + c.message_size)
-    stride, row = stride_of(across), row_length(n, across)
-    own = TEAM + natural(stride * i)
+    stride = stride_of(across)
+    own = natural(stride * i)
     _find_places(n, i, across, s)
     for m in range(n - 1):
         at = own + natural(stride * (m + 1))
-        ahead, left = seen_at(n, i, m, across, s)
+        ahead, left = seen_at(i, m, across, s)
         mates = _describe_mates(
-            load(s, own + 2 * row), load(s, own + 3 * row), number_behind(n, i, m, across, s),
-            ahead, left, load(s, _DISTANCE + WIDTH * m),
-            load(s, at + 2 * row), load(s, at + 3 * row), load(s, at + 4 * row),
+            load(s.team_cos, own), load(s.team_sin, own), number_behind(n, i, m, across, s),
+            ahead, left, load(s.distance, WIDTH * m),
+            load(s.team_cos, at), load(s.team_sin, at), load(s.team_speed, at),
         )  # fmt: skip
-        store(s, _TURN_RATES, load(s, at + 5 * row))
-        store(s, _START, load(s, _PLACE + WIDTH * m) * size + np.float32(k))
+        store(s.turn_rates, 0, load(s.team_turn_rate, at))
+        store(s.start, 0, load(s.place, WIDTH * m) * size + np.float32(k))
         _write_mates(mates, e, i, count, across, s, observations)
 
 
@@ -147,36 +141,35 @@ def _observe_nearest(
     i: int,
     count: int,
     across: int,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
     """Write the nearest team-mates of observers from k on, as many as there are places."""
     n, size = natural(c.num_trackers), natural(MATE + c.message_size)
     places = min(n - 1, natural(c.neighbours))
-    row = row_length(n, across)
-    own = TEAM + natural(stride_of(across) * i)
+    own = natural(stride_of(across) * i)
     list_nearest(n, places, i, count, across, s)
     for place in range(natural(places)):
-        listed = LISTED + WIDTH * place
+        listed = WIDTH * place
         # Not kept from place to place: to load them again costs less than registers do.
-        own_x, own_y = load(s, own), load(s, own + row)
-        hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+        own_x, own_y = load(s.team_x, own), load(s.team_y, own)
+        hc, hs = load(s.team_cos, own), load(s.team_sin, own)
         x, y, heading_x, heading_y, speed, turn_rate, _, _ = _columns_of(
             tracker, listed, e, count, across, s
         )
         dx, dy = x - own_x, y - own_y
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
         mates = _describe_mates(
-            hc, hs, load(s, listed), ahead, left, root(ahead * ahead + left * left),
+            hc, hs, load(s.listed, listed), ahead, left, root(ahead * ahead + left * left),
             heading_x, heading_y, speed,
         )  # fmt: skip
-        store(s, _TURN_RATES, turn_rate)
+        store(s.turn_rates, 0, turn_rate)
         at = natural(k + place * size)
         write_rows(mates, e, i, count, across, observations, at)
         for lane in range(count):
             o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-            o[at + MATE - 1] = s[_TURN_RATES + lane]
+            o[at + MATE - 1] = s.turn_rates[lane]
 
 
 @compiled
@@ -208,7 +201,7 @@ def _describe_mates(
 
 @compiled
 def _columns_of(
-    tracker: Records, listed: int, e: int, count: int, across: int, s: FloatArray
+    tracker: Records, listed: int, e: int, count: int, across: int, s: Record
 ) -> tuple[Lanes, ...]:
     """Return :func:`posse.signals.team.team_columns` of the poses of those that are listed."""
     return transpose(
@@ -225,13 +218,13 @@ def _columns_of(
 
 @compiled
 def _pose(
-    tracker: Records, listed: int, lane: int, e: int, count: int, across: int, s: FloatArray
+    tracker: Records, listed: int, lane: int, e: int, count: int, across: int, s: Record
 ) -> Lanes:
     """Return the pose of whom a lane's list names, and what follows on it.
 
     The last of ``count`` lanes stands in for those that there are not.
     """
-    number = natural(int(s[listed + min(lane, count - 1)]))
+    number = natural(int(s.listed[listed + min(lane, count - 1)]))
     return load_fields(tracker[natural(e + lane * across), number], POSE)
 
 
@@ -242,7 +235,7 @@ def _write_mates(
     i: int,
     count: int,
     across: int,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
 ) -> None:
     """Write what each of ``count`` observers observes of one team-mate, from where _START says."""
@@ -265,16 +258,16 @@ def _write_mate(
     i: int,
     count: int,
     across: int,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
 ) -> None:
     """Write what one of ``count`` observers observes of a team-mate, if there are so many."""
     if lane >= count:
         return
     o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-    start = natural(int(s[_START + lane]))
+    start = natural(int(s.start[lane]))
     store(o, start, fields)
-    o[start + MATE - 1] = s[_TURN_RATES + lane]
+    o[start + MATE - 1] = s.turn_rates[lane]
 
 
 @compiled

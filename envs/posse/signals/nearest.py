@@ -14,9 +14,9 @@ import numpy as np
 
 from posse.numeric import (
     WIDTH,
-    FloatArray,
     Lanes,
     Mask,
+    Record,
     choose,
     compiled,
     eight,
@@ -27,18 +27,8 @@ from posse.numeric import (
     tag,
     tagged,
 )
-from posse.rules.discs import FAR, OWN, ROW, SHORTLIST, TEAM, blocks, natural, store_each
-from posse.signals.team import own_numbers, round_again, row_length, stride_of, way_behind
-
-LISTED: Final = OWN + 1 * ROW
-"""Where the lists stand in scratch memory: the nearest to each of the eight, a lane each, then the
-second nearest. Numbers of team-mates; four rows hold lists of the largest team. The first of the
-rows that are a module's own stays with who asks for the lists."""
-
-# The nearest so far, how far and who; which of the eight lists are beyond doubt.
-_SO_FAR: Final = SHORTLIST
-WHO: Final = SHORTLIST + 1 * ROW
-_CERTAIN: Final = SHORTLIST + 2 * ROW
+from posse.rules.discs import FAR, blocks, natural, store_each
+from posse.signals.team import own_numbers, round_again, stride_of, way_behind
 
 _CLOSER: Final = np.float32(1 - 2**-15)  # two tags and rounding change half of that
 _ABSENT: Final = FAR * FAR
@@ -49,8 +39,8 @@ _Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 
 
 @compiled
-def list_nearest(n: int, places: int, i: int, count: int, across: int, s: FloatArray) -> None:
-    """List, from LISTED on, the nearest of a team of n to ``count`` trackers, the first of them i.
+def list_nearest(n: int, places: int, i: int, count: int, across: int, s: Record) -> None:
+    """List the nearest of a team of n to ``count`` trackers, the first of them i.
 
     They are at most eight; what other lanes hold is of no use.
     There are no more places than team-mates, and the team stands in its rows
@@ -60,12 +50,12 @@ def list_nearest(n: int, places: int, i: int, count: int, across: int, s: FloatA
     if together:
         rank_eight(n, i, across, s)
     for lane in range(count):
-        if not together or s[_CERTAIN + lane] == _ZERO:
+        if not together or s.certain[lane] == _ZERO:
             list_exactly(n, places, i, natural(lane), across, s)
 
 
 @compiled
-def rank_eight(n: int, i: int, across: int, s: FloatArray) -> None:
+def rank_eight(n: int, i: int, across: int, s: Record) -> None:
     """List the eight nearest team-mates of eight trackers, and say which lists are certain."""
     last = WIDTH * (blocks(n - 1) - 1)
     a, b, c, d, e, f, g, h = sort(eight_apart(n, i, last, False, across, s))
@@ -78,13 +68,13 @@ def rank_eight(n: int, i: int, across: int, s: FloatArray) -> None:
         as_near(a, b) | as_near(b, c) | as_near(c, d) | as_near(d, e)
         | as_near(e, f) | as_near(f, g) | as_near(g, h) | as_near(h, ninth)
     )  # fmt: skip
-    store(s, _CERTAIN, choose(doubtful, _ZERO, _ONE))
+    store(s.certain, 0, choose(doubtful, _ZERO, _ONE))
     behind = own_numbers(i, across, s) + _ONE
     lists = (
         whose(n, behind, a), whose(n, behind, b), whose(n, behind, c), whose(n, behind, d),
         whose(n, behind, e), whose(n, behind, f), whose(n, behind, g), whose(n, behind, h),
     )  # fmt: skip
-    store_each(lists, LISTED, WIDTH, s)
+    store_each(lists, s.listed, 0)
 
 
 @compiled
@@ -100,7 +90,7 @@ def whose(n: int, behind: Lanes, distance: Lanes) -> Lanes:
 
 
 @compiled
-def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: FloatArray) -> _Eight:
+def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: Record) -> _Eight:
     """Return how far the eight team-mates from m + 1 places behind eight trackers are, tagged.
 
     Who is not there is too far to count.
@@ -114,12 +104,12 @@ def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: FloatAr
 
 
 @compiled
-def apart(n: int, i: int, m: int, is_there: bool, across: int, s: FloatArray) -> Lanes:
+def apart(n: int, i: int, m: int, is_there: bool, across: int, s: Record) -> Lanes:
     """Return the squared distances to the team-mates m + 1 places behind, tagged with m.
 
     Of who is not there anything is read, and may be no number.
     """
-    dx, dy = way_behind(n, i, m, across, s)
+    dx, dy = way_behind(i, m, across, s)
     least = choose(is_there or m < n - 1, _ZERO, _ABSENT)
     # Last, what makes them numbers again to LLVM: it would not sort bits as fast.
     return greater(least, tagged(dx * dx + dy * dy, m))
@@ -170,40 +160,40 @@ def merge(one: _Eight, other: _Eight) -> tuple[Lanes, ...]:
 
 
 @compiled(seldom=True)
-def list_exactly(n: int, places: int, i: int, lane: int, across: int, s: FloatArray) -> None:
+def list_exactly(n: int, places: int, i: int, lane: int, across: int, s: Record) -> None:
     """List the nearest team-mates of the tracker in a lane, in order of exact distances."""
-    stride, row = stride_of(across), row_length(n, across)
+    stride = stride_of(across)
     own_number = natural(i + lane * (1 - across))
-    team = TEAM + natural(lane * across)
+    team = natural(lane * across)
     own = team + natural(stride * own_number)
     filled = 0
     for number in range(n):
         at = team + natural(stride * number)
-        dx, dy = s[at] - s[own], s[at + row] - s[own + row]
-        hc, hs = s[own + 2 * row], s[own + 3 * row]
+        dx, dy = s.team_x[at] - s.team_x[own], s.team_y[at] - s.team_y[own]
+        hc, hs = s.team_cos[own], s.team_sin[own]
         ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
         if number != own_number:
             distance = root(ahead * ahead + left * left)
             filled = keep_nearest(places, filled, number, distance, s)
     for place in range(natural(places)):
-        s[LISTED + WIDTH * place + lane] = s[WHO + place]
+        s.listed[WIDTH * place + lane] = s.who[place]
 
 
 @compiled
-def keep_nearest(places: int, filled: int, number: int, distance: np.float32, s: FloatArray) -> int:
+def keep_nearest(places: int, filled: int, number: int, distance: np.float32, s: Record) -> int:
     """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far.
 
-    Of those as near, who came first stays first. Who they are stands from WHO on.
+    Of those as near, who came first stays first. Who they are stands in ``who``.
     """
     if filled == places:
-        if distance >= s[_SO_FAR + places - 1]:
+        if distance >= s.so_far[places - 1]:
             return filled
         filled -= 1
     spot = filled
-    while spot > 0 and s[_SO_FAR + spot - 1] > distance:
-        s[_SO_FAR + spot] = s[_SO_FAR + spot - 1]
-        s[WHO + spot] = s[WHO + spot - 1]
+    while spot > 0 and s.so_far[spot - 1] > distance:
+        s.so_far[spot] = s.so_far[spot - 1]
+        s.who[spot] = s.who[spot - 1]
         spot -= 1
-    s[_SO_FAR + spot] = distance
-    s[WHO + spot] = np.float32(number)
+    s.so_far[spot] = distance
+    s.who[spot] = np.float32(number)
     return filled + 1

@@ -20,12 +20,12 @@ import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse.rules.contact import touches_surroundings
-from posse.rules.discs import GAP, natural, within_one
+from posse.rules.discs import natural, within_one
 from posse.rules.senses.sonar import ping
 from posse.scenarios.formation import FORMATIONS
 from posse.scenarios.scenario import Scenario
 from posse.signals.mates import MATE, copy_message, leave_empty
-from posse.signals.nearest import WHO, keep_nearest
+from posse.signals.nearest import keep_nearest
 from posse.signals.together import SONAR_AT, TARGET_AT, TASK_AT, write_task
 
 _ZERO: Final = np.float32(0.0)
@@ -219,7 +219,7 @@ def _observe_heard(
     trackers: Records,
     heard: Records,
     heard_message: FloatArray,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
@@ -238,7 +238,7 @@ def _write_heard(
     i: int,
     heard: Records,
     said: FloatArray,
-    s: FloatArray,
+    s: Record,
     o: FloatArray,
     k: int,
 ) -> None:
@@ -251,7 +251,7 @@ def _write_heard(
             filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
     for p in range(c.neighbours):
         if p < filled:
-            j = int(s[WHO + p])
+            j = int(s.who[p])
             age = np.float32(w.step - heard[j].step) * c.dt
             _write_neighbour(t, heard[j], j, age, o, k)
             copy_message(c, said[j], o, k)
@@ -267,7 +267,7 @@ def observe_alone(
     trackers: Records,
     heard: Records,
     heard_message: FloatArray,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
 ) -> None:
     """Write what :mod:`posse.signals.together` does not write of observations, (rows, F).
@@ -278,7 +278,7 @@ def observe_alone(
     for i in range(n):
         t = trackers[i]
         pose = (t.x, t.y, t.heading_cos, t.heading_sin)
-        ping(c, pose, i, s[GAP + i], s, observations[i], SONAR_AT)
+        ping(c, pose, i, s.gap[i], s, observations[i], SONAR_AT)
     k = SONAR_AT + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
@@ -290,7 +290,7 @@ def observe_target(
     w: Record,
     trackers: Records,
     obstacles: Records,
-    s: FloatArray,
+    s: Record,
     o: FloatArray,
 ) -> None:
     """Write what a target that is an agent is given, (F,): it knows where trackers are."""
@@ -315,7 +315,7 @@ def observe_target(
     for p in range(c.neighbours):
         leave_empty(c, o, k)
         if p < filled:
-            j = int(s[WHO + p])
+            j = int(s.who[p])
             _write_neighbour(w, trackers[j], j, _ZERO, o, k)
         k += MATE + natural(c.message_size)
 

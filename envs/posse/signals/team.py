@@ -13,6 +13,7 @@ from posse.numeric import (
     WIDTH,
     FloatArray,
     Lanes,
+    Record,
     Records,
     choose,
     compiled,
@@ -22,7 +23,7 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.discs import INDEX, TEAM, columns, natural
+from posse.rules.discs import columns, natural
 from posse.rules.state import POSE
 
 
@@ -30,16 +31,6 @@ from posse.rules.state import POSE
 def stride_of(across: int) -> int:
     """Return how far one tracker lies from the next in a row of the team."""
     return WIDTH if across else 1
-
-
-@compiled
-def row_length(n: int, across: int) -> int:
-    """Return how far one row of a team of n lies from the next.
-
-    The last block of a row may run over the end of what it holds; what is read from there is of
-    nobody, and must not count.
-    """
-    return natural(2 * n * stride_of(across) + WIDTH)
 
 
 @compiled
@@ -60,31 +51,30 @@ def team_columns(tracker: Records, e: int, i: int, across: int, offset: int) -> 
 
 
 @compiled
-def lay_out_team(tracker: Records, e: int, across: int, s: FloatArray) -> None:
+def lay_out_team(tracker: Records, e: int, across: int, s: Record) -> None:
     """Write the rows of the team of world e, or of eight worlds.
 
-    They hold x, y, heading (cosine, sine), speed and turn rate.
+    What is read beyond their end, from the last block, is of nobody, and must not count.
     """
-    n = natural(tracker.shape[1])
-    stride, row = stride_of(across), row_length(n, across)
+    n, stride = natural(tracker.shape[1]), stride_of(across)
     each = WIDTH // stride
     # From the last block on: what fills it is overwritten by the others' second place.
     for block in range((n + each - 1) // each - 1, -1, -1):
         i = natural(each * block)
         x, y, cosine, sine, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
-        for at in (TEAM + stride * i, TEAM + natural(stride * (i + n))):
-            store(s, at, x)
-            store(s, at + row, y)
-            store(s, at + 2 * row, cosine)
-            store(s, at + 3 * row, sine)
-            store(s, at + 4 * row, speed)
-            store(s, at + 5 * row, turn_rate)
+        for at in (stride * i, natural(stride * (i + n))):
+            store(s.team_x, at, x)
+            store(s.team_y, at, y)
+            store(s.team_cos, at, cosine)
+            store(s.team_sin, at, sine)
+            store(s.team_speed, at, speed)
+            store(s.team_turn_rate, at, turn_rate)
 
 
 @compiled
-def own_numbers(i: int, across: int, s: FloatArray) -> Lanes:
+def own_numbers(i: int, across: int, s: Record) -> Lanes:
     """Return the numbers of the observers, of which the first is i."""
-    return eight(np.float32(i)) if across else load(s, INDEX + i)
+    return eight(np.float32(i)) if across else load(s.index, i)
 
 
 @compiled
@@ -94,27 +84,25 @@ def round_again(n: int, number: Lanes) -> Lanes:
 
 
 @compiled
-def number_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> Lanes:
+def number_behind(n: int, i: int, m: int, across: int, s: Record) -> Lanes:
     """Return the numbers of the team-mates m + 1 places behind their observers."""
     return round_again(n, own_numbers(i, across, s) + np.float32(m + 1))
 
 
 @compiled
-def way_behind(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+def way_behind(i: int, m: int, across: int, s: Record) -> tuple[Lanes, Lanes]:
     """Return how far the team-mates m + 1 places behind are away, in x and in y, m."""
-    stride, row = stride_of(across), row_length(n, across)
-    own = TEAM + natural(stride * i)
-    at = own + natural(stride * (m + 1))
-    return load(s, at) - load(s, own), load(s, at + row) - load(s, own + row)
+    own = natural(stride_of(across) * i)
+    at = own + natural(stride_of(across) * (m + 1))
+    return load(s.team_x, at) - load(s.team_x, own), load(s.team_y, at) - load(s.team_y, own)
 
 
 @compiled
-def seen_at(n: int, i: int, m: int, across: int, s: FloatArray) -> tuple[Lanes, Lanes]:
+def seen_at(i: int, m: int, across: int, s: Record) -> tuple[Lanes, Lanes]:
     """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
-    row = row_length(n, across)
-    own = TEAM + natural(stride_of(across) * i)
-    dx, dy = way_behind(n, i, m, across, s)
-    hc, hs = load(s, own + 2 * row), load(s, own + 3 * row)
+    own = natural(stride_of(across) * i)
+    dx, dy = way_behind(i, m, across, s)
+    hc, hs = load(s.team_cos, own), load(s.team_sin, own)
     return dx * hc + dy * hs, dy * hc - dx * hs
 
 

@@ -24,9 +24,10 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.discs import INDEX, MOST_IN_TEAM, OWN, TASK, natural, within_one
+from posse.rules.discs import natural, within_one
 from posse.rules.state import FIX, NEVER, POSE, WorldArrays
 from posse.signals.mates import observe_mates
+from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.team import lay_out_team, team_columns, write_rows
 
 TOGETHER: Final = WIDTH
@@ -38,14 +39,6 @@ TASK_AT: Final = 8
 TARGET_AT: Final = TASK_AT + 18
 SONAR_AT: Final = TARGET_AT + 12
 
-# Scratch memory, of the eight observers: which step it is, when the fix was, whether it sees the
-# target, touches anything, and works.
-_STEP: Final = OWN
-_FIXED_AT: Final = OWN + 1 * WIDTH
-_SEES: Final = OWN + 2 * WIDTH
-_TOUCHING: Final = OWN + 3 * WIDTH
-_WORKING: Final = OWN + 4 * WIDTH
-
 _NUMBER_AT: Final = np.float32(3)  # in the task's part: which tracker it is
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -54,30 +47,30 @@ _TINY: Final = np.float32(1e-9)
 
 
 @compiled
-def lay_out_task(c: Record, s: FloatArray) -> None:
+def lay_out_task(c: Record, s: Record) -> None:
     """Write what every tracker of every world is told of its task to a row of scratch memory."""
     for k in range(2 * WIDTH):
-        s[TASK + k] = _ZERO
-    s[TASK + c.formation] = _ONE
-    s[TASK + 4] = np.float32(c.num_trackers)
-    s[TASK + 5] = c.formation_distance
-    s[TASK + 6] = c.formation_spacing
-    s[TASK + 7] = c.tracker_speed
-    s[TASK + 8] = c.tracker_turn_rate
-    s[TASK + 9] = c.acceleration_time
-    s[TASK + 10] = c.turn_acceleration_time
-    s[TASK + 11] = c.tolerance
-    s[TASK + 12] = c.radius
-    s[TASK + 13] = c.dt
-    s[TASK + 14] = c.told_sensing_range
-    s[TASK + 15] = c.sonar_range
+        s.task[k] = _ZERO
+    s.task[c.formation] = _ONE
+    s.task[4] = np.float32(c.num_trackers)
+    s.task[5] = c.formation_distance
+    s.task[6] = c.formation_spacing
+    s.task[7] = c.tracker_speed
+    s.task[8] = c.tracker_turn_rate
+    s.task[9] = c.acceleration_time
+    s.task[10] = c.turn_acceleration_time
+    s.task[11] = c.tolerance
+    s.task[12] = c.radius
+    s.task[13] = c.dt
+    s.task[14] = c.told_sensing_range
+    s.task[15] = c.sonar_range
 
 
 @compiled
-def write_task(number: int, s: FloatArray, o: FloatArray) -> None:
+def write_task(number: int, s: Record, o: FloatArray) -> None:
     """Write what a tracker is told of its task, but for the last two."""
-    store(o, TASK_AT, choose(load(s, INDEX) == _NUMBER_AT, np.float32(number), load(s, TASK)))
-    store(o, TASK_AT + WIDTH, load(s, TASK + WIDTH))
+    store(o, TASK_AT, choose(load(s.index, 0) == _NUMBER_AT, np.float32(number), load(s.task, 0)))
+    store(o, TASK_AT + WIDTH, load(s.task, WIDTH))
 
 
 @compiled
@@ -89,7 +82,7 @@ def observe_own_and_target(
     i: int,
     count: int,
     across: int,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
 ) -> None:
     """Write what observers know of themselves and of their target.
@@ -99,15 +92,15 @@ def observe_own_and_target(
     for lane in range(count):
         to, who = natural(e + lane * across), natural(i + lane * (1 - across))
         t, o = tracker[to, who], observations[to, who]
-        s[_STEP + lane] = np.float32(world[to].step)
-        s[_FIXED_AT + lane], s[_SEES + lane] = np.float32(t.fix_step), np.float32(t.sees)
-        s[_TOUCHING + lane] = np.float32(t.touching)
-        s[_WORKING + lane] = np.float32(t.broken_at == NEVER)
+        s.step[lane] = np.float32(world[to].step)
+        s.fix_step[lane], s.sees[lane] = np.float32(t.fix_step), np.float32(t.sees)
+        s.touching[lane] = np.float32(t.touching)
+        s.working[lane] = np.float32(t.broken_at == NEVER)
         write_task(who, s, o)
     own_x, own_y, hc, hs, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
     own = transpose(
         within_one(hc), within_one(hs), own_x, own_y, speed, turn_rate,
-        load(s, _TOUCHING), load(s, _WORKING),
+        load(s.touching, 0), load(s.working, 0),
     )  # fmt: skip
     write_rows(own, e, i, count, across, observations, 0)
     x, y, heading_x, heading_y, frame_x, frame_y, vx, vy = team_columns(tracker, e, i, across, FIX)
@@ -115,9 +108,9 @@ def observe_own_and_target(
     distance = root(dx * dx + dy * dy)
     per_metre = _ONE / greater(distance, _TINY)
     ux, uy = dx * per_metre, dy * per_metre
-    fixed_at = load(s, _FIXED_AT)
+    fixed_at = load(s.fix_step, 0)
     known = fixed_at >= _ZERO
-    age = choose(known, (load(s, _STEP) - fixed_at) * c.dt, _MINUS_ONE)
+    age = choose(known, (load(s.step, 0) - fixed_at) * c.dt, _MINUS_ONE)
     ahead = choose(distance > _ZERO, within_one(ux * hc + uy * hs), _ONE)
     ahead = choose(known, ahead, _ZERO)
     left = choose(known, within_one(uy * hc - ux * hs), _ZERO)
@@ -126,9 +119,9 @@ def observe_own_and_target(
     frame_cos = choose(known, within_one(frame_x * hc + frame_y * hs), _ZERO)
     frame_sin = choose(known, within_one(frame_y * hc - frame_x * hs), _ZERO)
     # The end of the task and the first of the target; then its last, eight at once.
-    time_left = (np.float32(c.horizon) - load(s, _STEP)) * c.dt
+    time_left = (np.float32(c.horizon) - load(s.step, 0)) * c.dt
     fields = transpose(
-        eight(c.told_arena), time_left, choose(known, _ONE, _ZERO), load(s, _SEES), age,
+        eight(c.told_arena), time_left, choose(known, _ONE, _ZERO), load(s.sees, 0), age,
         choose(known, distance, _MINUS_ONE), ahead, left,
     )  # fmt: skip
     write_rows(fields, e, i, count, across, observations, TARGET_AT - 2)
@@ -147,7 +140,7 @@ def _observe_some(
     i: int,
     count: int,
     across: int,
-    s: FloatArray,
+    s: Record,
     observations: FloatArray,
 ) -> None:
     """Write what ``count`` trackers, the first of them i of world e, observe together."""
@@ -165,7 +158,7 @@ def observes_mates(c: Record) -> bool:
 
 @compiled
 def observe_together(
-    c: Record, worlds: WorldArrays, first: int, count: int, s: FloatArray, observations: FloatArray
+    c: Record, worlds: WorldArrays, first: int, count: int, s: Record, observations: FloatArray
 ) -> None:
     """Write what trackers of ``count`` worlds, at most eight, observe together."""
     n = natural(c.num_trackers)

@@ -11,10 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posse
+from posse.engine.scratch import SCRATCH, SCRATCH_FOR_ONE
 from posse.numeric import kernel
-from posse.rules.discs import BLOCK, MOST_IN_TEAM, SIZE, SIZE_FOR_ONE, lay_out_constants
+from posse.rules.discs import BLOCK, lay_out_constants
+from posse.rules.scratch import new_scratch
 from posse.rules.state import TRACKER, config_record
-from posse.signals.nearest import _CERTAIN, LISTED, list_nearest
+from posse.signals.nearest import list_nearest
+from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.team import lay_out_team
 
 Numbers = npt.NDArray[np.float32]
@@ -23,22 +26,22 @@ Teams = npt.NDArray[Any]
 
 @kernel
 def make_lists(
-    config: Any, trackers: Any, beams: Numbers, across: int, places: int, s: Numbers,
+    config: Any, trackers: Any, beams: Numbers, across: int, places: int, scratch: Any,
     lists: Numbers, certain: Numbers,
 ) -> None:  # fmt: skip
     """List the nearest of every tracker, of eight worlds at once or of one, as observed."""
-    n = trackers.shape[1]
+    n, s = trackers.shape[1], scratch[0]
     lay_out_constants(config[0], beams, s)
     lay_out_team(trackers, 0, across, s)
     for first in range(0, n, 1 if across else BLOCK):
         count = BLOCK if across else min(BLOCK, n - first)
-        s[_CERTAIN : _CERTAIN + BLOCK] = 0
+        s.certain[:] = 0
         list_nearest(n, places, first, count, across, s)
         for lane in range(count):
             e, i = lane * across, first + lane * (1 - across)
             for p in range(places):
-                lists[e, i, p] = s[LISTED + BLOCK * p + lane]
-            certain[e, i] = s[_CERTAIN + lane]
+                lists[e, i, p] = s.listed[BLOCK * p + lane]
+            certain[e, i] = s.certain[lane]
 
 
 def team(x: Numbers, y: Numbers, heading: Numbers) -> Teams:
@@ -53,7 +56,8 @@ def listed(trackers: Teams, places: int, across: int) -> tuple[Numbers, Numbers]
     lists = np.full((worlds, n, places), -1, np.float32)
     certain = np.zeros((worlds, n), np.float32)
     # What nobody has written must not count.
-    scratch = np.full(SIZE if across else SIZE_FOR_ONE, np.nan, np.float32)
+    scratch = new_scratch(SCRATCH if across else SCRATCH_FOR_ONE)
+    scratch.view(np.float32)[:] = np.nan
     config = config_record(posse.get_scenario("constant"))
     beams = np.zeros((2, 0), np.float32)
     make_lists(config, trackers, beams, across, places, scratch, lists, certain)

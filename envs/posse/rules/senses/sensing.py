@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import (
-    FloatArray,
     Lanes,
     Record,
     Records,
@@ -22,27 +21,9 @@ from posse.numeric import (
     root,
     store_fields,
 )
-from posse.rules.discs import (
-    BLOCK,
-    OWN,
-    RADIUS,
-    ROW,
-    X,
-    Y,
-    blocks,
-    columns,
-    natural,
-    store_rows,
-)
+from posse.rules.discs import BLOCK, blocks, columns, natural, store_rows
 from posse.rules.randomness import SENSOR_NOISE, normal_pair
 from posse.rules.state import FIX, NEVER
-
-# Rows of scratch memory, of each tracker: when its last fix was, where it sees the target now, and
-# the fix that this makes, eight numbers each.
-_FIXED_AT: Final = OWN
-_SEEN_DX: Final = OWN + 1 * ROW
-_SEEN_DY: Final = OWN + 2 * ROW
-_NEW_FIX: Final = OWN + 3 * ROW
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -51,9 +32,7 @@ _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of th
 
 
 @compiled
-def in_sight(
-    c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray
-) -> bool:
+def in_sight(c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> bool:
     """Say whether a tracker's sensor has the target, which lies (dx, dy) from it.
 
     In range, in the field of view, the sensor alive, and no obstacle across the line of sight.
@@ -71,7 +50,7 @@ def in_sight(
 
 
 @compiled
-def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray) -> bool:
+def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> bool:
     """Say whether an obstacle lies across the line from a tracker to what is (dx, dy) from it.
 
     Eight at a time: which of them is across cannot be predicted.
@@ -80,7 +59,7 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: FloatArray) 
     first = natural(c.num_trackers) + 1
     for block in range(blocks(c.num_obstacles)):
         j = first + BLOCK * block
-        ox, oy, radius = load(s, X + j) - t.x, load(s, Y + j) - t.y, load(s, RADIUS + j)
+        ox, oy, radius = load(s.x, j) - t.x, load(s.y, j) - t.y, load(s.radius, j)
         along, across = ox * dx + oy * dy, ox * dy - oy * dx
         meets = (along > _ZERO) & (along < d2) & (across * across < radius * radius * d2)
         if bits(meets) != 0:
@@ -137,7 +116,7 @@ def take_fix(
 
 
 @compiled
-def look(c: Record, w: Record, trackers: Records, s: FloatArray) -> int:
+def look(c: Record, w: Record, trackers: Records, s: Record) -> int:
     """Let every tracker look for the target, and note the fix if it has it; return how many do.
 
     Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
@@ -150,19 +129,19 @@ def look(c: Record, w: Record, trackers: Records, s: FloatArray) -> int:
         dx, dy = w.x - t.x, w.y - t.y
         t.sees = t.broken_at == NEVER and in_sight(c, w, t, dx, dy, s)
         seeing += t.sees
-        s[_FIXED_AT + i] = np.float32(t.fix_step)
+        s.fixed_at[i] = np.float32(t.fix_step)
         if noisy and t.sees:
-            s[_SEEN_DX + i], s[_SEEN_DY + i] = measure(c, w, i, dx, dy)
+            s.seen_dx[i], s.seen_dy[i] = measure(c, w, i, dx, dy)
     if seeing == 0:
         return 0
     if w.detected_at < 0:
         w.detected_at = w.step
     for block in range(blocks(n)):
         i = BLOCK * block
-        own_x, own_y, before = load(s, X + i), load(s, Y + i), load(s, _FIXED_AT + i)
+        own_x, own_y, before = load(s.x, i), load(s.y, i), load(s.fixed_at, i)
         dx, dy = w.x - own_x, w.y - own_y
         if noisy:
-            dx, dy = load(s, _SEEN_DX + i), load(s, _SEEN_DY + i)
+            dx, dy = load(s.seen_dx, i), load(s.seen_dy, i)
         x, y = own_x + dx, own_y + dy
         old_x, old_y, _, _, _, _, old_vx, old_vy = columns(trackers, i, n, FIX)
         since = greater(np.float32(w.step) - before, _ONE)
@@ -171,13 +150,13 @@ def look(c: Record, w: Record, trackers: Records, s: FloatArray) -> int:
         store_rows(
             x, y, eight(w.heading_cos), eight(w.heading_sin), eight(w.frame_cos),
             eight(w.frame_sin), choose(fresh, vx, _ZERO), choose(fresh, vy, _ZERO),
-            _NEW_FIX + BLOCK * i, BLOCK, s,
+            s.new_fix, BLOCK * i,
         )  # fmt: skip
     for i in range(n):
         t = trackers[i]
         if t.sees:
             t.fix_step = w.step
-            store_fields(t, FIX, load(s, _NEW_FIX + BLOCK * i))
+            store_fields(t, FIX, load(s.new_fix, BLOCK * i))
     return seeing
 
 

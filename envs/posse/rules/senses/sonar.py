@@ -21,20 +21,7 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import (
-    BEAM_COS,
-    BEAM_SIN,
-    BLOCK,
-    FAR,
-    HEARD2,
-    RADIUS,
-    READING,
-    X,
-    Y,
-    blocks,
-    natural,
-    num_discs,
-)
+from posse.rules.discs import BLOCK, FAR, blocks, natural, num_discs
 
 _WORD: Final = 8  # blocks of eight discs, a bit each, that fill a number of 64 bits
 
@@ -49,7 +36,7 @@ _Echo = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 
 
 @compiled
-def echo(c: Record, robot: Pose, j: int, s: FloatArray) -> _Echo:
+def echo(c: Record, robot: Pose, j: int, s: Record) -> _Echo:
     """Return what the sonar has of disc j.
 
     Where its centre lies, ahead and to the left; how far its nearest point is; how far along a
@@ -59,7 +46,7 @@ def echo(c: Record, robot: Pose, j: int, s: FloatArray) -> _Echo:
     """
     at = natural(j)
     x, y, hc, hs = robot
-    dx, dy, radius = s[X + at] - x, s[Y + at] - y, s[RADIUS + at]
+    dx, dy, radius = s.x[at] - x, s.y[at] - y, s.radius[at]
     ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
     distance = root(ahead * ahead + left * left)
     reached = distance - radius < c.sonar_range + c.radius
@@ -73,13 +60,13 @@ def echo(c: Record, robot: Pose, j: int, s: FloatArray) -> _Echo:
 
 
 @compiled
-def listen(c: Record, one: _Echo, two: _Echo, three: _Echo, four: _Echo, s: FloatArray) -> None:
+def listen(c: Record, one: _Echo, two: _Echo, three: _Echo, four: _Echo, s: Record) -> None:
     """Shorten the sonar readings by four discs."""
     wide = max(max(one[4], two[4]), max(three[4], four[4])) >= _ZERO
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
-        cosine, sine = load(s, BEAM_COS + k), load(s, BEAM_SIN + k)
-        reading = load(s, READING + k)
+        cosine, sine = load(s.beam_cos, k), load(s.beam_sin, k)
+        reading = load(s.reading, k)
         reading = lesser(reading, in_width(one, cosine, sine))
         reading = lesser(reading, in_width(two, cosine, sine))
         reading = lesser(reading, in_width(three, cosine, sine))
@@ -89,7 +76,7 @@ def listen(c: Record, one: _Echo, two: _Echo, three: _Echo, four: _Echo, s: Floa
             reading = lesser(reading, on_axis(c, two, cosine, sine))
             reading = lesser(reading, on_axis(c, three, cosine, sine))
             reading = lesser(reading, on_axis(c, four, cosine, sine))
-        store(s, READING + k, reading)
+        store(s.reading, k, reading)
 
 
 @compiled
@@ -111,7 +98,7 @@ def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
 
 
 @compiled(seldom=True)
-def listen_to_walls(c: Record, robot: Pose, s: FloatArray) -> None:
+def listen_to_walls(c: Record, robot: Pose, s: Record) -> None:
     """Shorten the sonar readings by the walls of the arena."""
     half, (x, y, _, _) = c.half_arena, robot
     listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
@@ -127,7 +114,7 @@ def listen_to_wall(
     normal_x: np.float32,
     normal_y: np.float32,
     distance: np.float32,
-    s: FloatArray,
+    s: Record,
 ) -> None:
     """Shorten the sonar readings by a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
@@ -137,10 +124,10 @@ def listen_to_wall(
     ahead, left = normal_x * hc + normal_y * hs, normal_y * hc - normal_x * hs
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
-        towards = ahead * load(s, BEAM_COS + k) + left * load(s, BEAM_SIN + k)
+        towards = ahead * load(s.beam_cos, k) + left * load(s.beam_sin, k)
         axis = greater(distance / greater(towards, _TINY) - c.radius, _ZERO)
         found = choose(towards >= c.beam_cosine, nearest, choose(towards > _ZERO, axis, FAR))
-        store(s, READING + k, lesser(load(s, READING + k), found))
+        store(s.reading, k, lesser(load(s.reading, k), found))
 
 
 @compiled
@@ -150,7 +137,7 @@ def _next(near: int, otherwise: int) -> int:
 
 
 @compiled
-def listen_to_discs(c: Record, robot: Pose, number: int, s: FloatArray) -> None:
+def listen_to_discs(c: Record, robot: Pose, number: int, s: Record) -> None:
     """Shorten the sonar readings by all discs that are near."""
     x, y, _, _ = robot
     discs = blocks(num_discs(c))
@@ -158,8 +145,8 @@ def listen_to_discs(c: Record, robot: Pose, number: int, s: FloatArray) -> None:
         near = 0  # a bit for each disc that may be, looked at without a square root
         for block in range(min(_WORD, discs - first_block)):
             j = BLOCK * (first_block + block)
-            dx, dy = load(s, X + j) - x, load(s, Y + j) - y
-            near |= bits(dx * dx + dy * dy < load(s, HEARD2 + j)) << (BLOCK * block)
+            dx, dy = load(s.x, j) - x, load(s.y, j) - y
+            near |= bits(dx * dx + dy * dy < load(s.heard2, j)) << (BLOCK * block)
         own = int(number) - BLOCK * first_block
         if 0 <= own < BLOCK * _WORD:
             near &= ~(1 << own)
@@ -186,7 +173,7 @@ def ping(
     robot: Pose,
     number: int,
     gap: np.float32,
-    s: FloatArray,
+    s: Record,
     o: FloatArray,
     first: int,
 ) -> None:
@@ -196,7 +183,7 @@ def ping(
     (:func:`posse.rules.discs.lay_out`). No other is nearer than ``gap``, m between the rims.
     """
     for block in range(blocks(c.sonar_beams)):
-        store(s, READING + BLOCK * block, eight(c.sonar_range))
+        store(s.reading, BLOCK * block, eight(c.sonar_range))
     if gap < c.sonar_range + _A_LITTLE:
         listen_to_discs(c, robot, number, s)
     x, y, _, _ = robot
@@ -205,6 +192,6 @@ def ping(
     beams = natural(c.sonar_beams)
     whole = beams // BLOCK
     for block in range(whole):
-        store(o, first + BLOCK * block, load(s, READING + BLOCK * block))
+        store(o, first + BLOCK * block, load(s.reading, BLOCK * block))
     for k in range(BLOCK * whole, beams):
-        o[first + k] = s[READING + k]
+        o[first + k] = s.reading[k]

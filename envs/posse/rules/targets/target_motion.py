@@ -17,7 +17,6 @@ import numpy as np
 
 from posse.numeric import (
     WIDTH,
-    FloatArray,
     Record,
     Records,
     choose,
@@ -28,7 +27,6 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import OWN
 from posse.rules.kinematics import arc, turn_towards
 from posse.rules.randomness import TARGET, between, uniform
 from posse.rules.state import NEVER
@@ -58,7 +56,6 @@ _WEAVE_MOST: Final = 0.9
 SMART_DIRECTIONS: Final = 2 * WIDTH
 SMART_REPLAN: Final = 5
 _HALF_ROUND: Final = WIDTH
-_WORTH: Final = OWN  # a row of scratch memory: what each direction is worth
 _FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
 _LOYALTY: Final = np.float32(0.5)  # s; going back on its choice has to be worth twice that
 _LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
@@ -95,7 +92,7 @@ def draw_motion(c: Record, w: Record) -> None:
 
 @compiled
 def target_turn_rate(
-    c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray
+    c: Record, w: Record, trackers: Records, obstacles: Records, s: Record
 ) -> np.float32:
     """Return the turn rate that a scripted target takes for the next control step, rad/s."""
     if c.motion == ACCELERATING:
@@ -116,7 +113,7 @@ def target_turn_rate(
 
 
 @compiled
-def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
+def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Set the goal heading of a smart target.
 
     It makes ground through the widest gap, until the team keeps station on it or a tracker comes
@@ -167,7 +164,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
 
 
 @compiled
-def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: FloatArray) -> None:
+def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Set the goal heading through the widest gap that the team leaves.
 
     For every direction u, the soonest that any tracker, straight on at full speed, could be where
@@ -201,13 +198,13 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
             until = root(b * b + a * (px * px + py * py))
             ahead, astern = lesser(ahead, until - b), lesser(astern, until + b)
     same_way = loyalty * (ux * w.goal_cos + uy * w.goal_sin)
-    store(s, _WORTH, ahead * per_a + same_way)
-    store(s, _WORTH + _HALF_ROUND, astern * per_a - same_way)
+    store(s.worth, 0, ahead * per_a + same_way)
+    store(s.worth, _HALF_ROUND, astern * per_a - same_way)
     best = np.float32(-1e9)
     for k in range(_HALF_ROUND):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         for side in range(2):
-            value = s[_WORTH + _HALF_ROUND * side + k]
+            value = s.worth[_HALF_ROUND * side + k]
             if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
