@@ -275,6 +275,7 @@ def _check(s: Scenario) -> None:
     _check_motion(s)
     _check_formation(s)
     _check_place(s)
+    _check_rounding(s)
     _check_rewards(s)
 
 
@@ -342,7 +343,19 @@ def _check_types(s: Scenario) -> None:
 _SMALL: Final = 1e-3
 _WIDE: Final = 1e4
 FAR: Final = 1.0e6
-"""What stands for an unlimited range in the kernels; robots never come farther apart, m."""
+"""What stands for an unlimited range in the kernels; robots never come nearly as far apart, m."""
+_FARTHEST: Final = 2000.0
+"""Greatest coordinate of a robot, m: up to there float32 lie at most 1.2e-4 m apart."""
+_LONGEST_MOVE: Final = 2000.0
+"""Greatest square of the distance in a physics step per radius, m: d² <= 2,000 r.
+
+In float32 the squares of the sweep are off by about 2^-22 d², and so the place where discs of
+radius r meet by 2^-22 d² / (4 r): 1.2e-4 m at most.
+"""
+_LEAST_CHANGE: Final = 16
+"""Least change in a physics step, in spacings of float32: rounding costs it at most 1/32."""
+_MOST_WEIGHT: Final = 1e6
+"""Of a reward term. Terms are below 1e4: an episode's sum stays far below float32's 3e38."""
 
 # name -> (least, greatest, least is allowed)
 _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
@@ -350,8 +363,8 @@ _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
     "num_trackers": (1, MAX_TRACKERS, True),
     "tracker_speed": (_SMALL, 1000, True),
     "tracker_turn_rate": (_SMALL, _WIDE, True),
-    "tracker_acceleration": (_SMALL, math.inf, True),
-    "tracker_turn_acceleration": (_SMALL, math.inf, True),
+    "tracker_acceleration": (_SMALL, FAR, True),
+    "tracker_turn_acceleration": (_SMALL, FAR, True),
     "robot_radius": (_SMALL, _WIDE, True),
     "target_speed": (0, 1000, True),
     "target_turn_rate": (_SMALL, _WIDE, True),
@@ -362,17 +375,17 @@ _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
     "control_step": (1e-4, 100, True),
     "physics_step": (1e-4, 100, True),
     "horizon": (1, 1_000_000, True),
-    "arena": (0, math.inf, False),
+    "arena": (0, 2 * _FARTHEST, False),
     "num_obstacles": (0, MAX_OBSTACLES, True),
     "obstacle_gap": (0, _WIDE, True),
-    "sensing_range": (0, math.inf, False),
+    "sensing_range": (0, FAR, False),
     "field_of_view": (0, 2 * math.pi + 1e-9, False),
     "range_noise": (0, 0.3, True),
     "bearing_noise": (0, 0.5, True),
-    "velocity_smoothing": (0, math.inf, True),
+    "velocity_smoothing": (0, _WIDE, True),
     "sonar_beams": (0, 64, True),
     "sonar_range": (_SMALL, _WIDE, True),
-    "radio_range": (0, math.inf, False),
+    "radio_range": (0, FAR, False),
     "radio_delay": (0, 100, True),
     "radio_loss": (0, 0.999, True),
     "message_size": (0, 64, True),
@@ -384,17 +397,27 @@ _RANGES: Final[dict[str, tuple[float, float, bool]]] = {
     "radio_outages": (0, 1, True),
     "outage_time": (0, _WIDE, False),
 }
+_GREATEST_OF_PAIR: Final = {
+    "obstacle_radius": _WIDE,
+    "start_distance": _FARTHEST,
+    "break_window": 1.0,
+}
 
 
 def _check_ranges(s: Scenario) -> None:
     for name, (least, greatest, closed) in _RANGES.items():
         value = getattr(s, name)
-        if value is None:
+        may_be_infinite = name in _MAY_BE_INFINITE
+        if value is None or (may_be_infinite and value == math.inf):
             continue
         if value < least or value > greatest or (value == least and not closed):
             opening = "[" if closed else "("
             closing = ")" if math.isinf(greatest) else "]"
-            _fail(name, value, f"it must lie in {opening}{least:g}, {greatest:g}{closing}")
+            or_not = ", or be inf" if may_be_infinite and math.isfinite(greatest) else ""
+            _fail(name, value, f"it must lie in {opening}{least:g}, {greatest:g}{closing}{or_not}")
+    for name, greatest in _GREATEST_OF_PAIR.items():
+        if getattr(s, name)[1] > greatest:
+            _fail(name, getattr(s, name), f"both must lie in [0, {greatest:g}]")
     for name, values in (
         ("target_motion", TARGET_MOTIONS),
         ("formation", FORMATIONS),
@@ -408,10 +431,10 @@ def _check_ranges(s: Scenario) -> None:
 
 
 def _check_motion(s: Scenario) -> None:
-    if s.target_speed >= s.tracker_speed:
+    if s.target_speed > 0.9999 * s.tracker_speed:
         raise ScenarioError(
-            f"target_speed={s.target_speed:g} must be below tracker_speed={s.tracker_speed:g}: "
-            "a team that is no faster never catches up (paper, assumption ii)"
+            f"target_speed={s.target_speed:g} must be below tracker_speed={s.tracker_speed:g}, by "
+            "0.01 % at least: a team that is no faster never catches up (paper, assumption ii)"
         )
     if s.target_speed == 0 and s.target_motion != "constant":
         _fail("target_speed", s.target_speed, "only a target of constant motion may rest")
@@ -434,8 +457,6 @@ def _check_motion(s: Scenario) -> None:
         _fail("breaks", s.breaks, 'break_choice="given" names one tracker, break_number')
     if s.break_choice == "given" and s.break_number >= s.num_trackers:
         _fail("break_number", s.break_number, f"trackers are 0 to {s.num_trackers - 1}")
-    if s.break_window[1] > 1:
-        _fail("break_window", s.break_window, "shares of the horizon lie in [0, 1]")
     if s.settle_time > s.duration:
         _fail(
             "settle_time", s.settle_time,
@@ -468,12 +489,12 @@ def _check_formation(s: Scenario) -> None:
 
 
 def _check_place(s: Scenario) -> None:
-    if s.range_bound > FAR:
+    if s.position_bound > _FARTHEST:
         raise ScenarioError(
-            f"robots could come {s.range_bound:.3g} m apart, at most {FAR:g} m is possible: "
-            f"lower tracker_speed={s.tracker_speed:g}, horizon={s.horizon}, "
-            f"control_step={s.control_step:g}, start_distance={s.start_distance} or "
-            f"arena={s.arena:g}"
+            f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most "
+            f"{_FARTHEST:g} m is possible: lower tracker_speed={s.tracker_speed:g}, "
+            f"horizon={s.horizon}, control_step={s.control_step:g} or "
+            f"start_distance={s.start_distance}, or set an arena"
         )
     if s.start_distance[0] <= 2 * s.robot_radius:
         _fail(
@@ -548,6 +569,45 @@ def _room_to_start(s: Scenario) -> float:
     return min(areas)
 
 
+def _check_rounding(s: Scenario) -> None:
+    """Raise where the kernels' float32 would lose what the scenario asks for."""
+    move, longest = s.tracker_speed * s.physics_step, math.sqrt(_LONGEST_MOVE * s.robot_radius)
+    if move > longest:
+        raise ScenarioError(
+            f"tracker_speed={s.tracker_speed:g} moves {move:.3g} m in a physics step, contact of "
+            f"robots of robot_radius={s.robot_radius:g} is exact up to {longest:.3g} m: choose "
+            f"physics_step <= {longest / s.tracker_speed:.3g}"
+        )
+    for name, added_to, most in (
+        ("tracker_speed", "a position", s.position_bound),
+        ("target_speed", "a position", s.position_bound),
+        ("tracker_turn_rate", "a heading", 1.0),
+        ("target_turn_rate", "a heading", 1.0),
+        ("tracker_acceleration", "a speed", s.tracker_speed),
+        ("tracker_turn_acceleration", "a turn rate", s.tracker_turn_rate),
+    ):
+        value = getattr(s, name)
+        least = _LEAST_CHANGE * _spacing(most) / s.physics_step
+        if 0 < value < least:
+            raise ScenarioError(
+                f"{name}={value:g} adds {value * s.physics_step:.3g} to {added_to} of up to "
+                f"{most:.3g} in a physics step, which float32 loses to rounding: choose {name} >= "
+                f"{least:.3g}, or a longer physics_step={s.physics_step:g}"
+            )
+    outermost = max(math.hypot(x, y) for x, y in slot_offsets(s))
+    if outermost > _FARTHEST:
+        raise ScenarioError(
+            f"formation_spacing={s.formation_spacing:g} and "
+            f"formation_distance={s.formation_distance:g} put a slot {outermost:.3g} m from the "
+            f"target, at most {_FARTHEST:g} m is possible: lower them or num_trackers"
+        )
+
+
+def _spacing(value: float) -> float:
+    """Return how far the neighbouring float32 lie from a number."""
+    return math.ulp(value) * 2.0**29  # a double has 29 more bits
+
+
 START_CLEARANCE: Final = 0.2
 """Least free width between robots, and between a robot and an obstacle, at the start, m."""
 
@@ -562,3 +622,8 @@ def _check_rewards(s: Scenario) -> None:
             )
         if not _is_number(weight) or not math.isfinite(weight):
             _fail(f"reward_weights[{name!r}]", weight, "a weight must be a finite number")
+        if abs(weight) > _MOST_WEIGHT:
+            _fail(
+                f"reward_weights[{name!r}]", weight,
+                f"a weight must lie in [-{_MOST_WEIGHT:g}, {_MOST_WEIGHT:g}]: scale all of them",
+            )  # fmt: skip

@@ -47,7 +47,7 @@ GOOD = {f"tracker_{i}": f32([0.5, 0.1 * i]) for i in range(5)}
         ([], {"num_trackers": 0}, r"num_trackers=0 .*\[1, 64\]|num_trackers=0 does not fit"),
         ([], {"target_speed": 1.0}, r"target_speed=1 must be below tracker_speed=1"),
         ([], {"formation_spacing": 0.1, "num_trackers": 5}, r"slots .* apart|does not fit"),
-        ([], {"sensing_range": -1.0}, r"sensing_range=-1\.0 .*\(0, inf\)"),
+        ([], {"sensing_range": -1.0}, r"sensing_range=-1\.0 .*\(0, 1e\+06\], or be inf"),
         (["obstacles"], {"num_obstacles": 60}, r"num_obstacles=60 .* do not fit"),
         ([], {"split": "tests"}, r"unknown split 'tests'; splits are: train"),
         ([], {"seed": -1}, r"seed=-1 must be a whole number"),

@@ -69,7 +69,9 @@ def test_a_fast_robot_stops_where_it_meets_what_is_in_its_way(
     speed: float, away: float, bearing: float, miss: float, obstacle: bool
 ) -> None:
     """Against the intersection of a straight line with a circle."""
-    batch = posse.batch(num_trackers=2, tracker_speed=speed, physics_step=0.1, target_speed=0.5)
+    batch = posse.batch(
+        num_trackers=2, tracker_speed=speed, physics_step=0.1, target_speed=0.5, horizon=30
+    )
     direction = np.exp(1j * bearing)
     start = -direction * (away + 0.3) + 1j * direction * miss
     at(batch, [15.0, 15.0, 0.0], [start.real, start.imag, bearing], [0.0, 0.0, 0.0])

@@ -69,7 +69,7 @@ def test_the_physics_step_changes_nothing_but_rounding(name: str) -> None:
 
 
 def test_a_heading_stays_a_unit_vector_for_a_hundred_thousand_steps() -> None:
-    batch = posse.batch(num_trackers=3, horizon=100_000, start_distance=(50.0, 90.0))
+    batch = posse.batch(num_trackers=3, horizon=100_000, arena=400.0, start_distance=(50.0, 90.0))
     batch.reset(seed=1)
     rng = np.random.default_rng(1)
     several = rng.uniform(-1, 1, (16, *batch.action_shape)).astype(np.float32)

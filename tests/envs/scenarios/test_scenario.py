@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import posse
 from posse import Scenario, ScenarioError
+from posse.signals.global_state import StateLayout
 
 WALLED = {"arena": 20.0}
 
@@ -34,12 +35,21 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"tracker_speed": 10**400}, "number"),
     ({"tracker_turn_rate": 0.0}, "0.001"),
     ({"tracker_turn_rate": 30.0}, "physics_step"),
+    ({"tracker_turn_rate": 0.001, "physics_step": 1e-3}, ">= 0.00191"),
+    ({"tracker_speed": 1000.0, "horizon": 10, "settle_time": 0.1}, "physics_step <= 0.0173"),
+    ({"tracker_speed": 30.0, "robot_radius": 0.001, **WALLED}, "physics_step <= 0.0471"),
+    ({"tracker_speed": 0.001, "target_speed": 0.0005, "physics_step": 1e-3}, ">= 0.0305"),
     ({"tracker_acceleration": 0.0}, "0.001"),
+    ({"tracker_acceleration": 0.001, "tracker_speed": 9.0, "physics_step": 0.01}, "0.00153"),
+    ({"tracker_acceleration": 1e39}, "[0.001, 1e+06], or be inf"),
+    ({"tracker_turn_acceleration": 0.001, "physics_step": 0.001}, ">= 0.00381"),
     ({"tracker_turn_acceleration": -1.0}, "0.001"),
     ({"robot_radius": 0.0}, "0.001"),
     ({"target_motion": "smrat"}, "smart"),
     ({"target_speed": 1.0}, "tracker_speed"),
     ({"target_speed": 1.5}, "tracker_speed"),
+    ({"target_speed": 0.99995}, "0.01 %"),
+    ({"target_speed": 1e-300}, ">= 0.00244"),
     ({"target_speed": -0.1}, "0"),
     ({"target_speed": 0.0, "target_motion": "smart"}, "constant"),
     ({"target_turn_rate": 0.0}, "0.001"),
@@ -50,6 +60,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"formation_spacing": 0.6}, "tolerance"),
     ({"formation_spacing": 0.9, "robot_radius": 0.5, "formation_distance": 2.0}, "robot_radius"),
     ({"formation_spacing": math.inf}, "finite"),
+    ({"formation_spacing": 9000.0}, "at most 2000 m"),
     ({"tolerance": 0.6}, "formation_spacing"),
     ({"settle_time": 61.0}, "horizon=600 steps of 0.1 s"),
     ({"horizon": 5}, "settle_time=3.0"),
@@ -60,11 +71,11 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"physics_step": 1e-310}, "0.0001"),
     ({"horizon": 0}, "1"),
     ({"horizon": 1.5}, "whole"),
-    ({"horizon": 10**6, "tracker_speed": 900.0}, "apart"),
+    ({"horizon": 10**6, "tracker_speed": 9.0}, "origin"),
     ({"terminate_on_contact": 1}, "True or False"),
     ({"arena": -5.0}, "0"),
     ({"arena": 5.0}, "too small"),
-    ({"arena": 1e8}, "apart"),
+    ({"arena": 7e5}, "(0, 4000], or be inf"),
     ({"num_obstacles": 3}, "arena"),
     ({"num_obstacles": 61, **WALLED}, "60"),
     ({"num_obstacles": 30, **WALLED}, "fit"),
@@ -73,23 +84,27 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"obstacle_radius": (0.8, 0.4)}, "least"),
     ({"obstacle_radius": [0.4, 0.8]}, "tuple"),
     ({"obstacle_radius": (0.4, math.inf)}, "tuple"),
+    ({"obstacle_radius": (0.4, 1e200)}, "[0, 10000]"),
     ({"obstacle_gap": -0.1}, "0"),
     ({"start_distance": (0.2, 3.0)}, "clear of the target"),
     ({"start_distance": (4.0, 4.1), "num_trackers": 30}, "fit"),
     ({"start_distance": (4.0, 4.01), "num_trackers": 64, "arena": 40.0}, "fit"),
-    ({"start_distance": (4.0, 1e20)}, "apart"),
+    ({"start_distance": (4.0, 1e20)}, "[0, 2000]"),
     ({"start_distance": 4.0}, "tuple"),
     ({"sensing_range": 0.0}, "0"),
     ({"sensing_range": -1.0}, "0"),
+    ({"sensing_range": 1e308}, "(0, 1e+06], or be inf"),
     ({"field_of_view": 0.0}, "0"),
     ({"field_of_view": 7.0}, "6.28"),
     ({"range_noise": -0.1}, "0"),
     ({"range_noise": 0.5}, "0.3"),
     ({"bearing_noise": 1.0}, "0.5"),
     ({"velocity_smoothing": -1.0}, "0"),
+    ({"velocity_smoothing": 1e300}, "[0, 10000]"),
     ({"sonar_beams": 65}, "64"),
     ({"sonar_range": 0.0}, "0.001"),
     ({"radio_range": -1.0}, "0"),
+    ({"radio_range": 1e200}, "(0, 1e+06], or be inf"),
     ({"radio_delay": -1}, "0"),
     ({"radio_delay": 0.5}, "whole"),
     ({"radio_loss": 1.0}, "0.999"),
@@ -110,6 +125,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"outage_time": 0.0}, "0"),
     ({"reward_weights": {"slots": 1.0}}, "slot"),
     ({"reward_weights": {"slot": math.nan}}, "finite"),
+    ({"reward_weights": {"slot": -1e300}}, "[-1e+06, 1e+06]"),
     ({"reward_weights": {"slot": "much"}}, "number"),
     ({"reward_weights": 3}, "terms"),
     ({"reward_weights": {1: 1.0, "slot": 1.0}}, "terms"),
@@ -156,6 +172,82 @@ def test_nothing_but_a_scenario_error_is_ever_raised(name: str, overrides: dict[
     layout = posse.ObservationLayout(scenario)
     assert all(np.isfinite(bound).all() for bound in layout.bounds())
     assert 0 <= scenario.slot_turn_rate < math.inf
+
+
+def wide(least: float, most: float, *more: float) -> st.SearchStrategy[float]:
+    """Numbers of every order of magnitude, and some more."""
+    orders = st.floats(math.log10(least), math.log10(most)).map(lambda order: 10**order)
+    return st.one_of(orders, orders, orders, st.sampled_from([least, most, *more]))
+
+
+@st.composite
+def wide_settings(draw: st.DrawFn) -> dict[str, Any]:
+    """Settings of which many are possible, up to where they no longer are."""
+    physics_step = draw(wide(1e-4, 10, 0.05))
+    least = draw(wide(0.5, 3000, 4.0))
+    radius = draw(wide(1e-3, 10, 0.0))
+    speed = draw(wide(1e-3, 1000, 1.0))
+    chosen: dict[str, Any] = {
+        "tracker_speed": speed,
+        "target_speed": speed * draw(st.sampled_from([1e-6, 0.01, 0.6, 0.9999])),
+        "tracker_turn_rate": draw(wide(1e-3, 1e4)),
+        "target_turn_rate": draw(wide(1e-3, 1e4)),
+        "tracker_acceleration": draw(wide(1e-3, 1e308, math.inf)),
+        "tracker_turn_acceleration": draw(wide(1e-3, 1e308, math.inf)),
+        "robot_radius": draw(wide(1e-3, 1)),
+        "physics_step": physics_step,
+        "control_step": physics_step * draw(st.integers(1, 5)),
+        "tolerance": draw(wide(1e-3, 1)),
+        "formation_distance": draw(wide(0.1, 1e4)),
+        "formation_spacing": draw(wide(0.1, 1e4)),
+        "start_distance": (least, least * draw(wide(1.001, 10))),
+        "arena": draw(wide(1, 1e4, math.inf)),
+        "num_obstacles": draw(st.integers(0, 5)),
+        "obstacle_radius": (radius / 2, radius),
+        "sensing_range": draw(wide(1e-3, 1e308, math.inf)),
+        "radio_range": draw(wide(1e-3, 1e308, math.inf)),
+        "range_noise": draw(st.sampled_from([0.0, 0.3])),
+        "bearing_noise": draw(st.sampled_from([0.0, 0.5])),
+        "velocity_smoothing": draw(wide(1e-300, 1e308, 0.0)),
+        "sonar_range": draw(wide(1e-3, 1e4)),
+        "reward_weights": {name: draw(wide(1e-30, 1e300)) for name in ("distance", "contact")},
+    }
+    names = draw(st.sets(st.sampled_from(sorted(chosen)), min_size=1))
+    return {name: chosen[name] for name in names}
+
+
+@hypothesis.settings(
+    derandomize=True,
+    max_examples=200,
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.filter_too_much],
+)
+@given(
+    name=st.sampled_from(posse.scenario_names()),
+    target_motion=st.sampled_from(["constant", "accelerating", "smart", "agent"]),
+    num_trackers=st.sampled_from([2, 5, 9]),
+    chosen=wide_settings(),
+)
+def test_what_is_allowed_is_finite_and_within_its_bounds(
+    name: str, chosen: dict[str, Any], **settings: Any
+) -> None:
+    try:
+        batch = posse.batch(name, 3, **settings, horizon=30, settle_time=1e-6, **chosen)
+    except ScenarioError:
+        hypothesis.reject()
+    bounds = [batch.layout.bounds(), StateLayout(batch.scenario).bounds()]
+    observations = batch.reset(seed=1)
+    rng = np.random.default_rng(1)
+    total = np.zeros(batch.observation_shape[:2], np.float32)
+    for _ in range(35):
+        vectors = [observations, StateLayout(batch.scenario).vector(batch.arrays)]
+        for (low, high), vector in zip(bounds, vectors, strict=True):
+            outside = (vector < low) | (vector > high) | ~np.isfinite(vector)
+            assert not outside.any(), np.argwhere(outside)
+        actions = rng.choice([-1, 0.5, 1], batch.action_shape)
+        observations, rewards, *_ = batch.step(actions)
+        total += rewards
+        assert np.isfinite(total).all()
 
 
 @hypothesis.settings(derandomize=True, max_examples=40, deadline=None)
