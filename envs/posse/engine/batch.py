@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.engine.copies import write_copies
 from posse.engine.kernels import (
     LOOK,
     START,
@@ -254,6 +255,60 @@ class Batch:
         self._arrays.write(snapshot.arrays)
         self._started = True
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
+
+    def observe(self) -> FloatArray:
+        """Return the observations (E, rows, F) of the worlds as they stand.
+
+        Raises:
+            ResetNeeded: Before the first :meth:`reset`.
+        """
+        if not self._started:
+            raise ResetNeeded("observe before reset: call reset() first")
+        return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
+
+    def copies(
+        self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None
+    ) -> Batch:
+        """Return ``count`` copies of every world as it stands, to play ahead in.
+
+        Copy j of world e is world ``e * count + j`` of the returned batch. Copies go on from the
+        present of their original, under keys of their own: they draw other noise, losses and faults
+        than it will. What they draw follows from the original's key and step, ``seed`` and j. The
+        originals do not change. A copy whose episode ends begins an episode that is no world's.
+
+        Args:
+            count: Copies of each world, at least 1.
+            seed: Of what the copies draw.
+            alike: Whether all copies of a world draw the same, to compare what is done in them.
+            into: A batch of this scenario with ``num_worlds * count`` worlds to overwrite and
+                return, instead of making one: a small part of the time of a step.
+
+        Raises:
+            ResetNeeded: Before the first :meth:`reset`.
+            ScenarioError: ``count`` below 1, or a negative seed.
+            ValueError: ``into`` is this batch, or one of another scenario or number of worlds.
+        """
+        _check_count("count", count, 1)
+        seed = _check_seed(seed)
+        if not self._started:
+            raise ResetNeeded("copies before reset: call reset() first")
+        wanted = self.num_worlds * count
+        if into is None:
+            into = Batch(
+                self.scenario, wanted, seed=self.seed, split=self.split,
+                num_threads=self.num_threads,
+            )  # fmt: skip
+        elif type(into) is not Batch or into is self:
+            raise ValueError(f"copies go into another Batch on the CPU, got {into!r}")
+        elif into.scenario != self.scenario or into.num_worlds != wanted:
+            raise ValueError(
+                f"{count} copies of {self.num_worlds} worlds of {self.scenario.name!r} do not fit "
+                f"{into.num_worlds} worlds of {into.scenario.name!r}: scenario and number of "
+                "worlds must be equal"
+            )
+        write_copies(self._config, self.arrays, into.arrays, count, seed, alike)
+        into._started = True
+        return into
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None

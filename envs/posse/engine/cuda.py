@@ -264,6 +264,12 @@ class CudaBatch(Batch):
         self._upload()
         return self._pass(self._all_look).observations
 
+    def observe(self) -> DeviceArray:
+        """Return the observations (E, rows, F) of the worlds as they stand."""
+        if not self._started:
+            raise ResetNeeded("observe before reset: call reset() first")
+        return self._pass(self._all_look).observations
+
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> DeviceArray:

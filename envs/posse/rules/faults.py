@@ -12,6 +12,7 @@ from posse.rules.state import NEVER
 
 _PER_TRACKER: Final = 4  # draws for each tracker
 _BREAKS: Final = 1000  # where the draws of the breaks begin
+_ONE: Final = np.float32(1.0)
 
 
 @compiled
@@ -22,33 +23,56 @@ def _drawn_step(c: Record, w: Record, earliest: int, index: int) -> int:
 
 
 @compiled
+def _drawn_outage(c: Record, w: Record, chance: np.float32, looked: int, index: int) -> np.int32:
+    """Return when an outage begins, given that none has at the first ``looked`` steps, or NEVER."""
+    left = np.float32(c.horizon - looked)
+    share = left / np.float32(c.horizon)
+    if uniform(w.key, 0, FAULTS, index) >= chance * share / (_ONE - chance * (_ONE - share)):
+        return NEVER
+    return np.int32(looked) + np.int32(uniform(w.key, 0, FAULTS, index + 1) * left)
+
+
+@compiled
 def draw_faults(c: Record, w: Record, trackers: Records) -> None:
     """Draw the faults of an episode."""
-    n = c.num_trackers
-    for i in range(n):
+    for i in range(c.num_trackers):
         t = trackers[i]
         t.broken_at, t.breaks_at = NEVER, NEVER
         t.sensor_dead_from, t.radio_dead_from = NEVER, NEVER
-        if uniform(w.key, 0, FAULTS, _PER_TRACKER * i) < c.sensor_outages:
-            share = uniform(w.key, 0, FAULTS, _PER_TRACKER * i + 1)
-            t.sensor_dead_from = np.int32(share * np.float32(c.horizon))
-        if uniform(w.key, 0, FAULTS, _PER_TRACKER * i + 2) < c.radio_outages:
-            share = uniform(w.key, 0, FAULTS, _PER_TRACKER * i + 3)
-            t.radio_dead_from = np.int32(share * np.float32(c.horizon))
     w.breaks_left, w.break_step = c.breaks, NEVER
-    if c.breaks == 0:
+    draw_coming_faults(c, w, trackers, 0, 0)
+
+
+@compiled
+def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, moved: int) -> None:
+    """Draw the faults that are yet to come, given those that have been.
+
+    Sensors have looked ``looked`` times in this episode, and robots moved at ``moved`` steps: both
+    0 where it begins. Faults that have begun by then stay as they are.
+    """
+    n = c.num_trackers
+    for i in range(n):
+        t = trackers[i]
+        if t.sensor_dead_from >= looked:
+            t.sensor_dead_from = _drawn_outage(c, w, c.sensor_outages, looked, _PER_TRACKER * i)
+        if t.radio_dead_from >= looked:
+            t.radio_dead_from = _drawn_outage(c, w, c.radio_outages, looked, _PER_TRACKER * i + 2)
+        if t.broken_at == NEVER:
+            t.breaks_at = NEVER
+    if w.breaks_left == 0:
         return
+    earliest = max(c.break_from, moved)
     if c.break_nearest:
-        w.break_step = _drawn_step(c, w, c.break_from, _BREAKS)
+        w.break_step = _drawn_step(c, w, earliest, _BREAKS)
         return
     if c.break_number >= 0:
-        trackers[c.break_number].breaks_at = _drawn_step(c, w, c.break_from, _BREAKS)
+        trackers[c.break_number].breaks_at = _drawn_step(c, w, earliest, _BREAKS)
         return
-    for k in range(c.breaks):
+    for k in range(w.breaks_left):
         chosen = np.int64(bits(w.key, 0, FAULTS, _BREAKS + 2 * k + 1) % np.uint64(n))
         while trackers[chosen].breaks_at != NEVER:
             chosen = (chosen + 1) % n
-        trackers[chosen].breaks_at = _drawn_step(c, w, c.break_from, _BREAKS + 2 * k + 2)
+        trackers[chosen].breaks_at = _drawn_step(c, w, earliest, _BREAKS + 2 * k + 2)
 
 
 @compiled

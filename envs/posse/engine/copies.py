@@ -1,0 +1,54 @@
+"""Copies of worlds as they stand, whose noise, losses and faults are drawn anew.
+
+A copy shares the present with its original: poses, speeds, fixes, messages in flight, outages and
+breaks that have begun. What is drawn from now on hangs on a key of its own, so that a controller
+that plays ahead in copies knows the present and not the future.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.numeric import Records, kernel
+from posse.rules.faults import draw_coming_faults
+from posse.rules.randomness import mix
+from posse.rules.state import WorldArrays
+
+_COPIES: Final = np.uint64(0x636F70696573)  # sets keys of copies apart from those of episodes
+_SEED: Final = np.uint64(1)
+_POSITIVE: Final = np.uint64(2**63 - 1)
+_ONE: Final = np.uint64(1)
+
+
+@kernel
+def draw_anew(
+    config: Records, world: Records, tracker: Records, count: int, seed: int, alike: bool
+) -> None:
+    """Give copies, ``count`` in a row of each world, keys of their own, and redraw their faults."""
+    c = config[0]
+    for i in range(len(world)):
+        w = world[i]
+        number = np.uint64(0) if alike else np.uint64(i % count) + _ONE
+        key = mix(mix(mix(w.key, _COPIES), np.uint64(seed)), np.uint64(w.step))
+        w.key = mix(key, number)
+        w.seed = mix(w.key, _SEED) & _POSITIVE
+        draw_coming_faults(c, w, tracker[i], w.step + 1, w.step)
+
+
+def write_copies(
+    config: Records, original: WorldArrays, copies: WorldArrays, count: int, seed: int, alike: bool
+) -> None:
+    """Overwrite ``copies`` with ``count`` copies of each world of ``original``, side by side."""
+    for theirs, mine in zip(original.all(), copies.all(), strict=True):
+        if theirs.size:
+            _rows(mine, len(theirs))[...] = _rows(theirs, len(theirs))
+    draw_anew(config, copies.world, copies.tracker, count, seed, alike)
+
+
+def _rows(array: npt.NDArray[Any], num_worlds: int) -> npt.NDArray[np.uint8]:
+    """Return an array's memory as (worlds, copies, bytes of one): plain bytes copy fastest."""
+    size = array.nbytes // len(array)
+    return array.reshape(-1).view(np.uint8).reshape(num_worlds, -1, size)

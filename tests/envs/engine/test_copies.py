@@ -1,0 +1,168 @@
+"""Copies of worlds: the present of their originals, and a future of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+from tests.support.reference import snapshot
+
+import posse
+
+NOTHING_DRAWN = ("constant", "accelerating", "smart", "obstacles")
+DRAWS = ("radio", "leader-loss", "field")
+
+
+def played(name: str, worlds: int = 3, steps: int = 40, **overrides: Any) -> posse.Batch:
+    near: dict[str, Any] = {"start_distance": (1.5, 4.0)}
+    batch = posse.batch(name, worlds, seed=4, **{**near, **overrides})
+    batch.reset()
+    for step in range(steps):
+        batch.step(actions_for(batch, step))
+    return batch
+
+
+def actions_for(batch: posse.Batch, step: int, copies: int = 1) -> NDArray[np.float32]:
+    """Return the same actions for a batch and, repeated, for its copies."""
+    drawn = np.random.default_rng(step).uniform(-1, 1, batch.action_shape).astype(np.float32)
+    return np.repeat(drawn, copies, axis=0)
+
+
+def gone_on(batch: posse.Batch, copies: posse.Batch, count: int, steps: int = 30) -> bool:
+    """Play both by the same actions; say whether copies saw what their originals saw."""
+    alike = True
+    for step in range(100, 100 + steps):
+        seen = copies.step(actions_for(batch, step, count))[0]
+        own = batch.step(actions_for(batch, step))[0]
+        alike &= np.array_equal(seen, np.repeat(own, count, axis=0))
+    return alike
+
+
+@pytest.mark.parametrize("name", NOTHING_DRAWN)
+def test_copies_go_on_as_their_originals_where_nothing_is_drawn(name: str) -> None:
+    batch = played(name)
+    copies = batch.copies(4)
+    assert copies.num_worlds == 12
+    np.testing.assert_array_equal(copies.observe(), np.repeat(batch.observe(), 4, axis=0))
+    assert gone_on(batch, copies, 4)
+
+
+@pytest.mark.parametrize("name", DRAWS)
+def test_copies_draw_what_neither_their_original_nor_other_copies_draw(name: str) -> None:
+    batch = played(name)
+    copies = batch.copies(2)
+    np.testing.assert_array_equal(copies.observe(), np.repeat(batch.observe(), 2, axis=0))
+    steps = 400 if name == "leader-loss" else 30
+    seen, own = [], []
+    for step in range(100, 100 + steps):
+        seen.append(copies.step(actions_for(batch, step, 2))[0])
+        own.append(batch.step(actions_for(batch, step))[0])
+    first, second, original = np.stack(seen)[:, ::2], np.stack(seen)[:, 1::2], np.stack(own)
+    for e in range(3):
+        assert not np.array_equal(first[:, e], original[:, e])
+        assert not np.array_equal(second[:, e], original[:, e])
+        assert not np.array_equal(first[:, e], second[:, e])
+
+
+def test_copies_that_are_alike_draw_the_same() -> None:
+    batch = played("field")
+    copies = batch.copies(3, alike=True)
+    for step in range(30):
+        seen = copies.step(actions_for(batch, step, 3))[0]
+    np.testing.assert_array_equal(seen, np.repeat(seen[::3], 3, axis=0))
+    assert not gone_on(batch, copies, 3)
+
+
+def test_what_copies_draw_follows_from_seed_and_step() -> None:
+    def future(seed: int, steps: int = 40, into: posse.Batch | None = None) -> NDArray[np.float32]:
+        batch = played("field", steps=steps)
+        copies = batch.copies(2, seed=seed, into=into)
+        for step in range(20):
+            seen = copies.step(actions_for(batch, step, 2))[0]
+        return seen
+
+    used = played("field", 6)
+    np.testing.assert_array_equal(future(1), future(1, into=used))
+    assert not np.array_equal(future(1), future(2))
+
+
+def test_originals_go_on_as_if_no_copy_had_been_made() -> None:
+    batch, untouched = played("field"), played("field")
+    before = snapshot(batch)
+    copies = batch.copies(5)
+    for step in range(700):  # past the end of an episode
+        copies.step(actions_for(batch, step, 5))
+    for name, array in snapshot(batch).items():
+        np.testing.assert_array_equal(array, before[name], err_msg=name)
+    assert gone_on(batch, untouched, 1)
+
+
+def test_the_episode_after_a_copy_s_end_is_no_world_s() -> None:
+    batch = played("constant", 2, steps=9, horizon=10, settle_time=0.5)
+    copies = batch.copies(2)
+    for step in range(2):
+        batch.step(actions_for(batch, step))
+        copies.step(actions_for(batch, step, 2))
+    assert (copies.worlds["step"] == 0).all()
+    assert len({*batch.worlds["x"].tolist(), *copies.worlds["x"].tolist()}) == 6
+
+
+def test_faults_that_have_begun_stay_and_others_are_drawn_anew() -> None:
+    batch = played("field", 200, steps=300)
+    copies = batch.copies(20)
+    own, theirs = snapshot(batch), snapshot(copies)
+    for name in ("tracker_sensor_dead_from", "tracker_radio_dead_from"):
+        begun = np.repeat(own[name] <= 300, 20, axis=0)
+        np.testing.assert_array_equal(theirs[name][begun], np.repeat(own[name], 20, axis=0)[begun])
+        coming = theirs[name][~begun]
+        assert (coming > 300).all()
+        # A fifth has an outage at a uniform step of 600; of those with none by 300, a ninth.
+        assert (coming < 600).mean() == pytest.approx(1 / 9, abs=0.015)
+        assert coming[coming < 600].mean() == pytest.approx(450, abs=10)
+    for name in ("tracker_broken_at", "world_breaks_left"):
+        np.testing.assert_array_equal(theirs[name], np.repeat(own[name], 20, axis=0))
+
+
+@pytest.mark.parametrize("choice", ["nearest", "drawn", "given"])
+def test_breaks_to_come_are_drawn_from_what_is_left_of_their_window(choice: str) -> None:
+    overrides: dict[str, Any] = {"break_choice": choice, "break_window": (0.25, 0.75)}
+    if choice == "given":
+        overrides["break_number"] = 2
+    batch = played("constant", 200, steps=300, breaks=1, **overrides)
+    left = np.repeat(batch.worlds["breaks_left"], 10) == 1
+    assert 0.3 < left.mean() < 0.7
+    copies = batch.copies(10)
+    for _ in range(299):
+        copies.step(np.zeros(copies.action_shape, np.float32))
+    assert (copies.worlds["breaks_left"] == 0).all()
+    broken = copies.state["tracker_broken_at"][left]
+    assert ((broken < 2**30).sum(axis=1) == 1).all()
+    when = broken.min(axis=1)
+    assert when.min() >= 300
+    assert when.max() <= 450
+    assert when.mean() == pytest.approx(375, abs=5)
+    if choice == "given":
+        assert (broken[:, 2] < 2**30).all()
+
+
+def test_bad_copies_are_refused_before_anything_changes() -> None:
+    batch = posse.batch("constant", 2)
+    with pytest.raises(ResetNeeded, match="copies before reset"):
+        batch.copies(2)
+    with pytest.raises(ResetNeeded, match="observe before reset"):
+        batch.observe()
+    batch.reset()
+    with pytest.raises(posse.ScenarioError, match="count=0"):
+        batch.copies(0)
+    with pytest.raises(posse.ScenarioError, match="seed=-1"):
+        batch.copies(1, seed=-1)
+    other = posse.batch("constant", 3)
+    with pytest.raises(ValueError, match=r"2 copies of 2 worlds .* do not fit 3 worlds"):
+        batch.copies(2, into=other)
+    with pytest.raises(ValueError, match="another Batch"):
+        batch.copies(1, into=batch)
+    with pytest.raises(ResetNeeded):
+        other.step(np.zeros(other.action_shape, np.float32))
