@@ -306,7 +306,7 @@ class Batch:
                 f"{into.num_worlds} worlds of {into.scenario.name!r}: scenario and number of "
                 "worlds must be equal"
             )
-        write_copies(self._config, self.arrays, into.arrays, count, seed, alike)
+        write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
         into._started = True
         return into
 

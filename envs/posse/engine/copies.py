@@ -42,7 +42,7 @@ def write_copies(
     config: Records, original: WorldArrays, copies: WorldArrays, count: int, seed: int, alike: bool
 ) -> None:
     """Overwrite ``copies`` with ``count`` copies of each world of ``original``, side by side."""
-    for theirs, mine in zip(original.all(), copies.all(), strict=True):
+    for theirs, mine in zip(original, copies, strict=True):
         if theirs.size:
             _rows(mine, len(theirs))[...] = _rows(theirs, len(theirs))
     draw_anew(config, copies.world, copies.tracker, count, seed, alike)
