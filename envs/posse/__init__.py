@@ -7,8 +7,7 @@ from typing import Any
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
-from posse.scenarios.named import get_scenario, scenario_names
-from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
 from posse.signals.metrics import METRICS, Metric
 from posse.signals.observation import Field, ObservationLayout
 from posse.signals.reward import REWARD_TERMS, RewardTerm

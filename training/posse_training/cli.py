@@ -74,7 +74,7 @@ def _mendable() -> tuple[type[Exception], ...]:
     """Return the errors whose message is for the user; all others keep their traceback."""
     found: list[type[Exception]] = []
     for module, names in (
-        ("posse.scenarios.scenario", ("ScenarioError",)),
+        ("posse.scenarios", ("ScenarioError",)),
         ("posse_baselines.policy", ("PolicyError",)),
         ("posse_training.reports.evaluation", ("TrainedSplitError",)),
         ("posse_training.runs.settings", ("SettingsError",)),

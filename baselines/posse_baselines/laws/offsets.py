@@ -9,7 +9,7 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.numeric import Records
-from posse.scenarios.scenario import OPEN_PLANE_EXTENT
+from posse.scenarios.limits import OPEN_PLANE_EXTENT
 
 _FIELDS: Final = (
     "heading", "position", "speed", "turn_rate", "touching", "working",

@@ -15,7 +15,7 @@ from gymnasium import spaces
 
 from posse.engine.kernels import TO_CLIP, bad_action
 from posse.numeric import FloatArray, direct
-from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError
 
 SPEEDS: Final = (-1.0, 0.0, 1.0)
 """Speeds to choose from: at rest, half, full."""

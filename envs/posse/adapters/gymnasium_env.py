@@ -13,7 +13,7 @@ from posse.adapters.actions import MOTIONS, single_action_space
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.adapters.spaces import box
 from posse.numeric import FloatArray
-from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError
 from posse.signals.observation import ObservationLayout
 from posse.signals.reward import TERM_NAMES, name_terms
 

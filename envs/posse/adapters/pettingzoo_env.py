@@ -17,7 +17,7 @@ from posse.adapters.actions import agent_names, single_action_space
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.adapters.spaces import box
 from posse.numeric import FloatArray
-from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError
 from posse.signals.observation import ObservationLayout
 from posse.signals.reward import name_terms
 

@@ -15,8 +15,7 @@ from posse.adapters.actions import ActionReader
 from posse.engine.batch import Batch
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER
-from posse.scenarios.named import get_scenario
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
 from posse.signals.reward import REWARD_TERMS
 

@@ -21,7 +21,7 @@ from posse.adapters.single_world import (
 )
 from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 from posse.signals.observation import ObservationLayout
 
 _MODES: Final = {

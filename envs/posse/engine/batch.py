@@ -46,7 +46,8 @@ from posse.rules.state import (
     SPLITS,
     WorldArrays,
 )
-from posse.scenarios.scenario import SAFE_MARGIN, Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios.limits import SAFE_MARGIN
 from posse.signals.metrics import episode_metrics
 from posse.signals.observation import ObservationLayout
 from posse.signals.reward import REWARD_TERMS, TermsByName

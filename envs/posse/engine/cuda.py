@@ -33,7 +33,7 @@ from posse.engine.kernels import (
 from posse.engine.scratch import SCRATCH_FOR_ONE
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.state import SPLITS, WorldArrays
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 from posse.signals.metrics import episode_metrics
 from posse.signals.reward import REWARD_TERMS
 

@@ -44,7 +44,7 @@ from posse.rules.state import (
     slot_records,
 )
 from posse.rules.targets.target_motion import AGENT
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 from posse.signals.observation import observe_alone, observe_target
 from posse.signals.reward import write_reward
 from posse.signals.scratch import MOST_IN_TEAM

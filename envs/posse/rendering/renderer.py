@@ -18,7 +18,7 @@ from posse.rendering.layers import LAYERS, Drawing
 from posse.rendering.legend import FOOTER, HEADER, footer, header
 from posse.rendering.scene import Scene, read_scene
 from posse.rendering.style import DESIGN_SIZE, PAPER
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 
 if TYPE_CHECKING:
     from posse.engine.batch import Batch

@@ -13,8 +13,8 @@ from gymnasium.error import ResetNeeded
 
 from posse.numeric import BoolArray
 from posse.rules.state import NEVER
+from posse.scenarios import Scenario
 from posse.scenarios.formation import slot_offsets
-from posse.scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
     from posse.engine.batch import Batch

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import WIDTH, Records
-from posse.scenarios.scenario import MAX_OBSTACLES, MAX_TRACKERS
+from posse.scenarios.limits import MAX_OBSTACLES, MAX_TRACKERS
 
 Fields = tuple[tuple[str, int], ...]
 """Names and lengths."""

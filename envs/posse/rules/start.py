@@ -15,7 +15,7 @@ from posse.numeric import Record, Records, compiled
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, between, episode_key, uniform
 from posse.rules.targets.target_motion import AGENT, draw_motion, has_free_circle
-from posse.scenarios.scenario import START_CLEARANCE
+from posse.scenarios.limits import START_CLEARANCE
 
 _TRIES: Final = 2000
 _TWO_PI: Final = np.float32(2 * math.pi)

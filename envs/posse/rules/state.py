@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records
+from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
-from posse.scenarios.scenario import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS, Scenario
+from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS
 from posse.signals.reward import REWARD_TERMS
 
 SPLITS: Final = ("train", "validation", "test")

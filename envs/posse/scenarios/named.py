@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 from typing import Any, Final
 
-from posse.scenarios.scenario import Scenario, ScenarioError
+from posse.scenarios.scenario import Scenario
+from posse.scenarios.setting import ScenarioError
 
 # Why each setting is what it is, and what it costs a team, stands in docs/scenarios.md.
 _PAPER: Final = Scenario(

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER, WorldArrays, perfect_radio
 from posse.rules.targets.target_motion import DART_TURN, PATIENCE
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _Values = npt.NDArray[Any]

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import Records
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 
 _Column = npt.NDArray[np.float64]
 _Function = Callable[[Scenario, Records], _Column]

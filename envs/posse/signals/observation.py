@@ -22,8 +22,8 @@ from posse.numeric import FloatArray, Record, Records, compiled
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural, within_one
 from posse.rules.senses.sonar import ping
+from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.scenarios.scenario import Scenario
 from posse.signals.mates import MATE, copy_message, leave_empty
 from posse.signals.nearest import keep_nearest
 from posse.signals.together import SONAR_AT, TARGET_AT, TASK_AT, write_task

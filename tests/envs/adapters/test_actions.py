@@ -11,7 +11,7 @@ from tests.support.adapters import same
 
 import posse
 from posse.adapters.actions import ActionReader, agent_names
-from posse.scenarios.named import get_scenario
+from posse.scenarios import get_scenario
 
 VALUES = np.array([[0.5, -0.25], [1.0, -1.0], [0.0, 0.75]], np.float32)
 

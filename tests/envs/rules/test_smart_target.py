@@ -13,7 +13,7 @@ import pytest
 
 import posse
 from posse.scenarios.formation import slot_offsets
-from posse.scenarios.scenario import SAFE_MARGIN
+from posse.scenarios.limits import SAFE_MARGIN
 
 Floats = npt.NDArray[np.float64]
 Controller = Callable[[posse.Batch], npt.NDArray[np.float32]]

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 import posse
+from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
 from posse.scenarios.formation import slot_offsets
-from posse.scenarios.named import get_scenario, scenario_names
-from posse.scenarios.scenario import Scenario, ScenarioError
 
 # A version rises when the behaviour of a named scenario changes, and only then.
 VERSIONS = {

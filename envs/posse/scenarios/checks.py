@@ -1,0 +1,229 @@
+"""Checks of a scenario's settings against each other."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from posse.scenarios.formation import slot_offsets
+from posse.scenarios.limits import (
+    FARTHEST,
+    LEAST_CHANGE,
+    LONGEST_MOVE,
+    MOST_WEIGHT,
+    SAFE_MARGIN,
+    START_CLEARANCE,
+)
+from posse.scenarios.setting import ScenarioError, fail, is_number, near
+from posse.signals.reward import REWARD_TERMS
+
+if TYPE_CHECKING:
+    from posse.scenarios.scenario import Scenario
+
+
+def check_together(s: Scenario) -> None:
+    """Raise where settings that are valid by themselves do not go together.
+
+    Raises:
+        ScenarioError: Names the settings, the limit and the fix.
+    """
+    _check_motion(s)
+    _check_formation(s)
+    _check_place(s)
+    _check_rounding(s)
+    _check_rewards(s)
+
+
+def _check_motion(s: Scenario) -> None:
+    if s.target_speed > 0.9999 * s.tracker_speed:
+        raise ScenarioError(
+            f"target_speed={s.target_speed:g} must be below tracker_speed={s.tracker_speed:g}, by "
+            "0.01 % at least: a team that is no faster never catches up (paper, assumption ii)"
+        )
+    if s.target_speed == 0 and s.target_motion != "constant":
+        fail("target_speed", s.target_speed, "only a target of constant motion may rest")
+    steps = s.control_step / s.physics_step
+    if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+        raise ScenarioError(
+            f"control_step={s.control_step:g} must be a whole multiple of "
+            f"physics_step={s.physics_step:g}"
+        )
+    for name in ("tracker_turn_rate", "target_turn_rate"):
+        turn = getattr(s, name) * s.physics_step
+        if turn > 1.0:
+            raise ScenarioError(
+                f"{name}={getattr(s, name):g} turns {turn:.2f} rad in a physics step, at most 1 is "
+                f"possible: choose physics_step <= {1 / getattr(s, name):.3g}"
+            )
+    if s.breaks >= s.num_trackers > 0 and s.breaks > 0:
+        fail("breaks", s.breaks, f"at most num_trackers - 1 = {s.num_trackers - 1}")
+    if s.break_choice == "given" and s.breaks > 1:
+        fail("breaks", s.breaks, 'break_choice="given" names one tracker, break_number')
+    if s.break_choice == "given" and s.break_number >= s.num_trackers:
+        fail("break_number", s.break_number, f"trackers are 0 to {s.num_trackers - 1}")
+    if s.settle_time > s.duration:
+        fail(
+            "settle_time", s.settle_time,
+            f"an episode of horizon={s.horizon} steps of {s.control_step:g} s is over before that",
+        )  # fmt: skip
+
+
+def _check_formation(s: Scenario) -> None:
+    offsets = slot_offsets(s)
+    apart = min(
+        (math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf
+    )
+    if apart <= 2 * s.tolerance + 1e-9:
+        raise ScenarioError(
+            f"slots of the {s.formation} lie {apart:.3g} m apart, which must be more than twice "
+            f"tolerance={s.tolerance:g}: raise formation_spacing={s.formation_spacing:g} "
+            "or lower tolerance"
+        )
+    if apart <= 2 * s.robot_radius:
+        raise ScenarioError(
+            f"slots of the {s.formation} lie {apart:.3g} m apart, robots of "
+            f"robot_radius={s.robot_radius:g} would touch: raise formation_spacing"
+        )
+    nearest = min(math.hypot(x, y) for x, y in offsets)
+    if nearest <= 2 * s.robot_radius:
+        raise ScenarioError(
+            f"formation_distance={s.formation_distance:g} leaves a slot {nearest:.3g} m from the "
+            f"target, which robots of robot_radius={s.robot_radius:g} touch: raise it"
+        )
+
+
+def _check_place(s: Scenario) -> None:
+    if s.position_bound > FARTHEST:
+        raise ScenarioError(
+            f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most "
+            f"{FARTHEST:g} m is possible: lower tracker_speed={s.tracker_speed:g}, "
+            f"horizon={s.horizon}, control_step={s.control_step:g} or "
+            f"start_distance={s.start_distance}, or set an arena"
+        )
+    if s.start_distance[0] <= 2 * s.robot_radius:
+        fail(
+            "start_distance", s.start_distance,
+            f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m",
+        )  # fmt: skip
+    ring = math.pi * (s.start_distance[1] ** 2 - s.start_distance[0] ** 2)
+    excluded = s.num_trackers * math.pi * (2 * s.robot_radius + START_CLEARANCE) ** 2
+    if not math.isfinite(s.arena):
+        if s.num_obstacles:
+            raise ScenarioError(
+                f"num_obstacles={s.num_obstacles} needs a walled place: set arena to its side in m"
+            )
+        if excluded > ring:
+            raise ScenarioError(
+                f"{s.num_trackers} trackers do not fit at start_distance={s.start_distance}: "
+                "widen it, or lower num_trackers or robot_radius"
+            )
+        return
+    if s.obstacle_radius[0] <= 0 and s.num_obstacles:
+        fail("obstacle_radius", s.obstacle_radius, "radii must be above 0")
+    if s.target_extent <= 0 or s.arena / 2 <= s.start_distance[0]:
+        raise ScenarioError(
+            f"arena={s.arena:g} is too small for start_distance={s.start_distance} and a target "
+            f"that needs {s.target_clearance:.3g} m to turn away from a wall: raise arena"
+        )
+    width = 2 * s.obstacle_radius[1] + s.obstacle_gap
+    taken = s.num_obstacles * math.pi * width**2
+    if taken > 0.9 * (s.arena - width) ** 2:
+        raise ScenarioError(
+            f"num_obstacles={s.num_obstacles} of obstacle_radius up to {s.obstacle_radius[1]:g} m "
+            f"with obstacle_gap={s.obstacle_gap:g} do not fit in arena={s.arena:g}: "
+            "lower their number, radius or gap, or raise arena"
+        )
+    circle = s.target_speed / s.target_turn_rate + s.robot_radius + SAFE_MARGIN
+    blocked = s.num_obstacles * math.pi * (s.obstacle_radius[1] + circle) ** 2
+    if s.target_motion != "agent" and blocked > 0.9 * (s.arena - 2 * circle) ** 2:
+        raise ScenarioError(
+            f"num_obstacles={s.num_obstacles} leave no room to a target that needs {circle:.3g} m "
+            f"to turn round at target_turn_rate={s.target_turn_rate:g}: lower their number or "
+            "target_speed, or raise target_turn_rate or arena"
+        )
+    room = _room_to_start(s)
+    width = s.obstacle_radius[1] + s.robot_radius + START_CLEARANCE
+    room *= 1 - min(1, s.num_obstacles * math.pi * width**2 / s.arena**2)
+    if excluded > room:
+        raise ScenarioError(
+            f"{s.num_trackers} trackers do not fit at start_distance={s.start_distance} in "
+            f"arena={s.arena:g}: widen them, or lower num_trackers or robot_radius"
+        )
+
+
+def _room_to_start(s: Scenario) -> float:
+    """Return the area within the walls where trackers may start, for the worst place of the target.
+
+    By summing over a grid of distances and bearings, m².
+    """
+    least, most = s.start_distance
+    inner = s.arena / 2 - s.robot_radius - START_CLEARANCE
+    distances = [least + (most - least) * (k + 0.5) / 16 for k in range(16)]
+    bearings = [2 * math.pi * (k + 0.5) / 64 for k in range(64)]
+    areas = []
+    for at in (0.0, s.target_extent):  # the middle, and a corner
+        area = 0.0
+        for d in distances:
+            inside = sum(
+                abs(at + d * math.cos(b)) <= inner and abs(at + d * math.sin(b)) <= inner
+                for b in bearings
+            )
+            area += inside / 64 * 2 * math.pi * d * (most - least) / 16
+        areas.append(area)
+    return min(areas)
+
+
+def _check_rounding(s: Scenario) -> None:
+    """Raise where the kernels' float32 would lose what the scenario asks for."""
+    move, longest = s.tracker_speed * s.physics_step, math.sqrt(LONGEST_MOVE * s.robot_radius)
+    if move > longest:
+        raise ScenarioError(
+            f"tracker_speed={s.tracker_speed:g} moves {move:.3g} m in a physics step, contact of "
+            f"robots of robot_radius={s.robot_radius:g} is exact up to {longest:.3g} m: choose "
+            f"physics_step <= {longest / s.tracker_speed:.3g}"
+        )
+    for name, added_to, most in (
+        ("tracker_speed", "a position", s.position_bound),
+        ("target_speed", "a position", s.position_bound),
+        ("tracker_turn_rate", "a heading", 1.0),
+        ("target_turn_rate", "a heading", 1.0),
+        ("tracker_acceleration", "a speed", s.tracker_speed),
+        ("tracker_turn_acceleration", "a turn rate", s.tracker_turn_rate),
+    ):
+        value = getattr(s, name)
+        least = LEAST_CHANGE * _spacing(most) / s.physics_step
+        if 0 < value < least:
+            raise ScenarioError(
+                f"{name}={value:g} adds {value * s.physics_step:.3g} to {added_to} of up to "
+                f"{most:.3g} in a physics step, which float32 loses to rounding: choose {name} >= "
+                f"{least:.3g}, or a longer physics_step={s.physics_step:g}"
+            )
+    outermost = max(math.hypot(x, y) for x, y in slot_offsets(s))
+    if outermost > FARTHEST:
+        raise ScenarioError(
+            f"formation_spacing={s.formation_spacing:g} and "
+            f"formation_distance={s.formation_distance:g} put a slot {outermost:.3g} m from the "
+            f"target, at most {FARTHEST:g} m is possible: lower them or num_trackers"
+        )
+
+
+def _spacing(value: float) -> float:
+    """Return how far the neighbouring float32 lie from a number."""
+    return math.ulp(value) * 2.0**29  # a double has 29 more bits
+
+
+def _check_rewards(s: Scenario) -> None:
+    names = tuple(term.name for term in REWARD_TERMS)
+    for name, weight in dict(s.reward_weights).items():
+        if name not in names:
+            raise ScenarioError(
+                f"unknown reward term {name!r} in reward_weights{near(str(name), names)}; "
+                f"terms are: {', '.join(names)}"
+            )
+        if not is_number(weight) or not math.isfinite(weight):
+            fail(f"reward_weights[{name!r}]", weight, "a weight must be a finite number")
+        if abs(weight) > MOST_WEIGHT:
+            fail(
+                f"reward_weights[{name!r}]", weight,
+                f"a weight must lie in [-{MOST_WEIGHT:g}, {MOST_WEIGHT:g}]: scale all of them",
+            )  # fmt: skip
