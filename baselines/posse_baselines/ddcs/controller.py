@@ -13,8 +13,10 @@ from posse_baselines.ddcs.monitoring import hear_mates, watch_target
 from posse_baselines.ddcs.searching import begin_search, look_around, wander
 from posse_baselines.ddcs.slots import choose_slot
 from posse_baselines.ddcs.surroundings import surround
-from posse_baselines.ddcs.tracking import next_task, wanted_velocity
-from posse_baselines.laws.safeguard import command, safe_velocity
+from posse_baselines.ddcs.tasks import next_task
+from posse_baselines.ddcs.tracking import CENTRALIZED, note_error, take_up, wanted_motion
+from posse_baselines.laws.heading import regulate
+from posse_baselines.laws.safeguard import safe_velocity
 from posse_baselines.laws.steering import write_motion
 
 _UNLIMITED = 1e4  # m/s² or rad/s²: what stands for no limit
@@ -62,26 +64,31 @@ def decide(
     hear_mates(f, s, d, mates, o)
     look_around(f, s, d, mates, seen, x, y)
     # Tracking
-    settle_lead(f, s, d, mates, own, x, y)
+    if s.model == CENTRALIZED:
+        settle_lead(f, s, d, mates, own, x, y)
+    d.closing = 0
     if d.known == 0:
         d.slot, d.error = -1, -1.0
         if d.task != SEARCHING:
             begin_search(f, d, seen)
-        vx, vy = wander(f, s, d, mates, seen, own, x, y, hc, hs, body.max_speed)
     else:
         if d.slot < 0 or d.step % max(1, round(s.replan_time / f.dt)) == 0:
             choose_slot(
                 f, s, d, mates, slots, own, x, y, hc, hs, body.max_speed, body.max_omega,
                 cost, work,
             )  # fmt: skip
-        vx, vy = wanted_velocity(
-            f, s, d, mates, slots, own, float(o[f.formation_distance]), x, y, body
-        )
+        note_error(f, s, d, mates, slots, own, x, y)
     d.task = next_task(s, d)
+    if d.task == SEARCHING or d.slot < 0:
+        vx, vy = wander(f, s, d, mates, seen, own, x, y, hc, hs, body.max_speed)
+        vx, vy, speed, omega = take_up(body, vx, vy, 0.0)
+    else:
+        vx, vy, speed, omega = wanted_motion(f, s, d, mates, slots, own, x, y, body)
     # Actuation
     count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, discs)
-    vx, vy, _ = safe_velocity(body, discs, count, vx, vy, plays)
-    speed, omega = command(body, vx, vy)
+    vx, vy, changed = safe_velocity(body, discs, count, vx, vy, plays)
+    if changed:
+        speed, omega = regulate(body, vx, vy, 0.0)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)
     write_message(d, action)
     d.step += 1

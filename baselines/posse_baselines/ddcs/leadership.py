@@ -1,21 +1,28 @@
-"""Who leads: the nearest-neighbour rule of section 3.5, agreed on without a referee.
+"""Who leads the centralized model: selection and exchange by section 3.5, without a referee.
 
-A claim is a pair (term, leader). Everyone says which claim it holds and takes over a better one
-that it hears: the higher term; of equal terms, the leader of the lower number. Only two things make
-a new term: the leader finds another clearly nearer to the target and hands over, or a tracker has
-not heard of the leader for too long and appoints the nearest one that it knows. So the whole of a
-radio graph comes to hold one claim, and two parts that meet again agree on the higher one.
+A claim is a pair (term, leader). Every tracker broadcasts the claim that it holds and adopts a
+better one that it hears: the higher term; of equal terms, the leader of the lower number. Only two
+events make a higher term: the leader finds another clearly nearer to the target and hands over (the
+nearest-neighbour rule, every time lag), or a tracker has not heard of the leader for too long and
+appoints the nearest one that it knows of. So a connected radio graph comes to hold one claim, and
+two parts that meet again agree on the higher one.
 
-A leader counts its steps aloud, and the others pass the highest count on. That is how a tracker
-several hops away knows that the leader is alive.
+There is a leader from the first step on. While nobody knows the target, it is the tracker in the
+middle of those that hear each other. A tracker that hears nobody leads itself (rule ii), under a
+lower term, so that it yields as soon as it meets a group.
+
+The leader counts its steps in its message, and the others pass the highest count on: a tracker
+several hops away thus knows that the leader is alive.
 """
 
 from __future__ import annotations
 
 from posse.numeric import Record, Records, compiled
+from posse_baselines.ddcs.memory import EXCHANGING, SEARCHING
 from posse_baselines.ddcs.messages import COUNT, is_newer
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
-from posse_baselines.laws.guidance import length
+from posse_baselines.ddcs.tasks import may_change
+from posse_baselines.laws.geometry import length
 
 
 @compiled
@@ -58,6 +65,54 @@ def nearest_tracker(
 
 
 @compiled
+def place_of(
+    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, j: int
+) -> tuple[float, float]:
+    """Return where tracker j is now, m; (x, y) is the own place."""
+    return (x, y) if j == own else mate_now(f, s, d, mates[j])
+
+
+@compiled(seldom=True)
+def central_tracker(
+    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float
+) -> tuple[int, int]:
+    """Return who has the least sum of distances to all others that are heard, and their number."""
+    n, others = len(mates), 0
+    best, least = own, 1e30
+    for i in range(n):
+        if i != own:
+            if not is_there(f, s, d, mates[i], n):
+                continue
+            others += 1
+        x_i, y_i = place_of(f, s, d, mates, own, x, y, i)
+        total = 0.0
+        for j in range(n):
+            if j != i and (j == own or is_there(f, s, d, mates[j], n)):
+                x_j, y_j = place_of(f, s, d, mates, own, x, y, j)
+                total += length(x_i - x_j, y_i - y_j)
+        # Sums that are equal but for rounding go to the lower number.
+        if total < least - 1e-3:
+            best, least = i, total
+    return best, others
+
+
+@compiled
+def select_leader(
+    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int
+) -> None:
+    """Appoint somebody else than ``barred`` (-1: anybody) under a new term."""
+    if d.known:
+        best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, barred)
+        appoint(d, best, (d.term + 1) % COUNT, 0)
+        return
+    best, others = central_tracker(f, s, d, mates, own, x, y)
+    if others == 0:
+        appoint(d, own, (d.term - 1) % COUNT, 0)
+    else:
+        appoint(d, best if best != barred else own, (d.term + 1) % COUNT, 0)
+
+
+@compiled
 def settle_lead(
     f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float
 ) -> None:
@@ -74,19 +129,16 @@ def settle_lead(
             appoint(d, mate.leader, mate.term, mate.pulse)
     if d.leader == own:
         d.pulse, d.pulse_step, d.confirmed = (d.pulse + 1) % COUNT, d.step, 1
-    if d.known == 0:
-        return
     if d.leader < 0:
-        best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, -1)
-        appoint(d, best, 1, 0)
+        select_leader(f, s, d, mates, own, x, y, -1)
         return
-    if not s.exchange:
+    # In the search, where nobody follows anybody, the lead passes without a task of its own.
+    if d.task != SEARCHING and not may_change(s, d.task, EXCHANGING):
         return
     if d.leader == own:
-        if d.step % max(1, round(s.time_lag / f.dt)) == 0:
+        if d.known and d.step % max(1, round(s.time_lag / f.dt)) == 0:
             best, least, distance = nearest_tracker(f, s, d, mates, own, x, y, -1)
             if best != own and least < distance - s.lead_hysteresis:
                 appoint(d, best, (d.term + 1) % COUNT, 0)
-    elif (d.step - d.pulse_step) * f.dt > patience(s, d) + 0.2:
-        best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, d.leader)
-        appoint(d, best, (d.term + 1) % COUNT, 0)
+    elif (d.step - d.pulse_step) * f.dt > patience(s, d) + s.lead_patience:
+        select_leader(f, s, d, mates, own, x, y, d.leader)

@@ -42,8 +42,8 @@ MIND: Final = _record(
     ("task", _I),
     ("slot", _I),  # -1: none
     ("taken", np.uint64),  # slots in which the sonar found somebody not heard, a bit each
-    ("stage", _I),  # of a pursuit: chase or maintenance
-    ("error", _F),  # distance from its place, m; -1: it has none
+    ("error", _F),  # distance from its place (PNGL: excess of the range), m; -1: it has none
+    ("closing", _I),  # 1: the law itself, not the safeguard, keeps the range to the target
     # leadership
     ("leader", _I),  # -1: none yet
     ("term", _I),  # how often the lead has passed, modulo 256; the higher claim wins
@@ -62,6 +62,7 @@ MATE: Final = _record(
     ("step", _I),  # own step at which it sent what follows; -1: never heard
     ("x", _F), ("y", _F), ("speed_x", _F), ("speed_y", _F),
     ("heading_cos", _F), ("heading_sin", _F),
+    ("turn", _F),  # turn rate, rad/s
     ("fresh", _I),  # 1: heard in this step
     ("task", _I), ("leader", _I), ("term", _I), ("pulse", _I), ("slot", _I),  # -1: not said
 )  # fmt: skip

@@ -10,31 +10,23 @@ import math
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.messages import decode
-from posse_baselines.laws.guidance import clip, length, wrap
-
-_TURN_MEMORY = 1.0  # s; an older turn tells little of the heading now
-_WAY_MEMORY = 3.0  # s
-_GAP_MEMORY = 10.0  # s; how long a gap in what is heard is remembered
-_LEAST_PATIENCE = 0.3  # s
-_NOT_LOST = 1.0  # s; a fix of this age is late, an older one is a loss
-_JUMP = 1.0  # m; a fix farther than this from the estimate replaces it
-_UNKNOWN_SPEED = 0.6  # of the own greatest, until it has been measured
+from posse_baselines.laws.geometry import clip, length, wrap
 
 
 @compiled
 def carry_on(
-    x: float, y: float, theta: float, speed: float, turn: float, time: float
+    s: Record, x: float, y: float, theta: float, speed: float, turn: float, time: float
 ) -> tuple[float, float, float]:
     """Return the most likely (x, y, θ) after a time (s), with a turn rate that fades away.
 
-    After a second the way fades, too: where it leads is ever less sure, and the middle of where a
-    target may be stays behind one that keeps its heading.
+    After a second the way fades, too: its direction is ever less certain, and the mean of all
+    places where the target may be lags behind a target that keeps its heading.
     """
     if time <= 0.0:
         return x, y, theta
     if time > 1.0:
-        time = 1.0 + _WAY_MEMORY * (1.0 - math.exp((1.0 - time) / _WAY_MEMORY))
-    turned = turn * _TURN_MEMORY * (1.0 - math.exp(-time / _TURN_MEMORY))
+        time = 1.0 + s.way_memory * (1.0 - math.exp((1.0 - time) / s.way_memory))
+    turned = turn * s.turn_memory * (1.0 - math.exp(-time / s.turn_memory))
     middle = theta + 0.5 * turned
     return (
         x + speed * time * math.cos(middle),
@@ -62,12 +54,12 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
     if d.fix_step < 0:
         return
     d.age = (d.step - d.fix_step) * dt
-    if d.age <= _NOT_LOST:
+    if d.age <= s.late_fix:
         # How late fixes usually are, so that more than that can be told from the usual.
-        d.usual_age += (dt / _GAP_MEMORY) * (d.age - d.usual_age)
+        d.usual_age += (dt / s.gap_memory) * (d.age - d.usual_age)
     if d.age <= s.target_lost_after:
         d.known = 1
-    x, y, theta = carry_on(d.x, d.y, d.theta, d.speed, d.turn, d.age)
+    x, y, theta = carry_on(s, d.x, d.y, d.theta, d.speed, d.turn, d.age)
     d.now_x, d.now_y, d.now_theta = x, y, theta
     limit = frame_limit(d.speed, float(o[f.max_speed]), outermost)
     psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
@@ -94,12 +86,12 @@ def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: 
     if d.fix_step < 0 or time > s.target_lost_after:
         d.x, d.y, d.turn = x, y, 0.0
         if d.speed_known == 0:
-            d.speed = _UNKNOWN_SPEED * o[f.max_speed]
+            d.speed = s.unknown_speed * o[f.max_speed]
         d.mean_x, d.mean_y = d.speed * heading_c, d.speed * heading_s
     else:
-        guess_x, guess_y, _ = carry_on(d.x, d.y, d.theta, d.speed, d.turn, time)
+        guess_x, guess_y, _ = carry_on(s, d.x, d.y, d.theta, d.speed, d.turn, time)
         turned = wrap(theta - d.theta)
-        if time <= _TURN_MEMORY:
+        if time <= s.turn_memory:
             d.turn = turned / time
             middle = d.theta + 0.5 * turned
             along = ((x - d.raw_x) * math.cos(middle) + (y - d.raw_y) * math.sin(middle)) / time
@@ -109,7 +101,7 @@ def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: 
         else:
             d.turn = 0.0
         trust = s.fix_trust
-        if length(x - guess_x, y - guess_y) > _JUMP:
+        if length(x - guess_x, y - guess_y) > s.fix_jump:
             trust = 1.0
         d.x = guess_x + trust * (x - guess_x)
         d.y = guess_y + trust * (y - guess_y)
@@ -124,7 +116,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
     """Bring the table of team-mates (N,) up to date with an observation (F,)."""
     for j in range(len(mates)):
         mates[j].fresh = 0
-    d.usual_gap -= d.usual_gap * min(1.0, f.dt / _GAP_MEMORY)
+    d.usual_gap -= d.usual_gap * min(1.0, f.dt / s.gap_memory)
     if not s.radio:
         return
     hc, hs = float(o[f.heading]), float(o[f.heading + 1])
@@ -155,6 +147,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
         speed = float(o[f.neighbour_speed + k])
         mate.heading_cos, mate.heading_sin = cosine, sine
         mate.speed_x, mate.speed_y = speed * cosine, speed * sine
+        mate.turn = o[f.neighbour_turn_rate + k]
         m = f.neighbour_message + k
         mate.task, mate.leader, mate.term = decode(o[m]), decode(o[m + 1]), decode(o[m + 2])
         mate.pulse, mate.slot = decode(o[m + 3]), decode(o[m + 4])
@@ -162,8 +155,8 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
 
 @compiled
 def patience(s: Record, d: Record) -> float:
-    """Return how long (s) a silence has to be to mean something: twice the usual, and a bit."""
-    return float(min(s.lost_after, _LEAST_PATIENCE + 2.0 * d.usual_gap))
+    """Return how long (s) a silence has to be to mean something: twice the usual, plus a minimum."""
+    return float(min(s.lost_after, s.least_patience + 2.0 * d.usual_gap))
 
 
 @compiled

@@ -8,16 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import Record, Records, compiled
-from posse_baselines.ddcs.memory import GRID
+from posse_baselines.ddcs.memory import GRID, SEARCHING
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.laws.guidance import length
-
-_STALE = 30.0  # s; a place not looked at for so long counts as never looked at
-_AGE_WEIGHT = 0.35  # m of way that a second since the last look is worth
-_DRIFT = 0.35  # m/s; how fast a lost target gets away from where it should be
-_TO_THE_MIDDLE = 0.5  # m of way that a metre farther from the middle is worth
-_GOAL_TIME = 4.0  # s; a goal is thought over at least so often
-_LOOK_TIME = 0.5  # s between two entries into the map, and at least between two goals
+from posse_baselines.laws.geometry import length
 
 
 @compiled
@@ -61,7 +54,7 @@ def look_around(
     y: float,
 ) -> None:
     """Keep the map of where this tracker and those it hears have looked."""
-    if len(seen) == 0 or d.step % max(1, round(_LOOK_TIME / f.dt)) != 0:
+    if len(seen) == 0 or d.step % max(1, round(s.look_time / f.dt)) != 0:
         return
     mark_seen(f, d, seen, x, y, d.step)
     for j in range(len(mates)):
@@ -84,17 +77,36 @@ def wander(
     max_speed: float,
 ) -> tuple[float, float]:
     """Return the velocity (m/s) of a tracker that searches from (x, y)."""
+    flock = flock_heard_of(f, s, d, mates, own)
+    if flock >= 0:
+        # Rule iv of section 3.5; with a view of the target, or word of it, the search would end.
+        d.goal_x, d.goal_y, d.goal_step = mates[flock].x, mates[flock].y, d.step
     dx, dy = d.goal_x - x, d.goal_y - y
     near = 0.5 * min(f.sight, 4.0)
     time = (d.step - d.goal_step) * f.dt
-    arrived = dx * dx + dy * dy < near * near and time > _LOOK_TIME
-    if d.goal_step < 0 or arrived or time > _GOAL_TIME:
+    arrived = dx * dx + dy * dy < near * near and time > s.look_time
+    if d.goal_step < 0 or arrived or time > s.goal_time:
         choose_goal(f, s, d, mates, seen, own, x, y, heading_c, heading_s)
         dx, dy = d.goal_x - x, d.goal_y - y
     distance = length(dx, dy)
     if distance < 1e-6:
         return 0.0, 0.0
     return max_speed * dx / distance, max_speed * dy / distance
+
+
+@compiled
+def flock_heard_of(f: Record, s: Record, d: Record, mates: Records, own: int) -> int:
+    """Return the team-mate last heard in a flock, for a searcher who hears nobody; else -1."""
+    found = -1
+    for j in range(len(mates)):
+        if j == own or mates[j].step < 0:
+            continue
+        if is_there(f, s, d, mates[j], len(mates)):
+            return -1
+        in_flock = mates[j].task > SEARCHING and (d.step - mates[j].step) * f.dt <= s.join_memory
+        if in_flock and (found < 0 or mates[j].step > mates[found].step):
+            found = j
+    return found
 
 
 @compiled
@@ -114,7 +126,7 @@ def choose_goal(
     cell = 2.0 * f.area / GRID
     inner = f.area - min(1.5, 0.5 * f.area)
     best = -1e9
-    reach = 2.0 + _DRIFT * (d.step - d.fix_step) * f.dt
+    reach = 2.0 + s.lost_drift * (d.step - d.fix_step) * f.dt
     d.goal_x, d.goal_y, d.goal_step = 0.0, 0.0, d.step
     heard = 0
     for m in range(len(mates)):
@@ -126,21 +138,21 @@ def choose_goal(
             cx = d.area_x + min(max((i + 0.5) * cell - f.area, -inner), inner)
             cy = d.area_y + min(max((j + 0.5) * cell - f.area, -inner), inner)
             looked = seen[i * GRID + j] - 1 if len(seen) > 0 else -1
-            age = (d.step - looked) * f.dt if looked >= 0 else _STALE
+            age = (d.step - looked) * f.dt if looked >= 0 else s.stale_after
             bonus = 0.0
             if d.fix_step >= 0:
                 # It was there, and cannot be far.
                 away = length(cx - d.now_x, cy - d.now_y)
                 if away < reach:
-                    bonus = 6.0
+                    bonus = s.lost_worth
                     if looked < d.lost_step:
-                        age = _STALE
-                    bonus -= 0.3 * away
+                        age = s.stale_after
+                    bonus -= s.lost_slope * away
             # Who hears few of the others may find in the middle those who have found the target.
-            bonus -= _TO_THE_MIDDLE * deaf * length(cx - d.area_x, cy - d.area_y)
+            bonus -= s.middle_weight * deaf * length(cx - d.area_x, cy - d.area_y)
             way = length(cx - x, cy - y)
             turn = 1.0 - ((cx - x) * heading_c + (cy - y) * heading_s) / max(way, 1e-6)
-            value = _AGE_WEIGHT * min(age, _STALE) + bonus - way - 0.8 * turn
+            value = s.age_weight * min(age, s.stale_after) + bonus - way - s.turn_weight * turn
             if value <= best:
                 continue  # team-mates can only make it less
             for m in range(len(mates)):

@@ -1,4 +1,4 @@
-"""Every setting of the Distributed Decision Control System, with its unit."""
+"""Every setting of the Distributed Decision Control System, with unit, range and use in tuning."""
 
 from __future__ import annotations
 
@@ -9,168 +9,219 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import Records
+from posse_baselines.tuning import choice, number, tuned
 
 MODELS: Final = ("distributed", "centralized")
-GUIDANCE_LAWS: Final = ("cartesian", "polar", "pngl")
-LEADER_LAWS: Final = ("pursuit", "slot")
+GUIDANCE_LAWS: Final = ("slot", "pngl")
+DEVIATIONS: Final = ("none", "slot", "occupant")
 FOLLOWER_LAWS: Final = ("l-phi", "l-l")
+FOLLOWER_FRAMES: Final = ("leader", "slot-frame")
+TASK_NAMES: Final = ("searching", "converging", "flocking", "exchange")
+TRANSITIONS: Final = (
+    "searching>converging", "searching>flocking", "converging>searching", "converging>flocking",
+    "converging>exchange", "flocking>searching", "flocking>converging", "flocking>exchange",
+    "exchange>searching", "exchange>converging", "exchange>flocking",
+)  # fmt: skip
+"""Changes of the task that can be forbidden, for ablations."""
+NO_EXCHANGE: Final = ("converging>exchange", "flocking>exchange")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How a team plays. Lengths in metres, times in seconds, gains in 1/s.
+    """How a team plays. Units, ranges, and what tuning may change: each field's metadata.
 
     Raises:
-        ValueError: An unknown model or law, or a number out of its range.
+        ValueError: An unknown model, law or transition, or a number out of its range.
     """
 
-    model: str = "distributed"
-    """``"distributed"``: everyone keeps its own slot on the target; ``"centralized"``: the leader
-    keeps its place behind the target, the others theirs on the leader (``follower_law``)."""
-    guidance: str = "cartesian"
-    """How a slot on the target is approached: ``"cartesian"`` or ``"polar"``; ``"pngl"``: no slots,
-    but the paper's own spread, by one navigation constant K a tracker."""
-    leader_law: str = "slot"
-    """Of the centralized model's leader: ``"pursuit"`` (velocity pursuit, K = 1, as in the paper,
-    which is off its bearing while the target turns) or ``"slot"`` (it keeps the first slot)."""
-    follower_law: str = "l-phi"
-    """Of the centralized model's followers: ``"l-phi"`` (distance and direction from the leader) or
-    ``"l-l"`` (from the third robot on, the distances from the leader and from a follower before it
-    in the order of the slots)."""
-    exchange: bool = True
-    """Whether the lead ever passes on; without, the first leader stays leader, even broken."""
+    model: str = choice("distributed", MODELS)
+    """``"distributed"``: every tracker is tied to the target by ``guidance``; ``"centralized"``:
+    the leader is, the others keep their places on the leader by ``follower_law``."""
+    guidance: str = choice("slot", GUIDANCE_LAWS)
+    """Law of whoever is tied to the target: ``"slot"`` (Cartesian: the slot's velocity and a gain
+    on its offset) or ``"pngl"`` (θ = K σ + c, and (13) with a correction of the range)."""
+    deviation: str = choice("slot", DEVIATIONS)
+    """c of PNGL: ``"none"`` (0, as in (5)), ``"slot"`` (ψ - K σ_d) or ``"occupant"`` (the heading
+    of the slot's occupant, which differs from ψ while the frame turns, - K σ_d)."""
+    navigation_constant: float = number(1.0, "", 0.9, 1.1, tune=True)
+    """K of PNGL: of the leader, and the mean of a distributed team."""
+    spread: float = number(0.0, "", 0.0, 0.1)
+    """By how much K differs from the mean at both ends of a distributed team, η in the paper."""
+    follower_law: str = choice("l-phi", FOLLOWER_LAWS)
+    """``"l-phi"`` (distance and direction from the leader) or ``"l-l"`` (from the third robot on,
+    the distances from the leader and from a follower before it in the order of the slots)."""
+    follower_frame: str = choice("leader", FOLLOWER_FRAMES)
+    """What a follower's φ_d is constant in: the leader's heading (figure 6), or the slot frame."""
     radio: bool = True
     """Whether anything that was heard is used; without, each tracker is alone."""
+    forbidden: tuple[str, ...] = ()
+    """Changes of the task that do not happen (``TRANSITIONS``): for ablations."""
 
     # monitoring
-    speed_memory: float = 3.0
+    speed_memory: float = tuned(3.0, "s", 0.1, 10.0)
     """Time constant of the target's estimated speed."""
-    mean_memory: float = 6.0
+    mean_memory: float = tuned(6.0, "s", 0.5, 20.0)
     """Time constant of the target's mean velocity, by which far slots are met."""
-    weave_time: float = 1.5
+    weave_time: float = tuned(1.5, "s", 0.2, 10.0)
     """How long the target is taken to keep its present velocity, before its mean one counts."""
-    fix_trust: float = 0.6
-    """Share of a new fix in the estimate of the position, (0, 1]."""
-    lost_after: float = 1.5
+    turn_memory: float = tuned(1.0, "s", 0.1, 5.0)
+    """Time constant with which a measured turn rate of the target fades."""
+    way_memory: float = tuned(3.0, "s", 0.5, 10.0)
+    """Time constant with which the target's speed fades in an estimate older than 1 s."""
+    fix_trust: float = tuned(0.6, "", 0.05, 1.0)
+    """Share of a new fix in the estimate of the position."""
+    fix_jump: float = number(1.0, "m", 0.1, 10.0)
+    """A fix farther than this from the estimate replaces it."""
+    unknown_speed: float = number(0.6, "", 0.0, 1.0)
+    """Speed of the target until it has been measured, as a share of the own greatest."""
+    gap_memory: float = number(10.0, "s", 1.0, 100.0)
+    """How long a silence in what is heard is remembered."""
+    least_patience: float = tuned(0.3, "s", 0.1, 3.0)
+    """A silence shorter than this, plus twice the usual one, means nothing."""
+    late_fix: float = number(1.0, "s", 0.1, 10.0)
+    """A fix of up to this age is late, an older one is a loss."""
+    lost_after: float = tuned(1.5, "s", 0.3, 5.0)
     """A team-mate, or the leader's pulse, not heard for this long is gone."""
-    unseen_memory: float = 2.5
+    unseen_memory: float = tuned(2.5, "s", 0.3, 10.0)
     """The same, for team-mates who may just have had no place in the observation."""
-    target_lost_after: float = 10.0
+    target_lost_after: float = tuned(10.0, "s", 1.0, 30.0)
     """A fix older than this is no longer followed: the target is lost."""
 
     # the tasks
-    time_lag: float = 1.0
+    time_lag: float = tuned(1.0, "s", 0.1, 10.0)
     """Between two looks at who should lead."""
-    lead_hysteresis: float = 0.6
+    lead_hysteresis: float = tuned(0.6, "m", 0.0, 3.0)
     """How much nearer to the target another has to be to take the lead."""
-    near: float = 0.6
-    """Distance from its place at which converging ends and flocking begins."""
-    far: float = 1.2
-    """Distance from its place at which flocking ends and converging begins anew."""
+    lead_patience: float = tuned(0.2, "s", 0.0, 2.0)
+    """How much longer than a team-mate the leader may be silent before another is appointed."""
+    near: float = tuned(1.0, "m", 0.02, 1.5)
+    """Distance from its place at which converging ends and flocking begins (PNGL: of the range)."""
+    far: float = tuned(1.2, "m", 0.1, 4.0)
+    """Distance from its place at which flocking ends and converging begins again."""
+    join_memory: float = number(20.0, "s", 0.0, 60.0)
+    """A searcher who hears nobody heads for a flock that it heard of this recently."""
+
+    # searching
+    look_time: float = number(0.5, "s", 0.1, 5.0)
+    """Between two entries into the map of where has been looked, and at least between two goals."""
+    goal_time: float = tuned(4.0, "s", 0.5, 20.0)
+    """A goal is reconsidered at least this often."""
+    stale_after: float = tuned(30.0, "s", 5.0, 60.0)
+    """A place not looked at for this long counts as never looked at."""
+    age_weight: float = tuned(0.35, "m/s", 0.0, 2.0)
+    """Way that a second since the last look is worth."""
+    turn_weight: float = tuned(0.8, "m", 0.0, 5.0)
+    """Way that a turn by a right angle costs."""
+    lost_drift: float = tuned(0.35, "m/s", 0.0, 1.0)
+    """How fast the area grows in which a lost target is looked for first."""
+    lost_worth: float = tuned(6.0, "m", 0.0, 20.0)
+    """Way that a place in that area is worth."""
+    lost_slope: float = tuned(0.3, "", 0.0, 2.0)
+    """By how much less for each metre from where the target should be."""
+    middle_weight: float = tuned(0.5, "", 0.0, 3.0)
+    """Way that a metre farther from the middle costs a searcher who hears nobody."""
 
     # slots
-    replan_time: float = 0.5
+    replan_time: float = tuned(0.5, "s", 0.1, 3.0)
     """Between two assignments."""
-    loyalty: float = 0.6
-    """How much sooner all would have to arrive with other slots for a tracker to change, s."""
-    taken_cost: float = 8.0
+    loyalty: float = tuned(0.6, "s", 0.0, 5.0)
+    """How much sooner all would have to arrive with other slots for a tracker to change."""
+    taken_cost: float = tuned(8.0, "s", 0.0, 30.0)
     """How much later a tracker may arrive elsewhere than in a slot where its sonar finds somebody
-    who is not heard, s."""
-    sight_worth: float = 10.0
-    """How much later a tracker may arrive in a slot from which the target is in sight, s."""
-    close_in_after: float = 0.25
+    who is not heard."""
+    taken_memory: float = number(3.0, "s", 0.1, 20.0)
+    """The longest that a slot counts as taken after an echo from it."""
+    sight_worth: float = tuned(10.0, "s", 0.0, 30.0)
+    """How much later a tracker may arrive in a slot from which the target is in sight."""
+    in_sight: float = tuned(0.95, "", 0.1, 1.0)
+    """Share of the sensor's reach at which a slot counts as one that sees the target."""
+    in_place: float = number(0.4, "m", 0.05, 2.0)
+    """Nearer to a slot than this, a tracker is in it."""
+    equally_near: float = number(0.1, "m", 0.0, 1.0)
+    """Difference of two distances below which the lower number has the better right to a slot."""
+    close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
     """With a fix older than this, beyond the usual age, the team closes in on where the target may
     be, from all sides, to see it again."""
-    hunt_growth: float = 0.3
-    """How fast the ring grows on which it does so, m/s."""
+    hunt_growth: float = tuned(0.3, "m/s", 0.0, 1.0)
+    """How fast the ring grows on which it does so."""
 
     # laws
-    gain: float = 1.5
-    """Of the Cartesian slot law."""
-    range_gain: float = 1.0
-    """k_r of the polar law, and of the range in pursuit."""
-    bearing_gain: float = 1.0
-    """k_σ of the polar law."""
-    alpha_1: float = 2.0
-    """α_1 of the l-φ law."""
-    alpha_2: float = 2.0
-    """α_2 of the l-φ law."""
-    point_offset: float = 0.15
-    """How far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
-    least_crossing: float = 0.15
-    """Sine of the angle, seen from a follower under l-l, between the two robots that it keeps its
-    distances from, below which it keeps its place on the nearer one instead, (0, 0.5). In its place
-    the sine has to be twice that."""
-    spread: float = 0.1
-    """η of the paper's spread: K from 1 - η to 1 + η over the team (pngl)."""
-    enter_margin: float = 0.2
-    """Range beyond the wanted one at which the chase ends (pursuit, pngl)."""
-    leave_margin: float = 0.8
-    """Range beyond the wanted one at which it begins again."""
-
-    clearance: float = 0.75
+    gain: float = tuned(1.5, "1/s", 0.2, 6.0)
+    """Of the slot law."""
+    feed_forward: float = tuned(0.0, "", 0.0, 1.0)
+    """Share of the slot frame's turn rate that the slot law adds to the turn command. 0 scores best
+    on every scenario by hand: a weaving target's rate has changed before the robot has turned."""
+    aim_ahead: float = tuned(0.0, "m", -0.2, 0.3)
+    """How far ahead of a slot's middle, along the slot frame, the slot law aims."""
+    clearance: float = tuned(0.75, "m", 0.3, 2.0)
     """Distance at which the way to a slot leads round the target."""
+    range_gain: float = tuned(1.0, "1/s", 0.1, 6.0)
+    """Of the correction of the range in (13)."""
+    alpha_1: float = tuned(2.0, "1/s", 0.2, 6.0)
+    """α_1 of the l-φ law."""
+    alpha_2: float = tuned(2.0, "1/s", 0.2, 6.0)
+    """α_2 of the l-φ law."""
+    point_offset: float = tuned(0.15, "m", 0.05, 0.5)
+    """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
+    least_crossing: float = number(0.15, "", 0.01, 0.49)
+    """Sine of the angle, seen from a follower under l-l, between the two robots that it keeps its
+    distances from, below which it keeps its place on the nearer one instead. In its place
+    the sine has to be twice that."""
 
     # safeguard
-    margin: float = 0.15
+    margin: float = tuned(0.15, "m", 0.0, 0.6)
     """Free width that is kept to robots and walls."""
-    target_margin: float = 0.2
+    target_margin: float = tuned(0.2, "m", 0.0, 0.6)
     """Free width that is kept to the target."""
-    age_margin: float = 0.15
-    """By how much more the margin of a team-mate is widened, for each second of its message's age,
-    m/s."""
-    echo_margin: float = 0.25
-    """Free width that is kept to what the sonar finds and nobody explains."""
+    age_margin: float = tuned(0.15, "m/s", 0.0, 1.0)
+    """By how much more the margin of a team-mate is widened, for each second of its message's
+    age."""
+    most_age: float = number(0.7, "s", 0.0, 5.0)
+    """Age from which on it is widened no more."""
+    echo_margin: float = tuned(0.25, "m", 0.0, 0.6)
+    """Free width that is kept to what the sonar finds and nothing known explains."""
+    forgotten: float = number(30.0, "s", 1.0, 100.0)
+    """A team-mate silent for this long is no longer taken to stand where it was."""
 
     def __post_init__(self) -> None:
-        for name, allowed in (
-            ("model", MODELS), ("guidance", GUIDANCE_LAWS), ("leader_law", LEADER_LAWS),
-            ("follower_law", FOLLOWER_LAWS),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            if value not in allowed:
-                raise ValueError(f"{name}={value!r} is unknown; known: {', '.join(allowed)}")
         for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if isinstance(field.default, float) and not 0.0 <= value < float("inf"):
-                raise ValueError(f"{field.name}={value!r} must be a finite number, at least 0")
-        if not 0.0 < self.fix_trust <= 1.0:
-            raise ValueError(f"fix_trust={self.fix_trust!r} must lie in (0, 1]")
+            value, meta = getattr(self, field.name), field.metadata
+            allowed = meta.get("choices")
+            if allowed is not None:
+                if value not in allowed:
+                    known = ", ".join(allowed)
+                    raise ValueError(f"{field.name}={value!r} is unknown; known: {known}")
+            elif "low" in meta and not meta["low"] <= value <= meta["high"]:
+                unit = f" {meta['unit']}" if meta["unit"] else ""
+                raise ValueError(
+                    f"{field.name}={value!r} must lie in [{meta['low']:g}, {meta['high']:g}]{unit}"
+                )
+        for transition in self.forbidden:
+            if transition not in TRANSITIONS:
+                raise ValueError(
+                    f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}"
+                )
         if not self.near < self.far:
             raise ValueError(f"near={self.near!r} must be below far={self.far!r}: a hysteresis")
-        if not self.enter_margin < self.leave_margin:
-            raise ValueError(
-                f"enter_margin={self.enter_margin!r} must be below "
-                f"leave_margin={self.leave_margin!r}: a hysteresis"
-            )
-        if not 0.0 <= self.spread <= 0.1:
-            raise ValueError(f"spread={self.spread!r} must lie in [0, 0.1] (paper, section 3.3)")
-        if self.point_offset <= 0.0:
-            raise ValueError(f"point_offset={self.point_offset!r} must be above 0")
-        if not 0.0 < self.least_crossing < 0.5:
-            raise ValueError(f"least_crossing={self.least_crossing!r} must lie in (0, 0.5)")
 
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""
         return dataclasses.replace(self, **overrides)
 
 
-_CHOICES: Final = {
-    "model": MODELS, "guidance": GUIDANCE_LAWS, "leader_law": LEADER_LAWS,
-    "follower_law": FOLLOWER_LAWS,
-}  # fmt: skip
 SETTINGS: Final[np.dtype[Any]] = np.dtype(
     (
         np.record,
         np.dtype(
             [
-                (field.name, np.float64 if isinstance(field.default, float) else np.int64)
+                (field.name, np.float64 if "low" in field.metadata else np.int64)
                 for field in dataclasses.fields(Settings)
             ]
         ),
     )
 )
-"""Settings as the kernels read them; a choice is its position among those allowed."""
+"""Settings as the kernels read them; a choice is its position among those allowed, ``forbidden``
+a bit for each transition: 4 times the task before plus the task after."""
 
 
 def settings_record(settings: Settings) -> Records:
@@ -178,5 +229,14 @@ def settings_record(settings: Settings) -> Records:
     record = np.zeros(1, SETTINGS)
     for field in dataclasses.fields(settings):
         value = getattr(settings, field.name)
-        record[field.name] = _CHOICES[field.name].index(value) if field.name in _CHOICES else value
+        if "choices" in field.metadata:
+            value = field.metadata["choices"].index(value)
+        elif field.name == "forbidden":
+            value = sum(1 << _bit(transition) for transition in set(value))
+        record[field.name] = value
     return record
+
+
+def _bit(transition: str) -> int:
+    before, after = transition.split(">")
+    return 4 * TASK_NAMES.index(before) + TASK_NAMES.index(after)

@@ -14,23 +14,20 @@ import numpy as np
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.monitoring import is_there, mate_now
 from posse_baselines.laws.assignment import assign
-from posse_baselines.laws.guidance import length
+from posse_baselines.laws.geometry import length
+from posse_baselines.laws.slots import rotate
 from posse_baselines.laws.steering import intercept_time
 
-_IN_SIGHT = 0.95  # share of the sensor's reach at which a slot counts as seeing the target
 _HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
-_IN_PLACE = 0.4  # m; nearer to a slot than this, a tracker is in it
-_EQUALLY_NEAR = 0.1  # m
 _RESERVED = 1e4  # s; what a slot costs that belongs to another
 
 
 @compiled
 def slot_place(d: Record, slot: Record) -> tuple[float, float, float, float]:
     """Return a slot's place now (x, y) and its arm from the target (x, y), common frame, m."""
-    c, s = d.frame_cos, d.frame_sin
-    arm_x, arm_y = slot.x * c - slot.y * s, slot.x * s + slot.y * c
+    arm_x, arm_y = rotate(slot.x, slot.y, d.frame_cos, d.frame_sin)
     return d.now_x + arm_x, d.now_y + arm_y, arm_x, arm_y
 
 
@@ -57,7 +54,7 @@ def choose_slot(
         d.slot = own  # nobody to ask
         return
     rows, mine = 0, 0
-    c, sn, vx, vy = d.frame_cos, d.frame_sin, d.speed_x, d.speed_y
+    vx, vy = d.speed_x, d.speed_y
     for j in range(n):
         if j == own:
             mine = rows
@@ -71,7 +68,7 @@ def choose_slot(
             # No place for it in the observation, but it said which slot is its own. Were it there
             # still, and near, it would have a place.
             slot_x, slot_y, _, _ = slot_place(d, slots[mates[j].slot])
-            if length(slot_x - x, slot_y - y) < d.horizon - _IN_PLACE:
+            if length(slot_x - x, slot_y - y) < d.horizon - s.in_place:
                 mates[j].slot = -1
                 continue
             for k in range(n):
@@ -82,8 +79,8 @@ def choose_slot(
             continue
         for k in range(n):
             slot = slots[k]
-            dx = d.now_x + slot.x * c - slot.y * sn - at_x
-            dy = d.now_y + slot.x * sn + slot.y * c - at_y
+            place_x, place_y, _, _ = slot_place(d, slot)
+            dx, dy = place_x - at_x, place_y - at_y
             time = intercept_time(dx, dy, vx, vy, max_speed)
             if time > s.weave_time:
                 time = intercept_time(dx, dy, d.mean_x, d.mean_y, max_speed)
@@ -95,7 +92,7 @@ def choose_slot(
             if j == own and d.taken & (_BIT << np.uint64(k)) != _NO_BITS:
                 time += s.taken_cost
             # Where there are more slots than trackers, those that see the target are filled first.
-            if slot.x * slot.x + slot.y * slot.y < (_IN_SIGHT * f.sight) ** 2:
+            if slot.x * slot.x + slot.y * slot.y < (s.in_sight * f.sight) ** 2:
                 time -= s.sight_worth
             # The centralized model's leader has the first slot to itself.
             if s.model == 1 and d.leader >= 0 and (k == 0) != (j == d.leader):
@@ -132,6 +129,6 @@ def loses_slot(
         if j != own and mates[j].slot == slot and is_there(f, s, d, mates[j], len(mates)):
             at_x, at_y = mate_now(f, s, d, mates[j])
             other = length(slot_x - at_x, slot_y - at_y)
-            if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < own):
+            if other < mine - s.equally_near or (other < mine + s.equally_near and j < own):
                 return bool(d.slot == slot)
     return False

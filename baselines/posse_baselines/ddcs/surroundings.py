@@ -9,17 +9,14 @@ import numpy as np
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.monitoring import mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
-from posse_baselines.laws.guidance import length
+from posse_baselines.laws.geometry import length
 from posse_baselines.laws.safeguard import put_disc, put_wall
 
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
 _SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
-_TAKEN_MEMORY = 3.0  # s; the longest that a slot counts as taken after an echo from it
 _NEAR = 3.0  # m; farther things are no danger yet
 _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
-_MOST_AGE = 0.7  # s; a team-mate is not made wider for an older message
-_FORGOTTEN = 30.0  # s; where a team-mate that long silent stands is anybody's guess
 
 
 @compiled
@@ -125,11 +122,13 @@ def surround(
     if d.known:
         dx, dy = d.now_x - x, d.now_y - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
-            count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, two, s.target_margin)
+            # In a chase the target only explains its echo: the law ends the chase in time.
+            reach, margin = (0.0, 0.0) if d.closing else (two, float(s.target_margin))
+            count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, reach, margin)
     few = f.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
-        if j == own or mate.step < 0 or (d.step - mate.step) * f.dt > _FORGOTTEN:
+        if j == own or mate.step < 0 or (d.step - mate.step) * f.dt > s.forgotten:
             continue
         mx, my = mate_now(f, s, d, mate)
         dx, dy = mx - x, my - y
@@ -140,7 +139,7 @@ def surround(
                 if few and length(dx, dy) < d.horizon:
                     continue  # there still, it would have a place in the observation
                 vx, vy = 0.0, 0.0
-            margin = s.margin + s.age_margin * min(age, _MOST_AGE)
+            margin = s.margin + s.age_margin * min(age, s.most_age)
             count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
     robots = count
     if f.walled:
@@ -150,7 +149,7 @@ def surround(
             if away < _NEAR:
                 count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
     strangers = d.known != 0 and few
-    if not strangers or d.step % max(1, round(_TAKEN_MEMORY / f.dt)) == 0:
+    if not strangers or d.step % max(1, round(s.taken_memory / f.dt)) == 0:
         d.taken = _NO_BITS
     farthest = f.sonar_range - _EXPLAINED
     for k in range(f.sonar_beams):

@@ -1,29 +1,22 @@
-"""Guidance laws of a pair of robots: how one robot pursues another (section 3.2 and 3.3).
+"""The proportional navigation guidance law and its special cases (sections 3.2 and 3.3).
 
-A tracker pursues a target (in a chain of robots, the robot ahead of it). Symbols, as in the paper,
-without the indices i (target) and i+1 (tracker), which are written out here:
+One law, ``θ = K σ + c``, with a tracker's own navigation constant K (0.9 to 1.1; M = K - 1),
+deviation c and range r_d. Written through the pair (σ_d, θ_d) that it contains, c = θ_d - K σ_d, it
+has no jump where σ passes ±π::
 
-======================  =====  ==================================================================
-``r``                   m      distance from tracker to target
-``sigma``               rad    angle of the line of sight, from the tracker to the target
-``theta``               rad    a heading
-``delta``               rad    deviation of a heading from the line of sight, ``θ - σ``
-``navigation_constant``        K of the proportional navigation, 0.9 < K <= 1.1; M = K - 1
-======================  =====  ==================================================================
+    θ = θ_d + K wrap(σ - σ_d)
 
-Angles are measured from the positive x-axis and wrapped to (-π, π]. Every function takes and
-returns scalars (float32 or float64), is compiled, and runs uncompiled as well.
+=======================  ============  ========================================================
+law                      K             c
+=======================  ============  ========================================================
+velocity pursuit         1             0 (σ_d = θ_d = 0)
+deviated pursuit         1             not 0, constant: ψ - σ_d
+PNGL as printed, (5)     its own       0
+PNGL that holds a slot   its own       ψ - K σ_d, or the heading of the slot's occupant - K σ_d
+=======================  ============  ========================================================
 
-The three guidance laws are one law here, :func:`intact_law`: the tracker's heading has to be
-``K σ + δ``. They differ in K and δ alone:
-
-========================  ==================  ================
-law                       K                   δ
-========================  ==================  ================
-velocity pursuit          1                   0
-deviated pursuit          1                   not 0, constant
-proportional navigation   1 - 0.1 .. 1 + 0.1  0
-========================  ==================  ================
+ψ is the heading of the slot frame, σ_d the line of sight from the slot to the target. The heading
+is regulated first (:mod:`~posse_baselines.laws.heading`), then ω = K dσ/dt + dc/dt: (6), (12).
 """
 
 from __future__ import annotations
@@ -32,196 +25,39 @@ import math
 from typing import Final
 
 from posse.numeric import compiled
+from posse_baselines.laws.geometry import clip, wrap
 
-CHASE: Final = 0
-"""Stage of a pursuit: far from the wanted range, at full speed."""
-
-MAINTENANCE: Final = 1
-"""Stage of a pursuit: near the wanted range, at the speed that keeps it."""
-
-MIN_RANGE: Final = 1e-3
-"""m. A shorter distance counts as this one where a formula divides by it."""
-
-MIN_COSINE: Final = 0.1
-"""A smaller cosine of the tracker's deviation counts as this one where a formula divides by it."""
-
-TURN: Final = 2.0 * math.pi
-
-
-# --- geometry of a pair --------------------------------------------------------------------------
+MIN_COSINE: Final = 0.25
+"""A smaller cosine of the tracker's deviation counts as this one: nobody closes in sideways."""
 
 
 @compiled
-def wrap(angle: float) -> float:
-    """Return the same direction (rad) as an angle in (-π, π]."""
-    return angle - TURN * math.ceil((angle - math.pi) / TURN)
-
-
-@compiled
-def length(x: float, y: float) -> float:
-    """Return the length of a vector.
-
-    ``math.hypot`` takes care of lengths whose square no float holds, and of the last bit: it takes
-    several times as long, and no robot needs either.
-    """
-    return math.sqrt(x * x + y * y)
-
-
-@compiled
-def clip(value: float, low: float, high: float) -> float:
-    """Return ``value``, or the end of [low, high] that it lies beyond."""
-    return max(low, min(value, high))
-
-
-@compiled
-def line_of_sight(
-    tracker_x: float, tracker_y: float, target_x: float, target_y: float
-) -> tuple[float, float]:
-    """Return the range r (m, >= 0) and the angle σ (rad, (-π, π]) from tracker to target.
-
-    Where the two coincide, σ is 0.
-    """
-    ahead = target_x - tracker_x
-    aside = target_y - tracker_y
-    return math.hypot(ahead, aside), wrap(math.atan2(aside, ahead))
-
-
-@compiled
-def deviation(theta: float, sigma: float) -> float:
-    """Return δ (rad, (-π, π]), the angle from the line of sight to a heading: (1), (2)."""
-    return wrap(theta - sigma)
-
-
-@compiled
-def range_rate(
-    target_speed: float, target_delta: float, tracker_speed: float, tracker_delta: float
+def lawful_heading(
+    sigma: float, navigation_constant: float, wanted_sigma: float, wanted_theta: float
 ) -> float:
-    """Return dr/dt (m/s), positive while the target draws away: (3)."""
-    return target_speed * math.cos(target_delta) - tracker_speed * math.cos(tracker_delta)
+    """Return the heading (rad, (-π, π]) that obeys the law, ``K σ + c``: (5).
 
-
-@compiled
-def bearing_rate(
-    r: float,
-    target_speed: float,
-    target_delta: float,
-    tracker_speed: float,
-    tracker_delta: float,
-) -> float:
-    """Return dσ/dt (rad/s), the turn rate of the line of sight: (4).
-
-    Finite at every range: one below ``MIN_RANGE`` counts as ``MIN_RANGE``.
+    c = ``wanted_theta - K wanted_sigma``; both 0 make it the paper's (5).
     """
-    across = target_speed * math.sin(target_delta) - tracker_speed * math.sin(tracker_delta)
-    return across / max(r, MIN_RANGE)
-
-
-# --- the intact law ------------------------------------------------------------------------------
+    return wrap(wanted_theta + navigation_constant * wrap(sigma - wanted_sigma))
 
 
 @compiled
-def regulate_heading(
-    theta: float, wanted_theta: float, wanted_rate: float, max_omega: float, dt: float
-) -> float:
-    """Return the turn rate (rad/s, at most ``max_omega`` either way) that reaches a wanted heading.
+def lawful_rate(navigation_constant: float, sigma_rate: float, frame_rate: float) -> float:
+    """Return the turn rate (rad/s) of the lawful heading, K dσ/dt + dc/dt: (6), (12).
 
-    The wanted heading itself turns at ``wanted_rate``. The robot turns at its limit, the short way
-    round, for as long as it takes; from then on it turns with the wanted heading::
-
-        omega = clip(wanted_rate + wrap(wanted_theta - theta) / dt, -max_omega, max_omega)
-
-    A command held for the control step ``dt`` (s) therefore ends on the wanted heading of that
-    moment or short of it, never beyond. At an error of exactly π the robot turns to the left.
+    ``frame_rate`` (rad/s) is dψ/dt where c follows the slot frame, hence dc/dt = (1 - K) dψ/dt;
+    0 where c is constant.
     """
-    error = wrap(wanted_theta - theta)
-    return clip(wanted_rate + error / dt, -max_omega, max_omega)
-
-
-@compiled
-def lawful_heading(sigma: float, navigation_constant: float, delta: float) -> float:
-    """Return the heading (rad, (-π, π]) that obeys the law, ``K σ + δ``: (5).
-
-    Said as a deviation from the line of sight, that is ``M σ + δ`` with M = K - 1 (9).
-    ``sigma`` is taken in (-π, π], which bounds ``|M σ|`` by 0.1 π. At ``sigma`` = π the
-    heading jumps from one side of the line of sight to the other, by 2 π M.
-    """
-    return wrap(navigation_constant * wrap(sigma) + delta)
-
-
-@compiled
-def intact_law(
-    theta: float,
-    sigma: float,
-    sigma_rate: float,
-    navigation_constant: float,
-    delta: float,
-    max_omega: float,
-    dt: float,
-) -> float:
-    """Return the tracker's turn rate (rad/s) under ``θ = K σ + δ``: (5), (6), (12).
-
-    Intact: it holds for both signs of ``θ - σ`` and in every quadrant. A heading that does
-    not obey the law is first regulated, at the limit ``max_omega`` and the short way round; then
-    ω = K dσ/dt, the feed-forward of (12). See :func:`regulate_heading`.
-    """
-    wanted = lawful_heading(sigma, navigation_constant, delta)
-    return regulate_heading(theta, wanted, navigation_constant * sigma_rate, max_omega, dt)
-
-
-@compiled
-def velocity_pursuit(
-    theta: float, sigma: float, sigma_rate: float, max_omega: float, dt: float
-) -> float:
-    """Return the turn rate (rad/s) that keeps the velocity on the line of sight: K = 1."""
-    return intact_law(theta, sigma, sigma_rate, 1.0, 0.0, max_omega, dt)
-
-
-@compiled
-def deviated_pursuit(
-    theta: float, sigma: float, sigma_rate: float, delta: float, max_omega: float, dt: float
-) -> float:
-    """Return the turn rate (rad/s) that keeps the velocity ``delta`` (rad) off the line of sight.
-
-    The range can close only while ``|δ| < π / 2``; beyond, the tracker flees.
-    """
-    return intact_law(theta, sigma, sigma_rate, 1.0, delta, max_omega, dt)
-
-
-@compiled
-def proportional_navigation(
-    theta: float,
-    sigma: float,
-    sigma_rate: float,
-    navigation_constant: float,
-    max_omega: float,
-    dt: float,
-) -> float:
-    """Return the turn rate (rad/s) of the proportional navigation guidance law: (5), (6), (12)."""
-    return intact_law(theta, sigma, sigma_rate, navigation_constant, 0.0, max_omega, dt)
-
-
-# --- the two stages ------------------------------------------------------------------------------
-
-
-@compiled
-def next_stage(
-    stage: int, r: float, wanted_range: float, enter_margin: float, leave_margin: float
-) -> int:
-    """Return the stage of the pursuit, ``CHASE`` or ``MAINTENANCE``, given the present one.
-
-    The chase ends at ``wanted_range + enter_margin`` and begins again beyond ``wanted_range +
-    leave_margin`` (m). With ``0 <= enter_margin < leave_margin`` the switch has hysteresis.
-    """
-    margin = enter_margin if stage == CHASE else leave_margin
-    return MAINTENANCE if r <= wanted_range + margin else CHASE
+    return navigation_constant * sigma_rate + (1.0 - navigation_constant) * frame_rate
 
 
 @compiled
 def matching_speed(target_speed: float, target_delta: float, tracker_delta: float) -> float:
     """Return the tracker's speed (m/s) at which the range rests, dr/dt = 0: (13).
 
-    ``v cos(θ_i - σ) / cos(M σ)``, with the tracker's deviation for ``M σ``. It is
-    negative where the target approaches. A cosine below ``MIN_COSINE`` counts as ``MIN_COSINE``.
+    ``v cos(θ_i - σ) / cos(M σ)``, with the tracker's deviation for ``M σ``. It is negative where
+    the target approaches. A cosine below ``MIN_COSINE`` counts as ``MIN_COSINE``.
     """
     return target_speed * math.cos(target_delta) / max(math.cos(tracker_delta), MIN_COSINE)
 
@@ -244,22 +80,3 @@ def maintenance_speed(
     correction = range_gain * (r - wanted_range) / max(math.cos(tracker_delta), MIN_COSINE)
     matching = matching_speed(target_speed, target_delta, tracker_delta)
     return clip(matching + correction, 0.0, max_speed)
-
-
-@compiled
-def pursuit_speed(
-    stage: int,
-    target_speed: float,
-    target_delta: float,
-    tracker_delta: float,
-    r: float,
-    wanted_range: float,
-    range_gain: float,
-    max_speed: float,
-) -> float:
-    """Return the tracker's speed (m/s, [0, max_speed]): full in the chase, then maintenance."""
-    if stage == CHASE:
-        return max_speed
-    return maintenance_speed(
-        target_speed, target_delta, tracker_delta, r, wanted_range, range_gain, max_speed
-    )

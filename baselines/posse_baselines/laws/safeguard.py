@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import Record, Records, compiled
-from posse_baselines.laws.guidance import clip, length, wrap
+from posse_baselines.laws.geometry import clip, length, wrap
+from posse_baselines.laws.heading import heading_error, turn_command
 
 LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
 """Steps in which a velocity is played out, s."""
@@ -42,28 +43,6 @@ _STANDSTILL: Final = 1e-6  # m/s
 _CONTACT: Final = 0.015  # m; a narrower gap counts as a contact
 _CONTACT_COST: Final = 4.0
 _INTRUSION_COST: Final = 3.0
-_BRAKING_SHARE: Final = 0.8
-
-BODY: Final[np.dtype[Any]] = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("heading_cos", np.float64),
-                ("heading_sin", np.float64),
-                ("speed", np.float64),  # m/s
-                ("omega", np.float64),  # turn rate, rad/s
-                ("max_speed", np.float64),
-                ("max_omega", np.float64),
-                ("acceleration", np.float64),  # greatest change of the speed, m/s²
-                ("turn_acceleration", np.float64),  # greatest change of the turn rate, rad/s²
-                ("dt", np.float64),  # control step, s
-            ],
-            align=True,
-        ),
-    )
-)
-"""A robot as it moves now, and what it can do."""
 
 DISC: Final[np.dtype[Any]] = np.dtype(
     (
@@ -139,24 +118,10 @@ def put_wall(
 
 
 @compiled
-def heading_error(body: Record, x: float, y: float) -> float:
-    """Return the angle (rad) by which a robot has to turn to head along a vector."""
-    c, s = body.heading_cos, body.heading_sin
-    return math.atan2(c * y - s * x, c * x + s * y)
-
-
-@compiled
 def turned(body: Record, error: float) -> tuple[float, float]:
     """Return the direction (x, y) of a robot that has turned by an angle (rad)."""
     c, s = math.cos(error), math.sin(error)
     return body.heading_cos * c - body.heading_sin * s, body.heading_sin * c + body.heading_cos * s
-
-
-@compiled
-def turn_command(body: Record, error: float, time: float) -> float:
-    """Return the turn rate (rad/s) that ends a heading error (rad) without overshooting."""
-    most = math.sqrt(2.0 * _BRAKING_SHARE * body.turn_acceleration * abs(error))
-    return clip(error / time, -min(most, body.max_omega), min(most, body.max_omega))
 
 
 @compiled
@@ -367,17 +332,3 @@ def safe_velocity(
             if cost < least:
                 least, best_x, best_y = cost, top * x, top * y
     return best_x, best_y, True
-
-
-@compiled
-def command(body: Record, speed_x: float, speed_y: float) -> tuple[float, float]:
-    """Return the command (V, ω) of a robot that takes up a velocity (m/s) within its limits.
-
-    V is the part of the velocity that lies ahead, and 0 while it points backwards. A velocity of
-    nearly nothing keeps the heading.
-    """
-    if length(speed_x, speed_y) < 1e-3:
-        return 0.0, 0.0
-    ahead = clip(speed_x * body.heading_cos + speed_y * body.heading_sin, 0.0, body.max_speed)
-    error = heading_error(body, speed_x, speed_y)
-    return ahead, turn_command(body, error, body.dt)

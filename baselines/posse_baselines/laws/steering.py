@@ -6,12 +6,14 @@ import math
 from typing import Final
 
 from posse.numeric import FloatArray, compiled
-from posse_baselines.laws.formation_control import cartesian_slot_components
-from posse_baselines.laws.guidance import clip, length
+from posse_baselines.laws.geometry import clip, length
+from posse_baselines.laws.slots import slot_law, slot_velocity
 
 NEVER: Final = 1e6
 """s. What stands for a meeting that does not happen."""
 
+_FARTHEST: Final = 20.0  # s; a later meeting is planned as this one
+_SOON: Final = 0.1  # s; before that the present velocity alone counts
 _LEAST_TURN: Final = 0.6
 """rad. How far round at least a tracker heads that is on the circle, or inside it."""
 _SPEED_LEFT: Final = 0.8
@@ -46,16 +48,13 @@ def approach_velocity(
 ) -> tuple[float, float]:
     """Return the wanted velocity (x, y) in m/s towards a moving slot, with room to brake.
 
-    :func:`~posse_baselines.laws.formation_control.cartesian_slot_components` with the gain lowered
-    where the tracker, whose speed changes by at most ``deceleration`` (m/s²), could not brake in
-    time.
+    :func:`~posse_baselines.laws.slots.slot_law` with the gain lowered where the tracker, whose
+    speed changes by at most ``deceleration`` (m/s²), could not brake in time.
     """
     distance = length(offset_x, offset_y)
     if distance > 1e-6:
         gain = min(gain, math.sqrt(2.0 * _SPEED_LEFT * deceleration / distance))
-    return cartesian_slot_components(
-        offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed
-    )
+    return slot_law(offset_x, offset_y, slot_speed_x, slot_speed_y, gain, max_speed)
 
 
 @compiled
@@ -84,6 +83,41 @@ def way_round(
     c, s = math.cos(angle), math.sin(angle)
     scale = clearance / max(distance, 1e-6)
     return (from_x * c - from_y * s) * scale, (from_x * s + from_y * c) * scale
+
+
+@compiled
+def meeting_velocity(
+    from_x: float,
+    from_y: float,
+    arm_x: float,
+    arm_y: float,
+    speed_x: float,
+    speed_y: float,
+    mean_x: float,
+    mean_y: float,
+    frame_rate: float,
+    weave_time: float,
+    clearance: float,
+    gain: float,
+    max_speed: float,
+    deceleration: float,
+) -> tuple[float, float]:
+    """Return the velocity (x, y) in m/s on a course that meets a slot, round the target.
+
+    Tracker (``from``) and slot (``arm``) are given from the target, m. A slot far away is met where
+    the target's mean velocity (``mean``) takes it, a near one where its present velocity does: that
+    one counts for about ``weave_time`` (s). ``frame_rate`` (rad/s) is that of the slot frame.
+    """
+    round_x, round_y = way_round(from_x, from_y, arm_x, arm_y, clearance)
+    dx, dy = round_x - from_x, round_y - from_y
+    time = min(intercept_time(dx, dy, speed_x, speed_y, max_speed), _FARTHEST)
+    ahead = 1.0
+    if time > _SOON:
+        ahead = weave_time * (1.0 - math.exp(-time / weave_time)) / time
+    slot_x, slot_y = slot_velocity(speed_x, speed_y, frame_rate, arm_x, arm_y)
+    sx = ahead * slot_x + (1.0 - ahead) * mean_x
+    sy = ahead * slot_y + (1.0 - ahead) * mean_y
+    return approach_velocity(dx, dy, sx, sy, gain, max_speed, deceleration)
 
 
 @compiled

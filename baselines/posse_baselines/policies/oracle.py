@@ -26,22 +26,11 @@ from posse.numeric import (
 )
 from posse.rules.state import NEVER, config_record, slot_records
 from posse_baselines.laws.assignment import WORK_ROWS, assign
-from posse_baselines.laws.guidance import wrap
-from posse_baselines.laws.safeguard import (
-    BODY,
-    DISC,
-    PLAYS,
-    command,
-    put_disc,
-    put_wall,
-    safe_velocity,
-)
-from posse_baselines.laws.steering import (
-    approach_velocity,
-    intercept_time,
-    way_round,
-    write_motion,
-)  # fmt: skip
+from posse_baselines.laws.geometry import wrap
+from posse_baselines.laws.heading import BODY, regulate
+from posse_baselines.laws.safeguard import DISC, PLAYS, put_disc, put_wall, safe_velocity
+from posse_baselines.laws.slots import rotate
+from posse_baselines.laws.steering import intercept_time, meeting_velocity, write_motion
 from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (
     BasePolicy,
@@ -238,24 +227,16 @@ def lead(
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
         slot = slots[plans[i].slot]
-        arm_x = slot.x * w.frame_cos - slot.y * w.frame_sin
-        arm_y = slot.x * w.frame_sin + slot.y * w.frame_cos
-        round_x, round_y = way_round(t.x - w.x, t.y - w.y, arm_x, arm_y, s.clearance)
-        x, y = w.x + round_x - t.x, w.y + round_y - t.y
-        time = intercept_time(x, y, vx, vy, speed)
-        ahead = 1.0
-        if time > dt:
-            time = min(time, 20.0)
-            ahead = s.weave_time * (1.0 - math.exp(-time / s.weave_time)) / time
-        # Far away, the slot is met where its mean motion takes it; near, where it is.
-        sx = ahead * vx + (1.0 - ahead) * mean_x - ahead * rate * arm_y
-        sy = ahead * vy + (1.0 - ahead) * mean_y + ahead * rate * arm_x
-        wx, wy = approach_velocity(x, y, sx, sy, s.gain, speed, acceleration)
+        arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
+        wx, wy = meeting_velocity(
+            t.x - w.x, t.y - w.y, arm_x, arm_y, vx, vy, mean_x, mean_y, rate,
+            s.weave_time, s.clearance, s.gain, speed, acceleration,
+        )  # fmt: skip
         count = surround(c, w, trackers, obstacles, i, s.margin, discs)
         body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
         body.speed, body.omega = t.speed, t.turn_rate
         wx, wy, _ = safe_velocity(body, discs, count, wx, wy, plays)
-        v, omega = command(body, wx, wy)
+        v, omega = regulate(body, wx, wy, 0.0)
         write_motion(actions[i], v, omega, speed, c.tracker_turn_rate)
 
 
@@ -282,8 +263,8 @@ def plan(
         if t.broken_at != NEVER:
             continue
         for k in range(n):
-            x = w.x + slots[k].x * w.frame_cos - slots[k].y * w.frame_sin - t.x
-            y = w.y + slots[k].x * w.frame_sin + slots[k].y * w.frame_cos - t.y
+            arm_x, arm_y = rotate(slots[k].x, slots[k].y, w.frame_cos, w.frame_sin)
+            x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
             time = intercept_time(x, y, vx, vy, speed)
             if time > s.weave_time:
                 time = intercept_time(x, y, mean_x, mean_y, speed)

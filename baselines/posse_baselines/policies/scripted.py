@@ -3,27 +3,69 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from posse_baselines.ddcs import DDCS, Settings
+from posse_baselines.ddcs.settings import NO_EXCHANGE
 from posse_baselines.policies.oracle import Oracle
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random
-from posse_baselines.policy import Policy
+from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.tuning import Tunable, tunables
+
+_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl", "near": 0.15, "far": 0.8}
+_CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame": "slot-frame"}
+
+FAMILY: Final[dict[str, Settings]] = {
+    "pngl-l-phi": Settings(
+        model="centralized", navigation_constant=1.1, deviation="occupant", **_PURSUIT
+    ),
+    "pngl": Settings(deviation="slot", spread=0.1, **_PURSUIT),
+    "deviated-pursuit": Settings(deviation="slot", **_PURSUIT),
+    "velocity-pursuit": Settings(deviation="none", **_PURSUIT),
+    "ddcs-centralized-pursuit": Settings(model="centralized", deviation="none", **_PURSUIT),
+    "ddcs-distributed": Settings(),
+    "ddcs-centralized": Settings(**_CENTRALIZED),
+    "ddcs-centralized-l-l": Settings(follower_law="l-l", **_CENTRALIZED),
+    "ddcs-centralized-no-exchange": Settings(forbidden=NO_EXCHANGE, **_CENTRALIZED),
+    "ddcs-no-radio": Settings(radio=False),
+}
+"""The members of the DDCS family, the baseline first."""
 
 SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "random": Random,
     "idle": Idle,
     "pursuit": Pursuit,
-    "ddcs-distributed": DDCS,
-    "ddcs-centralized": lambda: DDCS(Settings(model="centralized")),
-    "ddcs-centralized-l-l": lambda: DDCS(
-        Settings(model="centralized", follower_law="l-l"), "ddcs-centralized-l-l"
-    ),
-    "ddcs-centralized-no-exchange": lambda: DDCS(
-        Settings(model="centralized", exchange=False), "ddcs-centralized-no-exchange"
-    ),
-    "ddcs-no-radio": lambda: DDCS(Settings(radio=False), "ddcs-no-radio"),
-    "pngl": lambda: DDCS(Settings(guidance="pngl"), "pngl"),
+    **{name: (lambda name=name: DDCS(FAMILY[name], name)) for name in FAMILY},  # type: ignore[misc]
     "oracle": Oracle,
 }
+
+
+def settings_of(name: str) -> Settings:
+    """Return the settings of a member of the DDCS family.
+
+    Raises:
+        PolicyError: No member of that name.
+    """
+    if name not in FAMILY:
+        raise PolicyError(f"policy {name!r} has no settings; those that have: {', '.join(FAMILY)}")
+    return FAMILY[name]
+
+
+def tunable(name: str) -> tuple[Tunable, ...]:
+    """Return the settings of a policy that a search may change, with ranges and units.
+
+    Raises:
+        PolicyError: The policy has no settings.
+    """
+    return tunables(settings_of(name))
+
+
+def with_settings(name: str, **values: Any) -> DDCS:
+    """Return a policy with some of its settings changed.
+
+    Raises:
+        PolicyError: The policy has no settings.
+        ValueError: A value out of its range.
+    """
+    return DDCS(settings_of(name).replace(**values), name)

@@ -1,0 +1,165 @@
+"""Followers of the centralized model: places on the leader, and the commands of l-φ and l-l."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from posse.numeric import Record, Records, compiled
+from posse_baselines.ddcs.memory import FLOCKING
+from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
+from posse_baselines.laws.geometry import length, line_of_sight, wrap
+from posse_baselines.laws.l_l import l_l_command
+from posse_baselines.laws.l_phi import l_phi_demand, limit_command, point_command
+from posse_baselines.laws.slots import rotate, slot_heading, slot_velocity
+
+BY_SLOT_FRAME: Final = 1
+L_L: Final = 1
+
+
+@compiled
+def motion_of(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, float, float]:
+    """Return speed (m/s), heading (rad, now) and turn rate (rad/s) of a team-mate.
+
+    One that is silent too long has stopped. In the first step nobody has moved yet: the mate is
+    expected to move as the target does.
+    """
+    theta = math.atan2(float(mate.heading_sin), float(mate.heading_cos))
+    age = float((d.step - mate.step) * f.dt)
+    if age > patience(s, d):
+        return 0.0, theta, 0.0
+    speed, turn = length(mate.speed_x, mate.speed_y), float(mate.turn)
+    if mate.step == 0:
+        speed = float(d.speed)
+    return speed, wrap(theta + turn * age), turn
+
+
+@compiled
+def place_and_frame(
+    f: Record, s: Record, d: Record, mate: Record, own: Record, theirs: Record
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Return a place in the formation by a team-mate that is in its own.
+
+    The mate's place (x, y) now, the wanted place (x, y), the mate's speed (m/s) and heading (rad),
+    heading (rad) and turn rate (rad/s) of the frame that the formation is kept in: the mate's own
+    (figure 6), or the slot frame.
+    """
+    mate_x, mate_y = mate_now(f, s, d, mate)
+    speed, theta, frame_rate = motion_of(f, s, d, mate)
+    frame = theta
+    if s.follower_frame == BY_SLOT_FRAME:
+        frame, frame_rate = math.atan2(d.frame_sin, d.frame_cos), float(d.psi_rate)
+    arm_x, arm_y = rotate(own.x - theirs.x, own.y - theirs.y, math.cos(frame), math.sin(frame))
+    return mate_x, mate_y, mate_x + arm_x, mate_y + arm_y, speed, theta, frame, frame_rate
+
+
+@compiled
+def place_on_leader(
+    f: Record, s: Record, d: Record, mate: Record, own: Record, theirs: Record
+) -> tuple[float, float, float, float]:
+    """Return the wanted place (x, y), m, by a team-mate, and its velocity (x, y), m/s."""
+    mate_x, mate_y, place_x, place_y, speed, theta, _, rate = place_and_frame(
+        f, s, d, mate, own, theirs
+    )
+    vx, vy = slot_velocity(
+        speed * math.cos(theta), speed * math.sin(theta), rate, place_x - mate_x, place_y - mate_y
+    )
+    return place_x, place_y, vx, vy
+
+
+@compiled
+def demand_on(
+    f: Record,
+    s: Record,
+    d: Record,
+    mate: Record,
+    own: Record,
+    theirs: Record,
+    x: float,
+    y: float,
+    body: Record,
+) -> tuple[float, float, float, float, float]:
+    """Return what l-φ on a team-mate wants of the control point c_j, and where that is.
+
+    (l, A, B, direction now, wanted direction): the directions of l in the common frame. c_j is
+    wanted where it lies when the robot is in its place, and heads as one does there.
+    """
+    mate_x, mate_y, place_x, place_y, speed, theta, frame, rate = place_and_frame(
+        f, s, d, mate, own, theirs
+    )
+    heading = slot_heading(
+        speed * math.cos(theta), speed * math.sin(theta), rate,
+        place_x - mate_x, place_y - mate_y, frame,
+    )  # fmt: skip
+    offset = s.point_offset
+    l_now, angle = line_of_sight(
+        mate_x, mate_y, x + offset * body.heading_cos, y + offset * body.heading_sin
+    )
+    l_d, wanted = line_of_sight(
+        mate_x, mate_y, place_x + offset * math.cos(heading), place_y + offset * math.sin(heading)
+    )
+    a, b = l_phi_demand(
+        l_now, wrap(angle - theta), l_d, wrap(wanted - theta), speed, rate, s.alpha_1, s.alpha_2
+    )
+    return l_now, a, b, angle, wanted
+
+
+@compiled
+def second_of(f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int) -> int:
+    """Return the team-mate that a follower under l-l keeps its distance from beside the leader.
+
+    Of those whose slots come between the leader's and its own, and who are in their places: the one
+    of the last slot from which the lines to both cross widely enough in the follower's place. -1 if
+    there is none.
+    """
+    found, n = -1, len(slots)
+    place, first = slots[d.slot], slots[0]
+    lead_x, lead_y = place.x - first.x, place.y - first.y
+    for j in range(n):
+        mate = mates[j]
+        if j == own or j == d.leader or mate.task != FLOCKING or not 0 < mate.slot < d.slot:
+            continue
+        if (found >= 0 and mate.slot < mates[found].slot) or not is_there(f, s, d, mate, n):
+            continue
+        dx, dy = place.x - slots[mate.slot].x, place.y - slots[mate.slot].y
+        widest = length(lead_x, lead_y) * length(dx, dy)
+        if abs(lead_x * dy - lead_y * dx) >= 2.0 * s.least_crossing * widest:
+            found = j
+    return found
+
+
+@compiled
+def on_leader(
+    f: Record,
+    s: Record,
+    d: Record,
+    mates: Records,
+    slots: Records,
+    own: int,
+    x: float,
+    y: float,
+    body: Record,
+) -> tuple[float, float, float, float]:
+    """Return (vx, vy, V, ω): what a follower in the flock wants of c_j, and the command.
+
+    By l-φ on the leader; by l-l on the leader and one more, where that is the law and there is one.
+    """
+    leader, place = mates[d.leader], slots[d.slot]
+    l_i, a, b, angle, wanted = demand_on(f, s, d, leader, place, slots[0], x, y, body)
+    theta = math.atan2(body.heading_sin, body.heading_cos)
+    gamma = wrap(angle - theta)
+    second = second_of(f, s, d, mates, slots, own) if s.follower_law == L_L else -1
+    if second < 0:
+        speed, omega = point_command(a, b, gamma, s.point_offset)
+    else:
+        mate = mates[second]
+        l_k, a_k, b_k, angle_k, wanted_k = demand_on(
+            f, s, d, mate, place, slots[mate.slot], x, y, body
+        )
+        speed, omega = l_l_command(
+            l_i, a, b, gamma, l_k, a_k, b_k, wrap(angle_k - theta), wanted_k - wanted,
+            s.least_crossing, s.point_offset,
+        )  # fmt: skip
+    vx, vy = rotate(speed, s.point_offset * omega, body.heading_cos, body.heading_sin)
+    speed, omega = limit_command(speed, omega, s.point_offset, body.max_speed, body.max_omega)
+    return vx, vy, speed, omega

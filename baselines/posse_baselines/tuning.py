@@ -1,0 +1,54 @@
+"""Settings that declare themselves: unit, range, and whether tuning may change them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Tunable:
+    """A setting that a search may change.
+
+    Attributes:
+        name: Of the field.
+        default: Its value in the policy asked for.
+        low: Least value.
+        high: Greatest value.
+        unit: Empty for a plain number.
+    """
+
+    name: str
+    default: float
+    low: float
+    high: float
+    unit: str
+
+
+def number(default: float, unit: str, low: float, high: float, *, tune: bool = False) -> Any:
+    """Declare a numeric field of a settings class, allowed in [low, high]."""
+    meta = {"unit": unit, "low": low, "high": high, "tunable": tune}
+    return dataclasses.field(default=default, metadata=meta)
+
+
+def tuned(default: float, unit: str, low: float, high: float) -> Any:
+    """Declare a numeric field that a search may change."""
+    return number(default, unit, low, high, tune=True)
+
+
+def choice(default: str, choices: tuple[str, ...]) -> Any:
+    """Declare a field that names one of several laws."""
+    return dataclasses.field(default=default, metadata={"choices": choices})
+
+
+def tunables(settings: Any) -> tuple[Tunable, ...]:
+    """Return the tunable fields of a settings object, with its values as defaults."""
+    return tuple(
+        Tunable(
+            field.name, getattr(settings, field.name),
+            field.metadata["low"], field.metadata["high"], field.metadata["unit"],
+        )
+        for field in dataclasses.fields(settings)
+        if field.metadata.get("tunable")
+    )  # fmt: skip
