@@ -9,8 +9,14 @@ from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import FLOCKING
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 from posse_baselines.laws.geometry import length, line_of_sight, wrap
-from posse_baselines.laws.l_l import l_l_command
-from posse_baselines.laws.l_phi import l_phi_demand, limit_command, point_command
+from posse_baselines.laws.l_l import l_l_velocity
+from posse_baselines.laws.l_phi import (
+    held_command,
+    l_phi_demand,
+    limit_command,
+    point_velocity,
+    sampled_rate,
+)
 from posse_baselines.laws.slots import rotate, slot_heading, slot_velocity
 
 BY_SLOT_FRAME: Final = 1
@@ -99,8 +105,9 @@ def demand_on(
         mate_x, mate_y, place_x + offset * math.cos(heading), place_y + offset * math.sin(heading)
     )
     a, b = l_phi_demand(
-        l_now, wrap(angle - theta), l_d, wrap(wanted - theta), speed, rate, s.alpha_1, s.alpha_2
-    )
+        l_now, wrap(angle - theta), l_d, wrap(wanted - theta), speed, rate,
+        sampled_rate(s.alpha_1, body.dt), sampled_rate(s.alpha_2, body.dt),
+    )  # fmt: skip
     return l_now, a, b, angle, wanted
 
 
@@ -150,16 +157,17 @@ def on_leader(
     gamma = wrap(angle - theta)
     second = second_of(f, s, d, mates, slots, own) if s.follower_law == L_L else -1
     if second < 0:
-        speed, omega = point_command(a, b, gamma, s.point_offset)
+        ahead, across = point_velocity(a, b, gamma)
     else:
         mate = mates[second]
         l_k, a_k, b_k, angle_k, wanted_k = demand_on(
             f, s, d, mate, place, slots[mate.slot], x, y, body
         )
-        speed, omega = l_l_command(
+        ahead, across = l_l_velocity(
             l_i, a, b, gamma, l_k, a_k, b_k, wrap(angle_k - theta), wanted_k - wanted,
-            s.least_crossing, s.point_offset,
+            s.least_crossing,
         )  # fmt: skip
-    vx, vy = rotate(speed, s.point_offset * omega, body.heading_cos, body.heading_sin)
+    vx, vy = rotate(ahead, across, body.heading_cos, body.heading_sin)
+    speed, omega = held_command(ahead, across, s.point_offset, body.dt)
     speed, omega = limit_command(speed, omega, s.point_offset, body.max_speed, body.max_omega)
     return vx, vy, speed, omega

@@ -95,9 +95,13 @@ class Settings:
     lead_patience: float = tuned(0.2, "s", 0.0, 2.0)
     """How much longer than a team-mate the leader may be silent before another is appointed."""
     near: float = tuned(1.0, "m", 0.02, 1.5)
-    """Distance from its place at which converging ends and flocking begins (PNGL: of the range)."""
+    """Distance from its place at which converging ends and flocking begins."""
     far: float = tuned(1.2, "m", 0.1, 4.0)
     """Distance from its place at which flocking ends and converging begins again."""
+    range_near: float = tuned(0.15, "m", 0.02, 1.5)
+    """The same under PNGL, by which the range exceeds the wanted one: the chase ends."""
+    range_far: float = tuned(0.8, "m", 0.1, 4.0)
+    """The same under PNGL, by which the range exceeds the wanted one: the chase begins again."""
     join_memory: float = number(20.0, "s", 0.0, 60.0)
     """A searcher who hears nobody heads for a flock that it heard of this recently."""
 
@@ -155,6 +159,8 @@ class Settings:
     """How far ahead of a slot's middle, along the slot frame, the slot law aims."""
     clearance: float = tuned(0.75, "m", 0.3, 2.0)
     """Distance at which the way to a slot leads round the target."""
+    bearing_gain: float = tuned(0.0, "", 0.0, 4.0)
+    """G of a deviation c = ... + G wrap(σ - σ_d): feedback on the bearing. 0 is the paper's law."""
     range_gain: float = tuned(1.0, "1/s", 0.1, 6.0)
     """Of the correction of the range in (13)."""
     alpha_1: float = tuned(2.0, "1/s", 0.2, 6.0)
@@ -201,8 +207,10 @@ class Settings:
                 raise ValueError(
                     f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}"
                 )
-        if not self.near < self.far:
-            raise ValueError(f"near={self.near!r} must be below far={self.far!r}: a hysteresis")
+        for near, far in (("near", "far"), ("range_near", "range_far")):
+            low, high = getattr(self, near), getattr(self, far)
+            if not low < high:
+                raise ValueError(f"{near}={low!r} must be below {far}={high!r}: a hysteresis")
 
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""

@@ -26,7 +26,8 @@ def next_task(s: Record, d: Record) -> int:
     """Return the task that follows from what the mind knows.
 
     Converging and flocking change with hysteresis: flocking begins within ``near`` of the place
-    and ends beyond ``far`` of it.
+    and ends beyond ``far`` of it. For who pursues under PNGL the excess of the range counts, with
+    limits of its own: chase and maintenance.
     """
     task = int(d.task)
     if d.known == 0:
@@ -34,6 +35,7 @@ def next_task(s: Record, d: Record) -> int:
     elif d.exchanges > 0 and d.confirmed == 0 and task != SEARCHING:
         wanted = EXCHANGING
     else:
-        limit = s.far if task == FLOCKING else s.near
+        near, far = (s.range_near, s.range_far) if d.pursues else (s.near, s.far)
+        limit = far if task == FLOCKING else near
         wanted = FLOCKING if 0.0 <= d.error <= limit else CONVERGING
     return wanted if wanted == task or may_change(s, task, wanted) else task

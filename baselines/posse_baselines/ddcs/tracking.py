@@ -99,6 +99,9 @@ def pursue(
         wanted_theta = slot_heading(
             d.speed_x, d.speed_y, d.psi_rate, arm_x, arm_y, wanted_theta
         )  # fmt: skip
+    if s.deviation != NO_DEVIATION and d.task == FLOCKING:
+        # Feedback on the bearing, c = ... + G wrap(σ - σ_d), acts as a greater K does.
+        constant += s.bearing_gain
     theta = lawful_heading(sigma, constant, wanted_sigma, wanted_theta)
     delta = clip(deviation(theta, sigma), -_MOST_DEVIATION, _MOST_DEVIATION)
     theta = sigma + delta
@@ -140,11 +143,13 @@ def note_error(
     f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, x: float, y: float
 ) -> None:
     """Note how far a tracker that knows the target is from its place, m."""
+    d.pursues = 0
     if follows(f, s, d, mates, own):
         place_x, place_y, _, _ = place_on_leader(f, s, d, mates[d.leader], slots[d.slot], slots[0])
     else:
         place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
         if s.guidance == PNGL:
+            d.pursues = 1
             r = length(d.now_x - x, d.now_y - y)
             d.error = max(0.0, r - length(arm_x, arm_y))
             return

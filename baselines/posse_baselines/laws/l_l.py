@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 from posse.numeric import compiled
-from posse_baselines.laws.l_phi import point_command
+from posse_baselines.laws.l_phi import point_velocity
 
 
 @compiled
-def l_l_command(
+def l_l_velocity(
     l_i: float,
     along_i: float,
     across_i: float,
@@ -24,9 +24,8 @@ def l_l_command(
     gamma_k: float,
     wanted_crossing: float,
     min_crossing_sine: float,
-    point_offset: float,
 ) -> tuple[float, float]:
-    """Return the follower's (v_j, ω_j) that keep its distances to two leaders i and k.
+    """Return (v_j, d ω_j), m/s, that keep a follower's distances to two leaders i and k.
 
     Both dl/dt equations, solved for v_j and d ω_j::
 
@@ -47,8 +46,8 @@ def l_l_command(
     side = 1.0 if math.sin(wanted_crossing) >= 0.0 else -1.0
     if side * determinant < min_crossing_sine:
         if l_i <= l_k:
-            return point_command(along_i, across_i, gamma_i, point_offset)
-        return point_command(along_k, across_k, gamma_k, point_offset)
+            return point_velocity(along_i, across_i, gamma_i)
+        return point_velocity(along_k, across_k, gamma_k)
     speed = (along_i * math.sin(gamma_k) - along_k * math.sin(gamma_i)) / determinant
     sideways = (along_k * math.cos(gamma_i) - along_i * math.cos(gamma_k)) / determinant
-    return speed, sideways / point_offset
+    return speed, sideways

@@ -51,21 +51,41 @@ def l_phi_demand(
 
 
 @compiled
-def point_command(
-    along: float, across: float, gamma: float, point_offset: float
-) -> tuple[float, float]:
-    """Return the follower's (v_j, ω_j) that give its control point the wanted velocity (A, B).
+def sampled_rate(alpha: float, dt: float) -> float:
+    """Return the gain (1/s) with which an error decays as exp(-α t) under commands held for dt."""
+    return (1.0 - math.exp(-alpha * dt)) / dt
+
+
+@compiled
+def point_velocity(along: float, across: float, gamma: float) -> tuple[float, float]:
+    """Return the wanted velocity (m/s) of the control point ahead of and across the follower.
 
     ::
 
         v_j = A cos(γ) - B sin(γ)        d ω_j = A sin(γ) + B cos(γ)
 
-    No γ is singular. The command ignores limits, and may ask for reversing: see
-    :func:`limit_command`.
+    No γ is singular.
     """
     cosine = math.cos(gamma)
     sine = math.sin(gamma)
-    return along * cosine - across * sine, (along * sine + across * cosine) / point_offset
+    return along * cosine - across * sine, along * sine + across * cosine
+
+
+@compiled
+def held_command(
+    ahead: float, across: float, point_offset: float, dt: float
+) -> tuple[float, float]:
+    """Return (v_j, ω_j) that, held for dt (s), move the control point as its velocity asks.
+
+    The robot moves on an arc. It ends with the control point where (``ahead``, ``across``), m/s,
+    takes it in a straight line; as dt goes to 0, v_j = ahead and ω_j = across / d. The command
+    ignores limits, and may ask for reversing: see :func:`limit_command`.
+    """
+    half = math.atan2(0.5 * across * dt, point_offset + 0.5 * ahead * dt)
+    c, s = math.cos(half), math.sin(half)
+    chord = ahead * dt * c + across * dt * s
+    arc = half / s if abs(s) > 1e-6 else 1.0
+    return chord * arc / dt, 2.0 * half / dt
 
 
 @compiled

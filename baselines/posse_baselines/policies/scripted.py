@@ -13,7 +13,7 @@ from posse_baselines.policies.simple import Idle, Random
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuning import Tunable, tunables
 
-_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl", "near": 0.15, "far": 0.8}
+_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl"}
 _CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame": "slot-frame"}
 
 FAMILY: Final[dict[str, Settings]] = {
