@@ -32,7 +32,7 @@ OF_OCCUPANT: Final = 2
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that asks for the greatest speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; a sensor that reaches farther finds the target without being moved
-_MOST_DEVIATION: Final = math.acos(MIN_COSINE)  # rad; beyond, a pursuit hardly closes in
+_MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
 
 Motion = tuple[float, float, float, float]
 
@@ -102,15 +102,22 @@ def pursue(
     if s.deviation != NO_DEVIATION and d.task == FLOCKING:
         # Feedback on the bearing, c = ... + G wrap(σ - σ_d), acts as a greater K does.
         constant += s.bearing_gain
+    if s.deviation == OF_OCCUPANT and d.task == FLOCKING:
+        # Who heads away from the target, in front of it, turns the bearing the other way.
+        constant *= clip(math.cos(wanted_theta - wanted_sigma) / MIN_COSINE, -1.0, 1.0)
     theta = lawful_heading(sigma, constant, wanted_sigma, wanted_theta)
-    delta = clip(deviation(theta, sigma), -_MOST_DEVIATION, _MOST_DEVIATION)
-    theta = sigma + delta
+    delta = deviation(theta, sigma)
     target_delta = deviation(d.now_theta, sigma)
-    speed = body.max_speed
     if d.task == FLOCKING:
         speed = maintenance_speed(
-            d.speed, target_delta, delta, r, length(arm_x, arm_y), s.range_gain, body.max_speed
-        )
+            d.speed, target_delta, delta, r, length(arm_x, arm_y), frame_rate,
+            s.range_gain, body.max_speed,
+        )  # fmt: skip
+    else:
+        # A chase has to close in, whichever side of the target its slot is on.
+        speed = float(body.max_speed)
+        delta = clip(delta, -_MOST_DEVIATION, _MOST_DEVIATION)
+    theta = sigma + delta
     sigma_rate = bearing_rate(r, d.speed, target_delta, speed, delta)
     d.closing = 1 if d.task == CONVERGING else 0
     return take_up(

@@ -27,8 +27,8 @@ from typing import Final
 from posse.numeric import compiled
 from posse_baselines.laws.geometry import clip, wrap
 
-MIN_COSINE: Final = 0.25
-"""A smaller cosine of the tracker's deviation counts as this one: nobody closes in sideways."""
+MIN_COSINE: Final = 0.6
+"""With a smaller cosine of its deviation a tracker hardly changes the range."""
 
 
 @compiled
@@ -53,30 +53,31 @@ def lawful_rate(navigation_constant: float, sigma_rate: float, frame_rate: float
 
 
 @compiled
-def matching_speed(target_speed: float, target_delta: float, tracker_delta: float) -> float:
-    """Return the tracker's speed (m/s) at which the range rests, dr/dt = 0: (13).
-
-    ``v cos(θ_i - σ) / cos(M σ)``, with the tracker's deviation for ``M σ``. It is negative where
-    the target approaches. A cosine below ``MIN_COSINE`` counts as ``MIN_COSINE``.
-    """
-    return target_speed * math.cos(target_delta) / max(math.cos(tracker_delta), MIN_COSINE)
-
-
-@compiled
 def maintenance_speed(
     target_speed: float,
     target_delta: float,
     tracker_delta: float,
     r: float,
     wanted_range: float,
+    frame_rate: float,
     range_gain: float,
     max_speed: float,
 ) -> float:
     """Return the tracker's speed (m/s, [0, max_speed]) that brings the range to the wanted one.
 
-    (13) with a correction on the range error, so that dr/dt = range_gain (r_d - r) wherever no
-    limit is hit. ``range_gain`` is in 1/s, and has to stay below 1 / control step.
+    (13) with a correction of the range error::
+
+        v = (v_i cos(θ_i - σ) + k_r (r - r_d)) / cos(δ)
+
+    so that dr/dt = k_r (r_d - r) wherever no limit is hit; δ is the tracker's deviation (M σ in the
+    paper). ``range_gain`` k_r is in 1/s, and has to stay below 1 / control step. It holds for a
+    tracker that moves away from the target too (cos δ < 0), where the target moves towards it.
+    Where cos δ is small, (13) is ill-conditioned: there the speed is the part along the heading of
+    the velocity that keeps range and bearing, the bearing turning at ``frame_rate`` (rad/s).
     """
-    correction = range_gain * (r - wanted_range) / max(math.cos(tracker_delta), MIN_COSINE)
-    matching = matching_speed(target_speed, target_delta, tracker_delta)
-    return clip(matching + correction, 0.0, max_speed)
+    along = target_speed * math.cos(target_delta) + range_gain * (r - wanted_range)
+    cosine = math.cos(tracker_delta)
+    if abs(cosine) >= MIN_COSINE:
+        return clip(along / cosine, 0.0, max_speed)
+    across = target_speed * math.sin(target_delta) - r * frame_rate
+    return clip(along * cosine + across * math.sin(tracker_delta), 0.0, max_speed)
