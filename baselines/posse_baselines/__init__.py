@@ -15,8 +15,10 @@ from posse_baselines.policy import (
     split_agents,
     stack_agents,
 )
+from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.registry import load, policy_names
 from posse_baselines.tracker_env import register
+from posse_baselines.tuning import Tunable
 
 register()
 
@@ -27,11 +29,15 @@ __all__ = [
     "Policy",
     "PolicyError",
     "StateReader",
+    "Tunable",
     "begin",
     "load",
     "play",
     "policy_names",
     "rollout",
+    "settings_of",
     "split_agents",
     "stack_agents",
+    "tunable",
+    "with_settings",
 ]

@@ -63,7 +63,8 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
     d.now_x, d.now_y, d.now_theta = x, y, theta
     limit = frame_limit(d.speed, float(o[f.max_speed]), outermost)
     psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
-    d.psi_rate = clip(wrap(theta - psi) / dt, -limit, limit)
+    turn = s.turn_share * d.turn * math.exp(-d.age / s.turn_memory)
+    d.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
     # What the rest of the step would otherwise work out again for every slot and every disc.
     d.speed_x, d.speed_y = d.speed * math.cos(theta), d.speed * math.sin(theta)
     d.frame_cos, d.frame_sin = math.cos(psi), math.sin(psi)

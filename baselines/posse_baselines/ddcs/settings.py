@@ -66,6 +66,9 @@ class Settings:
     """How long the target is taken to keep its present velocity, before its mean one counts."""
     turn_memory: float = tuned(1.0, "s", 0.1, 5.0)
     """Time constant with which a measured turn rate of the target fades."""
+    turn_share: float = tuned(0.0, "", 0.0, 1.0)
+    """Share of that turn rate in the slot frame's rate once the frame has caught up with it: 1 is
+    exact for a target on a circle, 0 scores better against one that weaves."""
     way_memory: float = tuned(3.0, "s", 0.5, 10.0)
     """Time constant with which the target's speed fades in an estimate older than 1 s."""
     fix_trust: float = tuned(0.6, "", 0.05, 1.0)

@@ -13,7 +13,7 @@ from posse_baselines.policies.simple import Idle, Random
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuning import Tunable, tunables
 
-_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl"}
+_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl", "turn_share": 1.0}
 _CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame": "slot-frame"}
 
 FAMILY: Final[dict[str, Settings]] = {

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posse_baselines.laws.heading import BODY, regulate
 from posse_baselines.laws.safeguard import (
-    BODY,
     DISC,
     LOOK_AHEAD,
     PLAYS,
     begin_plays,
-    command,
     cost_of,
     play_all,
     put_disc,
@@ -39,7 +38,7 @@ def body_of(theta: float, speed: float, limits: tuple[float, float]) -> Any:
 
 def drive(body: Any, x: float, y: float, wanted: tuple[float, float]) -> tuple[float, float]:
     """Move a body for one control step as it commands, in short steps; return the new place."""
-    speed, omega = command(body, *wanted)
+    speed, omega = regulate(body, *wanted, 0.0)
     for _ in range(10):
         dv, dw = body.acceleration * DT / 10, body.turn_acceleration * DT / 10
         body.speed = min(max(speed, body.speed - dv), body.speed + dv)

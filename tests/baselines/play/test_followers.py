@@ -1,0 +1,160 @@
+"""Followers of the centralized model as policies play them: l-φ and l-l, and their frames."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posse_baselines import Policy, load, with_settings
+from posse_baselines.ddcs import FLOCKING
+from tests.support.drive import Instant, complex_of, drive
+
+OFFSET = 0.15  # m, of the control point
+ALPHA = 2.0  # 1/s
+LIMITS: dict[str, Any] = {
+    "tracker_speed": 2.0, "tracker_turn_rate": 10.0, "target_speed": 1.2, "num_trackers": 2,
+    "start_distance": (0.5, 6.0),
+}  # fmt: skip
+"""So wide that none is hit. Nobody has moved yet, and 0.6 of the own speed is what is expected."""
+WING = 1.2 * math.sqrt(0.5)
+PLACE = complex(-WING, WING)
+"""Of the second slot of the wedge, from the first, in the frame of the formation."""
+
+
+def team(
+    policy: str | Policy,
+    error: complex,
+    dt: float = 0.1,
+    seconds: float = 3.0,
+    target: Callable[[float], tuple[float, float]] = lambda _: (1.2, 0.0),
+    theta: float = 0.0,
+) -> list[Instant]:
+    """A leader in its slot, and a follower that is ``error`` (m) off its own."""
+    leader, follower = -1.2 + 0j, -1.2 + PLACE + error
+    start = [(z.real, z.imag, theta * i) for i, z in enumerate((leader, follower))]
+    return list(
+        drive(
+            policy, "constant", 1, round(seconds / dt), tracker_pose=start,
+            target_pose=(0.0, 0.0, 0.0), target=target, control_step=dt, physics_step=dt / 2,
+            **LIMITS,
+        )
+    )  # fmt: skip
+
+
+def control_point(now: Instant) -> tuple[complex, float]:
+    """The follower's control point as seen from the leader (m), and the leader's heading."""
+    place, theta = complex_of(now.tracker)[0], now.tracker[0, :, 2]
+    return complex(place[1] + cmath.rect(OFFSET, theta[1]) - place[0]), float(theta[0])
+
+
+@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004), (0.005, 0.001)])
+@pytest.mark.parametrize("frame", ["leader", "slot-frame"])
+def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
+    wanted = PLACE + OFFSET
+    for error in (0.3 + 0.2j, -0.3 + 0.2j, -0.3j, -0.4 + 0j, 0.2 + 0.3j):
+        seen = team(with_settings("pngl-l-phi", follower_frame=frame), error, dt)
+        assert all((now.notes["task"] == FLOCKING).all() for now in seen)
+        arms = [control_point(now)[0] for now in seen]
+        decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
+        off = np.abs(arms) - abs(wanted)
+        np.testing.assert_allclose(off, off[0] * decay, atol=allowed)
+        turned = np.angle(np.array(arms) / wanted)
+        np.testing.assert_allclose(turned, turned[0] * decay, atol=allowed)
+
+
+def test_the_rates_are_those_of_the_settings() -> None:
+    policy = with_settings("pngl-l-phi", alpha_1=1.0, alpha_2=3.0)
+    seen = team(policy, -0.3 + 0.2j, 0.02)
+    wanted = PLACE + OFFSET
+    arms = [control_point(now)[0] for now in seen]
+    time = np.array([now.time for now in seen])
+    off, turned = np.abs(arms) - abs(wanted), np.angle(np.array(arms) / wanted)
+    np.testing.assert_allclose(off, off[0] * np.exp(-time), atol=0.004)
+    np.testing.assert_allclose(turned, turned[0] * np.exp(-3.0 * time), atol=0.004)
+
+
+def weaving(t: float) -> tuple[float, float]:
+    return 0.8, 0.25
+
+
+def test_phi_is_kept_from_the_leader_s_heading_while_it_turns() -> None:
+    # Figure 6: on a circle the formation turns with the leader, and the follower's centre keeps to
+    # its place in the leader's frame.
+    policy = with_settings("ddcs-centralized", follower_frame="leader")
+    last = team(policy, 0j, seconds=20.0, target=weaving)[-50:]
+    for now in last:
+        place, theta = complex_of(now.tracker)[0], now.tracker[0, 0, 2]
+        seen = (place[1] - place[0]) * cmath.exp(-1j * theta)
+        assert abs(seen - PLACE) < 0.01
+
+
+def test_phi_is_kept_from_the_slot_frame_while_it_turns() -> None:
+    # Without the frame's rate in B the follower would be 0.11 m off.
+    last = team("pngl-l-phi", 0j, seconds=20.0, target=lambda _: (0.8, 0.15))[-50:]
+    for now in last:
+        place = complex_of(now.tracker)[0]
+        seen = (place[1] - place[0]) * cmath.exp(-1j * now.psi[0])
+        assert abs(seen - PLACE) < 0.01
+    rates = np.diff(np.unwrap([now.psi[0] for now in last])) / 0.1
+    assert np.abs(rates).min() > 0.1  # the frame did turn
+
+
+def test_a_follower_never_reverses() -> None:
+    seen = team("pngl-l-phi", 0.5 - 0.1j, theta=2.0)
+    assert min(now.commands[..., 0].min() for now in seen) >= -1e-6
+    *_, last = team("pngl-l-phi", 0.5 - 0.1j, theta=2.0, seconds=8.0)
+    assert abs(control_point(last)[0] - PLACE - OFFSET) < 0.02
+
+
+# --- l-l -----------------------------------------------------------------------------------------
+
+
+def three(policy: str | Policy, error: complex, dt: float) -> list[Instant]:
+    """Three trackers of a wedge in their slots, but the third is ``error`` (m) off its own."""
+    places = (-1.2 + 0j, -1.2 + PLACE, -1.2 + PLACE.conjugate() + error)
+    return list(
+        drive(
+            policy, "constant", 1, round(2.0 / dt), target=lambda _: (1.2, 0.0),
+            tracker_pose=[(z.real, z.imag, 0.0) for z in places], target_pose=(0.0, 0.0, 0.0),
+            control_step=dt, physics_step=dt / 2, **{**LIMITS, "num_trackers": 3},
+        )
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.003), (0.02, 0.001)])
+def test_l_l_closes_the_distances_to_two_robots(dt: float, allowed: float) -> None:
+    error = -0.35 + 0.2j  # under l-φ the second distance is up to 0.006 m and 0.008 m off
+    seen = three("ddcs-centralized-l-l", error, dt)
+    decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
+    for mate, place in ((0, 0j), (1, PLACE)):
+        arms = np.array(
+            [
+                complex_of(now.tracker)[0, 2]
+                + cmath.rect(OFFSET, now.tracker[0, 2, 2])
+                - complex_of(now.tracker)[0, mate]
+                for now in seen
+            ]
+        )
+        off = np.abs(arms) - abs(PLACE.conjugate() + OFFSET - place)
+        # In the first step nobody knows yet who is in its place: that one is l-φ.
+        np.testing.assert_allclose(off[2:], off[2] * decay[2:] / decay[2], atol=allowed)
+
+
+def test_l_l_and_l_phi_differ_from_the_third_robot_on_alone() -> None:
+    both = [three(name, -0.35 + 0.2j, 0.1) for name in ("ddcs-centralized-l-l", "ddcs-centralized")]
+    for a, b in zip(*both, strict=True):
+        np.testing.assert_allclose(a.commands[0, :2], b.commands[0, :2], atol=1e-5)
+    assert any(np.abs(a.commands - b.commands).max() > 0.02 for a, b in zip(*both, strict=True))
+
+
+def test_in_rows_the_first_row_is_in_line_and_keeps_l_phi() -> None:
+    notes = []
+    for name in ("ddcs-centralized-l-l", "ddcs-centralized"):
+        *_, last = drive(load(name), "constant", 10, 400, formation="rows", num_trackers=6)
+        notes.append((last.notes["task"] == FLOCKING).mean())
+    assert min(notes) > 0.95

@@ -1,0 +1,193 @@
+"""The guidance laws as policies play them, against what is known of them in closed form."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from posse_baselines import Policy, load, with_settings
+from posse_baselines.ddcs import CONVERGING, FLOCKING
+from tests.support.drive import Instant, complex_of, drive
+
+ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
+RATIOS = (1.2, 1.5, 2.0, 3.0)
+START, LAST = 4.0, 0.5  # m
+
+
+def exact_time(k: float, aspect: float, general: float = 1.0) -> float:
+    """When θ = K σ comes within LAST of a target of speed 1 / k that heads along the x-axis."""
+
+    def rates(_: float, state: Any) -> list[float]:
+        r, sigma = state
+        delta = (general - 1.0) * sigma
+        return [
+            math.cos(sigma) / k - math.cos(delta),
+            (-math.sin(sigma) / k - math.sin(delta)) / r,
+        ]
+
+    def met(_: float, state: Any) -> float:
+        return float(state[0]) - LAST
+
+    met.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(rates, (0, 300), [START, -aspect], events=met, rtol=1e-9, atol=1e-11)
+    return float(found.t_events[0][0])
+
+
+def intercept_times(policy: str | Policy, k: float, dt: float, general: float = 1.0) -> Any:
+    """Times until the range is LAST, one for each aspect, (7,)."""
+    tracker = [[(-START * math.cos(a), START * math.sin(a), -general * a)] for a in ASPECTS]
+    longest = max(exact_time(k, a, general) for a in ASPECTS)
+    ranges = np.stack(
+        [
+            np.abs(now.line_of_sight[:, 0])
+            for now in drive(
+                policy, "constant", len(ASPECTS), math.ceil(1.1 * longest / dt),
+                tracker_pose=tracker, target_pose=np.zeros((len(ASPECTS), 3)),
+                num_trackers=1, control_step=dt, physics_step=dt / 2, target_speed=1.0 / k,
+                tracker_turn_rate=6.0, formation_distance=0.35, tolerance=0.1,
+                start_distance=(1.0, 10.0),
+            )
+        ]
+    )  # fmt: skip
+    after = (ranges <= LAST).argmax(axis=0)
+    assert (after > 0).all()
+    column = np.arange(len(ASPECTS))
+    before = ranges[after - 1, column]
+    return dt * (after - 1 + (before - LAST) / (before - ranges[after, column]))
+
+
+@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.025), (0.05, 0.010), (0.01, 0.002)])
+def test_velocity_pursuit_meets_its_target_when_the_closed_form_says(
+    dt: float, allowed: float
+) -> None:
+    for k in RATIOS:
+        times = intercept_times("velocity-pursuit", k, dt)
+        exact = [exact_time(k, aspect) for aspect in ASPECTS]
+        np.testing.assert_allclose(times, exact, rtol=allowed)
+
+
+@pytest.mark.parametrize("general", [0.9, 1.1])
+def test_pngl_as_printed_meets_its_target_when_its_equations_say(general: float) -> None:
+    policy = with_settings("velocity-pursuit", navigation_constant=general)
+    for k in (1.5, 3.0):
+        times = intercept_times(policy, k, 0.1, general)
+        exact = [exact_time(k, aspect, general) for aspect in ASPECTS]
+        # Almost head-on the limit of the turn rate counts.
+        np.testing.assert_allclose(times[:-1], exact[:-1], rtol=0.01)
+
+
+def on_a_circle(policy: str | Policy, seconds: float, rate: float = 0.3) -> list[Instant]:
+    """One tracker after a target on a circle of 2 m about (0, 2)."""
+    return list(
+        drive(
+            policy, "constant", 1, round(10 * seconds), num_trackers=1,
+            tracker_pose=[(-1.2, -1.0, 0.0)], target_pose=(0.0, 0.0, 0.0),
+            target=lambda _: (0.6, rate),
+        )
+    )  # fmt: skip
+
+
+def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> None:
+    # R_t² = R_p² + r², with R_t = 2 and r = 1.2.
+    last = on_a_circle("velocity-pursuit", 90.0)[-100:]
+    radii = [abs(complex_of(now.tracker)[0, 0] - 2j) for now in last]
+    np.testing.assert_allclose(radii, 1.6, rtol=0.005)
+    speeds = [now.commands[0, 0, 0] for now in last]
+    np.testing.assert_allclose(speeds, 0.6 * 1.6 / 2.0, rtol=0.005)
+
+
+def test_the_range_rests_whatever_the_target_s_angle() -> None:
+    # (13): the target swerves in front of a tracker in place; the range is kept.
+    ranges = [
+        abs(now.line_of_sight[0, 0])
+        for now in drive(
+            with_settings("velocity-pursuit", range_gain=0.1), "constant", 1, 100,
+            num_trackers=1, tracker_pose=[(-1.2, 0.0, 0.0)], target_pose=(0.0, 0.0, 0.0),
+            target=lambda t: (0.6, 0.5 * math.sin(2.0 * t)), tracker_turn_rate=4.0,
+        )
+    ]  # fmt: skip
+    np.testing.assert_allclose(ranges, 1.2, atol=0.02)
+
+
+def test_chase_and_maintenance_change_with_hysteresis() -> None:
+    # One that comes from afar chases until it is 0.15 m too far; one in place that has to turn
+    # round first is left behind by up to 0.8 m, and does not chase.
+    between: list[set[int]] = []
+    for pose in ((-2.4, 0.0, 0.0), (-1.2, 0.0, 2.5)):
+        tasks = set()
+        for now in drive(
+            "velocity-pursuit", "constant", 1, 60, num_trackers=1, target_speed=0.5,
+            tracker_pose=[pose], target_pose=(0.0, 0.0, 0.0),
+        ):  # fmt: skip
+            excess, task = abs(now.line_of_sight[0, 0]) - 1.2, int(now.notes["task"][0, 0])
+            if excess < 0.15:
+                assert task == FLOCKING
+            elif excess > 0.8:
+                assert task == CONVERGING
+            elif 0.2 < excess < 0.75:
+                tasks.add(task)
+        between.append(tasks)
+    assert between == [{CONVERGING}, {FLOCKING}]
+
+
+@pytest.mark.parametrize("theta", [math.pi, 0.5, -2.0])
+@pytest.mark.parametrize("name", ["pngl", "deviated-pursuit"])
+def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: float) -> None:
+    rng = np.random.default_rng(5)
+    worlds, starts = 100, []
+    while len(starts) < worlds:  # behind the target, a metre apart at least
+        away = rng.uniform(-4.0, -1.0, 5) + 1j * rng.uniform(-2.5, 2.5, 5)
+        if min(abs(a - b) for i, a in enumerate(away) for b in away[:i]) > 0.6:
+            heading = rng.uniform(-math.pi, math.pi, 5)
+            turned = away * np.exp(1j * theta)
+            starts.append(np.stack([turned.real, turned.imag, heading], axis=-1))
+    policy = load(name)
+    seen = list(
+        drive(
+            policy, "paper-distributed", worlds, 250, tracker_pose=starts,
+            target_pose=np.tile([0.0, 0.0, theta], (worlds, 1)), start_distance=(0.5, 6.0),
+        )
+    )  # fmt: skip
+    relative = np.stack([-now.line_of_sight for now in seen])
+    settled = np.abs(relative[200:] - relative[-1]).max(axis=(0, 2)) < 0.1
+    assert settled.all()
+    # Where they end: the five slots of the wedge, one each.
+    wing = 0.8 * math.sqrt(0.5)
+    wedge = [-0.8, *(-0.8 - k * wing + 1j * s * k * wing for k in (1, 2) for s in (1, -1))]
+    places = relative[-1] * np.exp(-1j * theta)
+    distance = np.abs(places[:, :, None] - np.array(wedge))
+    assert distance.min(axis=1).max() < 0.05
+    assert (np.sort(distance.argmin(axis=2), axis=1) == np.arange(5)).all()
+
+
+def test_without_a_deviation_the_bearing_settles_at_the_heading_over_k() -> None:
+    bearings = []
+    for k in (0.9, 1.0, 1.1):
+        *_, last = drive(
+            with_settings("velocity-pursuit", navigation_constant=k), "constant", 1, 400,
+            num_trackers=1, tracker_pose=[(4.0, -1.0, 3.0)], target_pose=(0.0, 0.0, 2.6),
+        )  # fmt: skip
+        bearings.append(np.angle(last.line_of_sight[0, 0]))
+        assert abs(last.line_of_sight[0, 0]) == pytest.approx(1.2, abs=0.01)
+    np.testing.assert_allclose(bearings, [2.6 / 0.9, 2.6, 2.6 / 1.1], atol=0.01)
+
+
+def test_the_bearing_converges_at_the_stated_rate() -> None:
+    # K v_t / (r cos δ), with δ = 0 in the slot: behind a target that goes straight.
+    for k in (0.9, 1.1):
+        errors = np.array(
+            [
+                np.angle(now.line_of_sight[0, 0])
+                for now in drive(
+                    with_settings("pngl", navigation_constant=k), "constant", 1, 60,
+                    num_trackers=1, target_pose=(0.0, 0.0, 0.0),
+                    tracker_pose=[(-1.2 * math.cos(0.2), -1.2 * math.sin(0.2), k * 0.2)],
+                )
+            ]
+        )  # fmt: skip
+        rate = np.log(errors[10] / errors[50]) / 4.0
+        assert rate == pytest.approx(k * 0.6 / 1.2, rel=0.03)

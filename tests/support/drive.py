@@ -1,0 +1,98 @@
+"""Policies driven through the public interface from given poses, with a target that a test steers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import posse
+from posse_baselines import Policy, begin, load
+
+Floats = npt.NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Where everybody is before a step, what the team has in mind, and what it commands then.
+
+    Attributes:
+        time: s.
+        tracker: (E, N, 3), x, y, θ.
+        target: (E, 3).
+        psi: (E,), heading of the slot frame.
+        notes: The policy's annotations, (E, N) each.
+        commands: (E, N, 2), V in m/s and ω in rad/s.
+        broken: (E, N).
+    """
+
+    time: float
+    tracker: Floats
+    target: Floats
+    psi: Floats
+    notes: dict[str, Any]
+    commands: Floats
+    broken: npt.NDArray[np.bool_]
+
+    @property
+    def line_of_sight(self) -> npt.NDArray[np.complex128]:
+        """From each tracker to the target, as complex numbers, (E, N)."""
+        return complex_of(self.target)[:, None] - complex_of(self.tracker)
+
+
+def complex_of(poses: Floats) -> npt.NDArray[np.complex128]:
+    """Positions of poses (..., 3) in the complex plane."""
+    return np.asarray(poses[..., 0] + 1j * poses[..., 1], np.complex128)
+
+
+def drive(
+    policy: str | Policy,
+    scenario: str,
+    worlds: int,
+    steps: int,
+    *,
+    tracker_pose: Any = None,
+    target_pose: Any = None,
+    target: Callable[[float], tuple[float, float]] | None = None,
+    seed: int = 0,
+    **settings: Any,
+) -> Iterator[Instant]:
+    """Play ``steps`` control steps; ``target`` gives its (V, ω) for a time, where a test steers it."""
+    team = load(policy) if isinstance(policy, str) else policy
+    if target is not None:
+        settings["target_motion"] = "agent"
+    settings = {"message_size": team.message_size, "horizon": steps + 1000, **settings}
+    batch = posse.batch(scenario, worlds, seed=seed, autoreset="disabled", **settings)
+    options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
+    observations = batch.reset(options={k: v for k, v in options.items() if v is not None})
+    memory, s = begin(team, batch), batch.scenario
+    limits = np.array([0.5 * s.tracker_speed, s.tracker_turn_rate])
+    for step in range(steps):
+        state = {name: array.copy() for name, array in batch.state.items()}
+        given = observations[:, : s.num_trackers]
+        team_actions, memory = team.act(given, memory)
+        actions = np.zeros(batch.action_shape, np.float32)
+        actions[:, : s.num_trackers] = team_actions
+        if target is not None:
+            speed, omega = target(step * s.control_step)
+            actions[:, -1, 0] = 2.0 * speed / s.target_speed - 1.0
+            actions[:, -1, 1] = omega / s.target_turn_rate
+        yield Instant(
+            step * s.control_step,
+            poses(state, "tracker"),
+            poses(state, "world"),
+            np.arctan2(state["world_frame_sin"], state["world_frame_cos"]),
+            team.annotations(memory),
+            (team_actions[..., :2].astype(np.float64) + (1.0, 0.0)) * limits,
+            batch.layout.views(given)["working"] == 0.0,
+        )
+        observations, *_ = batch.step(actions)
+
+
+def poses(state: dict[str, Any], who: str) -> Floats:
+    """(..., 3) of the trackers or of the target (``world``)."""
+    theta = np.arctan2(state[f"{who}_heading_sin"], state[f"{who}_heading_cos"])
+    return np.stack([state[f"{who}_x"], state[f"{who}_y"], theta], axis=-1).astype(np.float64)
