@@ -22,12 +22,13 @@ from rich.table import Table
 
 import posse
 from posse.engine import kernels as world
-from posse.engine.scratch import SCRATCH
+from posse.engine.scratch import scratch_for
 from posse.numeric import kernel
 from posse.rules import contact, motion, score
 from posse.rules import discs as survey
 from posse.rules.scratch import new_scratch
 from posse.signals import together
+from posse.signals.parts import Writers, built_in_parts, writers_for
 
 PARTS = (
     "motion", "where the discs are, and how near", "contact", "target sensor and radio", "score",
@@ -49,13 +50,17 @@ class Settings:
     out: Path = Path("runs/bench/costs.json")
 
 
+SETTINGS, OWN_FIELDS, WIDTH = writers_for(built_in_parts())
+
+
 @kernel(short_loops=True)
 def one_part(  # type: ignore[no-untyped-def]
     part, tables, worlds, actions, results, memory
 ):
     """Do one part of a step in every world."""
     scratch = memory[0]
-    world.prepare(tables, scratch)
+    writers = Writers(SETTINGS, OWN_FIELDS, WIDTH)
+    world.prepare(tables, writers, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
         w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
@@ -76,10 +81,12 @@ def one_part(  # type: ignore[no-untyped-def]
         elif part == 6:
             world.reward(c, w, t, tables.weights, results.rewards[e], results.terms[e])
         elif part == 7:
-            world.observe(c, worlds, e, scratch, observations[e])
+            world.observe(c, worlds, e, writers, scratch, observations)
             begun = e % together.TOGETHER + 1
             if begun == together.TOGETHER or e == len(worlds.world) - 1:
-                together.observe_together(c, worlds, e + 1 - begun, begun, scratch, observations)
+                together.observe_together(
+                    c, worlds, e + 1 - begun, begun, writers, scratch, observations
+                )
 
 
 def best(call: Callable[[], object], seconds: float) -> float:
@@ -114,7 +121,9 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     advance = batch.stepper(actions, observations, rewards, terms)
     flags = np.empty((2, batch.num_worlds), np.bool_)
     results = world.Results(observations, rewards, terms, flags)
-    arguments = (batch._tables, batch.arrays, actions, results, new_scratch(SCRATCH))
+    width = built_in_parts().width
+    memory = new_scratch(scratch_for(width, 8))
+    arguments = (batch._tables, batch.arrays, actions, results, memory)
     costs = {"step": best(advance, seconds) / agents * 1e9}
     snapshot = batch.save()
     for number, name in enumerate(PARTS):

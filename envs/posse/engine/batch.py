@@ -30,7 +30,7 @@ from posse.engine.kernels import (
     own_kernel,
     tables_of,
 )
-from posse.engine.scratch import SCRATCH
+from posse.engine.scratch import scratch_for
 from posse.numeric import (
     BoolArray,
     FloatArray,
@@ -50,6 +50,7 @@ from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import SAFE_MARGIN
 from posse.signals.metrics import episode_metrics
 from posse.signals.observation import ObservationLayout
+from posse.signals.parts import parts_for
 from posse.signals.reward import REWARD_TERMS, TermsByName
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
@@ -178,7 +179,8 @@ class Batch:
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
-        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
+        memory = scratch_for(parts_for(scenario).width, 8)
+        self._scratch = [new_scratch(memory) for _ in range(threads)]
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (

@@ -9,6 +9,7 @@ slowly: enough to test with, on a machine that has none.
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import itertools
 from collections.abc import Mapping
@@ -30,11 +31,12 @@ from posse.engine.kernels import (
     advance_worlds,
     prepare,
 )
-from posse.engine.scratch import SCRATCH_FOR_ONE
+from posse.engine.scratch import scratch_for
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario
 from posse.signals.metrics import episode_metrics
+from posse.signals.parts import Parts, Writers, parts_for, writers_for
 from posse.signals.reward import REWARD_TERMS
 
 _CONFIG: Final[Any] = numba.config
@@ -92,28 +94,37 @@ def _check(
                     cuda.atomic.min(report, _BAD_ACTION, (e * rows + i) * width + k)
 
 
-@cuda.jit  # type: ignore[untyped-decorator]
-def _advance(
-    tables: Tables,
-    worlds: WorldArrays,
-    actions: FloatArray,
-    results: Results,
-    score: FloatArray,
-    orders: npt.NDArray[np.uint8],
-    report: DeviceArray,
-) -> None:
-    """Do what each world is ordered to; nothing at all where there is something to complain of."""
-    e = cuda.grid(1)
-    if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
-        scratch = cuda.local.array(1, SCRATCH_FOR_ONE)
-        if _SIMULATED:
-            scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
-        prepare(tables, scratch[0])
-        over = advance_worlds(e, 1, tables, worlds, actions, results, orders, scratch[0])
-        results.flags[2, e] = over
-        score[e] = worlds.world[e].score
-        if over:
-            cuda.atomic.add(report, _OVER, 1)
+@functools.cache
+def _stepping(parts: Parts) -> Any:
+    """Return the kernel that steps worlds."""
+    memory = scratch_for(parts.width, 1)
+    settings, own_fields, width = writers_for(parts)
+
+    @cuda.jit  # type: ignore[untyped-decorator]
+    def advance(
+        tables: Tables,
+        worlds: WorldArrays,
+        actions: FloatArray,
+        results: Results,
+        score: FloatArray,
+        orders: npt.NDArray[np.uint8],
+        report: DeviceArray,
+    ) -> None:
+        """Do what each world is ordered to; nothing where there is something to complain of."""
+        e = cuda.grid(1)
+        if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
+            scratch = cuda.local.array(1, memory)
+            if _SIMULATED:
+                scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
+            s, writers = scratch[0], Writers(settings, own_fields, width)
+            prepare(tables, writers, s)
+            over = advance_worlds(e, 1, tables, worlds, actions, results, orders, writers, s)
+            results.flags[2, e] = over
+            score[e] = worlds.world[e].score
+            if over:
+                cuda.atomic.add(report, _OVER, 1)
+
+    return advance
 
 
 @cuda.jit  # type: ignore[untyped-decorator]
@@ -192,6 +203,7 @@ class CudaBatch(Batch):
     def _prepare(self) -> None:
         """Put the batch onto the device; the host's arrays are a mirror, up to date on demand."""
         super()._prepare()
+        self._advance = _stepping(parts_for(self.scenario))
         self._device_tables: Any = Tables(*map(cuda.to_device, self._tables))
         self._device_arrays: Any = WorldArrays(*map(cuda.to_device, self._arrays))
         self._device_actions = cuda.device_array(self.action_shape, np.float32)
@@ -209,8 +221,8 @@ class CudaBatch(Batch):
     def __getstate__(self) -> dict[str, Any]:
         self._download()
         device = (
-            "_device_tables", "_device_arrays", "_device_actions", "_all_step", "_all_look",
-            "_chosen", "_report", "_results", "_last", "_next",
+            "_advance", "_device_tables", "_device_arrays", "_device_actions", "_all_step",
+            "_all_look", "_chosen", "_report", "_results", "_last", "_next",
         )  # fmt: skip
         return {k: v for k, v in super().__getstate__().items() if k not in device}
 
@@ -400,8 +412,8 @@ class CudaBatch(Batch):
     def _launch_advance(self, actions: DeviceArray, orders: DeviceArray) -> None:
         done = self._next
         self._launch(
-            _advance, self._device_tables, self._device_arrays, actions, done.arrays(), done.score,
-            orders, self._report,
+            self._advance, self._device_tables, self._device_arrays, actions, done.arrays(),
+            done.score, orders, self._report,
         )  # fmt: skip
 
     def _launch(self, kernel: Any, *arguments: Any) -> None:

@@ -46,9 +46,10 @@ from posse.rules.state import (
 from posse.rules.targets.target_motion import AGENT
 from posse.scenarios import Scenario
 from posse.signals.observation import observe_alone, observe_target
+from posse.signals.parts import Parts, Writers, built_in_parts, parts_for, writers_for
 from posse.signals.reward import write_reward
 from posse.signals.scratch import MOST_IN_TEAM
-from posse.signals.together import TOGETHER, lay_out_task, observe_together
+from posse.signals.together import TOGETHER, observe_together
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -96,13 +97,19 @@ def sense(c: Record, worlds: WorldArrays, e: int, scratch: Record) -> None:
 
 @compiled
 def observe(
-    c: Record, worlds: WorldArrays, e: int, scratch: Record, observations: FloatArray
+    c: Record,
+    worlds: WorldArrays,
+    e: int,
+    writers: Writers,
+    scratch: Record,
+    observations: FloatArray,
 ) -> None:
-    """Write what every agent of world e observes, (rows, F), but for observe_together."""
+    """Write what every agent of world e observes, but for observe_together."""
     w, trackers = worlds.world[e], worlds.tracker[e]
-    observe_alone(c, w, trackers, worlds.heard[e], worlds.heard_message[e], scratch, observations)
+    heard, heard_message = worlds.heard[e], worlds.heard_message[e]
+    observe_alone(c, w, trackers, heard, heard_message, scratch, observations[e], writers.width)
     if c.motion == AGENT:
-        observe_target(c, w, trackers, worlds.obstacle[e], scratch, observations[c.num_trackers])
+        observe_target(c, worlds, e, writers, scratch, observations)
 
 
 @compiled(seldom=True)
@@ -195,6 +202,7 @@ def advance_worlds(
     actions: FloatArray,
     results: Results,
     orders: npt.NDArray[np.uint8],
+    writers: Writers,
     scratch: Record,
 ) -> int:
     """Do what worlds are ordered to, ``count`` from ``first`` on; return how many are over.
@@ -245,16 +253,16 @@ def advance_worlds(
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe(c, worlds, e, scratch, observations)
-    observe_together(c, worlds, first, count, scratch, results.observations)
+        observe(c, worlds, e, writers, scratch, results.observations)
+    observe_together(c, worlds, first, count, writers, scratch, results.observations)
     return over
 
 
 @compiled
-def prepare(tables: Tables, scratch: Record) -> None:
+def prepare(tables: Tables, writers: Writers, scratch: Record) -> None:
     """Write what is the same for all worlds to a thread's scratch memory."""
     lay_out_constants(tables.config[0], tables.beams, scratch)
-    lay_out_task(tables.config[0], scratch)
+    writers.settings(tables.config[0], scratch.columns)
 
 
 def tables_of(scenario: Scenario) -> Tables:
@@ -267,11 +275,12 @@ def tables_of(scenario: Scenario) -> Tables:
     )
 
 
-def _stepping(own: Tables | None) -> Callable[..., int]:
+def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
     """Return the kernel that steps worlds of any scenario, or of the one whose tables these are.
 
     Its configuration, slots and beams become constants in the code.
     """
+    settings, own_fields, width = writers_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
     @kernel(short_loops=True)
@@ -291,21 +300,21 @@ def _stepping(own: Tables | None) -> Callable[..., int]:
             tables.beams if own_beams is None else own_beams,
             tables.weights,
         )
-        s = scratch[0]
+        s, writers = scratch[0], Writers(settings, own_fields, width)
         if s.prepared[0] == _ZERO:
-            prepare(used, s)
+            prepare(used, writers, s)
             s.prepared[0] = _ONE
         over = 0
         for first, end in parts_of(thread, turns):
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
-                over += advance_worlds(e, count, used, worlds, actions, results, orders, s)
+                over += advance_worlds(e, count, used, worlds, actions, results, orders, writers, s)
         return over
 
     return advance
 
 
-advance: Final = _stepping(None)
+advance: Final = _stepping(built_in_parts(), None)
 """Do what each world is ordered to, for the worlds of a thread; the one loop over a batch.
 
 See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are over.
@@ -320,7 +329,7 @@ def own_kernel(scenario: Scenario) -> Callable[..., int]:
     what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
     compiled by itself, and kept on disk as any other.
     """
-    return _stepping(tables_of(scenario))
+    return _stepping(parts_for(scenario), tables_of(scenario))
 
 
 @kernel

@@ -17,6 +17,8 @@ from typing import Any, Final, TypeVar, cast, overload
 import numba
 import numpy as np
 from numba.core import types
+from numba.core.extending import models, register_model
+from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 
 import posse.numeric.simd.lane_code  # noqa: F401 (so that numba knows lanes)
@@ -101,6 +103,21 @@ def _widest(kind: Any) -> Any:
     return types.int64 if plain in (types.int32, types.uint8) else plain
 
 
+class _FunctionType(types.Dispatcher):
+    """A function as compiled code has it: a type, which says what to call, and no value.
+
+    numba's own has the function's address for a value, which no cache could keep.
+    """
+
+
+register_model(_FunctionType)(models.OpaqueModel)
+
+
+@lower_constant(_FunctionType)  # type: ignore[no-untyped-call, untyped-decorator]
+def _lower_function(context: Any, builder: Any, kind: Any, function: Any) -> Any:
+    return context.get_dummy_value()
+
+
 class _Function(CPUDispatcher):
     """A compiled function: one form of it for Python to call, one for kernels to link.
 
@@ -122,9 +139,9 @@ class _Function(CPUDispatcher):
         )
 
     @property
-    def _numba_type_(self) -> types.Dispatcher:
+    def _numba_type_(self) -> _FunctionType:
         """What compiled code takes this function for."""
-        return types.Dispatcher(self._linked)
+        return _FunctionType(self._linked)
 
 
 @overload

@@ -12,130 +12,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural, within_one
 from posse.rules.senses.sonar import ping
+from posse.rules.state import WorldArrays
 from posse.scenarios import Scenario
-from posse.scenarios.formation import FORMATIONS
+from posse.signals.columns import write_rows
+from posse.signals.fields import SLACK
+from posse.signals.fields import Field as Field
 from posse.signals.mates import MATE, copy_message, leave_empty
 from posse.signals.nearest import keep_nearest
-from posse.signals.together import SONAR_AT, TARGET_AT, TASK_AT, write_task
+from posse.signals.parts import Writers, parts_for
+from posse.signals.views import view_of_target
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
-_SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
-
-
-@dataclass(frozen=True)
-class Field:
-    """One named part of an observation."""
-
-    name: str
-    size: int
-    unit: str
-    low: float
-    high: float
-    meaning: str
-    unknown: float | None = None
-    """The value that stands for "not known", or ``None`` where it is always known."""
-    of_neighbour: bool = False
-    """Whether it is repeated for each place of a team-mate."""
-
-
-def _own_fields(s: Scenario) -> list[Field]:
-    bound = s.position_bound * _SLACK
-    return [
-        Field("heading", 2, "1", -1, 1, "own heading in the common frame, cosine and sine"),
-        Field("position", 2, "m", -bound, bound, "own odometry in the common frame, x and y"),
-        Field("speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "own speed"),
-        Field(
-            "turn_rate", 1, "rad/s",
-            -_most_turn(s), _most_turn(s), "own turn rate, positive to the left",
-        ),
-        Field("touching", 1, "1", 0, 1, "1 while it touches a robot, an obstacle or a wall"),
-        Field("working", 1, "1", 0, 1, "0 once it is broken: its actions are ignored"),
-    ]  # fmt: skip
-
-
-def _most_turn(s: Scenario) -> float:
-    return max(s.tracker_turn_rate, s.target_turn_rate) * _SLACK
-
-
-def _task_fields(s: Scenario) -> list[Field]:
-    n = s.num_trackers
-    return [
-        Field(
-            "formation", len(FORMATIONS), "1", 0, 1,
-            f"the formation asked for: 1 at its place among {', '.join(FORMATIONS)}",
-        ),
-        Field("number", 1, "1", -1, n - 1, "own number, 0 to N - 1", unknown=-1),
-        Field("team_size", 1, "1", n, n, "N, trackers in the team"),
-        _known(
-            s.formation_distance, "formation_distance", "m",
-            "wanted distance from the target to the nearest slot",
-        ),
-        _known(
-            s.formation_spacing, "formation_spacing", "m",
-            "wanted distance between neighbouring slots",
-        ),
-        Field("max_speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "own greatest speed"),
-        Field("max_turn_rate", 1, "rad/s", 0, _most_turn(s), "own greatest turn rate"),
-        Field(
-            "acceleration_time", 1, "s",
-            0, s.tracker_speed / s.tracker_acceleration * _SLACK,
-            "from rest to full speed; 0: at once",
-        ),
-        Field(
-            "turn_acceleration_time", 1, "s",
-            0, s.tracker_turn_rate / s.tracker_turn_acceleration * _SLACK,
-            "from no turn to the greatest turn rate; 0: at once",
-        ),
-        _known(s.tolerance, "tolerance", "m", "how near to a slot counts as in it"),
-        _known(s.robot_radius, "robot_radius", "m", "of every robot's disc"),
-        _known(s.control_step, "control_step", "s", "from one action to the next"),
-        _known(
-            s.sensing_range, "sensing_range", "m", "how far its sensor reaches; -1: any distance"
-        ),
-        _known(s.sonar_range, "sonar_range", "m", "how far its sonar reaches"),
-        _known(s.arena, "arena", "m", "side of the walled square round the origin; -1: no walls"),
-        Field("time_left", 1, "s", 0, s.duration * _SLACK, "until the episode is truncated"),
-    ]  # fmt: skip
-
-
-def _known(value: float, name: str, unit: str, meaning: str) -> Field:
-    """Return a field that holds a setting of the scenario; -1 stands for a boundless one."""
-    if math.isinf(value):
-        return Field(name, 1, unit, -1, -1, meaning)
-    return Field(name, 1, unit, value / _SLACK, value * _SLACK, meaning)
-
-
-def _target_fields(s: Scenario) -> list[Field]:
-    noise = 1 + 3 * s.range_noise + 3 * s.bearing_noise
-    most = s.range_bound * noise * _SLACK
-    return [
-        Field("target_known", 1, "1", 0, 1, "1 once it has a fix of the target, seen or heard"),
-        Field("target_seen", 1, "1", 0, 1, "1 while its own sensor has the target"),
-        Field(
-            "target_age", 1, "s", -1, s.duration * _SLACK,
-            "age of the fix that the following fields are about", unknown=-1,
-        ),
-        Field("target_range", 1, "m", -1, most, "distance of the fix from here", unknown=-1),
-        Field("target_bearing", 2, "1", -1, 1, "direction of the fix, ego", unknown=0),
-        Field("target_heading", 2, "1", -1, 1, "heading of the target at the fix, ego", unknown=0),
-        Field("target_frame", 2, "1", -1, 1, "slot frame ψ at the fix, ego", unknown=0),
-        Field(
-            "target_velocity", 2, "m/s", -s.tracker_speed * _SLACK, s.tracker_speed * _SLACK,
-            "velocity of the target from successive fixes, ego", unknown=0,
-        ),
-    ]  # fmt: skip
 
 
 @compiled
@@ -168,7 +65,7 @@ def _sonar_fields(s: Scenario) -> list[Field]:
         return []
     return [
         Field(
-            "sonar", s.sonar_beams, "m", 0, s.sonar_range * _SLACK,
+            "sonar", s.sonar_beams, "m", 0, s.sonar_range * SLACK,
             "distance from its rim to anything, each beam from straight ahead to the left; "
             "sonar_range where nothing is near",
         )
@@ -178,17 +75,17 @@ def _sonar_fields(s: Scenario) -> list[Field]:
 def _neighbour_fields(s: Scenario) -> list[Field]:
     fields = [
         Field("neighbour_number", 1, "1", -1, s.num_trackers - 1, "its number", -1),
-        Field("neighbour_age", 1, "s", -1, s.forget_after * _SLACK, "age of what was heard", -1),
+        Field("neighbour_age", 1, "s", -1, s.forget_after * SLACK, "age of what was heard", -1),
         Field(
-            "neighbour_range", 1, "m", -1, s.range_bound * _SLACK,
+            "neighbour_range", 1, "m", -1, s.range_bound * SLACK,
             "distance from here to where it was", -1,
         ),
         Field("neighbour_bearing", 2, "1", -1, 1, "direction of where it was, ego", 0),
         Field("neighbour_heading", 2, "1", -1, 1, "its heading, ego", 0),
-        Field("neighbour_speed", 1, "m/s", 0, s.tracker_speed * _SLACK, "its speed", 0),
+        Field("neighbour_speed", 1, "m/s", 0, s.tracker_speed * SLACK, "its speed", 0),
         Field(
             "neighbour_turn_rate", 1, "rad/s",
-            -s.tracker_turn_rate * _SLACK, s.tracker_turn_rate * _SLACK, "its turn rate", 0,
+            -s.tracker_turn_rate * SLACK, s.tracker_turn_rate * SLACK, "its turn rate", 0,
         ),
     ]  # fmt: skip
     if s.message_size:
@@ -269,6 +166,7 @@ def observe_alone(
     heard_message: FloatArray,
     s: Record,
     observations: FloatArray,
+    width: int,
 ) -> None:
     """Write what :mod:`posse.signals.together` does not write of observations, (rows, F).
 
@@ -278,8 +176,8 @@ def observe_alone(
     for i in range(n):
         t = trackers[i]
         pose = (t.x, t.y, t.heading_cos, t.heading_sin)
-        ping(c, pose, i, s.gap[i], s, observations[i], SONAR_AT)
-    k = SONAR_AT + natural(c.sonar_beams)
+        ping(c, pose, i, s.gap[i], s, observations[i], width)
+    k = width + natural(c.sonar_beams)
     if not c.perfect_radio:
         _observe_heard(c, w, trackers, heard, heard_message, s, observations, k)
 
@@ -287,27 +185,20 @@ def observe_alone(
 @compiled(seldom=True)
 def observe_target(
     c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
+    worlds: WorldArrays,
+    e: int,
+    writers: Writers,
     s: Record,
-    o: FloatArray,
+    observations: FloatArray,
 ) -> None:
-    """Write what a target that is an agent is given, (F,): it knows where trackers are."""
-    o[0], o[1] = within_one(w.heading_cos), within_one(w.heading_sin)
-    o[2], o[3], o[4], o[5] = w.x, w.y, w.speed, w.turn_rate
-    o[6] = w.touching != np.uint64(0) or touches_surroundings(c, w, obstacles)
-    o[7] = _ONE
-    write_task(-1, s, o)
-    o[TASK_AT + 7], o[TASK_AT + 8] = c.target_speed, c.target_turn_rate
-    o[TASK_AT + 9], o[TASK_AT + 10] = _ZERO, _ZERO  # acceleration limits are the trackers' alone
-    o[TARGET_AT - 2], o[TARGET_AT - 1] = c.told_arena, np.float32(c.horizon - w.step) * c.dt
-    for j in range(TARGET_AT, SONAR_AT):
-        o[j] = _ZERO
-    o[TARGET_AT + 2], o[TARGET_AT + 3] = _MINUS_ONE, _MINUS_ONE
-    pose = (w.x, w.y, w.heading_cos, w.heading_sin)
-    ping(c, pose, c.num_trackers, _ZERO, s, o, SONAR_AT)
-    k = SONAR_AT + natural(c.sonar_beams)
+    """Write what a target that is an agent is given: it knows where trackers are."""
+    w, trackers, n = worlds.world[e], worlds.tracker[e], natural(c.num_trackers)
+    view = view_of_target(c, w, worlds.obstacle[e])
+    writers.own(c, view, s.columns)
+    write_rows(s.columns, writers.width, e, n, 1, 0, observations, 0)
+    pose, o = (w.x, w.y, w.heading_cos, w.heading_sin), observations[e, n]
+    ping(c, pose, n, _ZERO, s, o, writers.width)
+    k = writers.width + natural(c.sonar_beams)
     filled = 0
     for j in range(c.num_trackers if c.neighbours > 0 else 0):
         dx, dy = trackers[j].x - w.x, trackers[j].y - w.y
@@ -332,9 +223,7 @@ class ObservationLayout:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         single = [
-            *_own_fields(scenario),
-            *_task_fields(scenario),
-            *_target_fields(scenario),
+            *(field.of(scenario) for field in parts_for(scenario).fields),
             *_sonar_fields(scenario),
         ]
         repeated = _neighbour_fields(scenario)

@@ -10,7 +10,10 @@ from posse.rules.scratch import TEAM, Fields
 MOST_IN_TEAM: Final = 16
 """Up to this team size, eight worlds are observed together."""
 
-KEPT: Final[Fields] = (("task", 2 * WIDTH),)  # what every tracker is told of its task
+
+def columns_for(width: int) -> Fields:
+    """Return the field for the columns of observations whose fields are ``width`` numbers."""
+    return (("columns", WIDTH * width),)
 
 
 def observing(worlds: int) -> Fields:

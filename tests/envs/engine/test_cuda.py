@@ -77,6 +77,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
 
     from posse.engine import cuda
     from posse.engine.kernels import Results
+    from posse.signals.parts import built_in_parts
 
     device = SimpleNamespace(compute_capability=(9, 0))
     monkeypatch.setattr(numba.cuda.dispatcher, "get_current_device", lambda: device)
@@ -88,7 +89,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
     orders, report = np.zeros(WORLDS, np.uint8), np.zeros(3, np.int64)
     actions = np.zeros(batch.action_shape, np.float32)
     kernels = {
-        cuda._advance: (
+        cuda._stepping(built_in_parts()): (
             batch._tables, batch.arrays, actions, Results(observations, rewards, terms, flags),
             infos["score"], orders, report,
         ),

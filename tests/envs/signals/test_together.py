@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import posse
-from posse.signals.together import SONAR_AT, TARGET_AT, TASK_AT
 
 TEAMS: list[dict[str, Any]] = [
     {"num_trackers": 1},
@@ -77,12 +76,6 @@ def test_the_largest_worlds_fit_their_memory() -> None:
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-
-
-def test_parts_are_written_where_they_are_declared() -> None:
-    offsets = posse.batch("smart", 1).layout.offsets
-    names = {"heading": 0, "formation": TASK_AT, "target_known": TARGET_AT, "sonar": SONAR_AT}
-    assert {name: offsets[name] for name in names} == names
 
 
 @pytest.mark.parametrize("worlds", [1, 8])

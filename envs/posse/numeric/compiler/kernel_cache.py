@@ -139,6 +139,15 @@ class KernelCache(FunctionCache):
 
     _impl_class = _Impl
 
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """Return what tells compiled forms apart (numba's name for it).
+
+        A function in the kernel's closure counts by its name: its sources are in the stamp.
+        """
+        cells = [cell.cell_contents for cell in self._py_func.__closure__ or ()]
+        named = [(cell.__module__, cell.__qualname__) if callable(cell) else cell for cell in cells]
+        return sig, codegen.magic_tuple(), hashlib.sha256(pickle.dumps(named)).hexdigest()
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return a kernel's compiled form, or None where it has to be compiled."""
         try:

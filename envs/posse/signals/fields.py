@@ -1,0 +1,142 @@
+"""What an observation field is, and how a function is declared as one.
+
+A field is declared on its formula. The parameters of the function say what it is about:
+
+========== =====================================================================================
+(c)        a setting of the scenario: the same number for everybody, always
+(c, v)     what a robot observes of itself and of the target (:class:`posse.signals.views.View`)
+(c, v, m)  what it observes of a team-mate (:class:`posse.signals.views.Mate`), once for each
+========== =====================================================================================
+
+``c`` is the scenario as kernels read it (:data:`posse.rules.state.CONFIG`). ``v`` and ``m`` hold
+eight observers side by side, so a formula is written for eight numbers as for one
+(:mod:`posse.numeric`). A function returns a number, or a tuple of ``size`` of them.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from posse.numeric import compiled
+from posse.registry import FIELDS, Function
+from posse.scenarios.scenario import Scenario
+
+Bound = float | Callable[[Scenario], float]
+
+SLACK: Final = 1.001
+"""By how much a bound is widened, so that it is true for numbers rounded to float32, too."""
+
+_SUBJECTS: Final = {1: "setting", 2: "self", 3: "mate"}
+
+
+@dataclass(frozen=True)
+class Field:
+    """One named part of a scenario's observation."""
+
+    name: str
+    size: int
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    unknown: float | None = None
+    """The value that stands for "not known", or ``None`` where it is always known."""
+    of_neighbour: bool = False
+    """Whether it is repeated for each place of a team-mate."""
+
+
+@dataclass(frozen=True)
+class FieldDeclaration:
+    """A field of any scenario, and the function that works it out."""
+
+    name: str
+    subject: str
+    """What it is about: ``"setting"``, ``"self"`` or ``"mate"``."""
+    size: int
+    unit: str
+    low: Bound
+    high: Bound
+    unknown: float | None
+    meaning: str
+    function: Function
+
+    def of(self, scenario: Scenario) -> Field:
+        """Return what the field is in a scenario.
+
+        Raises:
+            DeclarationError: Its bounds are no finite numbers, or the wrong way round.
+        """
+        low, high = (self._bound(name, scenario) for name in ("low", "high"))
+        if not low <= high:
+            raise self._error(f"low={low:g} is above high={high:g} in {scenario.name!r}")
+        return Field(
+            self.name, self.size, self.unit, low, high, self.meaning, self.unknown,
+            of_neighbour=self.subject == "mate",
+        )  # fmt: skip
+
+    def _bound(self, name: str, scenario: Scenario) -> float:
+        bound: Any = getattr(self, name)
+        value = bound(scenario) if callable(bound) else bound
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise self._error(f"{name}={value!r} in {scenario.name!r} is not a finite number")
+        return float(value)
+
+    def _error(self, reason: str) -> Exception:
+        return FIELDS.error(self.function, reason)
+
+
+def field(
+    unit: str,
+    low: Bound,
+    high: Bound,
+    unknown: float | None = None,
+    *,
+    size: int = 1,
+) -> Callable[[Function], Function]:
+    """Declare a function as an observation field of its name; its docstring is the meaning.
+
+    Args:
+        unit: What it is measured in; ``"1"`` for a bare number.
+        low: The least value, or a function (scenario) -> least value.
+        high: The greatest, likewise.
+        unknown: What the function returns for "not known"; a team-mate's place that is empty holds
+            it, too, or 0.
+        size: How many numbers the function returns; a tuple where there are more than one.
+
+    Raises:
+        DeclarationError: The name is taken, the docstring is missing, or the parameters are not
+            (c), (c, v) or (c, v, m).
+    """
+
+    def declare(function: Function) -> Function:
+        count = len(inspect.signature(function).parameters)
+        if count not in _SUBJECTS:
+            raise FIELDS.error(function, "its parameters must be (c), (c, v) or (c, v, m)")
+        name, meaning = function.__name__, (function.__doc__ or "").strip()
+        working = compiled(function)
+        FIELDS.add(
+            name,
+            FieldDeclaration(
+                name, _SUBJECTS[count], size, unit, low, high, unknown, meaning, working
+            ),
+            working,
+        )
+        return working
+
+    return declare
+
+
+def setting(unit: str, value: Callable[[Scenario], float]) -> Callable[[Function], Function]:
+    """Declare a function (c) as a field that holds a setting; -1 stands for a boundless one."""
+
+    def low(s: Scenario) -> float:
+        return -1.0 if math.isinf(value(s)) else value(s) / SLACK
+
+    def high(s: Scenario) -> float:
+        return -1.0 if math.isinf(value(s)) else value(s) * SLACK
+
+    return field(unit, low, high)

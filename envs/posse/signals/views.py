@@ -1,0 +1,130 @@
+"""What observation fields are worked out from: eight observers, a lane each.
+
+The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or
+teams are large, the trackers of one (0). A target that is an agent sees by itself, in the first
+lane. Only what a field uses costs time: the rest is left out when it is compiled.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from posse.numeric import (
+    Lanes,
+    Mask,
+    Record,
+    Records,
+    compiled,
+    eight,
+    load,
+    root,
+)
+from posse.rules.contact import touches_surroundings
+from posse.rules.discs import natural
+from posse.rules.state import FIX, NEVER, POSE, WorldArrays
+from posse.signals.team import own_numbers, team_columns
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_MINUS_ONE: Final = np.float32(-1.0)
+_NOBODY: Final = np.uint64(0)
+
+
+class View(NamedTuple):
+    """Eight observers, and what they know of the target.
+
+    Places and directions are in the common frame.
+    """
+
+    number: Lanes
+    """Which tracker it is; -1: the target."""
+    x: Lanes
+    """m."""
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    """m/s."""
+    turn_rate: Lanes
+    """rad/s, positive to the left."""
+    touching: Lanes
+    """1 while it touches anything, else 0."""
+    working: Lanes
+    """0 once it is broken, else 1."""
+    step: Lanes
+    """Control steps since the start."""
+    max_speed: Lanes
+    """m/s."""
+    max_turn_rate: Lanes
+    """rad/s."""
+    acceleration_time: Lanes
+    """From rest to full speed, s; 0: at once."""
+    turn_acceleration_time: Lanes
+    """From no turn to the greatest turn rate, s; 0: at once."""
+    target_known: Mask
+    """Whether it has a fix of the target, which the following is about."""
+    target_seen: Lanes
+    """1 while its own sensor has the target, else 0."""
+    target_step: Lanes
+    """Control step of the fix."""
+    target_dx: Lanes
+    """Where the target was, from here, m."""
+    target_dy: Lanes
+    target_distance: Lanes
+    target_cos: Lanes
+    """How it headed."""
+    target_sin: Lanes
+    target_frame_cos: Lanes
+    """The slot frame ψ."""
+    target_frame_sin: Lanes
+    target_vx: Lanes
+    """Velocity from successive fixes, m/s."""
+    target_vy: Lanes
+
+
+@compiled
+def ego(v: View, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
+    """Return a vector of the common frame as robots have it: ahead, and to the left."""
+    return x * v.heading_cos + y * v.heading_sin, y * v.heading_cos - x * v.heading_sin
+
+
+@compiled
+def view_of_trackers(
+    c: Record, worlds: WorldArrays, e: int, i: int, count: int, across: int, s: Record
+) -> View:
+    """Return the view of ``count`` trackers, the first of them i of world e."""
+    for lane in range(count):
+        to = natural(e + lane * across)
+        t = worlds.tracker[to, natural(i + lane * (1 - across))]
+        s.step[lane] = np.float32(worlds.world[to].step)
+        s.fix_step[lane], s.sees[lane] = np.float32(t.fix_step), np.float32(t.sees)
+        s.touching[lane] = np.float32(t.touching)
+        s.working[lane] = np.float32(t.broken_at == NEVER)
+    own_x, own_y, hc, hs, speed, turn_rate, _, _ = team_columns(worlds.tracker, e, i, across, POSE)
+    x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(
+        worlds.tracker, e, i, across, FIX
+    )
+    dx, dy, fixed_at = x - own_x, y - own_y, load(s.fix_step, 0)
+    return View(
+        own_numbers(i, across, s), own_x, own_y, hc, hs, speed, turn_rate,
+        load(s.touching, 0), load(s.working, 0), load(s.step, 0),
+        eight(c.tracker_speed), eight(c.tracker_turn_rate),
+        eight(c.acceleration_time), eight(c.turn_acceleration_time),
+        fixed_at >= _ZERO, load(s.sees, 0), fixed_at, dx, dy, root(dx * dx + dy * dy),
+        cosine, sine, frame_cos, frame_sin, vx, vy,
+    )  # fmt: skip
+
+
+@compiled
+def view_of_target(c: Record, w: Record, obstacles: Records) -> View:
+    """Return the view of a target that is an agent, whose limits act at once."""
+    touching = w.touching != _NOBODY or touches_surroundings(c, w, obstacles)
+    zero, never = eight(_ZERO), eight(_MINUS_ONE)
+    return View(
+        eight(_MINUS_ONE), eight(w.x), eight(w.y), eight(w.heading_cos), eight(w.heading_sin),
+        eight(w.speed), eight(w.turn_rate), eight(np.float32(touching)), eight(_ONE),
+        eight(np.float32(w.step)), eight(c.target_speed), eight(c.target_turn_rate), zero, zero,
+        never >= _ZERO, zero, never, zero, zero, zero, zero, zero, zero, zero, zero, zero,
+    )  # fmt: skip
