@@ -53,7 +53,7 @@ class Settings:
 SETTINGS, OWN_FIELDS, WIDTH = writers_for(built_in_parts())
 
 
-@kernel(short_loops=True)
+@kernel
 def one_part(  # type: ignore[no-untyped-def]
     part, tables, worlds, actions, results, memory
 ):

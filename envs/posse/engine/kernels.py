@@ -283,7 +283,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
     settings, own_fields, width = writers_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
-    @kernel(short_loops=True)
+    @kernel
     def advance(
         tables: Tables,
         worlds: WorldArrays,

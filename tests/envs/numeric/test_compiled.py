@@ -7,14 +7,8 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numba
-import numpy as np
-import numpy.typing as npt
 import pytest
-
-from posse.numeric.compiling import compiled, kernel
 
 HELPER = """
 from posse.numeric.compiling import compiled
@@ -40,26 +34,6 @@ def doubled(x):
     return 2.0 * helper(x)
 """
 
-SHORT_KERNEL = """
-from posse.numeric.compiling import kernel
-from herd.helpers import helper
-
-@kernel(short_loops=True)
-def fill(out):
-    for i in range(out.shape[0]):
-        out[i] = helper(i)
-"""
-
-SHORT_MAIN = """
-import numpy as np
-from herd.kernels import fill
-
-out = np.zeros(3)
-fill(out)
-stats = fill.stats
-print(out.sum(), sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
-"""
-
 CLOSURE_KERNEL = """
 import numpy as np
 from posse.numeric.compiling import kernel
@@ -68,7 +42,7 @@ from herd.helpers import helper
 def made_for(number):
     table = np.full(1, number, np.dtype([("x", "f4")]))
 
-    @kernel(short_loops=True)
+    @kernel
     def fill(out):
         out[0] = helper(table[0].x)
 
@@ -83,16 +57,6 @@ out = np.zeros(1)
 fill = made_for({number})
 fill(out)
 print(out[0], sum(fill.stats.cache_hits.values()), sum(fill.stats.cache_misses.values()))
-"""
-
-LOOPS_MAIN = """
-import numpy as np
-from herd.kernels import fill
-
-out = np.zeros(3)
-fill(out)
-(code,) = fill.inspect_llvm().values()
-print(out.sum(), code.count("store double"), 0)
 """
 
 ONE_MAIN = """
@@ -206,14 +170,6 @@ def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(
     assert (ready_when_loaded, ready_after_compiling) == (0, 1)
 
 
-def test_a_kernel_of_short_loops_is_kept_too(herd: Herd, tmp_path: Path) -> None:
-    (herd.root / "herd" / "kernels.py").write_text(SHORT_KERNEL)
-    parallel = Herd(herd.root, SHORT_MAIN)
-    assert parallel.run(tmp_path / "cache").answer == 6.0
-    again = parallel.run(tmp_path / "cache")
-    assert (again.answer, again.hits, again.misses) == (6.0, 1, 0)
-
-
 def test_kernels_with_other_constants_are_not_taken_for_each_other(
     herd: Herd, tmp_path: Path
 ) -> None:
@@ -222,14 +178,6 @@ def test_kernels_with_other_constants_are_not_taken_for_each_other(
     for number, hits in ((2, 0), (5, 0), (2, 1), (5, 1)):
         run = Herd(herd.root, CLOSURE_MAIN.format(number=number)).run(tmp_path / "cache")
         assert (run.answer, run.hits) == (number + 1, hits)
-
-
-def test_a_short_loop_is_not_unrolled_for_long_runs(herd: Herd, tmp_path: Path) -> None:
-    (herd.root / "herd" / "kernels.py").write_text(SHORT_KERNEL)
-    run = Herd(herd.root, LOOPS_MAIN).run(tmp_path / "cache")
-    assert run.answer == 6.0
-    copies_of_the_body = run.hits
-    assert copies_of_the_body == 1
 
 
 def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_stamp(
@@ -290,62 +238,3 @@ def test_without_the_compiler_the_plain_functions_run(herd: Herd, tmp_path: Path
     assert (run.answer, run.hits) == (6.0, -1)
     assert run.stderr == ""
     assert not cache.exists()
-
-
-def test_a_function_is_compiled_once_for_all_whole_numbers() -> None:
-    """A constant, and numbers of 32 and of 64 bits: each form costs a tenth of a second."""
-
-    @compiled
-    def twice(x: int) -> int:
-        return 2 * x
-
-    @kernel
-    def total(narrow: npt.NDArray[np.int32], wide: npt.NDArray[np.int64]) -> int:
-        return twice(3) + twice(4) + twice(narrow[0]) + twice(wide[0])
-
-    assert total(np.array([2**31 - 1], np.int32), np.array([2**40])) == 14 + 2 * (2**31 - 1 + 2**40)
-    assert len(twice._linked.overloads) == 1  # type: ignore[attr-defined]
-
-
-def test_what_a_kernel_remembers_while_it_compiles_is_gone_afterwards() -> None:
-    """numba's contexts are everyone's: nothing of ours may stay in them."""
-    from numba.core.registry import cpu_target
-
-    contexts = cpu_target.typing_context, cpu_target.target_context
-    before = [set(vars(context)) for context in contexts]
-
-    @compiled
-    def shifted(x: float) -> float:
-        return x + 1.0
-
-    @kernel
-    def moved(x: float) -> float:
-        return shifted(x)
-
-    @kernel
-    def wrong(x: float) -> float:
-        return shifted(x, x)  # type: ignore[call-arg]
-
-    @kernel
-    def moved_twice(x: float) -> float:
-        return moved(x) + shifted(x)
-
-    assert moved(2.0) == 3.0
-    assert moved_twice(2.0) == 6.0
-    with pytest.raises(numba.TypingError):
-        wrong(2.0)
-    assert [set(vars(context)) for context in contexts] == before
-
-    @numba.extending.overload(moved_later)
-    def _(x: Any) -> Any:
-        def tenfold(x: Any) -> Any:
-            return 10.0 * x
-
-        return tenfold
-
-    assert numba.njit(lambda x: moved_later(x))(2.0) == 20.0, "numba still learns new functions"
-
-
-def moved_later(x: float) -> float:
-    """Return what compiled code is told only after kernels have been compiled."""
-    raise NotImplementedError

@@ -1,0 +1,118 @@
+"""numba still has the private parts that posse overrides, and the overrides still take effect."""
+
+from __future__ import annotations
+
+import inspect
+
+import numba
+import numpy as np
+import numpy.typing as npt
+import pytest
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+
+from posse.numeric import UNCOMPILED, compiled, kernel
+from posse.numeric.compiler import numba_overrides
+
+Floats = npt.NDArray[np.float64]
+
+OURS = [
+    each
+    for each in vars(numba_overrides).values()
+    if inspect.isclass(each)
+    and each.__module__ == numba_overrides.__name__
+    and any(base.__module__.startswith("numba.") for base in each.__mro__)
+]
+OVERRIDES = [
+    (each, name)
+    for each in OURS
+    for name, member in vars(each).items()
+    if inspect.isfunction(member) or isinstance(member, property)
+]
+CALLED = [
+    (CompilerBase, "compile_extra"),
+    (DefaultPassBuilder, "define_nopython_pipeline"),
+    (Flags, "noalias"),
+    (Flags, "forceinline"),
+]
+
+pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
+
+
+def test_the_overrides_are_found() -> None:
+    assert len(OURS) >= 5
+    assert len(OVERRIDES) >= 8
+
+
+@pytest.mark.parametrize(("ours", "name"), OVERRIDES)
+def test_numba_still_has_what_is_overridden(ours: type, name: str) -> None:
+    theirs = [each for each in ours.__mro__ if each.__module__.startswith("numba.")]
+    assert any(name in vars(each) for each in theirs), (
+        f"numba {numba.__version__} no longer has {theirs[0].__name__}.{name}, which "
+        f"{ours.__name__} overrides: see {numba_overrides.__name__} for what it buys, and drop it "
+        "or follow numba"
+    )
+
+
+@pytest.mark.parametrize(("theirs", "name"), CALLED)
+def test_numba_still_has_what_is_called(theirs: type, name: str) -> None:
+    assert hasattr(theirs, name), (
+        f"numba {numba.__version__} no longer has {theirs.__name__}.{name}, which "
+        f"{numba_overrides.__name__} uses"
+    )
+
+
+def test_a_function_is_compiled_once_for_all_integers() -> None:
+    """A constant, and integers of 32 and of 64 bits."""
+
+    @compiled
+    def twice(x: int) -> int:
+        return 2 * x
+
+    @kernel
+    def total(narrow: npt.NDArray[np.int32], wide: npt.NDArray[np.int64]) -> int:
+        return twice(3) + twice(4) + twice(narrow[0]) + twice(wide[0])
+
+    assert total(np.array([2**31 - 1], np.int32), np.array([2**40])) == 14 + 2 * (2**31 - 1 + 2**40)
+    assert len(twice.inner.overloads) == 1  # type: ignore[attr-defined]
+
+
+def test_a_function_inside_a_kernel_becomes_no_machine_code_of_its_own() -> None:
+    @compiled
+    def half(x: float) -> float:
+        return 0.5 * x
+
+    @kernel
+    def quarter(x: float) -> float:
+        return half(half(x))
+
+    assert quarter(8.0) == 2.0
+    (inner,) = half.inner.overloads.values()  # type: ignore[attr-defined]
+    (outer,) = quarter.overloads.values()  # type: ignore[attr-defined]
+    engine = outer.library._codegen._engine
+    assert engine.is_symbol_defined(outer.fndesc.llvm_func_name)
+    assert not engine.is_symbol_defined(inner.fndesc.llvm_func_name)
+    assert half(8.0) == 4.0, "Python can call it all the same"
+
+
+@pytest.fixture(scope="module")
+def code() -> str:
+    """LLVM code of a kernel that loops over arrays."""
+
+    @kernel
+    def fill(out: Floats, source: Floats) -> None:
+        for i in range(out.shape[0]):
+            out[i] = source[0] / (1.0 + i)
+
+    out = np.zeros(3)
+    fill(out, np.ones(1))
+    np.testing.assert_allclose(out, [1.0, 1 / 2, 1 / 3])
+    (code,) = fill.inspect_llvm().values()  # type: ignore[attr-defined]
+    return str(code)
+
+
+def test_a_loop_of_unknown_length_is_not_unrolled(code: str) -> None:
+    assert code.count("store double") == 1
+
+
+def test_a_kernels_arrays_are_said_not_to_overlap(code: str) -> None:
+    assert "noalias" in code
