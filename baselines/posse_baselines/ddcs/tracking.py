@@ -22,7 +22,7 @@ from posse_baselines.laws.guidance import (
     maintenance_speed,
 )
 from posse_baselines.laws.heading import regulate
-from posse_baselines.laws.slots import slot_heading, slot_velocity
+from posse_baselines.laws.slots import slot_heading
 from posse_baselines.laws.steering import approach_velocity, meeting_velocity
 
 CENTRALIZED: Final = 1
@@ -70,13 +70,14 @@ def to_slot(s: Record, d: Record, slots: Records, x: float, y: float, body: Reco
     """
     place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
     arm_x, arm_y = arm_x + s.aim_ahead * d.frame_cos, arm_y + s.aim_ahead * d.frame_sin
-    converging = d.task == CONVERGING
+    gain, clearance, rate = s.gain, 0.0, s.feed_forward * d.psi_rate
+    if d.task == CONVERGING:
+        gain, clearance, rate = _FULL_SPEED, s.clearance, 0.0
     vx, vy = meeting_velocity(
         x - d.now_x, y - d.now_y, arm_x, arm_y, d.speed_x, d.speed_y, d.mean_x, d.mean_y,
-        d.psi_rate, s.weave_time, s.clearance, _FULL_SPEED if converging else s.gain,
-        body.max_speed, body.acceleration,
+        d.psi_rate, s.weave_time, clearance, gain, body.max_speed, body.acceleration,
     )  # fmt: skip
-    return take_up(body, vx, vy, 0.0 if converging else s.feed_forward * d.psi_rate)
+    return take_up(body, vx, vy, rate)
 
 
 @compiled
