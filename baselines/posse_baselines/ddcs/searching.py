@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import Record, Records, compiled
-from posse_baselines.ddcs.memory import GRID, SEARCHING
+from posse_baselines.ddcs.memory import GRID
 from posse_baselines.ddcs.monitoring import is_there, mate_now
 from posse_baselines.laws.geometry import length
 
@@ -77,10 +77,6 @@ def wander(
     max_speed: float,
 ) -> tuple[float, float]:
     """Return the velocity (m/s) of a tracker that searches from (x, y)."""
-    flock = flock_heard_of(f, s, d, mates, own)
-    if flock >= 0:
-        # Rule iv of section 3.5; with a view of the target, or word of it, the search would end.
-        d.goal_x, d.goal_y, d.goal_step = mates[flock].x, mates[flock].y, d.step
     dx, dy = d.goal_x - x, d.goal_y - y
     near = 0.5 * min(f.sight, 4.0)
     time = (d.step - d.goal_step) * f.dt
@@ -92,21 +88,6 @@ def wander(
     if distance < 1e-6:
         return 0.0, 0.0
     return max_speed * dx / distance, max_speed * dy / distance
-
-
-@compiled
-def flock_heard_of(f: Record, s: Record, d: Record, mates: Records, own: int) -> int:
-    """Return the team-mate last heard in a flock, for a searcher who hears nobody; else -1."""
-    found = -1
-    for j in range(len(mates)):
-        if j == own or mates[j].step < 0:
-            continue
-        if is_there(f, s, d, mates[j], len(mates)):
-            return -1
-        in_flock = mates[j].task > SEARCHING and (d.step - mates[j].step) * f.dt <= s.join_memory
-        if in_flock and (found < 0 or mates[j].step > mates[found].step):
-            found = j
-    return found
 
 
 @compiled

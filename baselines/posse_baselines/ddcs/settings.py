@@ -105,8 +105,6 @@ class Settings:
     """The same under PNGL, by which the range exceeds the wanted one: the chase ends."""
     range_far: float = tuned(0.8, "m", 0.1, 4.0)
     """The same under PNGL, by which the range exceeds the wanted one: the chase begins again."""
-    join_memory: float = number(20.0, "s", 0.0, 60.0)
-    """A searcher who hears nobody heads for a flock that it heard of this recently."""
 
     # searching
     look_time: float = number(0.5, "s", 0.1, 5.0)

@@ -1,0 +1,180 @@
+"""The four tasks: when they change, what each does, and what a team loses without each change."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posse
+from posse_baselines import play, settings_of, with_settings
+from posse_baselines.ddcs import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
+from posse_baselines.ddcs.settings import NO_EXCHANGE, TRANSITIONS
+from tests.support.drive import complex_of, drive
+
+LOSS = ("converging>searching", "flocking>searching")
+NO_RETURN = ("exchange>converging", "exchange>flocking")
+
+
+def metrics(name: str, scenario: str, *forbidden: str, worlds: int = 60) -> dict[str, Any]:
+    policy = with_settings(name, forbidden=forbidden)
+    batch = posse.batch(scenario, worlds, seed=3, split="train", message_size=5)
+    return play(batch, policy)
+
+
+def settled(found: dict[str, Any]) -> float:
+    return float(np.isfinite(found["settling_time"]).mean())
+
+
+# --- when they change ----------------------------------------------------------------------------
+
+
+def test_searching_lasts_until_the_target_is_seen_or_reported() -> None:
+    begun_by_hearing = 0
+    for now in drive("ddcs-distributed", "search", 40, 60, split="train"):
+        knows = now.notes["estimate_age"] >= 0
+        np.testing.assert_array_equal(now.notes["task"] != SEARCHING, knows)
+        begun_by_hearing += (knows & (np.abs(now.line_of_sight) > 3.0)).sum()
+    assert knows.any()
+    assert not knows.all()
+    assert begun_by_hearing > 0
+
+
+def test_converging_and_flocking_change_with_hysteresis() -> None:
+    settings = settings_of("ddcs-distributed")
+    wing = 1.2 * math.sqrt(0.5)
+    wings = [-1.2 - k * wing + 1j * side * k * wing for k in (1, 2) for side in (1, -1)]
+    wedge = np.array([-1.2, *wings])
+    begun, before = 0, None
+    for now in drive("ddcs-distributed", "accelerating", 20, 250, split="train"):
+        task, slot = now.notes["task"], wedge[now.notes["slot"]]
+        place = complex_of(now.target)[:, None] + slot * np.exp(1j * now.psi[:, None])
+        error = np.abs(place - complex_of(now.tracker))
+        assert (error[task == FLOCKING] < settings.far + 0.05).all()
+        assert (error[task == CONVERGING] > settings.near - 0.05).all()
+        if before is not None:
+            begins = (before == CONVERGING) & (task == FLOCKING)
+            assert (error[begins] < settings.near + 0.05).all()
+            begun += begins.sum()
+        before = task
+    assert begun >= 20 * 4
+    assert (task == FLOCKING).mean() > 0.95
+
+
+# --- what each does ------------------------------------------------------------------------------
+
+
+def test_who_converges_goes_at_full_speed_and_who_flocks_as_the_formation() -> None:
+    converging, flocking = [], []
+    for step, now in enumerate(drive("pngl-l-phi", "constant", 20, 300, split="train")):
+        speed, task = now.commands[..., 0], now.notes["task"]
+        if step > 60:  # by then all have turned round
+            converging.append(speed[task == CONVERGING])
+        if step > 250:
+            flocking.append(speed[task == FLOCKING])
+    assert np.quantile(np.concatenate(converging), 0.2) > 0.95  # the safeguard slows some
+    assert np.median(np.concatenate(flocking)) == pytest.approx(0.6, abs=0.01)
+
+
+def test_a_straggler_that_is_told_of_the_flock_speeds_up_and_heads_for_it() -> None:
+    # Rule iv of section 3.5: it sees neither the target nor its place, and is told by radio.
+    pose = [(-1.2, 0.0, 0.0), (-2.05, 0.85, 0.0), (-11.0, 2.0, 0.3)]
+    for name, task in (("pngl-l-phi", CONVERGING), ("ddcs-no-radio", SEARCHING)):
+        far, speeds = [], []
+        for now in drive(
+            name, "constant", 1, 100, num_trackers=3, tracker_pose=pose, sensing_range=3.0,
+            target_pose=(0.0, 0.0, 0.0), start_distance=(1.0, 12.0),
+        ):  # fmt: skip
+            assert now.notes["task"][0, 2] == task
+            far.append(abs(now.line_of_sight[0, 2]))
+            speeds.append(now.commands[0, 2, 0])
+        if task == CONVERGING:
+            assert min(speeds[5:]) > 0.97
+            assert far[-1] < far[0] - 0.9 * 0.4 * 10.0  # it gains 0.4 m/s on the flock
+
+
+def test_who_hears_of_another_leader_holds_the_flock_s_course() -> None:
+    held = 0
+    for now in drive("pngl-l-phi", "leader-loss", 20, 250, split="train", radio_delay=3):
+        exchanging = (now.notes["task"] == EXCHANGING) & ~now.broken
+        heading = now.tracker[..., 2] - now.target[:, None, 2]
+        on_course = exchanging & (np.abs(np.angle(np.exp(1j * heading))) < 0.1)
+        held += on_course.sum()
+        close = np.abs(now.commands[on_course, 0] - 0.6) < 0.06
+        assert close.mean() > 0.9 if on_course.any() else True  # the safeguard may differ
+    assert held > 50
+
+
+# --- what is lost without a change ---------------------------------------------------------------
+
+
+def test_without_converging_a_team_that_found_its_target_never_joins_it() -> None:
+    assert settled(metrics("ddcs-distributed", "search", "searching>converging")) < 0.1
+    assert settled(metrics("ddcs-distributed", "search")) > 0.9
+
+
+@pytest.mark.parametrize("name", ["pngl-l-phi", "pngl"])
+def test_without_flocking_the_team_never_settles(name: str) -> None:
+    assert settled(metrics(name, "constant", "converging>flocking")) < 0.1
+    assert settled(metrics(name, "constant")) > 0.9
+
+
+def test_without_converging_anew_followers_run_into_each_other() -> None:
+    free = [
+        (found["tracker_contacts"] + found["obstacle_contacts"] == 0).mean()
+        for found in (
+            metrics("ddcs-centralized", "obstacles"),
+            metrics("ddcs-centralized", "obstacles", "flocking>converging"),
+        )
+    ]
+    assert free[1] < free[0] - 0.1
+
+
+def test_without_exchange_a_team_does_not_recover_from_its_leader_s_loss() -> None:
+    with_it = metrics("pngl-l-phi", "leader-loss")
+    without = metrics("pngl-l-phi", "leader-loss", *NO_EXCHANGE)
+    assert np.isfinite(with_it["recovery_time"]).mean() > 0.9
+    assert np.isfinite(without["recovery_time"]).mean() < 0.5
+
+
+def test_without_a_way_back_from_exchange_the_team_never_recovers() -> None:
+    stuck = metrics("pngl-l-phi", "leader-loss", *NO_RETURN)
+    assert np.isfinite(stuck["recovery_time"]).mean() < 0.2
+
+
+def swerve(t: float) -> tuple[float, float]:
+    """Straight on, a right angle once out of sight, at last rounds on the spot."""
+    if t < 3.0:
+        return 0.95, 0.0
+    if t < 3.0 + math.pi / 2:
+        return 0.95, 1.0
+    return (0.95, 0.0) if t < 11.0 else (0.3, 1.0)
+
+
+def test_without_searching_a_lost_target_is_not_found_again() -> None:
+    rng = np.random.default_rng(3)
+    places = [(-6.0 - 2.5 * math.cos(b), -6.0 + 2.5 * math.sin(b)) for b in (0.5, -0.5)]
+    pose = [[(*p, math.pi + rng.uniform(-0.5, 0.5)) for p in places] for _ in range(40)]
+    found = []
+    for forbidden in ((), LOSS):
+        searched = False
+        for now in drive(
+            with_settings("ddcs-distributed", forbidden=forbidden), "constant", 40, 700,
+            tracker_pose=pose, target_pose=(-6.0, -6.0, 0.0), target=swerve, num_trackers=2,
+            target_speed=0.95, sensing_range=3.0, arena=24.0, tracker_turn_rate=0.5,
+            start_distance=(2.0, 4.0),
+        ):  # fmt: skip
+            searched |= bool((now.notes["task"] == SEARCHING).any())
+        found.append((np.abs(now.line_of_sight) < 3.0).any(axis=1).mean())
+        assert searched == (forbidden == ())
+    assert found[0] > 0.8
+    assert found[1] < 0.4
+
+
+def test_every_change_can_be_forbidden() -> None:
+    for change in TRANSITIONS:
+        assert settings_of("pngl-l-phi").replace(forbidden=(change,)).forbidden == (change,)
+    with pytest.raises(ValueError, match="forbidden='flocking>flocking' is unknown"):
+        settings_of("pngl-l-phi").replace(forbidden=("flocking>flocking",))
