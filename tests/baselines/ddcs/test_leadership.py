@@ -37,7 +37,7 @@ def test_the_nearest_leads_from_the_first_step_on() -> None:
 
 def test_the_lead_passes_to_who_is_clearly_nearer_and_to_nobody_else() -> None:
     passed, before = 0, None
-    for now in drive("pngl-l-phi", "smart", 30, 200, split="train"):
+    for now in drive("pngl-l-phi", "smart", 60, 200, split="train"):
         leader, away = now.notes["leader"][:, 0], np.abs(now.line_of_sight)
         if before is not None:
             for world in np.flatnonzero((leader != before) & agree(now)):

@@ -96,15 +96,15 @@ def test_a_straggler_that_is_told_of_the_flock_speeds_up_and_heads_for_it() -> N
 
 
 def test_who_hears_of_another_leader_holds_the_flock_s_course() -> None:
-    held = 0
+    speeds = []
     for now in drive("pngl-l-phi", "leader-loss", 20, 250, split="train", radio_delay=3):
         exchanging = (now.notes["task"] == EXCHANGING) & ~now.broken
         heading = now.tracker[..., 2] - now.target[:, None, 2]
         on_course = exchanging & (np.abs(np.angle(np.exp(1j * heading))) < 0.1)
-        held += on_course.sum()
-        close = np.abs(now.commands[on_course, 0] - 0.6) < 0.06
-        assert close.mean() > 0.9 if on_course.any() else True  # the safeguard may differ
-    assert held > 50
+        speeds.append(now.commands[on_course, 0])
+    held = np.concatenate(speeds)
+    assert len(held) > 15
+    assert (np.abs(held - 0.6) < 0.02).mean() > 0.85  # the safeguard may slow some
 
 
 # --- what is lost without a change ---------------------------------------------------------------

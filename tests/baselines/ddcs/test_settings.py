@@ -1,0 +1,69 @@
+"""Settings declare themselves: unit, range, use in tuning; impossible ones are refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posse
+from posse_baselines import PolicyError, play, settings_of, tunable, with_settings
+from posse_baselines.ddcs import Settings
+from posse_baselines.policies.scripted import FAMILY
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"model": "central"}, "model='central' is unknown; known: distributed, centralized"),
+        ({"guidance": "pn"}, "guidance='pn' is unknown"),
+        ({"gain": math.nan}, r"gain=nan must lie in \[0.2, 6\] 1/s"),
+        ({"time_lag": -1.0}, "time_lag=-1.0 must lie in"),
+        ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
+        ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
+        ({"fix_trust": 0.0}, "fix_trust=0.0 must lie in"),
+        ({"spread": 0.2}, "spread=0.2 must lie in"),
+        ({"navigation_constant": 1.2}, r"navigation_constant=1.2 must lie in \[0.9, 1.1\]"),
+        ({"follower_law": "l-psi"}, "follower_law='l-psi' is unknown; known: l-phi, l-l"),
+    ],
+)
+def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Settings(**setting)
+
+
+def test_each_number_declares_unit_and_range() -> None:
+    for field in dataclasses.fields(Settings):
+        if isinstance(field.default, float):
+            meta = field.metadata
+            assert meta["low"] <= field.default <= meta["high"], field.name
+            assert meta["low"] < meta["high"]
+            assert isinstance(meta["unit"], str)
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_tunables_have_the_values_of_their_policy(name: str) -> None:
+    found = {t.name: t for t in tunable(name)}
+    assert len(found) > 20
+    for t in found.values():
+        assert t.low <= t.default <= t.high
+        assert t.default == getattr(settings_of(name), t.name)
+    assert "spread" not in found
+
+
+def test_both_ends_of_each_range_can_be_played() -> None:
+    batch = posse.batch("field", 2, message_size=5, horizon=40)
+    for end in ("low", "high"):
+        values = {t.name: getattr(t, end) for t in tunable("pngl-l-phi")}
+        values |= {"near": 0.1, "far": 4.0, "range_near": 0.1, "range_far": 4.0}
+        assert np.isfinite(play(batch, with_settings("pngl-l-phi", **values))["score"]).all()
+
+
+def test_only_the_family_has_settings() -> None:
+    with pytest.raises(PolicyError, match="policy 'idle' has no settings; those that have: pngl-l"):
+        tunable("idle")
+    with pytest.raises(TypeError, match="gian"):
+        with_settings("pngl", gian=1.0)
