@@ -1,4 +1,4 @@
-"""The command line: ``posse train | compare | watch | ship | reproduce | scenarios``.
+"""The command line: ``posse train | compare | watch | replay | ship | ...``.
 
 Each command imports what it needs when it is called: listing the scenarios does not wait for torch.
 """
@@ -30,6 +30,9 @@ COMMANDS: Final[dict[str, _Command]] = {
     "train": _Command("train a team", __name__, "train"),
     "compare": _Command("score policies on the same worlds", f"{_REPORTS}.compare", "main"),
     "watch": _Command("see a policy at work, or film it", __name__, "watch"),
+    "replay": _Command(
+        "write teams at work as a web page", "posse_training.replay.command", "main"
+    ),
     "ship": _Command("make runs a policy that comes along", "posse_training.runs.ship", "main"),
     "reproduce": _Command("redo the paper's experiments", f"{_REPORTS}.reproduce", "main"),
     "scenarios": _Command("list the scenarios", __name__, "scenarios"),

@@ -1,6 +1,7 @@
 """How the pictures look: colours, and lengths in points.
 
-The hues are Okabe and Ito's, told apart by readers of every colour vision. Everything of the target
+The hues are Okabe and Ito's, told apart by readers of every colour vision; a test simulates
+deuteranopia, protanopia and tritanopia. Everything of the target
 is vermilion (the target, its slots, its frame), everything of the team grey or blue, so that a
 picture needs no key. A *point* is a pixel in a picture whose shorter side is :data:`DESIGN_SIZE`.
 """
@@ -42,8 +43,9 @@ TASK_COLOURS: Final[tuple[Colour, ...]] = (
     (86, 180, 233),
     (0, 114, 178),
     (0, 158, 115),
-    (204, 121, 167),
+    (240, 228, 66),
 )
+"""Not Okabe and Ito's pink for the last: seen with deuteranopia it is the grey of a tracker."""
 
 
 def mix(colour: Colour, ground: Colour, share: float) -> Colour:
@@ -63,3 +65,28 @@ PALETTE: Final[tuple[Colour, ...]] = (
     *TASK_COLOURS, *(pale(colour) for colour in TASK_COLOURS),
 )  # fmt: skip
 """Every flat colour of a picture; all others are blends of these, at edges and in what fades."""
+
+PLAYERS: Final[tuple[Colour, ...]] = ((0, 114, 178), (213, 120, 0), (40, 165, 130), INK)
+"""Curves of the teams that are compared in one picture, left to right."""
+
+DARK: Final[dict[str, Colour]] = {
+    "PAPER": (23, 26, 31), "GROUND": (29, 33, 39), "GRID": (58, 65, 75), "WALL": (132, 140, 151),
+    "OBSTACLE": (62, 69, 79), "OBSTACLE_RIM": (98, 107, 119), "INK": (230, 233, 238),
+    "FAINT_INK": (148, 156, 167), "TARGET": (240, 120, 40), "SLOT": (150, 92, 52),
+    "SLOT_FILLED": (108, 66, 38), "TRACKER": (140, 147, 157), "TRACKER_RIM": (222, 226, 232),
+    "TRAIL": (140, 147, 157), "BROKEN": (72, 78, 87), "LINK": (86, 180, 233),
+    "SENSING": (32, 47, 61), "SENSING_RIM": (58, 92, 122), "CONTACT": (255, 70, 100),
+}  # fmt: skip
+"""The colours of the same names on a dark screen."""
+DARK_TASK_COLOURS: Final[tuple[Colour, ...]] = (
+    (110, 195, 240),
+    (40, 130, 200),
+    (20, 175, 130),
+    (240, 228, 66),
+)
+DARK_PLAYERS: Final[tuple[Colour, ...]] = (
+    (86, 170, 235),
+    (240, 165, 40),
+    (40, 190, 150),
+    (230, 233, 238),
+)

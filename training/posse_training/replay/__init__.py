@@ -1,0 +1,19 @@
+"""Replays: one HTML file in which teams play the same world side by side."""
+
+from __future__ import annotations
+
+from posse_training.replay.episode import Column, Event, Player, Replay, join
+from posse_training.replay.page import read_replay, write_replay
+from posse_training.replay.recording import Recorder, record
+
+__all__ = [
+    "Column",
+    "Event",
+    "Player",
+    "Recorder",
+    "Replay",
+    "join",
+    "read_replay",
+    "record",
+    "write_replay",
+]

@@ -1,0 +1,59 @@
+"""``posse replay``: teams on the same world, as one HTML file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from posse_training.replay.episode import Replay, join
+from posse_training.replay.page import read_replay, write_replay
+from posse_training.replay.recording import record
+
+_PAGES = (".html", ".htm")
+
+
+@dataclass(frozen=True)
+class _Replay:
+    """Write one HTML file in which one to four teams play the same world side by side."""
+
+    players: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Policies: names, files, or "package.module:Class"; or replays (.html) of the same world, whose
+    players are taken over."""
+    scenario: str = "smart"
+    """What to play."""
+    world: int = 0
+    """Which world of the seed."""
+    seed: int = 7
+    """Of the world."""
+    split: str = "test"
+    """Of which split."""
+    num_trackers: int | None = None
+    """Trackers in the team; default: the scenario's."""
+    seconds: float | None = None
+    """Play so long at most, s; default: the whole episode."""
+    observations: bool = True
+    """Keep what every tracker observed: most of the file's size."""
+    out: Path = Path("replay.html")
+    """Where to write."""
+
+
+def main(arguments: list[str]) -> None:
+    """Play, and write the page."""
+    which = tyro.cli(_Replay, prog="posse replay", args=arguments)
+    replays: list[Replay] = []
+    for player in which.players:
+        if Path(player).suffix.lower() in _PAGES:
+            replays.append(read_replay(player))
+            continue
+        overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
+        replays.append(
+            record(
+                [player], which.scenario, seed=which.seed, world=which.world, split=which.split,
+                seconds=which.seconds, observations=which.observations, **overrides,
+            )
+        )  # fmt: skip
+    path = write_replay(join(replays), which.out)
+    print(f"{path} ({path.stat().st_size / 1000:.0f} kB): open it in a browser")

@@ -1,0 +1,160 @@
+"""How a replay is written: a JSON header, and one deflated stream of whole numbers.
+
+A column of shape (T + 1, ...) is divided by its resolution and rounded, K series of T + 1 whole
+numbers. Each series is replaced ``order`` times by its differences (the first number by its
+difference from 0); these are folded to numbers that are not negative (0, -1, 1, -2, ... become
+0, 1, 2, 3, ...) and stored as ``width`` planes of bytes, lowest first, each plane series by series.
+All columns stand one after another, and the whole is deflated (zlib). The header says of each
+column its ``name``, ``shape`` of a row, ``scale``, ``unit``, ``order``, ``width``, and the number
+``missing`` that stands for "not a number", if any.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import zlib
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse_training.replay.episode import Column, Event, Player, Replay
+from posse_training.runs.settings import SettingsError
+
+FORMAT: Final = 1
+_GREATEST: Final = 2**30
+_Integers = npt.NDArray[np.int64]
+
+
+def encode(replay: Replay) -> tuple[str, bytes]:
+    """Return the JSON header and the deflated columns.
+
+    Raises:
+        SettingsError: A column with numbers too great for its resolution.
+    """
+    parts: list[bytes] = []
+    players = []
+    for player in replay.players:
+        columns = []
+        for name, column in player.columns.items():
+            described, packed = _pack(name, column)
+            columns.append(described)
+            parts.append(packed)
+        players.append(
+            {
+                "name": player.name,
+                "frames": player.frames,
+                "events": [[e.step, e.kind, e.text, list(e.robots)] for e in player.events],
+                "metrics": player.metrics,
+                "about": player.about,
+                "columns": columns,
+            }
+        )
+    header = {"format": FORMAT, "world": replay.world, "players": players}
+    text = json.dumps(_to_json(header), separators=(",", ":"), allow_nan=False)
+    return text, zlib.compress(b"".join(parts), 9)
+
+
+def decode(header: str, data: bytes) -> Replay:
+    """Return what :func:`encode` was given, each number to half its column's resolution.
+
+    Raises:
+        SettingsError: Data of another format, or cut short.
+    """
+    try:
+        described = _from_json(json.loads(header))
+        raw = zlib.decompress(data)
+        version = described["format"]
+    except (ValueError, TypeError, KeyError, zlib.error) as error:
+        raise SettingsError(f"this is not the data of a replay: {error}") from error
+    if version != FORMAT:
+        raise SettingsError(f"a replay of format {version!r} cannot be read: known is {FORMAT}")
+    players, start = [], 0
+    for player in described["players"]:
+        columns = {}
+        for column in player["columns"]:
+            count = player["frames"] * math.prod(column["shape"])
+            end = start + count * column["width"]
+            if end > len(raw):
+                raise SettingsError(f"the data of a replay end within {column['name']!r}")
+            columns[column["name"]] = _unpack(column, player["frames"], raw[start:end])
+            start = end
+        events = tuple(Event(s, kind, text, tuple(who)) for s, kind, text, who in player["events"])
+        players.append(Player(player["name"], columns, events, player["metrics"], player["about"]))
+    return Replay(described["world"], tuple(players))
+
+
+def _pack(name: str, column: Column) -> tuple[dict[str, Any], bytes]:
+    values = np.asarray(column.values, np.float64) / column.resolution
+    finite = np.isfinite(values)
+    if (np.abs(values[finite]) > _GREATEST).any():
+        raise SettingsError(
+            f"column {name!r} holds {np.abs(values[finite]).max() * column.resolution:g}, too "
+            f"great for a resolution of {column.resolution:g}: raise it"
+        )
+    whole = np.rint(np.where(finite, values, 0)).astype(np.int64)
+    described: dict[str, Any] = {
+        "name": name,
+        "shape": list(values.shape[1:]),
+        "scale": column.resolution,
+        "unit": column.unit,
+    }
+    if not finite.all():
+        described["missing"] = int(whole.min() - 1)
+        whole[~finite] = described["missing"]
+    series = whole.reshape(len(whole), -1).T
+    candidates = [(order, *_planes(series, order)) for order in (0, 1, 2)]
+    order, width, packed = min(candidates, key=lambda one: len(zlib.compress(one[2], 6)))
+    return described | {"order": order, "width": width}, packed
+
+
+def _planes(series: _Integers, order: int) -> tuple[int, bytes]:
+    for _ in range(order):
+        series = np.diff(series, axis=1, prepend=0)
+    folded = (series << 1) ^ (series >> 63)
+    width = max(1, (int(folded.max(initial=0)).bit_length() + 7) // 8)
+    planes = [((folded >> 8 * k) & 255).astype(np.uint8).tobytes() for k in range(width)]
+    return width, b"".join(planes)
+
+
+def _unpack(column: dict[str, Any], frames: int, raw: bytes) -> Column:
+    planes = np.frombuffer(raw, np.uint8).reshape(column["width"], -1, frames).astype(np.int64)
+    folded = sum((plane << 8 * k for k, plane in enumerate(planes)), np.int64(0))
+    series = (np.asarray(folded) >> 1) ^ -(np.asarray(folded) & 1)
+    for _ in range(column["order"]):
+        series = np.cumsum(series, axis=1)
+    whole = series.T.reshape(frames, *column["shape"])
+    if column["scale"] == 1 and "missing" not in column:
+        return Column(whole, 1.0, column["unit"])
+    values = whole * float(column["scale"])
+    if "missing" in column:
+        values[whole == column["missing"]] = np.nan
+    return Column(values, float(column["scale"]), column["unit"])
+
+
+# JSON has no number that is infinite or none: they are written as {"number": "inf"}.
+
+
+def _to_json(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _to_json(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_to_json(part) for part in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"number": str(value)}
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)
+
+
+def _from_json(value: Any) -> Any:
+    if isinstance(value, dict):
+        if set(value) == {"number"} and value["number"] in ("inf", "-inf", "nan"):
+            return float(value["number"])
+        return {key: _from_json(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_from_json(part) for part in value]
+    return value

@@ -1,0 +1,162 @@
+"""The page: one HTML file that holds style, code and data, and asks for nothing from elsewhere.
+
+The code is that of the modules in ``web/``, one after another in one module: a page opened from a
+file may not import from another. It is deflated, as the data are, so that a page can be mailed;
+``web/loader.js`` unpacks and runs it. What comes from outside (names, cards, settings) is written
+as data, never as markup or code, and a policy in the page (Content-Security-Policy) lets the
+browser run no other code than this.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+import zlib
+from importlib import resources
+from pathlib import Path
+from typing import Any, Final
+
+from posse.rendering import style
+from posse_training.replay.episode import Replay
+from posse_training.replay.format import decode, encode
+from posse_training.runs.settings import SettingsError
+
+MODULES: Final = (
+    "data.js", "colours.js", "state.js", "geometry.js", "camera.js", "world.js", "sensing.js",
+    "robots.js", "view.js", "events.js", "timeline.js", "values.js", "panel.js", "header.js",
+    "export.js", "legend.js", "controls.js", "main.js",
+)  # fmt: skip
+"""The page's code, each after those that it imports from."""
+_COLOURS: Final = (
+    "PAPER", "GROUND", "GRID", "WALL", "OBSTACLE", "OBSTACLE_RIM", "INK", "FAINT_INK", "TARGET",
+    "SLOT", "SLOT_FILLED", "TRACKER", "TRACKER_RIM", "TRAIL", "BROKEN", "LINK", "SENSING",
+    "SENSING_RIM", "CONTACT",
+)  # fmt: skip
+_IMPORT: Final = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
+_EXPORT: Final = re.compile(r"^export ", re.MULTILINE)
+_DATA: Final = re.compile(
+    r'<script type="application/json" id="header">(.*?)</script>\s*'
+    r'<script type="text/plain" id="data">(.*?)</script>',
+    re.DOTALL,
+)
+
+
+def write_replay(replay: Replay, path: str | Path) -> Path:
+    """Write a page that shows a replay; folders are made, a file there is replaced.
+
+    Args:
+        replay: What :func:`posse_training.replay.record` or a
+            :class:`~posse_training.replay.Recorder` returns.
+        path: Where to, ending in ``.html``.
+
+    Raises:
+        SettingsError: A path that does not end in ``.html``.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise SettingsError(f"path={str(path)!r} must end in .html: a replay is a web page")
+    text = page(replay)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def read_replay(path: str | Path) -> Replay:
+    """Return the replay that a page shows, each number to half its column's resolution.
+
+    Raises:
+        SettingsError: No such file, or one that is no replay.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SettingsError(f"cannot read a replay from {path}: {error}") from error
+    found = _DATA.search(text)
+    if found is None:
+        raise SettingsError(f"{path} is no replay: posse replay writes one")
+    return decode(found[1], base64.b64decode(found[2]))
+
+
+def page(replay: Replay) -> str:
+    """Return the page's HTML."""
+    header, data = encode(replay)
+    code, loader, sheet = code_of_page(), _file("loader.js"), _file("style.css")
+    policy = {
+        "default-src": "'none'",
+        "script-src": f"'{_digest(loader)}' '{_digest(code)}'",
+        "style-src": f"'{_digest(sheet)}'",
+        "img-src": "blob: data:",
+        "media-src": "blob:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    values = {
+        "title": html.escape(_title(replay)),
+        "policy": "; ".join(f"{name} {value}" for name, value in policy.items()),
+        "style": sheet,
+        "colours": _as_data(json.dumps(colours(), separators=(",", ":"))),
+        "header": _as_data(header),
+        "data": _in_letters(data),
+        "code": _in_letters(zlib.compress(code.encode(), 9)),
+        "loader": loader,
+    }
+    # In one pass: what is put in is not looked at again.
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
+
+
+def _title(replay: Replay) -> str:
+    names = " and ".join(player.name for player in replay.players)
+    return f"{names} on {replay.world['scenario']}"
+
+
+def code_of_page() -> str:
+    """Return the modules as one: without their imports and the word "export"."""
+    modules = (_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in MODULES)
+    return "".join(
+        f"// --- {name} ---\n{text}\n" for name, text in zip(MODULES, modules, strict=True)
+    )
+
+
+def _in_letters(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def colours() -> dict[str, Any]:
+    """Return the colours of figures and films as the page has them, light and dark."""
+
+    def css(colour: style.Colour) -> str:
+        return "#" + "".join(f"{part:02x}" for part in colour)
+
+    light = {name: css(getattr(style, name)) for name in _COLOURS}
+    dark = light | {name: css(colour) for name, colour in style.DARK.items()}
+    return {
+        "light": {
+            **light,
+            "TASKS": [css(colour) for colour in style.TASK_COLOURS],
+            "PLAYERS": [css(colour) for colour in style.PLAYERS],
+        },
+        "dark": {
+            **dark,
+            "TASKS": [css(colour) for colour in style.DARK_TASK_COLOURS],
+            "PLAYERS": [css(colour) for colour in style.DARK_PLAYERS],
+        },
+    }
+
+
+def _as_data(text: str) -> str:
+    """Return JSON that means the same, and that nothing in a page takes for markup."""
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text
+
+
+def _digest(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _file(name: str) -> str:
+    return (resources.files(__package__) / "web" / name).read_text(encoding="utf-8")

@@ -1,0 +1,107 @@
+// Pictures and films of what is seen: header, views and timeline on one canvas.
+import { colours } from "./colours.js";
+import { headline } from "./header.js";
+import { app, listen, play, seconds, set } from "./state.js";
+import { drawTimeline, timelineHeight } from "./timeline.js";
+import { drawView, font } from "./view.js";
+
+const HEAD = 40;
+const RATE = 30; // frames a second of a film
+const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+
+let cameras = [];
+let recorder = null;
+let canvas = null;
+
+export function compose(target, ratio) {
+  const boxes = cameras.map((camera) => camera.canvas.getBoundingClientRect());
+  const left = Math.min(...boxes.map((box) => box.left));
+  const top = Math.min(...boxes.map((box) => box.top));
+  const width = Math.round(Math.max(...boxes.map((box) => box.right)) - left);
+  const views = Math.round(Math.max(...boxes.map((box) => box.bottom)) - top);
+  const strip = timelineHeight(width < 500);
+  const size = [width, HEAD + views + strip].map((value) => 2 * Math.ceil((value * ratio) / 2));
+  if (target.width !== size[0] || target.height !== size[1]) [target.width, target.height] = size;
+  const ctx = target.getContext("2d");
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  ctx.fillStyle = colours.PAPER;
+  ctx.fillRect(0, 0, width, HEAD + views + strip);
+  ctx.textBaseline = "middle";
+  ctx.textAlign = "left";
+  ctx.fillStyle = colours.INK;
+  ctx.font = font(14, 600);
+  ctx.fillText(headline(), 12, HEAD / 2, width - 120);
+  ctx.textAlign = "right";
+  ctx.fillText(`${seconds().toFixed(1)} s   ${app.speed}×`, width - 12, HEAD / 2);
+  cameras.forEach((camera, k) => {
+    ctx.save();
+    ctx.translate(boxes[k].left - left, HEAD + boxes[k].top - top);
+    drawView(ctx, camera.player, camera.look(app.position, cameras));
+    ctx.restore();
+  });
+  ctx.translate(0, HEAD + views);
+  drawTimeline(ctx, width, strip);
+}
+
+function save(blob, suffix) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  const names = app.players.map((player) => player.name).join("-");
+  const name = `${names}-${app.world.scenario}-${app.world.world}-${seconds().toFixed(1)}s`;
+  link.download = `${name.replace(/[^\w.-]+/g, "_").slice(0, 120)}.${suffix}`;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+export function savePicture() {
+  const picture = document.createElement("canvas");
+  compose(picture, 2);
+  picture.toBlob((blob) => save(blob, "png"), "image/png");
+}
+
+// Records from the present moment to the end, or until it is asked for again.
+export function toggleFilm() {
+  if (recorder) {
+    recorder.stop();
+    return;
+  }
+  const type = globalThis.MediaRecorder && TYPES.find((one) => MediaRecorder.isTypeSupported(one));
+  if (!type) {
+    const message = document.getElementById("message");
+    message.textContent = "This browser records no WebM films; use posse watch to write one.";
+    message.hidden = false;
+    setTimeout(() => (message.hidden = true), 6000);
+    return;
+  }
+  canvas = document.createElement("canvas");
+  compose(canvas, 1);
+  const parts = [];
+  recorder = new MediaRecorder(canvas.captureStream(RATE), {
+    mimeType: type,
+    videoBitsPerSecond: 6e6,
+  });
+  recorder.ondataavailable = (part) => parts.push(part.data);
+  recorder.onstop = () => {
+    save(new Blob(parts, { type: "video/webm" }), "webm");
+    recorder = canvas = null;
+    set({ recording: false, playing: false });
+  };
+  recorder.start(500);
+  set({ recording: true });
+  play(true);
+}
+
+// To be called once everything else is drawn.
+export function filmFrame() {
+  if (canvas) compose(canvas, 1);
+}
+
+export function connectExport(all) {
+  cameras = all;
+  let wasPlaying = false;
+  listen(() => {
+    const ended = wasPlaying && !app.playing;
+    wasPlaying = app.playing;
+    if (recorder?.state === "recording" && ended) recorder.stop();
+  });
+}

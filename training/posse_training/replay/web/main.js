@@ -1,0 +1,129 @@
+// Puts the page together, and draws it whenever something has changed.
+import { Camera } from "./camera.js";
+import { useTheme } from "./colours.js";
+import { connectControls, connectView } from "./controls.js";
+import { readReplay } from "./data.js";
+import { connectExport, filmFrame } from "./export.js";
+import { areaInSight, inside } from "./geometry.js";
+import { fillHeader } from "./header.js";
+import { connectPanel } from "./panel.js";
+import { sightOf } from "./sensing.js";
+import { app, listen, readHash, seconds, set, writeHash } from "./state.js";
+import { connectTimeline, drawTimeline, timelineHeight } from "./timeline.js";
+import { drawView } from "./view.js";
+
+const SETTLES = 250; // ms without a change before the address is written
+
+// Makes a canvas as large as its place, in the screen's own pixels.
+function fill(canvas, box) {
+  const ratio = Math.min(devicePixelRatio || 1, 3);
+  const size = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
+  if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+  const ctx = canvas.getContext("2d");
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return ctx;
+}
+
+function start() {
+  const views = document.getElementById("views");
+  const strip = document.getElementById("timeline");
+  const cameras = app.players.map((player) => {
+    const camera = new Camera(player);
+    const holder = document.createElement("div");
+    camera.canvas = document.createElement("canvas");
+    camera.canvas.setAttribute("role", "img");
+    camera.canvas.setAttribute("aria-label", `${player.name} at work`);
+    holder.append(camera.canvas);
+    views.append(holder);
+    return camera;
+  });
+  views.dataset.players = cameras.length;
+  document.body.style.setProperty("--count", cameras.length);
+
+  let waiting = false;
+  let before = null;
+  let hover = null;
+  let timer = 0;
+
+  const draw = () => {
+    for (const camera of cameras) {
+      const box = camera.canvas.parentElement.getBoundingClientRect();
+      camera.resize(box.width, box.height);
+    }
+    for (const camera of cameras) {
+      const ctx = fill(camera.canvas, camera);
+      drawView(ctx, camera.player, camera.look(app.position, cameras));
+    }
+    const box = strip.getBoundingClientRect();
+    drawTimeline(fill(strip.firstElementChild, box), box.width, box.height, hover);
+    filmFrame();
+  };
+  const tick = (now) => {
+    waiting = false;
+    if (app.playing) {
+      const passed = before === null ? 0 : Math.min(0.25, (now - before) / 1000);
+      before = now;
+      const position = app.position + (passed * app.speed) / seconds(1);
+      set({ position, playing: position < app.last });
+    } else {
+      before = null;
+    }
+    draw();
+    if (app.playing) redraw();
+  };
+  const redraw = () => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(tick);
+  };
+
+  let dark = null;
+  listen(() => {
+    if (dark !== app.dark) useTheme(app.dark);
+    dark = app.dark;
+    strip.setAttribute("aria-valuenow", seconds().toFixed(1));
+    strip.setAttribute("aria-valuemax", seconds(app.last).toFixed(1));
+    clearTimeout(timer);
+    timer = setTimeout(writeHash, SETTLES);
+    redraw();
+  });
+  fillHeader();
+  connectControls(cameras);
+  connectPanel();
+  connectExport(cameras);
+  connectTimeline(strip, (at) => {
+    hover = at;
+    redraw();
+  });
+  for (const camera of cameras) connectView(camera, cameras, redraw);
+  const narrow = matchMedia("(max-width: 760px)");
+  const arrange = () => {
+    strip.style.height = `${timelineHeight(narrow.matches)}px`;
+    redraw();
+  };
+  new ResizeObserver(arrange).observe(views);
+  addEventListener("resize", arrange);
+  addEventListener("hashchange", readHash);
+  if (narrow.matches) document.body.classList.add("no-panel");
+  set({ dark: matchMedia("(prefers-color-scheme: dark)").matches });
+  arrange();
+  readHash();
+}
+
+// For scripts and tests: window.replay.set({ position: 10 }), window.replay.app.players, ...
+async function main() {
+  try {
+    Object.assign(app, await readReplay());
+    app.last = Math.max(...app.players.map((player) => player.last));
+    start();
+    globalThis.replay = { app, set, areaInSight, inside, sightOf };
+    document.documentElement.dataset.ready = "yes";
+  } catch (error) {
+    const message = document.getElementById("message");
+    message.textContent = `This replay cannot be shown: ${error.message}`;
+    message.hidden = false;
+    throw error;
+  }
+}
+
+main();

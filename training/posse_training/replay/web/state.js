@@ -1,0 +1,86 @@
+// What the user has chosen: time, selection, layers. One object, and whoever wants to know of changes.
+
+export const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
+
+export const app = {
+  world: null,
+  players: [],
+  position: 0, // in frames, between two of them while it plays
+  last: 0,
+  playing: false,
+  speed: 1,
+  selected: null, // number of a robot; null: none
+  layers: { links: true, sensing: true, trails: true },
+  linked: true,
+  follow: false,
+  dark: false,
+  recording: false,
+};
+
+const listeners = [];
+
+export function listen(listener) {
+  listeners.push(listener);
+}
+
+export function set(changes) {
+  Object.assign(app, changes);
+  app.position = Math.max(0, Math.min(app.last, app.position));
+  for (const listener of listeners) listener();
+}
+
+export function seconds(frames = app.position) {
+  return frames * app.world.settings.control_step;
+}
+
+// The frame that a player is in; one whose episode has ended stays in its last.
+export function frameOf(player, position = app.position) {
+  return Math.min(Math.floor(position + 1e-6), player.last);
+}
+
+export function robotName(number) {
+  return number === app.world.settings.num_trackers ? "target" : `tracker ${number}`;
+}
+
+export function select(robot) {
+  const count = app.world.agents;
+  set({ selected: robot !== null && robot >= 0 && robot < count ? robot : null });
+}
+
+// Start over at the end; pausing leaves no half frame behind.
+export function play(playing = !app.playing) {
+  const over = playing && app.position >= app.last;
+  set({ playing, position: over ? 0 : playing ? app.position : Math.round(app.position) });
+}
+
+export function seek(position, playing = false) {
+  set({ position: Math.round(position), playing });
+}
+
+// --- the address: #t=12.4&r=3 ---
+
+export function readHash() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const changes = {};
+  if (asked.has("t")) {
+    const time = Number(asked.get("t"));
+    if (Number.isFinite(time)) changes.position = Math.round(time / seconds(1));
+  }
+  if (asked.has("r")) {
+    const robot = Number.parseInt(asked.get("r"), 10);
+    changes.selected = robot >= 0 && robot < app.world.agents ? robot : null;
+  }
+  if (Object.keys(changes).length) set({ ...changes, playing: false });
+}
+
+export function writeHash() {
+  if (app.playing) return;
+  const robot = app.selected === null ? "" : `&r=${app.selected}`;
+  const hash = `#t=${Number(seconds().toFixed(3))}${robot}`;
+  if (hash === location.hash) return;
+  try {
+    history.replaceState(null, "", hash);
+  } catch {
+    // Where the page is shown inside another, its address may be out of reach.
+  }
+}

@@ -1,0 +1,100 @@
+"""What a page says of the world that was played: scenario, settings, where things stand."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Final
+
+import posse
+from posse import REWARD_TERMS, Batch, Field, Scenario, ScenarioError, get_scenario
+from posse.rendering.style import TASKS
+from posse.scenarios.formation import slot_offsets
+from posse_training.runs.provenance import commit
+
+_OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")
+_BLOCKS: Final = ("own motion", "task", "target", "sonar", "team-mates")
+
+
+def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, Any]:
+    """Return what all players of a world have in common, as plain JSON with infinite numbers.
+
+    Of the observation's fields, only the sonar is described without ``observations``.
+    """
+    scenario, state = batch.scenario, batch.state
+    weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
+    return {
+        "posse": posse.__version__,
+        "commit": commit(),
+        "scenario": scenario.name,
+        "version": scenario.version,
+        "settings": scenario.to_dict(),
+        "changed": changed_settings(scenario),
+        "seed": int(state["world_seed"][world]),
+        "split": batch.split,
+        "world": int(state["world_index"][world]),
+        "episode": int(state["world_episode"][world]),
+        "agents": scenario.num_agents,
+        "slots": [[float(x), float(y)] for x, y in slot_offsets(scenario)],
+        "obstacles": [
+            [float(state[f"obstacle_{name}"][world, k]) for name in ("x", "y", "radius")]
+            for k in range(scenario.num_obstacles)
+        ],
+        "tasks": list(TASKS),
+        "weights": weights,
+        "terms": [
+            {"name": term.name, "unit": term.unit, "meaning": term.meaning}
+            for term in REWARD_TERMS
+            if term.name in weights
+        ],
+        "fields": [
+            _describe(field)
+            for field in batch.layout.fields
+            if observations or field.name == "sonar"
+        ],
+        "metrics": [
+            {"name": metric.name, "unit": metric.unit, "meaning": metric.meaning}
+            for metric in posse.METRICS
+        ],
+    }
+
+
+def _describe(field: Field) -> dict[str, Any]:
+    return {
+        "name": field.name,
+        "block": _block(field),
+        "size": field.size,
+        "unit": field.unit,
+        "low": float(field.low),
+        "high": float(field.high),
+        "meaning": field.meaning,
+        "unknown": None if field.unknown is None else float(field.unknown),
+    }
+
+
+def _block(field: Field) -> str:
+    """Return under which heading a field stands in the panel."""
+    if field.of_neighbour:
+        return _BLOCKS[4]
+    if field.name == "sonar":
+        return _BLOCKS[3]
+    if field.name.startswith("target_"):
+        return _BLOCKS[2]
+    return _BLOCKS[0] if field.name in _OWN else _BLOCKS[1]
+
+
+def changed_settings(scenario: Scenario) -> dict[str, list[Any]]:
+    """Return the settings that differ from the named scenario's: [there, here] by name.
+
+    ``message_size`` is left out: it is what the policy needs. Of a name that is not known, what
+    differs from the plainest scenario is returned.
+    """
+    try:
+        named = get_scenario(scenario.name)
+    except ScenarioError:
+        named = get_scenario("constant")
+    there, here = named.to_dict(), scenario.to_dict()
+    return {
+        field.name: [there[field.name], here[field.name]]
+        for field in dataclasses.fields(scenario)
+        if field.name not in ("name", "message_size") and there[field.name] != here[field.name]
+    }
