@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from posse_training.replay.episode import Column, Event, Player, Replay, join
 from posse_training.replay.page import read_replay, write_replay
-from posse_training.replay.recording import Recorder, record
+from posse_training.replay.playing import record
+from posse_training.replay.recording import Recorder
 
 __all__ = [
     "Column",

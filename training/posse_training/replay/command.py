@@ -10,7 +10,7 @@ import tyro
 
 from posse_training.replay.episode import Replay, join
 from posse_training.replay.page import read_replay, write_replay
-from posse_training.replay.recording import record
+from posse_training.replay.playing import record
 
 _PAGES = (".html", ".htm")
 
@@ -20,8 +20,8 @@ class _Replay:
     """Write one HTML file in which one to four teams play the same world side by side."""
 
     players: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Policies: names, files, or "package.module:Class"; or replays (.html) of the same world, whose
-    players are taken over."""
+    """Policies: names, files, or "package.module:Class"; or replays (.html) of the same world,
+    whose players are taken over."""
     scenario: str = "smart"
     """What to play."""
     world: int = 0

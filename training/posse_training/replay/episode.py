@@ -58,7 +58,7 @@ class Player:
 
     Attributes:
         name: What the page calls it.
-        columns: By name; :mod:`posse_training.replay.recording` lists them.
+        columns: By name; :mod:`posse_training.replay.columns` lists them.
         events: In order of time.
         metrics: Every metric of the episode, as far as it was played; nan: never happened.
         about: What is known of the policy, such as the card of a learned one; plain JSON.

@@ -1,0 +1,88 @@
+"""What is encoded is decoded, and what is no replay is refused."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from typing import Any
+
+import hypothesis.extra.numpy as arrays
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.support.replays import short
+
+from posse_training.replay import Column, Event, Player, Replay
+from posse_training.replay.format import decode, encode
+from posse_training.runs.settings import SettingsError
+
+VALUES = arrays.arrays(
+    np.float64,
+    st.tuples(st.integers(1, 12), st.integers(0, 4)),
+    elements=st.one_of(st.floats(-1000, 1000), st.just(float("nan"))),
+)
+
+
+@settings(deadline=None)
+@given(values=VALUES, resolution=st.sampled_from([1.0, 0.25, 0.001, 1 / 512]))
+def test_any_column_comes_back_to_half_its_resolution(values: Any, resolution: float) -> None:
+    replay = Replay({"a": 1}, (Player("p", {"c": Column(values, resolution, "m")}),))
+    column = decode(*encode(replay)).players[0].columns["c"]
+    assert column.values.shape == values.shape
+    assert (column.resolution, column.unit) == (resolution, "m")
+    np.testing.assert_array_equal(np.isnan(column.values), np.isnan(values))
+    off = np.abs(column.values - values)
+    assert np.nanmax(off, initial=0) <= resolution * 0.5 * (1 + 1e-9)
+
+
+@settings(deadline=None)
+@given(values=arrays.arrays(np.int64, st.tuples(st.integers(1, 12), st.integers(0, 3)),
+                            elements=st.integers(-(2**30), 2**30)))  # fmt: skip
+def test_whole_numbers_come_back_exactly(values: Any) -> None:
+    replay = Replay({}, (Player("p", {"c": Column(values)}),))
+    np.testing.assert_array_equal(decode(*encode(replay)).players[0].columns["c"].values, values)
+
+
+def test_all_that_is_not_a_column_comes_back() -> None:
+    world = {"inf": float("inf"), "list": [1, -float("inf"), None, True, "ü"], "in": {"a": 0.1}}
+    events = (Event(3, "contact", "text", (1, 2)), Event(9, "dart", ""))
+    metrics = {"score": 0.25, "settling_time": float("nan")}
+    player = Player("näme", {"c": Column(np.zeros((2, 1)))}, events, metrics, {"card": "x"})
+    back = decode(*encode(Replay(world, (player,))))
+    assert back.world == world
+    assert back.players[0].events == events
+    assert back.players[0].about == {"card": "x"}
+    assert back.players[0].metrics["score"] == 0.25
+    assert np.isnan(back.players[0].metrics["settling_time"])
+
+
+def test_the_header_says_what_every_column_is() -> None:
+    header = json.loads(encode(short())[0])
+    columns = {column["name"]: column for column in header["players"][0]["columns"]}
+    assert columns["tracker_x"]["unit"] == "m"
+    assert columns["tracker_x"]["shape"] == [4]
+    assert columns["tracker_slot"]["scale"] == 1
+    fields = {field["name"]: field for field in header["world"]["fields"]}
+    for name, field in fields.items():
+        assert {"unit", "low", "high", "meaning", "unknown", "block"} <= set(field), name
+    assert fields["target_range"]["unknown"] == -1
+
+
+def test_numbers_too_great_are_refused() -> None:
+    replay = Replay({}, (Player("p", {"far": Column(np.full((2, 1), 1e7), 0.001)}),))
+    with pytest.raises(SettingsError, match=r"column 'far' holds 1e\+07, too great"):
+        encode(replay)
+
+
+def test_what_is_no_replay_is_refused() -> None:
+    header, data = encode(Replay({}, (Player("p", {"c": Column(np.arange(50.0))}),)))
+    for bad, message in (
+        (("{", data), "not the data of a replay"),
+        (("[]", data), "not the data of a replay"),
+        ((header, b"no zlib"), "not the data of a replay"),
+        ((header.replace('"format":1', '"format":2'), data), "format 2 cannot be read"),
+        ((header, zlib.compress(zlib.decompress(data)[:-1])), "end within 'c'"),
+    ):
+        with pytest.raises(SettingsError, match=message):
+            decode(*bad)

@@ -1,0 +1,211 @@
+"""What is recorded is what happened, step by step, also after it was written and read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.replays import short
+
+import posse
+from posse_baselines import begin, load
+from posse_training.replay import Player, Recorder, join, record
+from posse_training.replay.format import decode, encode
+from posse_training.runs.settings import SettingsError
+
+
+def close(column: Any, frame: int, value: Any, angle: bool = False) -> None:
+    """One row is a value, to half the column's resolution (whole numbers: exactly)."""
+    off = np.asarray(column.values[frame], np.float64) - np.asarray(value, np.float64)
+    if angle:
+        off = (off + np.pi) % (2 * np.pi) - np.pi
+    allowed = 1e-9 if column.resolution == 1 else column.resolution * 0.501
+    assert np.abs(off).max(initial=0) <= allowed
+
+
+@pytest.mark.parametrize(
+    ("policy", "scenario"),
+    [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("oracle", "leader-loss")],
+)
+def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -> None:
+    player_of = load(policy)
+    settings = posse.get_scenario(scenario, horizon=150)
+    recorded = record([policy], settings, seed=5, world=2)
+    player = decode(*encode(recorded)).players[0]
+    settings = settings.replace(message_size=max(settings.message_size, player_of.message_size))
+    batch = posse.Batch(
+        settings, 1, seed=5, split="test", first_world=2, autoreset="disabled"
+    )  # fmt: skip
+    memory, observations = begin(player_of, batch), batch.reset()
+    column, outage = player.columns, round(settings.outage_time / settings.control_step)
+    assert player.frames == 151
+    for frame in range(151):
+        of = {name: array[0] for name, array in batch.state.items()}
+        for name in ("x", "y", "fix_x", "fix_y"):
+            close(column[f"tracker_{name}"], frame, of[f"tracker_{name}"])
+        for name, cosine, sine in (
+            ("tracker_heading", "tracker_heading_cos", "tracker_heading_sin"),
+            ("tracker_fix_heading", "tracker_fix_cos", "tracker_fix_sin"),
+            ("target_heading", "world_heading_cos", "world_heading_sin"),
+            ("target_frame", "world_frame_cos", "world_frame_sin"),
+        ):
+            close(column[name], frame, np.arctan2(of[sine], of[cosine]), angle=True)
+        for name in ("sees", "slot", "onsets", "fix_step"):
+            close(column[f"tracker_{name}"], frame, of[f"tracker_{name}"])
+        for fault in ("sensor_dead", "radio_dead"):
+            since = frame - of[f"tracker_{fault}_from"].astype(np.int64)
+            close(column[f"tracker_{fault}"], frame, (since >= 0) & (since < outage))
+        close(column["tracker_broken"], frame, of["tracker_broken_at"] <= frame)
+        close(column["target_x"], frame, of["world_x"])
+        close(column["target_y"], frame, of["world_y"])
+        close(column["target_dart"], frame, of["world_pressed"] < 0)
+        close(column["score"], frame, batch.score[0])
+        assert ("heard_step" in column) == (of["heard_step"].size > 0)
+        if of["heard_step"].size:
+            close(column["heard_step"], frame, of["heard_step"])
+        for name, value in batch.layout.views(observations[0]).items():
+            close(column[f"observation/{name}"], frame, value)
+        if frame == 150:
+            break
+        actions, memory = player_of.act(observations, memory)
+        close(column["action"], frame, actions[0, :, :2])
+        if settings.message_size:
+            close(column["message"], frame, actions[0, :, 2:])
+        beliefs = player_of.annotations(memory)
+        assert {n for n in column if n.startswith("belief/")} == {f"belief/{n}" for n in beliefs}
+        for name, value in beliefs.items():
+            close(column[f"belief/{name}"], frame, value[0])
+        observations, _, _, _, infos = batch.step(actions)
+        for name in dict(settings.reward_weights):
+            close(column[f"reward/{name}"], frame + 1, infos["reward_terms"][name][0])
+    for name, value in batch.metrics().items():
+        assert player.metrics[name] == pytest.approx(float(value[0]), nan_ok=True)
+
+
+def test_the_world_is_described() -> None:
+    world = short().world
+    assert (world["scenario"], world["seed"], world["split"], world["world"]) == (
+        "field", 3, "test", 1,
+    )  # fmt: skip
+    assert world["version"] == posse.get_scenario("field").version
+    assert world["changed"] == {"num_trackers": [5, 4]}
+    batch = posse.batch("field", 1, seed=3, split="test", first_world=1, num_trackers=4)
+    batch.reset()
+    state = batch.state
+    obstacles = np.stack([state[f"obstacle_{k}"][0] for k in ("x", "y", "radius")], -1)
+    np.testing.assert_array_equal(np.array(world["obstacles"], np.float32), obstacles)
+    # Both players' fields: the message of a team-mate is only in the first one's observation.
+    names = [field["name"] for field in world["fields"]]
+    assert set(names) == {field.name for field in batch.layout.fields} | {"neighbour_message"}
+    assert [p.name for p in short().players] == ["ddcs-distributed", "pursuit"]
+
+
+def test_without_observations_only_what_is_drawn_is_kept() -> None:
+    for player in short(observations=False).players:
+        kept = [name for name in player.columns if name.startswith("observation/")]
+        assert kept == ["observation/sonar"]
+    assert [field["name"] for field in short(observations=False).world["fields"]] == ["sonar"]
+
+
+def drive(recorder: Recorder, steps: int) -> Player:
+    recorder.reset()
+    for step in range(steps):
+        speed = np.full(recorder.batch.action_shape, 0.1 * np.sin(step), np.float32)
+        recorder.step(speed)
+    return recorder.player()
+
+
+def test_a_world_of_a_larger_batch_is_recorded_as_if_alone() -> None:
+    many = drive(Recorder(posse.batch("radio", 5, seed=2), "a", world=3), 30)
+    alone = drive(Recorder(posse.batch("radio", 1, seed=2, first_world=3), "a"), 30)
+    assert list(many.columns) == list(alone.columns)
+    for name, column in many.columns.items():
+        np.testing.assert_array_equal(column.values, alone.columns[name].values)
+    assert many.events == alone.events
+
+
+def test_a_target_that_is_an_agent_has_a_row_of_its_own() -> None:
+    batch = posse.batch("smart", 1, target_motion="agent")
+    recorder = Recorder(batch, "me")
+    player = drive(recorder, 10)
+    n = batch.scenario.num_trackers
+    assert player.columns["action"].values.shape == (11, n + 1, 2)
+    assert player.columns["observation/heading"].values.shape == (11, n + 1, 2)
+    assert player.columns["tracker_x"].values.shape == (11, n)
+    assert recorder.replay().world["agents"] == n + 1
+
+
+def test_an_episode_ends_where_it_ends() -> None:
+    recorded = record(["idle"], "constant", horizon=7, settle_time=0.5)
+    assert recorded.players[0].frames == 8
+    assert record(["idle"], "constant", seconds=0.5).players[0].frames == 6
+
+
+def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
+    one, two = record(["idle"], "smart", seconds=1), record(["pursuit"], "smart", seconds=1)
+    joined = join([one, two])
+    assert [player.name for player in joined.players] == ["idle", "pursuit"]
+    talker = record(["ddcs-distributed"], "smart", seconds=1)
+    assert len(join([one, talker]).players) == 2  # the length of messages does not count
+    other = record(["pursuit"], "smart", seconds=1, world=1, tolerance=0.2)
+    with pytest.raises(SettingsError, match="same world: tolerance, world differ"):
+        join([one, other])
+    with pytest.raises(SettingsError, match="1 to 4 players, got 5"):
+        join([one] * 5)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"policies": []}, "1 to 4 players, got 0"),
+        ({"policies": ["idle"] * 5}, "1 to 4 players, got 5"),
+        ({"seconds": 0.0}, "seconds=0.0 must be above 0"),
+        ({"seconds": float("nan")}, "seconds=nan must be above 0"),
+        ({"policies": ["idel"]}, "unknown policy 'idel'"),
+        ({"scenario": "smrt"}, "unknown scenario 'smrt'"),
+        ({"world": -1}, "first_world=-1 must be"),
+        ({"target_motion": "agent"}, "the target of 'smart' is an agent"),
+    ],
+)
+def test_what_cannot_be_recorded_is_named(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        record(**({"policies": ["idle"], "scenario": "smart"} | wrong))
+
+
+def test_a_recorder_used_wrongly_says_so() -> None:
+    recorder = Recorder(posse.batch("constant", 1, horizon=30), "a")
+    actions = np.zeros(recorder.batch.action_shape, np.float32)
+    for use in (recorder.player, lambda: recorder.step(actions)):
+        with pytest.raises(SettingsError, match="before reset"):
+            use()
+    drive(recorder, 30)
+    assert recorder.over
+    with pytest.raises(SettingsError, match="has ended"):
+        recorder.step(actions)
+    with pytest.raises(SettingsError, match="world=1 is not in the batch"):
+        Recorder(posse.batch("constant", 1), "a", world=1)
+    with pytest.raises(SettingsError, match="same_step"):
+        Recorder(posse.batch("constant", 1, autoreset="same_step"), "a")
+
+
+def test_a_reset_begins_a_new_recording() -> None:
+    recorder = Recorder(posse.batch("constant", 1), "a")
+    drive(recorder, 12)
+    assert drive(recorder, 5).frames == 6
+    assert recorder.replay().world["episode"] == 1
+
+
+def test_only_small_entries_of_a_card_are_taken() -> None:
+    about = record(["learned-smart"], "smart", seconds=0.5).players[0].about
+    assert about["trained_splits"] == "train"
+    assert about["steps"] == load("learned-smart").card["steps"]  # type: ignore[attr-defined]
+    assert sum(len(str(value)) for value in about.values()) < 3000
+
+
+def test_a_recording_does_not_change_with_the_batch() -> None:
+    recorder = Recorder(posse.batch("constant", 1), "a")
+    first = drive(recorder, 5)
+    before = first.columns["tracker_x"].values.copy()
+    drive(recorder, 5)
+    np.testing.assert_array_equal(first.columns["tracker_x"].values, before)

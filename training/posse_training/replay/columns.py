@@ -1,0 +1,160 @@
+"""The columns of a recorded episode: which there are, how fine they are kept, how they are made.
+
+========================== ================= ======================================================
+column                     shape of a row    what it holds
+========================== ================= ======================================================
+tracker_x, tracker_y       (N,) m            where each tracker is
+tracker_heading            (N,) rad          its heading, without jumps of 2π
+tracker_sees               (N,)              1: its own sensor has the target
+tracker_slot               (N,)              the slot that it occupies; -1: none
+tracker_onsets             (N,)              contacts that began in this step
+tracker_broken             (N,)              1: it is broken
+tracker_sensor_dead        (N,)              1: its target sensor is in an outage
+tracker_radio_dead         (N,)              1: its radio is in an outage
+tracker_fix_step           (N,)              when its best fix of the target was taken; -1: none
+tracker_fix_x, _y          (N,) m            where that fix is
+tracker_fix_heading        (N,) rad          the target's heading in it
+heard_step                 (N, N)            when what i last heard of j was sent; -1: never. Left
+                                             out where the radio is perfect
+target_x, _y, _heading     () m, rad         the target
+target_frame               () rad            heading of the slot frame, ψ
+target_dart                ()                1: a smart target darts
+score                      ()                the present step's score
+action                     (rows, 2)         what was chosen, in [-1, 1]: speed, turn rate
+message                    (rows, m)         what was added to the broadcast
+reward/NAME                (rows,)           each term that the scenario weighs, unweighted
+belief/NAME                (N, ...)          what the policy tells of itself
+observation/NAME           (rows, ...)       each field; only the sonar without ``observations``
+========================== ================= ======================================================
+
+Rows are trackers, and after them the target where it is an agent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import ObservationLayout, Scenario
+from posse.numeric import FloatArray
+from posse_training.replay.episode import Column
+
+_PLACE: Final = 0.001  # m
+_ANGLE: Final = 0.001  # rad
+_FIX: Final = 0.01  # m, a measured place
+_ACTION: Final = 0.004
+_MESSAGE: Final = 1 / 512
+_SCORE: Final = 0.0001
+_COARSE: Final = 0.02  # what is only drawn
+_RESOLUTIONS: Final = {"m": 0.001, "m/s": 0.001, "rad": 0.001, "rad/s": 0.001, "s": 0.01}
+_FINE: Final = 0.001
+STATES: Final = (
+    "tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin", "tracker_sees",
+    "tracker_slot", "tracker_onsets", "tracker_broken_at", "tracker_sensor_dead_from",
+    "tracker_radio_dead_from", "tracker_fix_step", "tracker_fix_x", "tracker_fix_y",
+    "tracker_fix_cos", "tracker_fix_sin", "heard_step",
+    "world_step", "world_x", "world_y", "world_heading_cos", "world_heading_sin",
+    "world_frame_cos", "world_frame_sin", "world_pressed", "world_score", "world_detected_at",
+    "world_settled_at", "world_recovered_at",
+    "world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target",
+)  # fmt: skip
+
+"""What is read of the state of a world, frame by frame."""
+
+States = dict[str, npt.NDArray[Any]]
+"""By name, (T + 1, ...) each."""
+
+
+def last_kept(rows: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Return T rows as T + 1: nothing is chosen in the last frame, which keeps what was."""
+    return np.stack([*rows, rows[-1]])
+
+
+def _number_column(values: npt.NDArray[Any], resolution: float) -> Column:
+    """Return a column that is kept exactly where it holds whole numbers."""
+    finite = np.isfinite(values)
+    whole = np.array_equal(values[finite], np.rint(values[finite]))
+    return Column(values, 1.0 if whole else resolution)
+
+
+def _angle(states: States, cosine: str, sine: str) -> Column:
+    return Column(np.unwrap(np.arctan2(states[sine], states[cosine]), axis=0), _ANGLE, "rad")
+
+
+def state_columns(states: States, scenario: Scenario) -> dict[str, Column]:
+    """Return the columns of the robots, the target and the radio."""
+    step = states["world_step"][:, None]
+    outage = max(1, round(scenario.outage_time / scenario.control_step))
+
+    def in_outage(name: str) -> Column:
+        since = step.astype(np.int64) - states[name]
+        return Column(((since >= 0) & (since < outage)).astype(np.int8))
+
+    columns = {
+        "tracker_x": Column(states["tracker_x"], _PLACE, "m"),
+        "tracker_y": Column(states["tracker_y"], _PLACE, "m"),
+        "tracker_heading": _angle(states, "tracker_heading_cos", "tracker_heading_sin"),
+        "tracker_sees": Column(states["tracker_sees"]),
+        "tracker_slot": Column(states["tracker_slot"]),
+        "tracker_onsets": Column(states["tracker_onsets"]),
+        "tracker_broken": Column((states["tracker_broken_at"] <= step).astype(np.int8)),
+        "tracker_sensor_dead": in_outage("tracker_sensor_dead_from"),
+        "tracker_radio_dead": in_outage("tracker_radio_dead_from"),
+        "tracker_fix_step": Column(states["tracker_fix_step"]),
+        "tracker_fix_x": Column(states["tracker_fix_x"], _FIX, "m"),
+        "tracker_fix_y": Column(states["tracker_fix_y"], _FIX, "m"),
+        "tracker_fix_heading": _angle(states, "tracker_fix_cos", "tracker_fix_sin"),
+        "target_x": Column(states["world_x"], _PLACE, "m"),
+        "target_y": Column(states["world_y"], _PLACE, "m"),
+        "target_heading": _angle(states, "world_heading_cos", "world_heading_sin"),
+        "target_frame": _angle(states, "world_frame_cos", "world_frame_sin"),
+        "target_dart": Column((states["world_pressed"] < 0).astype(np.int8)),
+        "score": Column(states["world_score"], _SCORE),
+    }
+    if states["heard_step"].size:
+        columns["heard_step"] = Column(states["heard_step"])
+    return columns
+
+
+def reward_columns(terms: dict[str, list[npt.NDArray[Any]]]) -> dict[str, Column]:
+    """Return a column of each term of T steps; there is none of the start, which gives nothing."""
+    return {
+        f"reward/{name}": _number_column(np.stack([np.zeros_like(column[0]), *column]), _FINE)
+        for name, column in terms.items()
+    }
+
+
+def belief_columns(beliefs: States) -> dict[str, Column]:
+    """Return a column of each thing that the policy tells."""
+    return {f"belief/{name}": _number_column(value, _COARSE) for name, value in beliefs.items()}
+
+
+def action_columns(actions: Sequence[FloatArray]) -> dict[str, Column]:
+    """Return the columns of T actions (rows, 2 + m)."""
+    if not actions:
+        return {}
+    values = last_kept(actions)
+    columns = {"action": Column(values[..., :2], _ACTION)}
+    if values.shape[-1] > 2:
+        columns["message"] = Column(values[..., 2:], _MESSAGE)
+    return columns
+
+
+def observation_columns(
+    layout: ObservationLayout, observations: FloatArray, whole: bool
+) -> dict[str, Column]:
+    """Return a column of each field of observations (T + 1, rows, F); of the sonar if not whole."""
+    columns = {}
+    views = layout.views(observations)
+    for field in layout.fields:
+        if not whole and field.name != "sonar":
+            continue
+        finest = _RESOLUTIONS.get(field.unit, _FINE) if whole else _COARSE
+        if field.name == "neighbour_message":
+            finest = _MESSAGE
+        kept = _number_column(views[field.name], finest)
+        columns[f"observation/{field.name}"] = Column(kept.values, kept.resolution, field.unit)
+    return columns

@@ -1,0 +1,90 @@
+"""Plays one world with one or more policies, and records it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from posse import Batch, Scenario, get_scenario
+from posse_baselines import Policy, PolicyError, begin, load
+from posse_training.replay.episode import MOST_PLAYERS, Replay, join
+from posse_training.replay.recording import Recorder
+from posse_training.runs.settings import SettingsError
+
+_LONGEST_ENTRY: Final = 400  # characters, of a card
+
+
+def record(
+    policies: Sequence[str | Policy | tuple[str, Policy]],
+    scenario: str | Scenario = "smart",
+    *,
+    seed: int = 7,
+    world: int = 0,
+    split: str = "test",
+    seconds: float | None = None,
+    observations: bool = True,
+    **overrides: Any,
+) -> Replay:
+    """Play one world with each policy.
+
+    Args:
+        policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs
+            (label, policy).
+        scenario: By name or as a value; its messages are made as long as each policy needs.
+        seed: Of the world.
+        world: Its index.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        seconds: Play so long at most, s; ``None``: to the end.
+        observations: Whether to keep what every tracker observed: most of a page's size.
+        **overrides: Settings of the scenario.
+
+    Raises:
+        SettingsError: No policy, more than four, ``seconds`` not above 0.
+        PolicyError: A policy that does not fit the scenario, or a target that is an agent.
+        ScenarioError: An unknown scenario or split, an impossible setting, seed or world.
+    """
+    settings = get_scenario(scenario, **overrides)
+    if not 1 <= len(policies) <= MOST_PLAYERS:
+        raise SettingsError(
+            f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies"
+        )
+    if seconds is not None and not seconds > 0:
+        raise SettingsError(f"seconds={seconds!r} must be above 0")
+    if settings.num_agents != settings.num_trackers:
+        raise PolicyError(
+            f"the target of {settings.name!r} is an agent, and a policy drives trackers only: "
+            "record the episode with posse_training.replay.Recorder"
+        )
+    steps = settings.horizon if seconds is None else round(seconds / settings.control_step)
+    replays = []
+    for given in policies:
+        label, policy = given if isinstance(given, tuple) else (None, given)
+        if isinstance(policy, str):
+            policy = load(policy)
+        longest = max(settings.message_size, policy.message_size)
+        batch = Batch(
+            settings.replace(message_size=longest), 1,
+            seed=seed, split=split, first_world=world, autoreset="disabled",
+        )  # fmt: skip
+        recorder = Recorder(
+            batch, label or policy.name, observations=observations, about=_about(policy)
+        )
+        memory, seen = begin(policy, batch), recorder.reset()
+        for _ in range(max(1, steps)):
+            actions, memory = policy.act(seen, memory)
+            seen, *_ = recorder.step(actions, policy.annotations(memory))
+            if recorder.over:
+                break
+        replays.append(recorder.replay())
+    return join(replays)
+
+
+def _about(policy: Policy) -> dict[str, Any]:
+    """Return what is known of a policy: of a learned one's card, what fits a line each."""
+    about: dict[str, Any] = {"reads_state": True} if policy.reads_state else {}
+    card = getattr(policy, "card", None)
+    for name, value in card.items() if isinstance(card, Mapping) else ():
+        text = ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+        if not isinstance(value, Mapping) and len(text) <= _LONGEST_ENTRY:
+            about[str(name)] = value if isinstance(value, (int, float)) else text
+    return about
