@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Final
 
 import posse
-from posse_training.replay import Replay, record
+from posse_baselines import load
+from posse_training.replay import Event, Replay, record
+
+ATTACK: Final = (
+    "</script><script>window.ran=1</script><img src=x onerror=window.ran=1>"
+    "<!--<script>'\"`${window.ran=1}&lt;\u2028]]>{{code}}\\u003c"
+)
+"""Runs, wherever a page takes a name for markup or code."""
 
 
 @cache
@@ -18,16 +26,16 @@ def short(scenario: str = "field", observations: bool = True) -> Replay:
     )  # fmt: skip
 
 
-def hostile_scenario() -> posse.Scenario:
-    """A scenario whose name is an attack."""
-    return posse.get_scenario("constant", name=ATTACK, horizon=20, settle_time=0.5)
-
-
-ATTACK = (
-    "</script><script>window.ran=1</script><img src=x onerror=window.ran=1>"
-    "<!--<script>'\"`${window.ran=1}&lt;\u2028]]>{{code}}\\u003c"
-)
-
-
-def hostile_card() -> dict[str, Any]:
-    return {"name": ATTACK, ATTACK: ATTACK, "list": [ATTACK, 1]}
+@cache
+def hostile() -> Replay:
+    """A replay in which every text that can come from outside is an attack."""
+    scenario = posse.get_scenario("constant", name=ATTACK, horizon=40)
+    replay = record([(ATTACK, load("pursuit"))], scenario)
+    player = replace(
+        replay.players[0],
+        name=ATTACK,
+        about={ATTACK: ATTACK, "list": [ATTACK, 1]},
+        events=(Event(3, "contact", ATTACK, (1,)),),
+    )
+    world = replay.world | {"commit": ATTACK, "changed": {ATTACK: [ATTACK, ATTACK]}}
+    return Replay(world, (player,))

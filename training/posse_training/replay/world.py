@@ -27,7 +27,7 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
         "commit": commit(),
         "scenario": scenario.name,
         "version": scenario.version,
-        "settings": scenario.to_dict(),
+        "settings": _settings(scenario),
         "changed": changed_settings(scenario),
         "seed": int(state["world_seed"][world]),
         "split": batch.split,
@@ -55,6 +55,14 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
             {"name": metric.name, "unit": metric.unit, "meaning": metric.meaning}
             for metric in posse.METRICS
         ],
+    }
+
+
+def _settings(scenario: Scenario) -> dict[str, Any]:
+    """Return every setting by name; pairs as lists, as JSON has them."""
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in scenario.to_dict().items()
     }
 
 
@@ -92,7 +100,7 @@ def changed_settings(scenario: Scenario) -> dict[str, list[Any]]:
         named = get_scenario(scenario.name)
     except ScenarioError:
         named = get_scenario("constant")
-    there, here = named.to_dict(), scenario.to_dict()
+    there, here = _settings(named), _settings(scenario)
     return {
         field.name: [there[field.name], here[field.name]]
         for field in dataclasses.fields(scenario)

@@ -4,7 +4,7 @@ import { useTheme } from "./colours.js";
 import { connectControls, connectView } from "./controls.js";
 import { readReplay } from "./data.js";
 import { connectExport, filmFrame } from "./export.js";
-import { areaInSight, inside } from "./geometry.js";
+import { inside } from "./geometry.js";
 import { fillHeader } from "./header.js";
 import { connectPanel } from "./panel.js";
 import { sightOf } from "./sensing.js";
@@ -108,6 +108,7 @@ function start() {
   set({ dark: matchMedia("(prefers-color-scheme: dark)").matches });
   arrange();
   readHash();
+  return cameras;
 }
 
 // For scripts and tests: window.replay.set({ position: 10 }), window.replay.app.players, ...
@@ -115,8 +116,9 @@ async function main() {
   try {
     Object.assign(app, await readReplay());
     app.last = Math.max(...app.players.map((player) => player.last));
-    start();
-    globalThis.replay = { app, set, areaInSight, inside, sightOf };
+    const cameras = start();
+    const look = (k) => cameras[k].look(app.position, cameras);
+    globalThis.replay = { app, set, look, inside, sightOf };
     document.documentElement.dataset.ready = "yes";
   } catch (error) {
     const message = document.getElementById("message");

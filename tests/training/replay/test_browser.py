@@ -1,0 +1,384 @@
+"""The page in a real browser. Skipped where there is none."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from tests.support.browser import chromium, opened, until
+from tests.support.replays import ATTACK, hostile, short
+
+from posse.rendering.style import DARK, PAPER, TARGET
+from posse_training.replay import Replay, read_replay, record, write_replay
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_replay(short(), tmp_path_factory.mktemp("replay") / "a replay.html")
+
+
+def state(page: Page, what: str) -> Any:
+    return page.evaluate(f"window.replay.app.{what}")
+
+
+def drawn(page: Page, path: Path) -> Any:
+    """Return the first picture's pixels, (H, W, 3)."""
+    page.wait_for_timeout(80)
+    page.locator("#views canvas").first.screenshot(path=path)
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def centre_of(picture: Any, colour: tuple[int, int, int]) -> Any:
+    """Return where the pixels of a colour are on average, (x, y)."""
+    rows, columns = np.nonzero(np.abs(picture - colour).max(axis=-1) <= 6)
+    assert len(rows) > 20
+    return np.array([columns.mean(), rows.mean()])
+
+
+def test_every_number_arrives(browser: Browser, written: Path) -> None:
+    with opened(browser, written) as page:
+        for k, player in enumerate(read_replay(written).players):
+            assert state(page, f"players[{k}].name") == player.name
+            for name, column in player.columns.items():
+                found = page.evaluate(
+                    """([k, name, frame]) => {
+                        const column = window.replay.app.players[k].columns.get(name);
+                        return Array.from({ length: column.size }, (_, i) => column.at(frame, i));
+                    }""",
+                    [k, name, 123],
+                )
+                np.testing.assert_allclose(
+                    found, column.values[123].ravel(), rtol=0, atol=1e-9, err_msg=name
+                )
+                sums = page.evaluate(
+                    """([k, name]) => window.replay.app.players[k].columns.get(name).series
+                        .reduce((sum, value, i) => sum + value * ((i % 97) + 1), 0)""",
+                    [k, name],
+                )
+                series = np.rint(column.values / column.resolution).reshape(player.frames, -1).T
+                assert sums == (series.ravel() * (np.arange(series.size) % 97 + 1)).sum(), name
+
+
+def test_it_plays_to_the_end_and_pauses(browser: Browser, written: Path) -> None:
+    with opened(browser, written) as page:
+        page.keyboard.press("Space")
+        page.wait_for_timeout(600)
+        page.keyboard.press("Space")
+        there = state(page, "position")
+        assert 1 <= there < 40
+        assert there == int(there)
+        assert not state(page, "playing")
+        page.select_option("#speed", "8")
+        page.click("#play")
+        until(page, "window.replay.app.position === window.replay.app.last")
+        until(page, "!window.replay.app.playing")
+        page.click("#play")  # at the end it starts over
+        until(page, "window.replay.app.position < 100 && window.replay.app.playing")
+
+
+def test_keys_seek_and_the_picture_follows_the_data(
+    browser: Browser, written: Path, tmp_path: Path
+) -> None:
+    player = read_replay(written).players[0]
+    with opened(browser, written) as page:
+        for keys, frame in (
+            (["ArrowRight"], 1), (["Shift+ArrowRight"], 11), (["ArrowLeft"], 10), (["End"], 200),
+            (["Home"], 0), (["Shift+ArrowRight"] * 9, 90),
+        ):  # fmt: skip
+            for key in keys:
+                page.keyboard.press(key)
+            assert state(page, "position") == frame
+        page.keyboard.press("t")
+        look = "window.replay.look(0).project"
+        for frame in (0, 90, 200):
+            page.evaluate(f"window.replay.set({{ position: {frame} }})")
+            picture = drawn(page, tmp_path / "view.png")
+            place = [float(player.columns[f"target_{k}"].values[frame]) for k in ("x", "y")]
+            wanted = np.array(page.evaluate(f"{look}({place[0]}, {place[1]})"))
+            assert np.abs(centre_of(picture, TARGET) - wanted).max() < 8
+
+
+def test_the_timeline_jumps_and_ticks_select(browser: Browser, written: Path) -> None:
+    player = read_replay(written).players[0]
+    event = next(e for e in player.events if e.robots)
+    with opened(browser, written) as page:
+        box = page.locator("#timeline").bounding_box()
+        assert box is not None
+        left, width = box["x"] + 58, box["width"] - 58 - 14
+        page.mouse.click(left + width / 2, box["y"] + 60)
+        assert abs(state(page, "position") - 100) <= 1
+        page.mouse.down()
+        page.mouse.move(left + width / 4, box["y"] + 60)
+        page.mouse.up()
+        assert abs(state(page, "position") - 50) <= 1
+        page.mouse.click(left + width * event.step / 200, box["y"] + 9)
+        assert state(page, "position") == event.step
+        assert state(page, "selected") in event.robots
+        steps = sorted({e.step for p in read_replay(written).players for e in p.events})
+        page.keyboard.press("Home")
+        page.keyboard.press("n")
+        assert state(page, "position") == next(step for step in steps if step > 0)
+
+
+def test_selecting_a_robot_shows_its_numbers(browser: Browser, written: Path) -> None:
+    replay = read_replay(written)
+    with opened(browser, written) as page:
+        page.evaluate("window.replay.set({ position: 60 })")
+        x, y = (float(replay.players[0].columns[f"tracker_{k}"].values[60, 2]) for k in "xy")
+        place = page.evaluate(f"window.replay.look(0).project({x}, {y})")
+        page.locator("#views canvas").first.click(position={"x": place[0], "y": place[1]})
+        assert state(page, "selected") == 2
+        assert page.locator("#panel h2").inner_text().startswith("tracker 2")
+        for block in ("own motion", "task", "target", "sonar", "team-mates"):
+            assert page.locator("summary", has_text=f"observed: {block}").count() == 1
+        row = page.locator("tr", has=page.locator("th", has_text="target range"))
+        cells = row.locator("td").all_inner_texts()
+        assert cells[0] == "m"
+        for cell, player in zip(cells[1:], replay.players, strict=True):
+            told = player.columns["observation/target_range"].values[60, 2]
+            assert cell == ("not known" if told == -1 else f"{told:.2f}")
+        page.keyboard.press("3")
+        assert page.locator("#panel h2").inner_text().startswith("tracker 3")
+        page.keyboard.press("Escape")
+        assert state(page, "selected") is None
+        assert "No robot selected" in page.locator("#panel").inner_text()
+
+
+def test_what_is_not_known_is_grey(browser: Browser, tmp_path: Path) -> None:
+    path = write_replay(record(["ddcs-distributed"], "search", seconds=1), tmp_path / "a.html")
+    with opened(browser, path, "#r=0") as page:
+        known = page.locator("tr", has=page.locator("th", has_text="target range")).locator("td")
+        assert known.last.inner_text() == "not known"
+        assert "unknown" in str(known.last.get_attribute("class"))
+        seen = page.locator("tr", has=page.locator("th", has_text="target seen")).locator("td")
+        assert seen.last.inner_text() == "0"
+        assert "unknown" not in str(seen.last.get_attribute("class"))
+
+
+def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None:
+    with opened(browser, written, "#t=12.4&r=3") as page:
+        assert (state(page, "position"), state(page, "selected")) == (124, 3)
+        assert page.locator("#clock").inner_text() == "12.4 / 20.0 s"
+        page.evaluate("location.hash = '#t=3&r=1'")
+        until(page, "window.replay.app.position === 30")
+        assert state(page, "selected") == 1
+        page.keyboard.press("ArrowRight")
+        until(page, "location.hash === '#t=3.1&r=1'")
+        page.evaluate("location.hash = '#t=nonsense&r=99'")
+        until(page, "window.replay.app.selected === null")
+        assert state(page, "position") == 31
+
+
+def test_dark_and_light(browser: Browser, written: Path, tmp_path: Path) -> None:
+    with opened(browser, written, dark=True) as page:
+        assert state(page, "dark")
+        assert (drawn(page, tmp_path / "a.png")[10, 5] == DARK["PAPER"]).all()
+        page.keyboard.press("d")
+        assert (drawn(page, tmp_path / "a.png")[10, 5] == PAPER).all()
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == (
+            f"rgb({', '.join(map(str, PAPER))})"
+        )
+
+
+def test_on_a_phone(browser: Browser, written: Path) -> None:
+    with opened(browser, written, size=(390, 844), touch=True) as page:
+        wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+        assert wide[0] <= wide[1] == 390
+        boxes = [box.bounding_box() for box in page.locator("#views canvas").all()]
+        assert all(box and box["width"] > 380 and box["height"] > 150 for box in boxes)
+        for selector in ("#play", "#forth", "#speed", "#more", "#trails", "#help"):
+            box = page.locator(selector).bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= 390
+            assert box["y"] + box["height"] <= 844
+            assert box["height"] >= 30
+        assert not page.locator("#panel").is_visible()
+        page.tap("#more")
+        assert page.locator("#panel").is_visible()
+        page.wait_for_timeout(100)  # for the pictures to take their new places
+        place = page.evaluate("""() => {
+            const { columns } = window.replay.app.players[0];
+            return window.replay.look(0).project(
+                columns.get("tracker_x").at(0, 1), columns.get("tracker_y").at(0, 1));
+        }""")
+        page.locator("#views canvas").first.tap(position={"x": place[0], "y": place[1]})
+        assert state(page, "selected") == 1
+
+
+def test_views_zoom_and_move_together_unless_unlinked(browser: Browser, written: Path) -> None:
+    def scales() -> list[float]:
+        looks: list[float] = page.evaluate("[0, 1].map((k) => window.replay.look(k).scale)")
+        return looks
+
+    with opened(browser, written) as page:
+        first = page.locator("#views canvas").first
+        before = scales()
+        assert before[0] == pytest.approx(before[1])
+        first.hover()
+        page.mouse.wheel(0, -400)
+        until(page, f"window.replay.look(0).scale > {1.5 * before[0]}")
+        assert scales()[0] == pytest.approx(scales()[1])
+        middle = page.evaluate("window.replay.look(1).x")
+        page.mouse.down()
+        page.mouse.move(100, 300)
+        page.mouse.up()
+        assert page.evaluate("window.replay.look(1).x") != middle
+        page.keyboard.press("c")
+        linked = scales()
+        page.mouse.wheel(0, 400)
+        until(page, f"window.replay.look(0).scale < {0.8 * linked[0]}")
+        assert scales()[1] == pytest.approx(linked[1])
+        page.keyboard.press("r")
+        page.keyboard.press("c")
+        assert scales() == pytest.approx(before)
+
+
+def test_following_keeps_a_robot_in_the_middle(browser: Browser, written: Path) -> None:
+    with opened(browser, written, "#t=8&r=1") as page:
+        page.keyboard.press("f")
+        for k in (0, 1):
+            x, y = page.evaluate(f"""() => {{
+                const {{ columns }} = window.replay.app.players[{k}];
+                const look = window.replay.look({k});
+                return [look.x - columns.get("tracker_x").at(80, 1),
+                        look.y - columns.get("tracker_y").at(80, 1)];
+            }}""")
+            assert (x, y) == pytest.approx((0, 0))
+
+
+def test_layers_are_switched(browser: Browser, written: Path, tmp_path: Path) -> None:
+    with opened(browser, written, "#t=15&r=0") as page:
+        pictures = [drawn(page, tmp_path / "0.png")]
+        for key in ("l", "s", "t"):
+            page.keyboard.press(key)
+            pictures.append(drawn(page, tmp_path / f"{key}.png"))
+        assert state(page, "layers") == {"links": False, "sensing": False, "trails": False}
+        for one, other in itertools.pairwise(pictures):
+            assert (one != other).any(axis=-1).sum() > 50
+
+
+def test_help_opens_and_closes(browser: Browser, written: Path) -> None:
+    with opened(browser, written, "#r=2") as page:
+        page.keyboard.press("?")
+        assert page.locator("#legend").is_visible()
+        assert "its last fix of the target" in page.locator("#legend").inner_text()
+        page.keyboard.press("Escape")
+        assert not page.locator("#legend").is_visible()
+        assert state(page, "selected") == 2
+
+
+def test_a_picture_and_a_film_are_saved(browser: Browser, written: Path, tmp_path: Path) -> None:
+    with opened(browser, written, "#t=5") as page:
+        with page.expect_download() as saved:
+            page.click("#png")
+        saved.value.save_as(tmp_path / "a.png")
+        with Image.open(tmp_path / "a.png") as image:
+            assert image.width > 1000
+            assert len(image.convert("RGB").getcolors(1 << 24) or []) > 50
+        with page.expect_download() as saved:
+            page.click("#webm")
+            page.wait_for_timeout(900)
+            assert state(page, "recording")
+            page.click("#webm")
+        saved.value.save_as(tmp_path / "a.webm")
+        film = (tmp_path / "a.webm").read_bytes()
+        assert film[:4] == b"\x1a\x45\xdf\xa3"  # Matroska
+        assert len(film) > 2000
+        until(page, "!window.replay.app.recording")
+
+
+def test_a_hostile_page_runs_nothing_and_shows_the_text(browser: Browser, tmp_path: Path) -> None:
+    path = write_replay(hostile(), tmp_path / "a.html")
+    with opened(browser, path, "#t=0.3&r=1") as page:
+        page.keyboard.press("?")
+        page.keyboard.press("Escape")
+        for summary in page.locator("summary").all():
+            summary.click()
+        page.wait_for_timeout(200)
+        assert page.evaluate("window.ran") is None
+        assert page.title().split() == f"{ATTACK} on {ATTACK}".split()
+        assert ATTACK in page.evaluate("document.getElementById('scenario').textContent")
+        assert ATTACK in page.evaluate("document.getElementById('facts').textContent")
+        assert page.evaluate("document.getElementById('panel').textContent").count(ATTACK) >= 4
+        assert page.locator("img").count() == 0
+
+
+def test_the_policy_stops_code_that_is_not_the_pages_own(browser: Browser, written: Path) -> None:
+    text = written.read_text(encoding="utf-8")
+    path = written.with_name("changed.html")
+    path.write_text(text.replace("</body>", "<script>window.ran=1</script></body>"), "utf-8")
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(path.as_uri())
+    page.wait_for_selector("html[data-ready]")
+    assert page.evaluate("window.ran") is None
+    context.close()
+
+
+@pytest.mark.parametrize("view", [2.0, 2 * np.pi])
+@pytest.mark.parametrize("reach", [5.0, np.inf])
+def test_the_sensing_area_holds_the_target_when_it_is_seen(
+    browser: Browser, tmp_path: Path, view: float, reach: float
+) -> None:
+    replay = record(
+        ["ddcs-distributed"], "obstacles", seed=2, num_obstacles=12, obstacle_gap=0.8,
+        field_of_view=view, sensing_range=reach, observations=False,
+    )  # fmt: skip
+    sees = replay.players[0].columns["tracker_sees"].values.astype(bool)
+    with opened(browser, write_replay(replay, tmp_path / "a.html")) as page:
+        inside = page.evaluate("""() => {
+            const { app, sightOf, inside } = window.replay;
+            const [player] = app.players;
+            const at = (name, frame, k) => player.columns.get(name).at(frame, k);
+            return Array.from({ length: player.frames }, (_, frame) =>
+                Array.from({ length: app.world.settings.num_trackers }, (_, i) => inside(
+                    sightOf(app.world.settings, app.world.obstacles, at("tracker_x", frame, i),
+                        at("tracker_y", frame, i), at("tracker_heading", frame, i)),
+                    at("target_x", frame, 0), at("target_y", frame, 0))));
+        }""")
+    wrong = np.array(inside) != sees
+    assert 0.05 < sees.mean() < 0.98
+    # Only where rounding to a millimetre decides.
+    assert wrong.mean() < 0.004
+
+
+def test_four_players_of_unequal_length(browser: Browser, tmp_path: Path) -> None:
+    names = ["ddcs-distributed", "pursuit", "idle", "random"]
+    replay = record(names, "obstacles", world=3, seconds=30, terminate_on_contact=True)
+    lengths = [player.frames for player in replay.players]
+    assert len(set(lengths)) > 1
+    with opened(browser, write_replay(replay, tmp_path / "a.html"), "#r=0") as page:
+        assert page.locator("#views canvas").count() == 4
+        page.keyboard.press("End")
+        assert state(page, "position") == max(lengths) - 1
+        assert page.locator("#panel .player").all_inner_texts() == names
+
+
+def test_one_player_and_a_target_that_is_driven(browser: Browser, tmp_path: Path) -> None:
+    import posse
+    from posse_training.replay import Recorder
+
+    recorder = Recorder(posse.batch("smart", 1, target_motion="agent"), "me")
+    recorder.reset()
+    for _ in range(20):
+        recorder.step(np.zeros(recorder.batch.action_shape, np.float32))
+    replay: Replay = recorder.replay()
+    n = recorder.batch.scenario.num_trackers
+    with opened(browser, write_replay(replay, tmp_path / "a.html"), f"#t=1&r={n}") as page:
+        assert page.locator("#panel h2").inner_text().startswith("target")

@@ -1,0 +1,181 @@
+"""A page is one small file that asks for nothing and runs nothing but its own code."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import re
+import zlib
+from dataclasses import replace
+from html.parser import HTMLParser
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.support.replays import ATTACK, hostile, short
+
+from posse.rendering import style
+from posse_training.cli import main
+from posse_training.replay import read_replay, record, write_replay
+from posse_training.replay.page import MODULES, colours, page
+from posse_training.runs.settings import SettingsError
+
+WEB = resources.files("posse_training.replay") / "web"
+
+
+@pytest.mark.parametrize("scenario", ["smart", "field"])
+@pytest.mark.parametrize(("observations", "most"), [(True, 1_000_000), (False, 150_000)])
+def test_a_minute_of_two_teams_of_six_can_be_mailed(
+    scenario: str, observations: bool, most: int
+) -> None:
+    replay = record(
+        ["ddcs-distributed", "learned-field"], scenario, world=3, num_trackers=6,
+        observations=observations,
+    )  # fmt: skip
+    assert replay.players[0].frames == 601
+    assert len(page(replay).encode()) <= most
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = write_replay(short(), tmp_path / "deep" / "a.html")
+    back = read_replay(path)
+    assert back.world == short().world
+    for mine, theirs in zip(back.players, short().players, strict=True):
+        assert (mine.name, mine.events, mine.about) == (theirs.name, theirs.events, theirs.about)
+        for name, column in theirs.columns.items():
+            off = np.abs(mine.columns[name].values - column.values.astype(np.float64))
+            assert off.max(initial=0) <= column.resolution * 0.501, name
+
+
+def test_the_same_replay_is_the_same_page() -> None:
+    assert page(short()) == page(short())
+
+
+class Tags(HTMLParser):
+    """Every tag with its attributes, and what stands in scripts and style."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.inline: dict[str, str] = {}
+        self._inside: str | None = None
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag in ("script", "style"):
+            self._inside = dict(attrs).get("id") or tag
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = None
+
+    def handle_data(self, data: str) -> None:
+        if self._inside:
+            self.inline[self._inside] = self.inline.get(self._inside, "") + data
+
+
+def digest(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def test_the_policy_names_the_code_and_lets_nothing_else_in() -> None:
+    tags = Tags(page(short()))
+    meta = next(a["content"] for t, a in tags.tags if t == "meta" and "http-equiv" in a)
+    policy = dict(part.strip().split(" ", 1) for part in str(meta).split(";"))
+    code = zlib.decompress(base64.b64decode(tags.inline["code"])).decode()
+    assert policy["default-src"] == "'none'"
+    assert policy["script-src"].split() == [digest(tags.inline["script"]), digest(code)]
+    assert policy["style-src"] == digest(tags.inline["style"])
+    assert "unsafe" not in str(meta)
+    for tag, attributes in tags.tags:
+        assert tag not in ("link", "iframe", "img", "object", "base")
+        assert not {"src", "href", "style"} & set(attributes)
+        assert not [name for name in attributes if name.startswith("on")]
+
+
+def test_nothing_of_a_hostile_name_is_markup() -> None:
+    replay = hostile()
+    assert replay.players[0].name == ATTACK
+    text = page(replay)
+    plain, hostile_tags = Tags(page(short())), Tags(text)
+    assert [tag for tag, _ in hostile_tags.tags] == [tag for tag, _ in plain.tags]
+    assert text.count("</script") == page(short()).count("</script")
+    assert hostile_tags.inline["script"] == plain.inline["script"]
+    assert hostile_tags.inline["code"] == plain.inline["code"]
+    title = re.search("<title>(.*?)</title>", text)
+    assert title is not None
+    assert "<" not in title[1]
+    assert html.unescape(title[1]).startswith(ATTACK)
+
+
+def test_the_hostile_name_comes_back_from_the_page(tmp_path: Path) -> None:
+    back = read_replay(write_replay(hostile(), tmp_path / "a.html"))
+    assert back.players[0].name == ATTACK
+    assert back.players[0].about == hostile().players[0].about
+    assert back.world["scenario"] == ATTACK
+
+
+def test_the_code_is_in_small_files_that_make_no_markup_of_text() -> None:
+    files = {file.name: file.read_text(encoding="utf-8") for file in WEB.iterdir()}
+    modules = {name for name in files if name.endswith(".js")} - {"loader.js"}
+    assert modules == set(MODULES)
+    for name, text in files.items():
+        assert len(text.splitlines()) < 400, name
+        assert not re.search(
+            r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function"
+            r"|setAttribute\(\"on|https?://|fetch\(|XMLHttpRequest|import\(",
+            text,
+        ), name
+    for number, name in enumerate(MODULES):
+        wanted = re.findall(r'from "\./(.*?)"', files[name])
+        assert set(wanted) <= set(MODULES[:number]), name
+
+
+def test_the_colours_are_those_of_figures_and_films() -> None:
+    def css(colour: style.Colour) -> str:
+        return "#{:02x}{:02x}{:02x}".format(*colour)
+
+    light, dark = colours()["light"], colours()["dark"]
+    assert light["TARGET"] == css(style.TARGET)
+    assert light["TASKS"] == [css(colour) for colour in style.TASK_COLOURS]
+    assert light["PLAYERS"] == [css(colour) for colour in style.PLAYERS]
+    assert set(light) == set(dark)
+    assert set(style.DARK) <= set(light)
+
+
+def test_a_path_or_file_that_is_no_page_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"must end in \.html"):
+        write_replay(short(), tmp_path / "a.gif")
+    with pytest.raises(SettingsError, match="cannot read a replay"):
+        read_replay(tmp_path / "none.html")
+    (tmp_path / "other.html").write_text("<p>")
+    with pytest.raises(SettingsError, match="is no replay"):
+        read_replay(tmp_path / "other.html")
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_command_writes_a_page_and_takes_players_from_pages(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    world = ["--scenario", "smart", "--world", "3", "--seconds", "1", "--no-observations"]
+    assert main(["replay", "idle", "pursuit", *world, "--num-trackers", "3"]) == 0
+    assert "replay.html" in capsys.readouterr().out
+    assert main(["replay", "replay.html", "random", *world, "--num-trackers", "3",
+                 "--out", "all.html"]) == 0  # fmt: skip
+    replay = read_replay(tmp_path / "all.html")
+    assert [player.name for player in replay.players] == ["idle", "pursuit", "random"]
+    assert replay.world["world"] == 3
+    assert replay.world["changed"] == {"num_trackers": [5, 3]}
+    assert main(["replay", "replay.html", "random", *world]) == 2
+    assert "did not play the same world: num_trackers" in capsys.readouterr().err
+    assert main(["replay"]) == 2
+    assert "1 to 4 players, got 0: give at least one policy" in capsys.readouterr().err
+
+
+def test_a_page_of_one_and_of_four_players() -> None:
+    one = record(["idle"], "constant", seconds=1)
+    four = replace(one, players=one.players * 4)
+    assert len(page(four)) < 1.5 * len(page(one))
