@@ -159,6 +159,24 @@ def test_selecting_a_robot_shows_its_numbers(browser: Browser, written: Path) ->
         assert "No robot selected" in page.locator("#panel").inner_text()
 
 
+def test_the_safe_score_stops_at_the_first_contact(browser: Browser, tmp_path: Path) -> None:
+    replay = record(["pursuit", "idle"], "obstacles", world=3, seconds=30, observations=False)
+    scores = [player.columns["score"].values for player in replay.players]
+    touches = [
+        next((event.step for event in player.events if event.kind == "contact"), 10**6)
+        for player in replay.players
+    ]
+    assert touches[0] < 300 < touches[1]
+    with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=28") as page:
+        for name, kept in (("score so far", [10**6] * 2), ("safe score so far", touches)):
+            row = page.locator("tr", has=page.get_by_text(name, exact=True))
+            wanted = [
+                f"{score[: min(281, end)].sum() / 280:.3f}"
+                for score, end in zip(scores, kept, strict=True)
+            ]
+            assert row.locator("td").all_inner_texts()[1:] == wanted
+
+
 def test_what_is_not_known_is_grey(browser: Browser, tmp_path: Path) -> None:
     path = write_replay(record(["ddcs-distributed"], "search", seconds=1), tmp_path / "a.html")
     with opened(browser, path, "#r=0") as page:
@@ -174,14 +192,14 @@ def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None
     with opened(browser, written, "#t=12.4&r=3") as page:
         assert (state(page, "position"), state(page, "selected")) == (124, 3)
         assert page.locator("#clock").inner_text() == "12.4 / 20.0 s"
-        page.evaluate("location.hash = '#t=3&r=1'")
-        until(page, "window.replay.app.position === 30")
+        page.evaluate("location.hash = '#t=0.3&r=1'")
+        until(page, "window.replay.app.position === 3")
         assert state(page, "selected") == 1
         page.keyboard.press("ArrowRight")
-        until(page, "location.hash === '#t=3.1&r=1'")
+        until(page, "location.hash === '#t=0.4&r=1'")
         page.evaluate("location.hash = '#t=nonsense&r=99'")
         until(page, "window.replay.app.selected === null")
-        assert state(page, "position") == 31
+        assert state(page, "position") == 4
 
 
 def test_dark_and_light(browser: Browser, written: Path, tmp_path: Path) -> None:

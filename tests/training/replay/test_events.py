@@ -10,7 +10,7 @@ import pytest
 import posse
 from posse_baselines import load
 from posse_training.replay import Recorder, record
-from posse_training.replay.episode import EVENT_KINDS, running_scores
+from posse_training.replay.episode import EVENT_KINDS
 from posse_training.replay.events import find_events
 from posse_training.reports.evaluation import evaluate
 
@@ -88,12 +88,3 @@ def test_a_leader_is_whom_more_than_half_follow() -> None:
     events = find_events(states, 0.1, leader)
     assert [(event.step, event.robots) for event in events] == [(3, (2, 0)), (5, (0, 2))]
     assert find_events(states, 0.1, None) == ()
-
-
-def test_the_safe_score_stops_at_the_first_contact() -> None:
-    player = record(["pursuit"], "obstacles", seed=7, world=3).players[0]
-    score, safe = running_scores(player)
-    assert score[-1] == pytest.approx(player.metrics["score"], abs=1e-4)
-    first = next(event.step for event in player.events if event.kind == "contact")
-    np.testing.assert_array_equal(safe[:first], score[:first])
-    assert safe[-1] * 600 == pytest.approx(safe[first - 1] * (first - 1))

@@ -131,12 +131,3 @@ def join(replays: Sequence[Replay]) -> Replay:
         for entry in replay.world["fields"]:
             fields.setdefault(entry["name"], entry)
     return Replay({**replays[0].world, "fields": list(fields.values())}, players)
-
-
-def running_scores(player: Player) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return the score and the safe score so far, (T + 1,) each; 0 in frame 0."""
-    present = player.columns["score"].values.astype(np.float64)
-    steps = np.maximum(np.arange(len(present)), 1)
-    contacts = [event.step for event in player.events if event.kind == "contact"]
-    safe = np.where(np.arange(len(present)) < min(contacts, default=len(present)), present, 0.0)
-    return np.cumsum(present) / steps, np.cumsum(safe) / steps

@@ -13,7 +13,7 @@ let cameras = [];
 let recorder = null;
 let canvas = null;
 
-export function compose(target, ratio) {
+function compose(target, ratio, note = "") {
   const boxes = cameras.map((camera) => camera.canvas.getBoundingClientRect());
   const left = Math.min(...boxes.map((box) => box.left));
   const top = Math.min(...boxes.map((box) => box.top));
@@ -32,7 +32,7 @@ export function compose(target, ratio) {
   ctx.font = font(14, 600);
   ctx.fillText(headline(), 12, HEAD / 2, width - 120);
   ctx.textAlign = "right";
-  ctx.fillText(`${seconds().toFixed(1)} s   ${app.speed}×`, width - 12, HEAD / 2);
+  ctx.fillText(`${note}${seconds().toFixed(1)} s`, width - 12, HEAD / 2);
   cameras.forEach((camera, k) => {
     ctx.save();
     ctx.translate(boxes[k].left - left, HEAD + boxes[k].top - top);
@@ -93,7 +93,7 @@ export function toggleFilm() {
 
 // To be called once everything else is drawn.
 export function filmFrame() {
-  if (canvas) compose(canvas, 1);
+  if (canvas) compose(canvas, 1, `${app.speed}× speed   `);
 }
 
 export function connectExport(all) {

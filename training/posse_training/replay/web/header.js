@@ -4,7 +4,9 @@ import { element, setting, words } from "./values.js";
 
 export function headline() {
   const { world } = app;
-  return `${world.scenario} v${world.version} · ${world.split} seed ${world.seed} world ${world.world}`;
+  const { num_trackers: team } = world.settings;
+  const place = `${world.split} seed ${world.seed} world ${world.world}`;
+  return `${world.scenario} v${world.version} · ${team} trackers · ${place}`;
 }
 
 function fact(name, value, title = "") {

@@ -96,7 +96,7 @@ function start() {
     redraw();
   });
   for (const camera of cameras) connectView(camera, cameras, redraw);
-  const narrow = matchMedia("(max-width: 760px)");
+  const narrow = matchMedia("(max-width: 760px), (max-height: 480px)");
   const arrange = () => {
     strip.style.height = `${timelineHeight(narrow.matches)}px`;
     redraw();
