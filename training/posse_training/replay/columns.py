@@ -45,10 +45,12 @@ from posse_training.replay.episode import Column
 _PLACE: Final = 0.001  # m
 _ANGLE: Final = 0.001  # rad
 _FIX: Final = 0.01  # m, a measured place
-_ACTION: Final = 0.004
+_ACTION: Final = 0.002
+_COARSE_ACTION: Final = 0.008
 _MESSAGE: Final = 1 / 512
 _SCORE: Final = 0.0001
-_COARSE: Final = 0.02  # what is only drawn
+_DRAWN: Final = 0.05  # what is only drawn
+_BELIEF: Final = 0.01
 _RESOLUTIONS: Final = {"m": 0.001, "m/s": 0.001, "rad": 0.001, "rad/s": 0.001, "s": 0.01}
 _FINE: Final = 0.001
 STATES: Final = (
@@ -127,17 +129,18 @@ def reward_columns(terms: dict[str, list[npt.NDArray[Any]]]) -> dict[str, Column
     }
 
 
-def belief_columns(beliefs: States) -> dict[str, Column]:
-    """Return a column of each thing that the policy tells."""
-    return {f"belief/{name}": _number_column(value, _COARSE) for name, value in beliefs.items()}
+def belief_columns(beliefs: States, whole: bool) -> dict[str, Column]:
+    """Return a column of each thing that the policy tells; coarse if not whole."""
+    finest = _BELIEF if whole else _DRAWN
+    return {f"belief/{name}": _number_column(value, finest) for name, value in beliefs.items()}
 
 
-def action_columns(actions: Sequence[FloatArray]) -> dict[str, Column]:
-    """Return the columns of T actions (rows, 2 + m)."""
+def action_columns(actions: Sequence[FloatArray], whole: bool) -> dict[str, Column]:
+    """Return the columns of T actions (rows, 2 + m); coarse if not whole."""
     if not actions:
         return {}
     values = last_kept(actions)
-    columns = {"action": Column(values[..., :2], _ACTION)}
+    columns = {"action": Column(values[..., :2], _ACTION if whole else _COARSE_ACTION)}
     if values.shape[-1] > 2:
         columns["message"] = Column(values[..., 2:], _MESSAGE)
     return columns
@@ -152,7 +155,7 @@ def observation_columns(
     for field in layout.fields:
         if not whole and field.name != "sonar":
             continue
-        finest = _RESOLUTIONS.get(field.unit, _FINE) if whole else _COARSE
+        finest = _RESOLUTIONS.get(field.unit, _FINE) if whole else _DRAWN
         if field.name == "neighbour_message":
             finest = _MESSAGE
         kept = _number_column(views[field.name], finest)

@@ -146,9 +146,9 @@ class Recorder:
         scenario = self.batch.scenario
         columns = {
             **state_columns(states, scenario),
-            **action_columns(self._actions),
+            **action_columns(self._actions, self._whole),
             **reward_columns(self._terms),
-            **belief_columns(beliefs),
+            **belief_columns(beliefs, self._whole),
             **observation_columns(self.batch.layout, np.stack(self._observations), self._whole),
         }
         events = find_events(states, scenario.control_step, beliefs.get("leader"))
