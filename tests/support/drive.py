@@ -69,7 +69,7 @@ def drive(
     options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
     observations = batch.reset(options={k: v for k, v in options.items() if v is not None})
     memory, s = begin(team, batch), batch.scenario
-    limits = np.array([0.5 * s.tracker_speed, s.tracker_turn_rate])
+    limits = np.stack([0.5 * np.array(s.tracker_speeds), s.tracker_turn_rates], -1)
     for step in range(steps):
         state = {name: array.copy() for name, array in batch.state.items()}
         given = observations[:, : s.num_trackers]

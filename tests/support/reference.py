@@ -131,10 +131,10 @@ def free_motion(
                 if not alive[i]:
                     speeds[i] = turns[i] = 0.0
                     continue
-                wanted = (float(actions[i, 0]) + 1) / 2 * s.tracker_speed
+                wanted = (float(actions[i, 0]) + 1) / 2 * s.tracker_speeds[i]
                 most = s.tracker_acceleration * dt
                 speeds[i] += max(-most, min(most, wanted - speeds[i]))
-                wanted = float(actions[i, 1]) * s.tracker_turn_rate
+                wanted = float(actions[i, 1]) * s.tracker_turn_rates[i]
                 most = s.tracker_turn_acceleration * dt
                 turns[i] += max(-most, min(most, wanted - turns[i]))
             place[i], heading[i] = on_arc(place[i], heading[i], speeds[i], turns[i], dt)
@@ -226,7 +226,7 @@ class Fix:
             if s.velocity_smoothing > 0:
                 share = 1 - math.exp(-s.control_step / s.velocity_smoothing)
                 velocity = self.velocity + min(1.0, share * steps) * (velocity - self.velocity)
-            velocity *= min(1.0, s.tracker_speed / max(abs(velocity), 1e-12))
+            velocity *= min(1.0, max(s.tracker_speeds) / max(abs(velocity), 1e-12))
         return Fix(other.step, other.place, other.heading, other.frame, velocity)
 
 
@@ -377,10 +377,10 @@ def observation(
         "team_size": s.num_trackers,
         "formation_distance": s.formation_distance,
         "formation_spacing": s.formation_spacing,
-        "max_speed": s.tracker_speed,
-        "max_turn_rate": s.tracker_turn_rate,
-        "acceleration_time": s.tracker_speed / s.tracker_acceleration,
-        "turn_acceleration_time": s.tracker_turn_rate / s.tracker_turn_acceleration,
+        "max_speed": s.tracker_speeds[i],
+        "max_turn_rate": s.tracker_turn_rates[i],
+        "acceleration_time": s.tracker_speeds[i] / s.tracker_acceleration,
+        "turn_acceleration_time": s.tracker_turn_rates[i] / s.tracker_turn_acceleration,
         "tolerance": s.tolerance,
         "robot_radius": s.robot_radius,
         "control_step": s.control_step,
@@ -535,11 +535,11 @@ class Episode:
             if self._lost_at is not None and self._recovered_at is None:
                 self._recovered_at = self._held_from
         assert self._arrived is not None
-        reach = s.tracker_speed * step * s.control_step + s.tolerance
-        could = np.abs(self._start[:, None] - places[None, :]).min(axis=1) <= reach
+        reach = np.array(s.tracker_speeds)[:, None] * step * s.control_step + s.tolerance
+        could = (np.abs(self._start[:, None] - places[None, :]) <= reach).any(axis=1)
         self._arrived |= could & alive
-        v = state["tracker_speed"].astype(np.float64) / s.tracker_speed
-        turn = state["tracker_turn_rate"].astype(np.float64) / s.tracker_turn_rate
+        v = state["tracker_speed"].astype(np.float64) / s.tracker_speeds
+        turn = state["tracker_turn_rate"].astype(np.float64) / s.tracker_turn_rates
         for name, value in (
             ("score", self.score),
             ("safe_score", 0.0 if self._touched else self.score),
@@ -634,6 +634,14 @@ CASES: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = (
         ),
     ),  # a ring so tight that trackers run into the target
     ("constant", (("num_trackers", 3), ("num_neighbours", 8), ("message_size", 1))),
+    (
+        "obstacles",
+        (
+            ("tracker_speed", (1.0, 0.8, 1.3, 0.7, 1.0)),
+            ("tracker_turn_rate", (1.2, 2.0, 1.0, 1.5, 0.8)),
+            ("tracker_acceleration", 2.0),
+        ),
+    ),  # no two trackers alike
     ("constant", (("num_trackers", 1),)),
     (
         "constant",

@@ -201,13 +201,12 @@ def lead(
 ) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
     n = c.num_trackers
-    speed, dt = float(c.tracker_speed), float(c.dt)
-    acceleration = speed / c.acceleration_time if c.acceleration_time > 0.0 else _UNLIMITED
+    dt = float(c.dt)
+    acceleration = 1.0 / c.per_acceleration if c.per_acceleration > 0.0 else _UNLIMITED
     turn_acceleration = _UNLIMITED
-    if c.turn_acceleration_time > 0.0:
-        turn_acceleration = c.tracker_turn_rate / c.turn_acceleration_time
-    body.max_speed, body.max_omega, body.dt = speed, c.tracker_turn_rate, dt
-    body.acceleration, body.turn_acceleration = acceleration, turn_acceleration
+    if c.per_turn_acceleration > 0.0:
+        turn_acceleration = 1.0 / c.per_turn_acceleration
+    body.dt, body.acceleration, body.turn_acceleration = dt, acceleration, turn_acceleration
     vx, vy = float(w.speed * w.heading_cos), float(w.speed * w.heading_sin)
     # The slot frame turns towards the heading, at its limit until it is there.
     psi = math.atan2(w.frame_sin, w.frame_cos)
@@ -226,6 +225,8 @@ def lead(
         if t.broken_at != NEVER:
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
+        speed = float(t.max_speed)
+        body.max_speed, body.max_omega = speed, t.max_turn_rate
         slot = slots[plans[i].slot]
         arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
         wx, wy = meeting_velocity(
@@ -237,7 +238,7 @@ def lead(
         body.speed, body.omega = t.speed, t.turn_rate
         wx, wy, _ = safe_velocity(body, discs, count, wx, wy, plays)
         v, omega = regulate(body, wx, wy, 0.0)
-        write_motion(actions[i], v, omega, speed, c.tracker_turn_rate)
+        write_motion(actions[i], v, omega, speed, t.max_turn_rate)
 
 
 @compiled
@@ -257,11 +258,11 @@ def plan(
 ) -> None:
     """Assign the working trackers to slots so that they arrive soonest in total."""
     n, rows = c.num_trackers, 0
-    speed = float(c.tracker_speed)
     for i in range(n):
         t = trackers[i]
         if t.broken_at != NEVER:
             continue
+        speed = float(t.max_speed)
         for k in range(n):
             arm_x, arm_y = rotate(slots[k].x, slots[k].y, w.frame_cos, w.frame_sin)
             x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
@@ -270,7 +271,7 @@ def plan(
                 time = intercept_time(x, y, mean_x, mean_y, speed)
             # Turning towards it takes time, too.
             away = wrap(math.atan2(y, x) - math.atan2(t.heading_sin, t.heading_cos))
-            time += 0.5 * abs(away) / c.tracker_turn_rate * min(1.0, time)
+            time += 0.5 * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= s.loyalty
             cost[rows, k] = time

@@ -148,7 +148,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         if c.walled:
             wall = inner - max(abs(t.x), abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
-        wall_near = wall <= c.tracker_speed * c.dt + TOUCHING_GAP
+        wall_near = wall <= t.max_speed * c.dt + TOUCHING_GAP
         near = s.excess[i] <= _ZERO or wall_near
         if not near:
             if t.near:
@@ -181,7 +181,7 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
 @compiled
 def near_target(c: Record, w: Record, t: Record) -> bool:
     """Say whether a tracker and the target could touch within the next control step."""
-    reach = c.radius + c.radius + TOUCHING_GAP + (c.tracker_speed + c.target_speed) * c.dt
+    reach = c.radius + c.radius + TOUCHING_GAP + (t.max_speed + c.target_speed) * c.dt
     dx, dy = w.x - t.x, w.y - t.y
     return bool(dx * dx + dy * dy <= reach * reach)
 

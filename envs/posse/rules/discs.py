@@ -179,9 +179,9 @@ def find_gaps(c: Record, s: Record) -> None:
     """
     n = natural(c.num_trackers)
     robots = c.radius + c.radius
-    tracker_reach = robots + TOUCHING_GAP + (c.tracker_speed + c.tracker_speed) * c.dt
-    target_reach = robots + TOUCHING_GAP + (c.target_speed + c.tracker_speed) * c.dt
-    margin = TOUCHING_GAP + c.tracker_speed * c.dt
+    tracker_reach = robots + TOUCHING_GAP + (c.fastest + c.fastest) * c.dt
+    target_reach = robots + TOUCHING_GAP + (c.target_speed + c.fastest) * c.dt
+    margin = TOUCHING_GAP + c.fastest * c.dt
     for block in range(blocks(n)):
         i = BLOCK * block
         x, y, number = load(s.x, i), load(s.y, i), load(s.index, i)

@@ -98,19 +98,26 @@ def move_in_parts(
             t = trackers[i]
             if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
-                    c, t.speed, t.turn_rate, actions[i, 0], actions[i, 1]
-                )
+                    c, t.speed, t.turn_rate, t.max_speed, t.max_turn_rate,
+                    actions[i, 0], actions[i, 1],
+                )  # fmt: skip
                 move_swept(c, t, k, near + 1, obstacles, s)
 
 
 @compiled
 def command(
-    c: Record, speed: Lanes, turn_rate: Lanes, wanted_speed: Lanes, wanted_turn: Lanes
+    c: Record,
+    speed: Lanes,
+    turn_rate: Lanes,
+    max_speed: Lanes,
+    max_turn_rate: Lanes,
+    wanted_speed: Lanes,
+    wanted_turn: Lanes,
 ) -> tuple[Lanes, Lanes]:
     """Return speed and turn rate, brought towards what an action asks for within the limits."""
     return (
-        approach(speed, _HALF * (wanted_speed + _ONE) * c.tracker_speed, c.speed_change),
-        approach(turn_rate, wanted_turn * c.tracker_turn_rate, c.turn_change),
+        approach(speed, _HALF * (wanted_speed + _ONE) * max_speed, c.speed_change),
+        approach(turn_rate, wanted_turn * max_turn_rate, c.turn_change),
     )
 
 
@@ -127,14 +134,19 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
         i = BLOCK * block
-        x, y, cosine, sine, speed, turn_rate, next_1, next_2 = columns(trackers, i, n, POSE)
+        x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate = columns(
+            trackers, i, n, POSE
+        )
         for _ in range(parts):
             speed, turn_rate = command(
-                c, speed, turn_rate, load(s.wanted_speed, i), load(s.wanted_turn, i)
-            )
+                c, speed, turn_rate, max_speed, max_turn_rate,
+                load(s.wanted_speed, i), load(s.wanted_turn, i),
+            )  # fmt: skip
             dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
             x, y = x + dx, y + dy
-        store_rows(x, y, cosine, sine, speed, turn_rate, next_1, next_2, s.new_pose, BLOCK * i)
+        store_rows(
+            x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate, s.new_pose, BLOCK * i
+        )
     others = False
     for i in range(n):
         t = trackers[i]

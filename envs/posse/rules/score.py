@@ -78,7 +78,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
 @compiled
 def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
     """Say whether a tracker, straight on from its start at full speed, could be in a slot now."""
-    reach = c.tracker_speed * np.float32(w.step) * c.dt + c.tolerance
+    reach = t.max_speed * np.float32(w.step) * c.dt + c.tolerance
     dx, dy = t.start_x - w.x, t.start_y - w.y
     most = reach + c.slots_reach
     if dx * dx + dy * dy > most * most:
@@ -106,7 +106,7 @@ def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
             t.could_arrive = could_arrive(c, w, t, slots)
         bound += t.could_arrive
         error += t.slot_distance
-        v, turn = t.speed * c.per_speed, t.turn_rate * c.per_turn_rate
+        v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
         effort += v * v + turn * turn
         sight += np.float32(t.sees)
     w.error_sum += error

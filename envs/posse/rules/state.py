@@ -44,7 +44,8 @@ CONFIG: Final = _record(
     ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
     ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
     ("dt", _F), ("physics_dt", _F),
-    ("tracker_speed", _F), ("tracker_turn_rate", _F), ("speed_change", _F), ("turn_change", _F),
+    ("fastest", _F),  # greatest speed of any tracker
+    ("speed_change", _F), ("turn_change", _F),
     ("target_speed", _F), ("target_turn_rate", _F), ("radius", _F),
     ("tolerance", _F), ("frame_c", _F), ("frame_s", _F), ("slots_reach", _F),
     ("half_arena", _F), ("obstacle_least", _F), ("obstacle_most", _F), ("obstacle_gap", _F),
@@ -53,8 +54,7 @@ CONFIG: Final = _record(
     ("smoothing", _F), ("sonar_range", _F), ("beam_cosine", _F),
     ("radio_range", _F), ("radio_loss", _F), ("sensor_outages", _F), ("radio_outages", _F),
     ("formation_distance", _F), ("formation_spacing", _F),
-    ("acceleration_time", _F), ("turn_acceleration_time", _F),
-    ("per_speed", _F), ("per_turn_rate", _F),  # 1 / tracker_speed, 1 / tracker_turn_rate
+    ("per_acceleration", _F), ("per_turn_acceleration", _F),  # 1 / limit; 0: no limit
     ("told_sensing_range", _F), ("told_arena", _F),  # -1: boundless
 )  # fmt: skip
 """A scenario as the kernels read it."""
@@ -96,6 +96,8 @@ WORLD: Final = _record(
 TRACKER: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
+    ("max_speed", _F), ("max_turn_rate", _F),  # its own limits, as the scenario sets them
+    ("per_speed", _F), ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
     ("broken_at", _I),  # control step at which it broke, NEVER while it works
     ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
     ("sensor_dead_from", _I), ("radio_dead_from", _I),  # outages, of outage_time each
@@ -118,7 +120,7 @@ TRACKER: Final = _record(
 """One tracker."""
 
 # Kernels read and write these of a tracker's fields eight at a time; what they do not change, they
-# write as they read it. From x on: pose, speed, turn rate, and two more. From fix_x on: the fix.
+# write as they read it. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
 POSE: Final = _offset(TRACKER, "x")
 FIX: Final = _offset(TRACKER, "fix_x")
 
@@ -169,9 +171,15 @@ class WorldArrays(NamedTuple):
         n, m = scenario.num_trackers, scenario.message_size
         kept = 0 if perfect_radio(scenario) else n
         delay = scenario.radio_delay + 1
+        tracker = np.zeros((num_worlds, n), TRACKER)
+        for limit, inverse, values in (
+            ("max_speed", "per_speed", scenario.tracker_speeds),
+            ("max_turn_rate", "per_turn_rate", scenario.tracker_turn_rates),
+        ):
+            tracker[limit], tracker[inverse] = values, 1 / np.array(values)
         return cls(
             world=np.zeros(num_worlds, WORLD),
-            tracker=np.zeros((num_worlds, n), TRACKER),
+            tracker=tracker,
             obstacle=np.zeros((num_worlds, scenario.num_obstacles), OBSTACLE),
             heard=np.zeros((num_worlds, kept, kept), HEARD),
             broadcast=np.zeros((num_worlds, delay if kept else 0, kept), BROADCAST),
@@ -257,7 +265,7 @@ def config_record(scenario: Scenario) -> Records:
     c.all_round = s.field_of_view >= 2 * math.pi - 1e-9
     c.perfect_radio = perfect_radio(s)
     c.dt, c.physics_dt = s.control_step, s.control_step / s.physics_steps
-    c.tracker_speed, c.tracker_turn_rate = s.tracker_speed, s.tracker_turn_rate
+    c.fastest = max(s.tracker_speeds)
     c.speed_change = min(s.tracker_acceleration * c.physics_dt, FAR)
     c.turn_change = min(s.tracker_turn_acceleration * c.physics_dt, FAR)
     c.target_speed, c.target_turn_rate = s.target_speed, s.target_turn_rate
@@ -284,9 +292,8 @@ def config_record(scenario: Scenario) -> Records:
     c.sensor_outages, c.radio_outages = s.sensor_outages, s.radio_outages
     c.formation = FORMATIONS.index(s.formation)
     c.formation_distance, c.formation_spacing = s.formation_distance, s.formation_spacing
-    c.acceleration_time = s.tracker_speed / s.tracker_acceleration
-    c.turn_acceleration_time = s.tracker_turn_rate / s.tracker_turn_acceleration
-    c.per_speed, c.per_turn_rate = 1 / s.tracker_speed, 1 / s.tracker_turn_rate
+    c.per_acceleration = 1 / s.tracker_acceleration
+    c.per_turn_acceleration = 1 / s.tracker_turn_acceleration
     c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
     c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
     return config

@@ -27,6 +27,7 @@ def check_together(s: Scenario) -> None:
     Raises:
         ScenarioError: Names the settings, the limit and the fix.
     """
+    _check_each(s)
     _check_motion(s)
     _check_formation(s)
     _check_place(s)
@@ -34,10 +35,22 @@ def check_together(s: Scenario) -> None:
     _check_rewards(s)
 
 
+def _check_each(s: Scenario) -> None:
+    for name, setting in s.settings().items():
+        value = getattr(s, name)
+        if setting.per_tracker and isinstance(value, tuple) and len(value) != s.num_trackers:
+            fail(
+                name, value,
+                f"{len(value)} values for num_trackers={s.num_trackers}: give one number, or one "
+                "for each tracker",
+            )  # fmt: skip
+
+
 def _check_motion(s: Scenario) -> None:
-    if s.target_speed > 0.9999 * s.tracker_speed:
+    slowest = min(s.tracker_speeds)
+    if s.target_speed > 0.9999 * slowest:
         raise ScenarioError(
-            f"target_speed={s.target_speed:g} must be below tracker_speed={s.tracker_speed:g}, by "
+            f"target_speed={s.target_speed:g} must be below tracker_speed={slowest:g}, by "
             "0.01 % at least: a team that is no faster never catches up (paper, assumption ii)"
         )
     if s.target_speed == 0 and s.target_motion != "constant":
@@ -48,12 +61,15 @@ def _check_motion(s: Scenario) -> None:
             f"control_step={s.control_step:g} must be a whole multiple of "
             f"physics_step={s.physics_step:g}"
         )
-    for name in ("tracker_turn_rate", "target_turn_rate"):
-        turn = getattr(s, name) * s.physics_step
+    for name, rate in (
+        ("tracker_turn_rate", max(s.tracker_turn_rates)),
+        ("target_turn_rate", s.target_turn_rate),
+    ):
+        turn = rate * s.physics_step
         if turn > 1.0:
             raise ScenarioError(
-                f"{name}={getattr(s, name):g} turns {turn:.2f} rad in a physics step, at most 1 is "
-                f"possible: choose physics_step <= {1 / getattr(s, name):.3g}"
+                f"{name}={rate:g} turns {turn:.2f} rad in a physics step, at most 1 is "
+                f"possible: choose physics_step <= {1 / rate:.3g}"
             )
     if s.breaks >= s.num_trackers > 0 and s.breaks > 0:
         fail("breaks", s.breaks, f"at most num_trackers - 1 = {s.num_trackers - 1}")
@@ -96,7 +112,7 @@ def _check_place(s: Scenario) -> None:
     if s.position_bound > FARTHEST:
         raise ScenarioError(
             f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most "
-            f"{FARTHEST:g} m is possible: lower tracker_speed={s.tracker_speed:g}, "
+            f"{FARTHEST:g} m is possible: lower tracker_speed={max(s.tracker_speeds):g}, "
             f"horizon={s.horizon}, control_step={s.control_step:g} or "
             f"start_distance={s.start_distance}, or set an arena"
         )
@@ -175,22 +191,23 @@ def _room_to_start(s: Scenario) -> float:
 
 def _check_rounding(s: Scenario) -> None:
     """Raise where the kernels' float32 would lose what the scenario asks for."""
-    move, longest = s.tracker_speed * s.physics_step, math.sqrt(LONGEST_MOVE * s.robot_radius)
+    fastest = max(s.tracker_speeds)
+    move, longest = fastest * s.physics_step, math.sqrt(LONGEST_MOVE * s.robot_radius)
     if move > longest:
         raise ScenarioError(
-            f"tracker_speed={s.tracker_speed:g} moves {move:.3g} m in a physics step, contact of "
+            f"tracker_speed={fastest:g} moves {move:.3g} m in a physics step, contact of "
             f"robots of robot_radius={s.robot_radius:g} is exact up to {longest:.3g} m: choose "
-            f"physics_step <= {longest / s.tracker_speed:.3g}"
+            f"physics_step <= {longest / fastest:.3g}"
         )
-    for name, added_to, most in (
-        ("tracker_speed", "a position", s.position_bound),
-        ("target_speed", "a position", s.position_bound),
-        ("tracker_turn_rate", "a heading", 1.0),
-        ("target_turn_rate", "a heading", 1.0),
-        ("tracker_acceleration", "a speed", s.tracker_speed),
-        ("tracker_turn_acceleration", "a turn rate", s.tracker_turn_rate),
+    slowest, most_turn = min(s.tracker_speeds), max(s.tracker_turn_rates)
+    for name, value, added_to, most in (
+        ("tracker_speed", slowest, "a position", s.position_bound),
+        ("target_speed", s.target_speed, "a position", s.position_bound),
+        ("tracker_turn_rate", min(s.tracker_turn_rates), "a heading", 1.0),
+        ("target_turn_rate", s.target_turn_rate, "a heading", 1.0),
+        ("tracker_acceleration", s.tracker_acceleration, "a speed", fastest),
+        ("tracker_turn_acceleration", s.tracker_turn_acceleration, "a turn rate", most_turn),
     ):
-        value = getattr(s, name)
         least = LEAST_CHANGE * _spacing(most) / s.physics_step
         if 0 < value < least:
             raise ScenarioError(

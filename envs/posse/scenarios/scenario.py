@@ -63,11 +63,14 @@ class Scenario:
     num_trackers: int = whole(
         5, 1, MAX_TRACKERS, "robots in the team", source="section 4: five trackers"
     )
-    tracker_speed: float = number(
-        1.0, "m/s", SMALL, 1000, "greatest speed of a tracker; above target_speed",
+    tracker_speed: float | tuple[float, ...] = number(
+        1.0, "m/s", SMALL, 1000, "greatest speed of a tracker, or of each; above target_speed",
+        per_tracker=True,
         source="section 2, assumption ii",
     )  # fmt: skip
-    tracker_turn_rate: float = number(2.0, "rad/s", SMALL, WIDE, "greatest turn rate of a tracker")
+    tracker_turn_rate: float | tuple[float, ...] = number(
+        2.0, "rad/s", SMALL, WIDE, "greatest turn rate of a tracker, or of each", per_tracker=True
+    )
     tracker_acceleration: float = number(
         math.inf, "m/s²", SMALL, FAR, "greatest change of a tracker's speed; inf: no limit",
         infinite=True,
@@ -220,6 +223,8 @@ class Scenario:
     def __post_init__(self) -> None:
         object.__setattr__(self, "reward_weights", _weights(self.reward_weights))
         for name, setting in self.settings().items():
+            if setting.per_tracker and isinstance(getattr(self, name), list):
+                object.__setattr__(self, name, tuple(getattr(self, name)))
             check(name, getattr(self, name), setting)
         check_together(self)
 
@@ -227,6 +232,19 @@ class Scenario:
     def settings(cls) -> dict[str, Setting]:
         """Return the declaration of every field by name: unit, range, meaning, source."""
         return {field.name: setting_of(field) for field in dataclasses.fields(cls)}
+
+    @property
+    def tracker_speeds(self) -> tuple[float, ...]:
+        """Greatest speed of each tracker, m/s."""
+        return self._of_each(self.tracker_speed)
+
+    @property
+    def tracker_turn_rates(self) -> tuple[float, ...]:
+        """Greatest turn rate of each tracker, rad/s."""
+        return self._of_each(self.tracker_turn_rate)
+
+    def _of_each(self, value: float | tuple[float, ...]) -> tuple[float, ...]:
+        return value if isinstance(value, tuple) else (value,) * self.num_trackers
 
     @property
     def neighbours(self) -> int:
@@ -243,7 +261,7 @@ class Scenario:
     @property
     def whole_arcs(self) -> bool:
         """Whether a robot far from anything moves on one arc for the whole control step."""
-        turn = max(self.tracker_turn_rate, self.target_turn_rate) * self.control_step
+        turn = max(*self.tracker_turn_rates, self.target_turn_rate) * self.control_step
         limits = (self.tracker_acceleration, self.tracker_turn_acceleration)
         return turn <= 1.0 and all(math.isinf(limit) for limit in limits)
 
@@ -283,7 +301,7 @@ class Scenario:
         """Greatest absolute coordinate that any robot can reach, m."""
         if math.isfinite(self.arena):
             return self.arena / 2
-        return self.start_extent + self.tracker_speed * self.duration
+        return self.start_extent + max(self.tracker_speeds) * self.duration
 
     @property
     def range_bound(self) -> float:
@@ -294,11 +312,12 @@ class Scenario:
     def slot_turn_rate(self) -> float:
         """Greatest turn rate of the slot frame, rad/s: what a robot in the outermost slot follows.
 
-        ω_s = min(0.8 (V - v_t), v_t) / ρ_max, so that no slot ever has to move backwards nor
-        faster than a tracker can.
+        ω_s = min(0.8 (V - v_t), v_t) / ρ_max with V of the slowest tracker, so that no slot ever
+        has to move backwards nor faster than a tracker can.
         """
         rho = max(math.hypot(x, y) for x, y in slot_offsets(self))
-        return min(0.8 * (self.tracker_speed - self.target_speed), self.target_speed) / rho
+        slowest = min(self.tracker_speeds)
+        return min(0.8 * (slowest - self.target_speed), self.target_speed) / rho
 
     def replace(self, **overrides: Any) -> Scenario:
         """Return a copy with some fields changed.

@@ -33,6 +33,7 @@ class Setting:
         low_is_allowed: Whether the range includes ``low``.
         may_be_infinite: Whether ``math.inf`` is allowed beyond ``high``: no limit.
         may_be_none: Whether ``None`` is allowed.
+        per_tracker: Whether it may be a tuple, one value for each tracker.
         choices: Returns the names that a text may be.
         source: Where the paper speaks of it.
     """
@@ -45,6 +46,7 @@ class Setting:
     low_is_allowed: bool = True
     may_be_infinite: bool = False
     may_be_none: bool = False
+    per_tracker: bool = False
     choices: Callable[[], Iterable[str]] | None = None
     source: str = ""
 
@@ -59,9 +61,10 @@ class Setting:
             return ""
         opening = "[" if self.low_is_allowed else "("
         closing = ")" if math.isinf(self.high) else "]"
-        infinite = " or inf" if self.may_be_infinite and math.isfinite(self.high) else ""
-        none = " or None" if self.may_be_none else ""
-        return f"{opening}{self.low:g}, {self.high:g}{closing}{infinite}{none}"
+        infinite = ", or be inf" if self.may_be_infinite and math.isfinite(self.high) else ""
+        none = ", or be None" if self.may_be_none else ""
+        each = ", or one for each tracker" if self.per_tracker else ""
+        return f"{opening}{self.low:g}, {self.high:g}{closing}{infinite}{none}{each}"
 
 
 def declare(default: Any, setting: Setting) -> Any:
@@ -71,13 +74,14 @@ def declare(default: Any, setting: Setting) -> Any:
 
 def number(
     default: float, unit: str, low: float, high: float, meaning: str, *,
-    above: bool = False, infinite: bool = False, source: str = "",
+    above: bool = False, infinite: bool = False, per_tracker: bool = False, source: str = "",
 ) -> Any:  # fmt: skip
     """Declare a real number in [low, high], or (low, high] where it must lie ``above`` low."""
-    return declare(
-        default,
-        Setting("number", unit, meaning, low, high, not above, infinite, source=source),
-    )
+    setting = Setting(
+        "number", unit, meaning, low, high, not above, infinite, per_tracker=per_tracker,
+        source=source,
+    )  # fmt: skip
+    return declare(default, setting)
 
 
 def whole(
@@ -127,6 +131,10 @@ def check(name: str, value: object, setting: Setting) -> None:
             fail(name, value, "it must be a whole number")
         _check_range(name, value, setting)
     elif setting.kind == "number":
+        if setting.per_tracker and isinstance(value, tuple):
+            for number, each in enumerate(value):
+                check(f"{name}[{number}]", each, dataclasses.replace(setting, per_tracker=False))
+            return
         if not is_number(value) or math.isnan(value):  # type: ignore[arg-type]
             fail(name, value, "it must be a number")
         _check_range(name, value, setting)  # type: ignore[arg-type]

@@ -160,13 +160,13 @@ def _limits(s: Scenario) -> dict[str, tuple[str, float, float]]:
     place = s.position_bound * _SLACK
     # A measured place is off by the noise, cut at three standard deviations, times the range.
     fix = (s.position_bound + 3 * (s.range_noise + s.bearing_noise) * s.range_bound) * _SLACK
-    turn = max(s.tracker_turn_rate, s.target_turn_rate) * _SLACK
+    turn = max(*s.tracker_turn_rates, s.target_turn_rate) * _SLACK
     limits = {
         "x": ("m", -place, place),
         "y": ("m", -place, place),
         "fix_x": ("m", -fix, fix),
         "fix_y": ("m", -fix, fix),
-        "speed": ("m/s", 0.0, s.tracker_speed * _SLACK),
+        "speed": ("m/s", 0.0, max(s.tracker_speeds) * _SLACK),
         "turn_rate": ("rad/s", -turn, turn),
     }
     for name in ("heading", "fix", "fix_frame", "frame", "goal"):
@@ -208,7 +208,7 @@ def _target_entries(s: Scenario) -> list[StateEntry]:
 
 def _tracker_entries(s: Scenario) -> list[StateEntry]:
     limits, n, dt = _limits(s), s.num_trackers, s.control_step
-    speed, duration = s.tracker_speed * _SLACK, s.duration * _SLACK
+    speed, duration = max(s.tracker_speeds) * _SLACK, s.duration * _SLACK
     named = [
         StateEntry(
             f"tracker_{name}", (n,), *limits[name], f"each tracker's {name}",

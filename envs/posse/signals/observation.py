@@ -82,10 +82,11 @@ def _neighbour_fields(s: Scenario) -> list[Field]:
         ),
         Field("neighbour_bearing", 2, "1", -1, 1, "direction of where it was, ego", 0),
         Field("neighbour_heading", 2, "1", -1, 1, "its heading, ego", 0),
-        Field("neighbour_speed", 1, "m/s", 0, s.tracker_speed * SLACK, "its speed", 0),
+        Field("neighbour_speed", 1, "m/s", 0, max(s.tracker_speeds) * SLACK, "its speed", 0),
         Field(
             "neighbour_turn_rate", 1, "rad/s",
-            -s.tracker_turn_rate * SLACK, s.tracker_turn_rate * SLACK, "its turn rate", 0,
+            -max(s.tracker_turn_rates) * SLACK, max(s.tracker_turn_rates) * SLACK,
+            "its turn rate", 0,
         ),
     ]  # fmt: skip
     if s.message_size:

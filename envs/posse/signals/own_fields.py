@@ -28,7 +28,7 @@ Pair = tuple[Lanes, Lanes]
 
 def most_turn(s: Scenario) -> float:
     """Return a bound of every robot's turn rate, rad/s."""
-    return max(s.tracker_turn_rate, s.target_turn_rate) * SLACK
+    return max(*s.tracker_turn_rates, s.target_turn_rate) * SLACK
 
 
 def _place(s: Scenario) -> float:
@@ -36,7 +36,7 @@ def _place(s: Scenario) -> float:
 
 
 def _fast(s: Scenario) -> float:
-    return s.tracker_speed * SLACK
+    return max(s.tracker_speeds) * SLACK
 
 
 # Own motion
@@ -128,13 +128,13 @@ def max_turn_rate(c: Record, v: View) -> Lanes:
     return v.max_turn_rate
 
 
-@field("s", 0, lambda s: s.tracker_speed / s.tracker_acceleration * SLACK)
+@field("s", 0, lambda s: max(s.tracker_speeds) / s.tracker_acceleration * SLACK)
 def acceleration_time(c: Record, v: View) -> Lanes:
     """From rest to full speed; 0: at once."""
     return v.acceleration_time
 
 
-@field("s", 0, lambda s: s.tracker_turn_rate / s.tracker_turn_acceleration * SLACK)
+@field("s", 0, lambda s: max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK)
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
     """From no turn to the greatest turn rate; 0: at once."""
     return v.turn_acceleration_time

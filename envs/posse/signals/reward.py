@@ -79,7 +79,7 @@ def contact(c: Record, w: Record, t: Record) -> np.float32:
 @reward_term("1")
 def effort(c: Record, w: Record, t: Record) -> np.float32:
     """(V / V_max)² + (ω / ω_max)² of the motion the tracker made."""
-    v, turn = t.speed * c.per_speed, t.turn_rate * c.per_turn_rate
+    v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
     return np.float32(v * v + turn * turn)
 
 

@@ -102,7 +102,9 @@ def view_of_trackers(
         s.fix_step[lane], s.sees[lane] = np.float32(t.fix_step), np.float32(t.sees)
         s.touching[lane] = np.float32(t.touching)
         s.working[lane] = np.float32(t.broken_at == NEVER)
-    own_x, own_y, hc, hs, speed, turn_rate, _, _ = team_columns(worlds.tracker, e, i, across, POSE)
+    own_x, own_y, hc, hs, speed, turn_rate, max_speed, max_turn_rate = team_columns(
+        worlds.tracker, e, i, across, POSE
+    )
     x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(
         worlds.tracker, e, i, across, FIX
     )
@@ -110,8 +112,8 @@ def view_of_trackers(
     return View(
         own_numbers(i, across, s), own_x, own_y, hc, hs, speed, turn_rate,
         load(s.touching, 0), load(s.working, 0), load(s.step, 0),
-        eight(c.tracker_speed), eight(c.tracker_turn_rate),
-        eight(c.acceleration_time), eight(c.turn_acceleration_time),
+        max_speed, max_turn_rate,
+        max_speed * c.per_acceleration, max_turn_rate * c.per_turn_acceleration,
         fixed_at >= _ZERO, load(s.sees, 0), fixed_at, dx, dy, root(dx * dx + dy * dy),
         cosine, sine, frame_cos, frame_sin, vx, vy,
     )  # fmt: skip

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.drive import complex_of, drive
 
 import posse
 from posse_baselines import play, settings_of, with_settings
 from posse_baselines.ddcs import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.ddcs.settings import NO_EXCHANGE, TRANSITIONS
-from tests.support.drive import complex_of, drive
 
 LOSS = ("converging>searching", "flocking>searching")
 NO_RETURN = ("exchange>converging", "exchange>flocking")

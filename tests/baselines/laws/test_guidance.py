@@ -135,9 +135,7 @@ def test_the_rate_is_the_derivative_of_the_heading(
 
 
 @PROPERTY
-@given(
-    st.floats(0.3, 5.0), ANGLES, ANGLES, ANGLES, st.floats(0.0, 1.0), st.floats(0.3, 5.0)
-)
+@given(st.floats(0.3, 5.0), ANGLES, ANGLES, ANGLES, st.floats(0.0, 1.0), st.floats(0.3, 5.0))
 def test_the_range_closes_at_its_gain(
     r: float, sigma: float, target_theta: float, delta: float, target_speed: float, wanted: float
 ) -> None:

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.drive import Instant, complex_of, drive
 
 from posse_baselines import Policy, load, with_settings
 from posse_baselines.ddcs import FLOCKING
-from tests.support.drive import Instant, complex_of, drive
 
 OFFSET = 0.15  # m, of the control point
 ALPHA = 2.0  # 1/s

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.support.drive import Instant, complex_of, drive
 
 from posse_baselines import Policy, load, with_settings
 from posse_baselines.ddcs import CONVERGING, FLOCKING
-from tests.support.drive import Instant, complex_of, drive
 
 ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
 RATIOS = (1.2, 1.5, 2.0, 3.0)

@@ -154,3 +154,14 @@ def test_a_turn_is_the_angle_within_its_limit(
         assert float(rate) * 0.1 == pytest.approx(max(-limit, min(limit, exact)), abs=3e-7)
     else:
         assert abs(float(rate)) == pytest.approx(min(float(most), math.pi / 0.1), rel=1e-3)
+
+
+def test_each_tracker_moves_within_its_own_limits() -> None:
+    speeds, rates = (1.0, 0.7, 1.4), (2.0, 0.5, 1.1)
+    batch = posse.batch(
+        "constant", 4, num_trackers=3, tracker_speed=speeds, tracker_turn_rate=rates
+    )
+    batch.reset(seed=0)
+    batch.step(np.ones(batch.action_shape, np.float32))
+    np.testing.assert_allclose(batch.state["tracker_speed"], [speeds] * 4, rtol=1e-6)
+    np.testing.assert_allclose(batch.state["tracker_turn_rate"], [rates] * 4, rtol=1e-6)

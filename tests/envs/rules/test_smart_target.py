@@ -33,9 +33,9 @@ def drive(batch: posse.Batch, wanted: npt.NDArray[np.complex128]) -> npt.NDArray
     s, state = batch.scenario, batch.state
     heading = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
     error = np.angle(wanted * np.conj(heading))
-    turn = np.clip(error / (s.control_step * s.tracker_turn_rate), -1, 1)
-    speed = np.clip(np.abs(wanted) * np.cos(error), 0, s.tracker_speed)
-    return np.stack([2 * speed / s.tracker_speed - 1, turn], -1).astype(np.float32)
+    turn = np.clip(error / (s.control_step * s.tracker_turn_rates[0]), -1, 1)
+    speed = np.clip(np.abs(wanted) * np.cos(error), 0, s.tracker_speeds[0])
+    return np.stack([2 * speed / s.tracker_speeds[0] - 1, turn], -1).astype(np.float32)
 
 
 def offsets(batch: posse.Batch) -> npt.NDArray[np.complex128]:
@@ -50,7 +50,7 @@ def pursuing(batch: posse.Batch) -> npt.NDArray[np.float32]:
     to_target = offsets(batch)
     distance = np.abs(to_target)
     speed = np.where(distance < 3 * batch.scenario.robot_radius, 0.6, 1.0)
-    return drive(batch, batch.scenario.tracker_speed * speed * to_target / distance)
+    return drive(batch, batch.scenario.tracker_speeds[0] * speed * to_target / distance)
 
 
 def keeping_slots(batch: posse.Batch) -> npt.NDArray[np.float32]:
@@ -60,7 +60,7 @@ def keeping_slots(batch: posse.Batch) -> npt.NDArray[np.float32]:
     frame = state["world_frame_cos"] + 1j * state["world_frame_sin"]
     slots = np.array([x + 1j * y for x, y in slot_offsets(s)])
     offset = offsets(batch) + frame[:, None] * slots
-    pull = np.minimum(2.0 * np.abs(offset), s.tracker_speed - s.target_speed)
+    pull = np.minimum(2.0 * np.abs(offset), s.tracker_speeds[0] - s.target_speed)
     pull = pull * offset / np.maximum(np.abs(offset), 1e-9)
     return drive(batch, s.target_speed * heading[:, None] + pull)
 
@@ -68,7 +68,7 @@ def keeping_slots(batch: posse.Batch) -> npt.NDArray[np.float32]:
 def flying_blind(batch: posse.Batch) -> npt.NDArray[np.float32]:
     """Every tracker straight on at the target's speed, whatever it does."""
     actions = np.zeros(batch.action_shape, np.float32)
-    actions[..., 0] = 2 * batch.scenario.target_speed / batch.scenario.tracker_speed - 1
+    actions[..., 0] = 2 * batch.scenario.target_speed / batch.scenario.tracker_speeds[0] - 1
     return actions
 
 
@@ -171,7 +171,7 @@ def test_it_heeds_where_trackers_are_going() -> None:
             tracker_pose=[[-2.0, 0.0, theta], [2.0, 0.0, theta]],
             target_pose=[0.0, 0.0, math.pi / 2],
         )
-        batch.arrays.tracker["speed"] = batch.scenario.tracker_speed
+        batch.arrays.tracker["speed"] = batch.scenario.tracker_speeds[0]
         batch.step(flying_blind(batch))
         assert direction * batch.state["world_heading_cos"][0] > 0.1
 

@@ -92,7 +92,9 @@ class Team:
         bearing = np.angle((goal - trackers) / headings(batch, "tracker"))
         actions = self.rng.uniform(-1, 1, batch.action_shape)
         actions[:, :n, 0] = 1.0
-        actions[:, :n, 1] = np.clip(bearing / (s.control_step * s.tracker_turn_rate), -1, 1)
+        actions[:, :n, 1] = np.clip(
+            bearing / (s.control_step * np.array(s.tracker_turn_rates)), -1, 1
+        )
         batch.step(actions)
         self.step += 1
 

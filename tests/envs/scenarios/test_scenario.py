@@ -327,17 +327,6 @@ def test_reward_weights_compare_whatever_their_order_and_kind() -> None:
     assert dict(one.reward_weights)["slot"] == 1.0, "nothing outside can change it"
 
 
-def test_every_field_is_documented() -> None:
-    import inspect
-
-    source = inspect.getsource(Scenario)
-    for field in dataclasses.fields(Scenario):
-        after = source.split(f"    {field.name}: ", 1)[1]
-        assert after.split("\n    ", 2)[1].startswith('"""') or ')\n    """' in after[:400], (
-            field.name
-        )
-
-
 @pytest.mark.parametrize("number", [1, 2, 64])
 @pytest.mark.parametrize("name", posse.scenario_names())
 def test_one_to_sixty_four_trackers_in_every_scenario(name: str, number: int) -> None:
@@ -348,3 +337,36 @@ def test_one_to_sixty_four_trackers_in_every_scenario(name: str, number: int) ->
     observations = batch.reset(seed=0)
     assert np.isfinite(observations).all()
     assert np.isfinite(batch.step(np.zeros(batch.action_shape))[0]).all()
+
+
+def test_a_limit_may_be_one_number_or_one_for_each_tracker() -> None:
+    each = posse.get_scenario("smart", num_trackers=3, tracker_speed=[1.0, 0.8, 1.5])
+    assert each.tracker_speed == (1.0, 0.8, 1.5)
+    assert each.tracker_speeds == (1.0, 0.8, 1.5)
+    assert posse.get_scenario("smart", num_trackers=3).tracker_speeds == (1.0, 1.0, 1.0)
+    assert each.slot_turn_rate < posse.get_scenario("smart", num_trackers=3).slot_turn_rate
+    assert each.position_bound > posse.get_scenario("smart", num_trackers=3).position_bound
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"tracker_speed": (1.0, 2.0)}, "2 values for num_trackers=5: give one number, or one for"),
+        ({"tracker_turn_rate": (1.0,) * 4 + (0.0,)}, r"tracker_turn_rate\[4\]=0.0"),
+        ({"tracker_speed": (1.0,) * 4 + (0.5,)}, "must be below tracker_speed=0.5"),
+        ({"tracker_speed": (1.0,) * 4 + ("fast",)}, r"tracker_speed\[4\]='fast'.* a number"),
+        ({"tracker_acceleration": (1.0,) * 5}, "tracker_acceleration=.* it must be a number"),
+    ],
+)
+def test_limits_of_each_tracker_are_checked(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        posse.get_scenario("smart", **settings)
+
+
+def test_every_setting_says_what_it_is() -> None:
+    for name, setting in posse.Scenario.settings().items():
+        assert setting.meaning, name
+        assert setting.unit or setting.kind in ("text", "flag"), name
+        if setting.kind in ("number", "whole"):
+            default = getattr(posse.get_scenario("constant"), name)
+            assert default is None or setting.low <= default, name

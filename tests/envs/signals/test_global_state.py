@@ -23,6 +23,8 @@ FOLLOWS: Final = (
     "tracker_onsets",  # counted anew where anything is near, and 0 elsewhere
     # from poses, the slot frame and contacts: who occupies which slot (test_score)
     "tracker_slot", "tracker_slot_distance",
+    # from the scenario, always the same
+    "tracker_max_speed", "tracker_max_turn_rate", "tracker_per_speed", "tracker_per_turn_rate",
     # from the times of faults, from time and contacts
     "world_working", "world_over", "world_terminated",
 )  # fmt: skip

@@ -86,8 +86,8 @@ def fix_velocity(
     vx, vy = old_vx + keep * (vx - old_vx), old_vy + keep * (vy - old_vy)
     # No target is faster than a tracker (assumption ii), so noise that says so is cut.
     speed2 = vx * vx + vy * vy
-    too_fast = speed2 > c.tracker_speed * c.tracker_speed
-    cut = choose(too_fast, c.tracker_speed / root(greater(speed2, _TINY)), _ONE)
+    too_fast = speed2 > c.fastest * c.fastest
+    cut = choose(too_fast, c.fastest / root(greater(speed2, _TINY)), _ONE)
     return vx * cut, vy * cut
 
 

@@ -145,7 +145,6 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
     that comes nearer than any slot is a danger, which takes more than all patience at once.
     """
     near = c.slots_reach + _STATION_MARGIN
-    slow = _STATION_SPEED * (c.tracker_speed - c.target_speed)
     danger = max(_DANGER * c.formation_distance, c.radius + c.radius)
     vx, vy = c.target_speed * w.heading_cos, c.target_speed * w.heading_sin
     committed = _ZERO
@@ -153,6 +152,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
         t = trackers[i]
         if t.broken_at != NEVER:
             continue
+        slow = _STATION_SPEED * (t.max_speed - c.target_speed)
         dx, dy = t.x - w.x, t.y - w.y
         d2 = dx * dx + dy * dy
         if d2 < danger * danger:
@@ -172,7 +172,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     that is latest, seen from where the trackers will be shortly, and does not go back on a choice
     for little: among trackers that surround it, it would dither.
     """
-    v, most = c.target_speed, c.tracker_speed
+    v, most = c.target_speed, c.fastest
     a = most * most - v * v
     per_a = _ONE / a
     clear = c.radius + c.radius + _CLEARANCE
