@@ -11,20 +11,15 @@ With ``NUMBA_DISABLE_JIT=1`` both decorators return the plain function, for debu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final, TypeVar, cast, overload
 
 import numba
 import numpy as np
 
 import posse.numeric.simd.lane_code  # noqa: F401 (registers lanes with numba)
-from posse.numeric.compiler.kernel_cache import (
-    KernelCache,
-    cache_directory,
-    package_directory,
-    package_stamp,
-)
-from posse.numeric.compiler.numba_overrides import CompiledFunction, KernelCompiler
+from posse.numeric.compiler.numba_overrides import CompiledFunction, KernelCache, KernelCompiler
+from posse.numeric.compiler.stamps import remember
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -56,30 +51,48 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
     def decorate(function: F) -> F:
         if UNCOMPILED:
             return function
-        package_stamp(package_directory(function))
-        return cast("F", CompiledFunction(function, _OPTIONS, inline=not seldom))
+        remember(function)
+        options = {**_OPTIONS, "nopython": True, "boundscheck": None, "forceinline": not seldom}
+        return cast("F", CompiledFunction(function, options))
 
     return decorate if function is None else decorate(function)
 
 
-def kernel(function: F) -> F:
+@overload
+def kernel(function: F) -> F: ...
+
+
+@overload
+def kernel(*, sources: Iterable[Callable[..., Any]] = ...) -> Callable[[F], F]: ...
+
+
+def kernel(
+    function: F | None = None, *, sources: Iterable[Callable[..., Any]] = ()
+) -> F | Callable[[F], F]:
     """Compile a function that Python calls, and keep the result on disk.
 
     The arrays that a kernel is given must not overlap: what it has read from one, it does not read
     again after it wrote to another.
 
-    The directory is ``$POSSE_CACHE_DIR``, or ``posse`` in the user's cache directory. Where it
-    cannot be written, and for functions outside a package (a script, a notebook), every process
-    compiles anew.
+    It is compiled again when a file of a package changes that it, or a function that it calls,
+    stands in, or a constant of theirs. The directory is ``$POSSE_CACHE_DIR``, or ``posse`` in the
+    user's cache directory; where it cannot be used, every process compiles anew, and says why.
+
+    Args:
+        function: The function.
+        sources: Functions that it calls, but that neither its globals nor its closure lead to, as
+            those of a registry.
     """
-    if UNCOMPILED:
-        return function
-    package = package_directory(function)
-    package_stamp(package)
-    dispatcher = numba.njit(**_OPTIONS, pipeline_class=KernelCompiler)(function)
-    if package is not None and cache_directory() is not None:
-        dispatcher._cache = KernelCache(function)  # type: ignore[no-untyped-call]
-    return cast("F", dispatcher)
+
+    def decorate(function: F) -> F:
+        if UNCOMPILED:
+            return function
+        remember(function)
+        dispatcher = numba.njit(**_OPTIONS, pipeline_class=KernelCompiler)(function)
+        dispatcher._cache = KernelCache(function, tuple(sources))
+        return cast("F", dispatcher)
+
+    return decorate if function is None else decorate(function)
 
 
 def direct(function: F) -> F:

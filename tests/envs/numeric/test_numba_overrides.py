@@ -8,7 +8,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
-from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.codegen import JITCPUCodegen
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, Flags
 
 from posse.numeric import UNCOMPILED, compiled, kernel
 from posse.numeric.compiler import numba_overrides
@@ -22,15 +23,19 @@ OURS = [
     and each.__module__ == numba_overrides.__name__
     and any(base.__module__.startswith("numba.") for base in each.__mro__)
 ]
+ADDED = {"__init__", "_name"}
 OVERRIDES = [
     (each, name)
     for each in OURS
     for name, member in vars(each).items()
-    if inspect.isfunction(member) or isinstance(member, property)
+    if (inspect.isfunction(member) or isinstance(member, property)) and name not in ADDED
 ]
 CALLED = [
     (CompilerBase, "compile_extra"),
     (DefaultPassBuilder, "define_nopython_pipeline"),
+    (CompileResult, "_reduce"),
+    (CompileResult, "_rebuild"),
+    (JITCPUCodegen, "magic_tuple"),
     (Flags, "noalias"),
     (Flags, "forceinline"),
 ]

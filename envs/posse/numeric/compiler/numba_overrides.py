@@ -1,62 +1,58 @@
-"""Every override of numba's private parts, and what each one buys.
+"""Every use of numba's private parts, and what each one buys.
 
 =========================== ======================================================================
-``_InnerLibrary``           A function inside a kernel is optimised and turned into machine code
-                            with the kernel, not by itself as well: cold start 11 s, else 17 s.
+``_InnerLibrary``           A function inside a kernel is optimised and made machine code with the
+                            kernel, not by itself as well: cold start 14 s, else 20 s.
 ``_InnerDispatcher``        A function is compiled once for all integers that it is called with,
-                            not for each constant and each width: cold start 11 s, else 16 s.
-``_Library.add_ir_module``  Loops of unknown length (over trackers, beams, slots: a few rounds) are
-                            not unrolled: batches run at 1.00, else at 0.95 to 0.97.
-``_InnerType``              Functions can be passed to a kernel's functions in named tuples, and the
-                            kernel still be cached: numba's own type has an address for a value.
-``noalias``                 LLVM may assume that a kernel's arrays do not overlap: 1.00, else 0.95.
+                            not for each constant and each width: cold start 14 s, else 19 s.
+``_Library.add_ir_module``  Loops of unknown length are not unrolled: speed 1.00, else 0.91 to 1.00.
+``noalias``                 LLVM may assume that arrays do not overlap: 1.00, else 0.93 to 1.00.
+``KernelCache``             Warm start 0.6 s; numba's own cache goes stale and reads damaged files.
 =========================== ======================================================================
 
-Cold start: first step of ``smart`` in a new process, nothing cached. A test checks that numba still
-has all that is overridden or called here.
+Cold start: first step of ``smart``, nothing cached. A test checks that numba still has all of this.
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import pickle
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Any
 
 from numba.core import types
+from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.extending import models, register_model
-from numba.core.imputils import lower_constant
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
 
-_NO_RUNTIME_UNROLL: Final = "llvm.loop.unroll.runtime.disable"
+from posse.numeric.compiler import kernel_files
+from posse.numeric.compiler.function_type import FunctionType
+from posse.numeric.compiler.stamps import Stamp
 
 
 class _Library(JITCodeLibrary):
-    """LLVM code in which loops of unknown length are not unrolled; others may be."""
+    """LLVM code whose loops of unknown length, which run a few times, are not unrolled."""
 
     def add_ir_module(self, ir_module: Any) -> None:
+        option = ir_module.add_metadata(["llvm.loop.unroll.runtime.disable"])
         for function in ir_module.functions:
-            _mark_loops(ir_module, function)
-        super().add_ir_module(ir_module)  # type: ignore[no-untyped-call]
-
-
-def _mark_loops(module: Any, function: Any) -> None:
-    """Forbid unrolling at run time for every loop, known by its jump backwards."""
-    position = {id(block): k for k, block in enumerate(function.blocks)}
-    option = module.add_metadata([_NO_RUNTIME_UNROLL])
-    loops: dict[int, Any] = {}
-    for k, block in enumerate(function.blocks):
-        jump = block.terminator
-        for target in jump.operands if jump is not None and jump.opname == "br" else ():
-            if position.get(id(target), len(position)) > k:
-                continue
-            if id(target) not in loops:
-                # LLVM identifies a loop by a node whose first operand is the node itself.
-                node = module.add_metadata([f"{function.name} {target.name}"])
-                node.operands = (node, option)
-                loops[id(target)] = node
-            jump.set_metadata("llvm.loop", loops[id(target)])
+            loops: dict[int, Any] = {}  # by their first block: a jump to an earlier one is a loop
+            for block in function.blocks:
+                loops[id(block)] = None
+                jump = block.terminator
+                for target in jump.operands if jump is not None and jump.opname == "br" else ():
+                    if id(target) in loops:
+                        if loops[id(target)] is None:
+                            # LLVM identifies a loop by a node whose first operand is the node.
+                            node = ir_module.add_metadata([f"{function.name} {target.name}"])
+                            node.operands = (node, option)
+                            loops[id(target)] = node
+                        jump.set_metadata("llvm.loop", loops[id(target)])
+        super().add_ir_module(ir_module)
 
 
 class _InnerLibrary(_Library):
@@ -70,7 +66,7 @@ class _InnerLibrary(_Library):
 
     @property
     def codegen(self) -> Any:
-        """Where numba registers a function's globals, which needs machine code."""
+        # numba would register the function's globals there, which needs machine code.
         return SimpleNamespace(set_env=lambda name, environment: None)
 
 
@@ -83,12 +79,10 @@ class _Compiler(CompilerBase):
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]  # type: ignore[no-untyped-call]
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
 class _InnerCompiler(_Compiler):
-    """Compiles a function that kernels link."""
-
     library = _InnerLibrary
 
 
@@ -96,54 +90,59 @@ class KernelCompiler(_Compiler):
     """Compiles a kernel, whose arrays do not overlap."""
 
     def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+        super().__init__(*arguments)
         self.state.flags.noalias = True
 
 
 class CompiledFunction(CPUDispatcher):
-    """A function in two forms: for Python, compiled when Python calls it; and for kernels to link.
+    """A function in two forms: for Python, compiled if Python calls it; and for kernels to link."""
 
-    Args:
-        function: What to compile.
-        options: numba's, of both forms.
-        inline: Whether it becomes part of every place that calls it. Else LLVM decides.
-    """
-
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any], inline: bool) -> None:
-        options = {**options, "nopython": True, "boundscheck": None}
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function, targetoptions=options)
         inner = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self.inner = _InnerDispatcher(
-            function, None, {**inner, "forceinline": inline}, _InnerCompiler
-        )
+        self.inner = _InnerDispatcher(function, None, inner, _InnerCompiler)
 
     @property
-    def _numba_type_(self) -> types.Dispatcher:
-        return _InnerType(self.inner)
-
-
-class _InnerType(types.Dispatcher):
-    """A function as compiled code has it: a type, which says what to call, and no value."""
-
-
-register_model(_InnerType)(models.OpaqueModel)
-
-
-@lower_constant(_InnerType)  # type: ignore[no-untyped-call, untyped-decorator]
-def _lower_function(context: Any, builder: Any, kind: Any, function: Any) -> Any:
-    return context.get_dummy_value()
+    def _numba_type_(self) -> FunctionType:
+        return FunctionType(self.inner)
 
 
 class _InnerDispatcher(CPUDispatcher):
-    """The form for kernels, compiled once for all integers."""
-
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        return super().get_call_template(
-            tuple(_widest(kind) for kind in args),
-            {name: _widest(kind) for name, kind in kws.items()},
-        )
+        widest = {name: _widest(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(_widest, args)), widest)
 
 
 def _widest(kind: Any) -> Any:
-    plain = types.unliteral(kind)  # type: ignore[no-untyped-call]
+    plain = types.unliteral(kind)
     return types.int64 if plain in (types.int32, types.uint8) else plain
+
+
+class KernelCache(NullCache):
+    """Where numba looks for a kernel before it compiles it, and puts it afterwards."""
+
+    def __init__(self, *stamped: Any) -> None:
+        self._stamped = stamped
+
+    @functools.cached_property
+    def _stamp(self) -> Stamp:
+        return Stamp(*self._stamped)  # only now: a kernel may call what stands below it
+
+    def _name(self, sig: Any, codegen: Any) -> str:
+        return self._stamp.hexdigest(str(sig), *map(str, codegen.magic_tuple()))
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return a kernel for these types, or None."""
+        with contextlib.suppress(Exception):  # whatever it is, the kernel is compiled
+            kept = kernel_files.read(self._name(sig, target_context.codegen()))
+            signature, parts = pickle.loads(kept) if kept is not None else (None, ())  # noqa: S301
+            if signature == sig:
+                return CompileResult._rebuild(target_context, *parts)
+        kernel_files.announce()
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a kernel for these types."""
+        with contextlib.suppress(Exception):
+            if self._stamp.holds() and not data.library.has_dynamic_globals:
+                kernel_files.write(self._name(sig, data.codegen), dumps((sig, data._reduce())))
