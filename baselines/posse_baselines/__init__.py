@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.policy import (
     BasePolicy,
     Memory,
@@ -15,7 +16,6 @@ from posse_baselines.policy import (
     split_agents,
     stack_agents,
 )
-from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.registry import load, policy_names
 from posse_baselines.tracker_env import register
 from posse_baselines.tuning import Tunable

@@ -1,4 +1,4 @@
-"""Policies driven through the public interface from given poses, with a target that a test steers."""
+"""Policies driven through the public interface from given poses; a test may steer the target."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def drive(
     seed: int = 0,
     **settings: Any,
 ) -> Iterator[Instant]:
-    """Play ``steps`` control steps; ``target`` gives its (V, ω) for a time, where a test steers it."""
+    """Play ``steps`` control steps; ``target`` gives its (V, ω) at a time where a test steers it."""
     team = load(policy) if isinstance(policy, str) else policy
     if target is not None:
         settings["target_motion"] = "agent"
@@ -86,7 +86,7 @@ def drive(
             poses(state, "world"),
             np.arctan2(state["world_frame_sin"], state["world_frame_cos"]),
             team.annotations(memory),
-            (team_actions[..., :2].astype(np.float64) + (1.0, 0.0)) * limits,
+            (team_actions[..., :2].astype(np.float64) + np.array([1.0, 0.0])) * limits,
             batch.layout.views(given)["working"] == 0.0,
         )
         observations, *_ = batch.step(actions)

@@ -156,7 +156,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
 
 @compiled
 def patience(s: Record, d: Record) -> float:
-    """Return how long (s) a silence has to be to mean something: twice the usual, plus a minimum."""
+    """Return how long (s) a silence has to be to mean something: over twice the usual."""
     return float(min(s.lost_after, s.least_patience + 2.0 * d.usual_gap))
 
 

@@ -18,8 +18,8 @@ from posse_baselines.ddcs.memory import GRID, MATE, MIND
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
-from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.laws.heading import BODY
+from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.laws.safeguard import DISC, PLAYS
 from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (

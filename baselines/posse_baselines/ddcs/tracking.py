@@ -68,7 +68,7 @@ def to_slot(s: Record, d: Record, slots: Records, x: float, y: float, body: Reco
 
     Converging, the slot is met at full speed, round the target; flocking is the slot law.
     """
-    place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
+    _, _, arm_x, arm_y = slot_place(d, slots[d.slot])
     arm_x, arm_y = arm_x + s.aim_ahead * d.frame_cos, arm_y + s.aim_ahead * d.frame_sin
     gain, clearance, rate = s.gain, 0.0, s.feed_forward * d.psi_rate
     if d.task == CONVERGING:

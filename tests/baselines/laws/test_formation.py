@@ -93,15 +93,15 @@ SPEED = 0.6 + 0j
 
 def asked(point: complex, theta: float) -> complex:
     """What l-l asks of a control point, in the common frame; both leaders go straight on."""
-    seen: list[float] = []
+    seen = []
     for leader in LEADERS:
         arm, wanted = point - leader, PLACE - leader
         demand = l_phi.l_phi_demand(
             abs(arm), cmath.phase(arm), abs(wanted), cmath.phase(wanted), 0.6, 0.0, 2.0, 2.0
         )
-        seen += [abs(arm), *demand, short_way(cmath.phase(arm) - theta)]
+        seen.append((abs(arm), *demand, short_way(cmath.phase(arm) - theta)))
     crossing = cmath.phase(PLACE - LEADERS[1]) - cmath.phase(PLACE - LEADERS[0])
-    velocity = l_l.l_l_velocity(*seen[:4], *seen[4:], crossing, 0.15)
+    velocity = l_l.l_l_velocity(*seen[0], *seen[1], crossing, 0.15)
     return complex(*velocity) * cmath.exp(1j * theta)
 
 

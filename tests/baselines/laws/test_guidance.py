@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -169,7 +170,7 @@ def test_speed_stays_within_the_limits() -> None:
 # --- heading regulation --------------------------------------------------------------------------
 
 
-def body(theta: float, dt: float = 0.1, turn_acceleration: float = 1e4) -> np.record:
+def body(theta: float, dt: float = 0.1, turn_acceleration: float = 1e4) -> Any:
     b = np.zeros(1, BODY)[0]
     b["heading_cos"], b["heading_sin"] = math.cos(theta), math.sin(theta)
     b["max_speed"], b["max_omega"], b["dt"] = 1.0, 2.0, dt

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tests.support.drive import Instant, complex_of, drive
+from tests.support.drive import Floats, Instant, complex_of, drive
 
 from posse_baselines import Policy, load, with_settings
 from posse_baselines.ddcs import CONVERGING, FLOCKING
@@ -138,7 +138,8 @@ def test_chase_and_maintenance_change_with_hysteresis() -> None:
 @pytest.mark.parametrize("name", ["pngl", "deviated-pursuit"])
 def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: float) -> None:
     rng = np.random.default_rng(5)
-    worlds, starts = 100, []
+    worlds = 100
+    starts: list[Floats] = []
     while len(starts) < worlds:  # behind the target, a metre apart at least
         away = rng.uniform(-4.0, -1.0, 5) + 1j * rng.uniform(-2.5, 2.5, 5)
         if min(abs(a - b) for i, a in enumerate(away) for b in away[:i]) > 0.6:
