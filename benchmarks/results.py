@@ -17,7 +17,11 @@ from posse_training.reports.statistics import Estimate, mean, share
 from posse_training.runs.provenance import commit
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
-POLICIES = ("pursuit", "ddcs-centralized", "ddcs-distributed", "oracle")
+POLICIES = (
+    "pursuit", "pngl-l-phi", "pngl", "deviated-pursuit", "velocity-pursuit",
+    "ddcs-centralized-pursuit", "ddcs-centralized", "ddcs-centralized-l-l", "ddcs-distributed",
+    "oracle",
+)  # fmt: skip
 ABLATIONS = (
     ("leader-loss", "ddcs-centralized-no-exchange"),
     ("search", "ddcs-no-radio"),

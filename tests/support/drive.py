@@ -60,7 +60,7 @@ def drive(
     seed: int = 0,
     **settings: Any,
 ) -> Iterator[Instant]:
-    """Play ``steps`` control steps; ``target`` gives its (V, ω) at a time where a test steers it."""
+    """Play ``steps`` control steps; ``target`` gives its (V, ω) where a test steers it."""
     team = load(policy) if isinstance(policy, str) else policy
     if target is not None:
         settings["target_motion"] = "agent"
