@@ -27,7 +27,7 @@ FAMILY: Final[dict[str, Settings]] = {
     "pngl": Settings(deviation="slot", spread=0.1, **_PURSUIT),
     "deviated-pursuit": Settings(deviation="slot", **_PURSUIT),
     "velocity-pursuit": Settings(deviation="none", **_PURSUIT),
-    "ddcs-centralized-pursuit": Settings(model="centralized", deviation="none", **_PURSUIT),
+    "ddcs-centralized-pursuit": Settings(deviation="none", **_CENTRALIZED, **_PURSUIT),
     "ddcs-distributed": Settings(),
     "ddcs-centralized": Settings(**_CENTRALIZED),
     "ddcs-centralized-l-l": Settings(follower_law="l-l", **_CENTRALIZED),

@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 
 import posse
-from posse_training.reports.reproduce import (
-    EXPERIMENTS,
+from posse_training.reports.reproduce import MEMBERS, MODELS, Settings, reproduce
+from posse_training.reports.reproduce.recording import (
     Floats,
     Recording,
-    Settings,
     draw_starts,
-    reproduce,
+    median_world,
     settling_times,
 )
 
@@ -23,7 +22,11 @@ def recording(relative: Floats, speeds: Floats) -> Recording:
     target[:, 0, 0] = -0.05 * np.arange(steps)
     trackers = np.zeros((steps, 1, relative.shape[1], 3))
     trackers[..., :2] = relative[:, None] + target[:, :, None, :2]
-    return Recording(np.arange(steps) * 0.1, trackers, target, speeds[:, None], 0.15)
+    none = np.full(trackers.shape[:3], -1)
+    slots = np.zeros((*trackers.shape[:3], 2))
+    return Recording(
+        np.arange(steps) * 0.1, trackers, target, speeds[:, None], slots, none, none, none < 0, 0.15
+    )  # fmt: skip
 
 
 def test_settling_time_of_a_known_approach() -> None:
@@ -55,14 +58,22 @@ def test_starts_are_the_figures() -> None:
     np.testing.assert_array_equal(few, trackers[:5])
 
 
-def test_figures_and_numbers_of_every_experiment_are_written(tmp_path: Path) -> None:
-    rows = reproduce(Settings(out=tmp_path, starts=5))
+def test_the_shown_run_is_the_median_one() -> None:
+    assert median_world(np.array([3.0, np.nan, 1.0, 2.0, 9.0])) == 3
+    assert median_world(np.array([4.0, 1.0])) == 1
+    assert median_world(np.array([np.nan, np.nan])) == 0
+
+
+def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
+    rows = reproduce(Settings(out=tmp_path, starts=8))
     written = json.loads((tmp_path / "settling.json").read_text())
-    assert written["experiments"] == rows
-    for experiment in EXPERIMENTS:
-        for kind in ("frames", "curves"):
-            assert (tmp_path / f"{experiment.name}-{kind}.png").stat().st_size > 10_000
-            assert (tmp_path / f"{experiment.name}-{kind}.svg").read_text().startswith("<?xml")
-    by_model = {row["model"]: row for row in rows}
-    assert by_model["centralized"]["settled"] >= 4
-    assert by_model["distributed"]["settled"] >= 4
+    assert written["policies"] == rows
+    names = [f"{model.name}-{kind}" for model in MODELS for kind in ("frames", "curves")]
+    for name in (*names, "tracks", "leader-loss"):
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+        assert (tmp_path / f"{name}.svg").read_text().startswith("<?xml")
+    assert tuple(row["policy"] for row in rows) == MEMBERS
+    for row in rows:
+        if row["policy"] != "velocity-pursuit":  # all pursue to one point behind the target
+            assert row["settled"] >= 7
+            assert row["in_slots"] >= 7

@@ -25,7 +25,7 @@ from posse_training.reports.sweeps import BOUND, SWEEPS, Point, Sweep
 
 WIDTH: Final = 7.2
 """Of every figure, inches: as wide as a page of the manual."""
-_RC: Final[Any] = {
+RC: Final[Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.labelsize": 9,
@@ -107,7 +107,7 @@ def draw(
         points: Of the sweeps.
         losses: Of the scenario in which the leader breaks.
     """
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(RC):
         drawn: dict[str, Figure] = {}
         if plays:
             drawn["profile"] = profile(plays)

@@ -1,0 +1,153 @@
+"""``posse reproduce``: the paper's section 4, figures 7 to 10, and what it announces beside them.
+
+The paper gives neither scale, gains nor starts; docs/reproduction.md says what was chosen.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+import numpy as np
+import tyro
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+import posse
+from posse_baselines.policies.scripted import FAMILY
+from posse_training.reports.figures import RC
+from posse_training.reports.reproduce.laws import leader_loss, tracks
+from posse_training.reports.reproduce.motion import curves, frames
+from posse_training.reports.reproduce.recording import (
+    Floats,
+    Recording,
+    draw_starts,
+    median_world,
+    record,
+    settling_times,
+)
+
+HORIZON: Final = 250
+"""Control steps that are played, so that the slowest law settles."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """One model of the paper: its laws, ours, and what the paper says of it."""
+
+    name: str
+    scenario: str
+    paper_policy: str
+    our_policy: str
+    paper_settling_time: float
+
+
+MODELS: Final = (
+    Model("centralized", "paper-centralized", "pngl-l-phi", "ddcs-centralized", 1.6),
+    Model("distributed", "paper-distributed", "pngl", "ddcs-distributed", 2.0),
+)
+MEMBERS: Final = tuple(name for name in FAMILY if name != "ddcs-no-radio")
+"""Policies whose settling times are measured."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What ``posse reproduce`` takes."""
+
+    out: Path = Path("runs/paper")
+    """Folder for figures (PNG and SVG) and numbers (JSON)."""
+    starts: int = 200
+    """Drawn starts; the run of the median settling time is shown."""
+    seed: int = 7
+    """Of the starts, on the test split."""
+    tolerance: float = 0.1
+    """A position relative to the target within this of its last value has settled, m."""
+
+
+def play_member(policy: str, settings: Settings) -> Recording:
+    """Play a policy from the drawn starts; the models' scenarios differ in name alone."""
+    scenario = posse.get_scenario("paper-distributed", horizon=HORIZON)
+    tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
+    options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
+    return record(policy, scenario, settings.starts, settings.seed, options)
+
+
+def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
+    """Return the numbers of a policy: times (E,) s, and final distances from slots (E, N) m."""
+    known = times[np.isfinite(times)]
+    model = next((m for m in MODELS if policy in (m.paper_policy, m.our_policy)), None)
+    return {
+        "policy": policy,
+        "model": "centralized" if FAMILY[policy].model == "centralized" else "distributed",
+        "paper_settling_time": model.paper_settling_time if model else None,
+        "settling_time_quartiles": (
+            np.percentile(known, [25, 50, 75]).tolist() if len(known) else [None] * 3
+        ),
+        "settled": len(known),
+        "in_slots": int((error < 0.2).all(axis=1).sum()),
+        "starts": len(times),
+    }
+
+
+def reproduce(settings: Settings) -> list[dict[str, Any]]:
+    """Play every member of the family, write figures and numbers, and return the numbers."""
+    mpl.use("Agg")
+    settings.out.mkdir(parents=True, exist_ok=True)
+    rows, shown = [], {}
+    for policy in MEMBERS:
+        run = play_member(policy, settings)
+        times = settling_times(run, settings.tolerance)
+        rows.append(summary(policy, times, run.error[-1]))
+        shown[policy] = (run, times)
+    with mpl.rc_context(RC):
+        for model in MODELS:
+            world = median_world(shown[model.paper_policy][1])
+            pair = [
+                (policy, shown[policy][0], world, float(shown[policy][1][world]))
+                for policy in (model.paper_policy, model.our_policy)
+            ]
+            _write(settings.out, f"{model.name}-frames", frames(pair))
+            _write(settings.out, f"{model.name}-curves", curves(pair, model.paper_settling_time))
+        _write(settings.out, "tracks", tracks(settings.seed))
+        loss = leader_loss("pngl-l-phi", settings.starts, settings.seed)
+        _write(settings.out, "leader-loss", loss)
+    stated = {"seed": settings.seed, "split": "test", "tolerance": settings.tolerance}
+    text = json.dumps({**stated, "policies": rows}, indent=2)
+    (settings.out / "settling.json").write_text(text + "\n")
+    return rows
+
+
+def _write(folder: Path, name: str, figure: Figure) -> None:
+    for suffix in ("png", "svg"):
+        dated = {"Date": None} if suffix == "svg" else None
+        figure.savefig(folder / f"{name}.{suffix}", dpi=130, metadata=dated)
+    plt.close(figure)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Redo the paper's experiments and print the settling times beside the paper's."""
+    settings = tyro.cli(Settings, prog="posse reproduce", args=arguments)
+    rows = reproduce(settings)
+    table = Table(title=f"settling time, s: within {settings.tolerance:g} m and 0.1 m/s for good")
+    for column in ("policy", "model", "paper", "median [quartiles]", "settled", "all in slots"):
+        table.add_column(column)
+    for row in rows:
+        low, middle, high = row["settling_time_quartiles"]
+        paper = row["paper_settling_time"]
+        table.add_row(
+            row["policy"],
+            row["model"],
+            "-" if paper is None else f"{paper:.1f}",
+            "-" if middle is None else f"{middle:.1f} [{low:.1f}, {high:.1f}]",
+            f"{row['settled']} of {row['starts']}",
+            f"{row['in_slots']} of {row['starts']}",
+        )
+    console = Console()
+    console.print(table)
+    console.print(f"figures and numbers: {settings.out}")
