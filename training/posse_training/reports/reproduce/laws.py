@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -125,7 +126,9 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
         if np.isfinite(recovered):
             axis.axvline(recovered, color=TARGET, lw=1.0, ls=":")
     axes[3].set_xlabel("time, s (line: the leader breaks; dotted: all places are held again)")
-    handles = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)]
+    handles: list[Artist] = [
+        Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)
+    ]
     handles += [Patch(fc=c, label=t) for c, t in zip(_TASK_COLOURS, TASKS, strict=True)]
     figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
     return figure
@@ -133,10 +136,10 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
 
 def _shown(run: Recording) -> tuple[int, float, float]:
     """Return the world of the median recovery, when its leader broke, and when it recovered (s)."""
-    broken = ~run.working.all(axis=2)
+    broken = np.asarray(~run.working.all(axis=2))
     broke = np.where(broken.any(axis=0), run.time[broken.argmax(axis=0)], np.nan)
-    held = np.where(run.working, run.error < 0.3, True).all(axis=2)
-    off = broken & ~held  # (T + 1, E)
+    held = (~run.working | (run.error < 0.3)).all(axis=2)
+    off = np.asarray(broken & ~held)  # (T + 1, E)
     last = len(run.time) - 1 - off[::-1].argmax(axis=0)
     recovered = run.time[np.minimum(last + 1, len(run.time) - 1)]
     taken = np.where(off.any(axis=0) & ~off[-1], recovered - broke, np.nan)

@@ -102,9 +102,13 @@ def record(
         instants.append(_instant(batch, offsets, team.annotations(memory), observations))
         if step < scenario.horizon:
             observations, *_ = batch.step(actions)
-    parts = (np.stack(part) for part in zip(*instants, strict=True))
     time = np.arange(scenario.horizon + 1) * scenario.control_step
-    return Recording(time, *parts, scenario.robot_radius)
+    trackers, target, speeds, slots, leader, task, working = (
+        np.stack(part) for part in zip(*instants, strict=True)
+    )
+    return Recording(
+        time, trackers, target, speeds, slots, leader, task, working, scenario.robot_radius
+    )
 
 
 def _poses(state: Mapping[str, Any], who: str) -> Floats:
