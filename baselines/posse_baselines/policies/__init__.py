@@ -1,1 +1,1 @@
-"""Policies without a decision system: simple ones, pursuit, the oracle."""
+"""Policies without a decision system: simple ones, pursuit, the planner."""

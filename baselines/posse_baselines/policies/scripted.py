@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from posse_baselines.ddcs import DDCS, Settings
 from posse_baselines.ddcs.settings import NO_EXCHANGE
-from posse_baselines.policies.oracle import Oracle
+from posse_baselines.policies.planner import Planner
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random
 from posse_baselines.policy import Policy, PolicyError
@@ -41,7 +41,7 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "idle": Idle,
     "pursuit": Pursuit,
     **{name: (lambda name=name: DDCS(FAMILY[name], name)) for name in FAMILY},  # type: ignore[misc]
-    "oracle": Oracle,
+    "planner": Planner,
 }
 
 

@@ -1,0 +1,6 @@
+"""The planner: a reference that reads the state and plays ahead in copies of the worlds."""
+
+from posse_baselines.policies.planner.policy import Planner
+from posse_baselines.policies.planner.settings import PlannerSettings
+
+__all__ = ["Planner", "PlannerSettings"]
