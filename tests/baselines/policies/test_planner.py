@@ -1,0 +1,177 @@
+"""The planner: above the teams that play by the rules, and blind for what is yet to be drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.support.reference import snapshot
+
+import posse
+from posse_baselines import PolicyError, begin, load, play, rollout, split_agents
+from posse_baselines.policies.planner import Planner, PlannerSettings
+
+QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
+"""Looks ahead for a shorter time than it should."""
+
+
+def actions_of(planner: Planner, batch: posse.Batch, steps: int) -> NDArray[np.float32]:
+    """Return the actions (steps, E, N, 2 + m) of so many steps."""
+    played = rollout(batch, planner)
+    return np.stack([next(played).actions for _ in range(steps)])
+
+
+def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
+    metrics = play(posse.batch("constant", 10, split="train"), Planner(QUICK))
+    assert metrics["safe_score"].mean() >= 0.9 * metrics["bound"].mean()
+
+
+@pytest.mark.parametrize("name", ["smart", "obstacles"])
+def test_playing_ahead_is_worth_more_than_the_scripted_team(name: str) -> None:
+    planned = play(posse.batch(name, 6, split="validation"), load("planner"))
+    team = load("ddcs-distributed")
+    scripted = play(
+        posse.batch(name, 6, split="validation", message_size=team.message_size), team
+    )
+    assert planned["safe_score"].mean() >= scripted["safe_score"].mean() + 0.05
+    assert planned["contact_free"].all()
+
+
+def test_a_world_is_played_alone_as_among_others() -> None:
+    together = actions_of(Planner(QUICK), posse.batch("field", 5, seed=2), 60)
+    alone = actions_of(Planner(QUICK), posse.batch("field", 1, seed=2, first_world=3), 60)
+    np.testing.assert_array_equal(together[:, 3:4], alone)
+
+
+def test_a_new_episode_is_played_as_if_it_were_the_first() -> None:
+    planner, batch = Planner(QUICK), posse.batch("radio", 3, seed=5)
+    batch.reset()
+    memory, start = begin(planner, batch), batch.save()
+    attempts = []
+    for _ in range(2):
+        observations = batch.restore(start)
+        attempts.append([])
+        for _ in range(22):
+            actions, memory = planner.act(observations, memory)
+            observations = batch.step(actions)[0]
+            attempts[-1].append(actions)
+        memory = planner.restart(memory, np.ones(3, np.bool_))
+    np.testing.assert_array_equal(attempts[0], attempts[1])
+
+
+def test_worlds_whose_episodes_begin_at_different_steps_are_played_as_alone() -> None:
+    planner, batch = Planner(QUICK), posse.batch("smart", 2, seed=1)
+    memory, observations = begin(planner, batch), batch.reset()
+    for step in range(23):
+        if step == 7:
+            mask = np.array([True, False])
+            observations = batch.reset(options={"reset_mask": mask})
+            memory = planner.restart(memory, mask)
+        actions, memory = planner.act(observations, memory)
+        observations = batch.step(actions)[0]
+    other = actions_of(Planner(QUICK), posse.batch("smart", 1, seed=1, first_world=1), 23)
+    np.testing.assert_array_equal(actions[1:], other[-1])
+
+
+def test_it_changes_nothing_in_the_worlds_that_it_reads() -> None:
+    planner, batch = Planner(QUICK), posse.batch("field", 3)
+    memory, observations = begin(planner, batch), batch.reset()
+    before = snapshot(batch)
+    planner.act(observations, memory)
+    for name, array in snapshot(batch).items():
+        np.testing.assert_array_equal(array, before[name], err_msg=name)
+
+
+def test_it_does_not_know_the_faults_to_come() -> None:
+    """Worlds that differ in nothing but when a tracker will break are played alike."""
+    planned = []
+    for when in (10, 500):
+        batch = posse.batch("leader-loss", 30, seed=3, start_distance=(1.5, 3.0))
+        planner, observations = Planner(), batch.reset()
+        batch.arrays.world["break_step"][:] = when
+        planned.append(planner.act(observations, begin(planner, batch))[0])
+    np.testing.assert_array_equal(planned[0], planned[1])
+
+
+def test_it_plays_beside_a_target_that_is_an_agent() -> None:
+    batch = posse.batch("smart", 2, target_motion="agent")
+    planner = Planner(QUICK)
+    observations = batch.reset()[:, :5]
+    memory = begin(planner, batch)
+    for _ in range(5):
+        actions, memory = planner.act(observations, memory)
+        assert actions.shape == (2, 5, 2)
+        target = np.full((2, 1, 2), 0.5, np.float32)
+        observations = batch.step(np.concatenate([actions, target], axis=1))[0][:, :5]
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+def test_it_plays_past_the_end_of_episodes(autoreset: str) -> None:
+    batch = posse.batch(
+        "obstacles", 3, autoreset=autoreset, horizon=25, settle_time=1.0, start_distance=(1.5, 3.0)
+    )
+    played = rollout(batch, Planner(QUICK))
+    steps = [step for step, _ in zip(played, range(60), strict=False)]
+    assert len(steps) == (25 if autoreset == "disabled" else 60)
+    assert np.isfinite(np.stack([step.actions for step in steps])).all()
+
+
+def test_it_sends_every_tracker_to_a_slot_of_its_own() -> None:
+    batch, planner = posse.batch("leader-loss", 4, num_trackers=3), Planner(QUICK)
+    memory, observations = begin(planner, batch), batch.reset()
+    assert (planner.annotations(memory)["slot"] == -1).all()
+    _, memory = planner.act(observations, memory)
+    slots = planner.annotations(memory)["slot"]
+    assert np.sort(slots, axis=1).tolist() == [[0, 1, 2]] * 4
+
+
+def test_a_single_world_is_played_with_actions_by_agent() -> None:
+    batch, planner = posse.batch("radio", 1, message_size=2), Planner(QUICK)
+    memory, observations = begin(planner, batch), batch.reset()
+    actions, memory = planner.act(observations, memory)
+    by_name = split_agents(actions, [f"tracker_{i}" for i in range(5)])
+    assert all(action.shape == (4,) for action in by_name.values())
+
+
+def test_it_can_be_pickled_before_it_plays() -> None:
+    planner = pickle.loads(pickle.dumps(Planner(QUICK)))  # noqa: S301
+    assert planner.settings == QUICK
+
+
+def test_it_has_to_be_shown_the_batch() -> None:
+    batch = posse.batch("constant", 2)
+    with pytest.raises(PolicyError, match=r"do not hold their state: show it the batch"):
+        load("planner").begin(batch.layout, 2)
+
+
+def test_it_refuses_a_batch_other_than_the_one_it_watches() -> None:
+    planner = load("planner")
+    begin(planner, posse.batch("constant", 2))
+    with pytest.raises(PolicyError, match="watches 2 worlds of 'constant', not 3 of 'smart'"):
+        planner.begin(posse.batch("smart", 3, num_trackers=3).layout, 3)
+
+
+def test_each_setting_has_a_unit_and_a_range_that_holds_its_default() -> None:
+    for field in dataclasses.fields(PlannerSettings):
+        assert isinstance(field.metadata["unit"], str)
+        assert field.metadata["low"] <= field.default <= field.metadata["high"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("look_ahead", 0.0, r"look_ahead=0.0 must lie in \[0.1, 20.0\] s"),
+        ("look_ahead", float("nan"), "look_ahead=nan must lie"),
+        ("look_ahead", "4", "look_ahead='4' must be a number"),
+        ("rounds", 1.5, "rounds=1.5 must be a whole number"),
+        ("rounds", True, "rounds=True must be a whole number"),
+        ("keep", 5.0, "keep=5.0 must be at most look_ahead=4.0"),
+    ],
+)
+def test_settings_out_of_range_are_refused(name: str, value: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        PlannerSettings(**{name: value})
