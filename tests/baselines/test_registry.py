@@ -22,15 +22,15 @@ def test_a_class_is_loaded_by_where_it_is() -> None:
     assert isinstance(policy, DDCS)
 
 
-def test_only_the_oracle_reads_the_state() -> None:
-    assert [name for name in policy_names() if load(name).reads_state] == ["oracle"]
+def test_only_the_planner_reads_the_state() -> None:
+    assert [name for name in policy_names() if load(name).reads_state] == ["planner"]
 
 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
         ("ddcs-distribute", "did you mean 'ddcs-distributed'"),
-        ("orcale", "did you mean 'oracle'"),
+        ("plannner", "did you mean 'planner'"),
         ("nothing-like-it", "policies are: random, idle, pursuit"),
         ("no_such_module:Team", "cannot import 'no_such_module'"),
         ("posse_baselines.ddcs:DDSC", "has no 'DDSC' .did you mean 'DDCS'"),

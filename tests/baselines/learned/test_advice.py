@@ -85,7 +85,7 @@ def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was() -> No
 
 def test_who_cannot_advise() -> None:
     with pytest.raises(PolicyError, match="no tracker can know"):
-        check_adviser("oracle", load("oracle"))
+        check_adviser("planner", load("planner"))
 
     class Mute:
         name, message_size, reads_state = "mute", 0, False
