@@ -27,7 +27,7 @@ from posse.numeric import kernel
 from posse.rules import contact, motion, score
 from posse.rules import discs as survey
 from posse.rules.scratch import new_scratch
-from posse.signals import together
+from posse.signals import observing
 from posse.signals.parts import Writers, built_in_parts, writers_for
 
 PARTS = (
@@ -50,7 +50,7 @@ class Settings:
     out: Path = Path("runs/bench/costs.json")
 
 
-SETTINGS, OWN_FIELDS, WIDTH = writers_for(built_in_parts())
+SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
 
 
 @kernel
@@ -59,7 +59,7 @@ def one_part(  # type: ignore[no-untyped-def]
 ):
     """Do one part of a step in every world."""
     scratch = memory[0]
-    writers = Writers(SETTINGS, OWN_FIELDS, WIDTH)
+    writers = Writers(SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH)
     world.prepare(tables, writers, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
@@ -81,10 +81,10 @@ def one_part(  # type: ignore[no-untyped-def]
         elif part == 6:
             world.reward(c, w, t, tables.weights, results.rewards[e], results.terms[e])
         elif part == 7:
-            world.observe(c, worlds, e, writers, scratch, observations)
-            begun = e % together.TOGETHER + 1
-            if begun == together.TOGETHER or e == len(worlds.world) - 1:
-                together.observe_together(
+            observing.observe_sonar(c, t, scratch, observations[e], WIDTH)
+            begun = e % observing.TOGETHER + 1
+            if begun == observing.TOGETHER or e == len(worlds.world) - 1:
+                observing.observe_together(
                     c, worlds, e + 1 - begun, begun, writers, scratch, observations
                 )
 
@@ -121,8 +121,7 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     advance = batch.stepper(actions, observations, rewards, terms)
     flags = np.empty((2, batch.num_worlds), np.bool_)
     results = world.Results(observations, rewards, terms, flags)
-    width = built_in_parts().width
-    memory = new_scratch(scratch_for(width, 8))
+    memory = new_scratch(scratch_for(built_in_parts(), 8))
     arguments = (batch._tables, batch.arrays, actions, results, memory)
     costs = {"step": best(advance, seconds) / agents * 1e9}
     snapshot = batch.save()

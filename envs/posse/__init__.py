@@ -8,8 +8,9 @@ from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
+from posse.signals.fields import Field
+from posse.signals.layout import ObservationLayout
 from posse.signals.metrics import METRICS, Metric
-from posse.signals.observation import Field, ObservationLayout
 from posse.signals.reward import REWARD_TERMS, RewardTerm
 
 __version__ = "0.1.0"

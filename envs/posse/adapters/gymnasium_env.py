@@ -14,7 +14,7 @@ from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_se
 from posse.adapters.spaces import box
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
-from posse.signals.observation import ObservationLayout
+from posse.signals.layout import ObservationLayout
 from posse.signals.reward import TERM_NAMES, name_terms
 
 

@@ -22,7 +22,7 @@ from posse.adapters.single_world import (
 from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
-from posse.signals.observation import ObservationLayout
+from posse.signals.layout import ObservationLayout
 
 _MODES: Final = {
     AutoresetMode.NEXT_STEP: "next_step",

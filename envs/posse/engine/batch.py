@@ -48,8 +48,8 @@ from posse.rules.state import (
 )
 from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import SAFE_MARGIN
+from posse.signals.layout import ObservationLayout
 from posse.signals.metrics import episode_metrics
-from posse.signals.observation import ObservationLayout
 from posse.signals.parts import parts_for
 from posse.signals.reward import REWARD_TERMS, TermsByName
 
@@ -179,7 +179,7 @@ class Batch:
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
-        memory = scratch_for(parts_for(scenario).width, 8)
+        memory = scratch_for(parts_for(scenario), 8)
         self._scratch = [new_scratch(memory) for _ in range(threads)]
 
     def __getstate__(self) -> dict[str, Any]:

@@ -97,8 +97,8 @@ def _check(
 @functools.cache
 def _stepping(parts: Parts) -> Any:
     """Return the kernel that steps worlds."""
-    memory = scratch_for(parts.width, 1)
-    settings, own_fields, width = writers_for(parts)
+    memory = scratch_for(parts, 1)
+    settings, own, mate, empty, width, mate_width = writers_for(parts)
 
     @cuda.jit  # type: ignore[untyped-decorator]
     def advance(
@@ -116,7 +116,8 @@ def _stepping(parts: Parts) -> Any:
             scratch = cuda.local.array(1, memory)
             if _SIMULATED:
                 scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
-            s, writers = scratch[0], Writers(settings, own_fields, width)
+            s = scratch[0]
+            writers = Writers(settings, own, mate, empty, width, mate_width)
             prepare(tables, writers, s)
             over = advance_worlds(e, 1, tables, worlds, actions, results, orders, writers, s)
             results.flags[2, e] = over

@@ -45,11 +45,10 @@ from posse.rules.state import (
 )
 from posse.rules.targets.target_motion import AGENT
 from posse.scenarios import Scenario
-from posse.signals.observation import observe_alone, observe_target
+from posse.signals.observing import TOGETHER, observe_sonar, observe_target, observe_together
 from posse.signals.parts import Parts, Writers, built_in_parts, parts_for, writers_for
 from posse.signals.reward import write_reward
 from posse.signals.scratch import MOST_IN_TEAM
-from posse.signals.together import TOGETHER, observe_together
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -93,23 +92,6 @@ def sense(c: Record, worlds: WorldArrays, e: int, scratch: Record) -> None:
         broadcast, message = worlds.broadcast[e], worlds.message[e]
         send(c, w, trackers, broadcast)
         hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
-
-
-@compiled
-def observe(
-    c: Record,
-    worlds: WorldArrays,
-    e: int,
-    writers: Writers,
-    scratch: Record,
-    observations: FloatArray,
-) -> None:
-    """Write what every agent of world e observes, but for observe_together."""
-    w, trackers = worlds.world[e], worlds.tracker[e]
-    heard, heard_message = worlds.heard[e], worlds.heard_message[e]
-    observe_alone(c, w, trackers, heard, heard_message, scratch, observations[e], writers.width)
-    if c.motion == AGENT:
-        observe_target(c, worlds, e, writers, scratch, observations)
 
 
 @compiled(seldom=True)
@@ -253,7 +235,9 @@ def advance_worlds(
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe(c, worlds, e, writers, scratch, results.observations)
+        observe_sonar(c, trackers, scratch, observations, writers.width)
+        if c.motion == AGENT:
+            observe_target(c, worlds, e, writers, scratch, results.observations)
     observe_together(c, worlds, first, count, writers, scratch, results.observations)
     return over
 
@@ -280,7 +264,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
     Its configuration, slots and beams become constants in the code.
     """
-    settings, own_fields, width = writers_for(parts)
+    settings, own_fields, mate, empty, width, mate_width = writers_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
     @kernel
@@ -300,7 +284,8 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             tables.beams if own_beams is None else own_beams,
             tables.weights,
         )
-        s, writers = scratch[0], Writers(settings, own_fields, width)
+        s = scratch[0]
+        writers = Writers(settings, own_fields, mate, empty, width, mate_width)
         if s.prepared[0] == _ZERO:
             prepare(used, writers, s)
             s.prepared[0] = _ONE

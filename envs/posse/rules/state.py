@@ -24,8 +24,15 @@ NEVER: Final = np.int32(2**30)
 """A control step that no episode reaches."""
 
 
-def _record(*fields: tuple[str, type]) -> np.dtype[Any]:
-    return np.dtype((np.record, np.dtype(list(fields), align=True)))
+def _record(*fields: tuple[str, type], size: int | None = None) -> np.dtype[Any]:
+    """Return a record of fields, at least ``size`` bytes long."""
+    layout = np.dtype(list(fields), align=True)
+    if size is not None:
+        names, formats = zip(*fields, strict=True)
+        offsets = [at for _, at, *_ in (layout.fields or {}).values()]
+        given = {"names": names, "formats": formats, "offsets": offsets, "itemsize": size}
+        layout = np.dtype(given, align=True)  # type: ignore[call-overload]
+    return np.dtype((np.record, layout))
 
 
 def _offset(record: np.dtype[Any], name: str) -> int:
@@ -123,6 +130,7 @@ TRACKER: Final = _record(
 # write as they read it. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
 POSE: Final = _offset(TRACKER, "x")
 FIX: Final = _offset(TRACKER, "fix_x")
+CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 
@@ -130,9 +138,10 @@ SLOT: Final = _record(("x", _F), ("y", _F))
 """A slot's place in the slot frame; one table for all worlds."""
 
 HEARD: Final = _record(
-    ("step", _I),  # when it was sent; -1: never heard
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
+    ("step", _I),  # when it was sent; -1: never heard
+    size=32,  # to be read eight numbers at a time, as TRACKER is from x on
 )  # fmt: skip
 """What a tracker last heard of a team-mate: (E, receiver, sender)."""
 

@@ -7,7 +7,7 @@ the declarations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from posse.numeric import (
 )
 from posse.rules.discs import natural
 from posse.signals.fields import FieldDeclaration
+
+_FEW: Final = 2
+"""Up to so many columns are written faster one by one than by a transposition."""
 
 Declarations = Sequence[FieldDeclaration]
 
@@ -42,6 +45,18 @@ def own_writer(declarations: Declarations) -> Callable[..., Any]:
     return _writer("own", declarations, "c, v", "self", "{}")
 
 
+def mate_writer(declarations: Declarations) -> Callable[..., Any]:
+    """Return (c, v, m, columns), which writes the columns of team-mates."""
+    return _writer("mate", declarations, "c, v, m", "mate", "{}")
+
+
+def empty_writer(declarations: Declarations) -> Callable[..., Any]:
+    """Return (o, k), which writes the place of a team-mate that nobody fills, from k on."""
+    values = [float(d.unknown or 0.0) for d in declarations for _ in range(d.size)]
+    lines = [f"    o[k + {q}] = np.float32({value})" for q, value in enumerate(values)]
+    return _function("empty", declarations, "o, k", lines, {"np": np})
+
+
 def _writer(
     name: str, declarations: Declarations, arguments: str, subject: str, value: str
 ) -> Callable[..., Any]:
@@ -50,12 +65,12 @@ def _writer(
     Its lines are written out: to call one after the other from a tuple, numba would have to know
     all of them as one type.
     """
-    lines, names, column = [f"def write({arguments}, columns):"], [], 0
-    functions: dict[str, Any] = {"np": np, "store": store, "eight": eight}
+    lines: list[str] = []
+    column = 0
+    names: dict[str, Any] = {"np": np, "store": store, "eight": eight}
     for k, field in enumerate(declarations):
         if field.subject == subject:
-            functions[f"field_{k}"] = field.function
-            names.append(field.name)
+            names[f"field_{k}"] = field.function
             parts = [f"part_{q}" for q in range(field.size)]
             lines.append(f"    {', '.join(parts)} = field_{k}({arguments})")
             lines += [
@@ -63,10 +78,17 @@ def _writer(
                 for q, part in enumerate(parts)
             ]
         column += field.size
-    functions["__name__"] = __name__
-    exec("\n".join(lines), functions)
-    write: Callable[..., Any] = functions["write"]
-    write.__qualname__ = f"{name}({', '.join(names)})"
+    return _function(name, declarations, f"{arguments}, columns", lines, names)
+
+
+def _function(
+    name: str, declarations: Declarations, parameters: str, lines: list[str], names: dict[str, Any]
+) -> Callable[..., Any]:
+    """Return a compiled function of these lines, whose name says of which fields it is made."""
+    names["__name__"] = __name__
+    exec("\n".join([f"def write({parameters}):", *lines, "    return"]), names)
+    write: Callable[..., Any] = names["write"]
+    write.__qualname__ = f"{name}({', '.join(d.name for d in declarations)})"
     return compiled(write)
 
 
@@ -81,14 +103,54 @@ def write_rows(
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write columns to ``count`` observations, the first of them of robot i of world e, from k on.
+    """Write columns to ``count`` observations, the first of robot i of world e, from k on."""
+    _write(columns, width, e, i, count, across, observations, k, False, columns)
 
-    The last eight columns may overlap those before them.
-    """
+
+@compiled
+def write_scattered(
+    columns: FloatArray,
+    width: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    starts: FloatArray,
+) -> None:
+    """As :func:`write_rows`, to each observation from a place of its own on, (8,)."""
+    _write(columns, width, e, i, count, across, observations, 0, True, starts)
+
+
+@compiled
+def _write(
+    columns: FloatArray,
+    width: int,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    observations: FloatArray,
+    k: int,
+    scattered: bool,
+    starts: FloatArray,
+) -> None:
     for block in range(width // WIDTH):
-        _write_block(columns, WIDTH * block, e, i, count, across, observations, k)
-    if width % WIDTH != 0:
-        _write_block(columns, width - WIDTH, e, i, count, across, observations, k)
+        first = WIDTH * block
+        _write_block(
+            columns, first, e, i, count, across, observations, k + first, scattered, starts
+        )
+    if width % WIDTH > _FEW:  # the last eight, some of them again
+        first = width - WIDTH
+        _write_block(
+            columns, first, e, i, count, across, observations, k + first, scattered, starts
+        )
+    else:
+        for column in range(width - width % WIDTH, width):
+            for lane in range(count):
+                o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
+                start = natural(int(starts[lane])) if scattered else 0
+                o[start + k + column] = columns[WIDTH * column + lane]
 
 
 @compiled
@@ -101,8 +163,10 @@ def _write_block(
     across: int,
     observations: FloatArray,
     k: int,
+    scattered: bool,
+    starts: FloatArray,
 ) -> None:
-    """Write eight columns from ``first`` on to their places in observations."""
+    """Write eight columns from ``first`` on to observations, from k on."""
     at = WIDTH * first
     a, b, c, d, f, g, h, j = transpose(
         load(columns, at), load(columns, at + WIDTH),
@@ -111,14 +175,14 @@ def _write_block(
         load(columns, at + 6 * WIDTH), load(columns, at + 7 * WIDTH),
     )  # fmt: skip
     # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, e, i, count, across, observations, k + first)
-    _write_row(b, 1, e, i, count, across, observations, k + first)
-    _write_row(c, 2, e, i, count, across, observations, k + first)
-    _write_row(d, 3, e, i, count, across, observations, k + first)
-    _write_row(f, 4, e, i, count, across, observations, k + first)
-    _write_row(g, 5, e, i, count, across, observations, k + first)
-    _write_row(h, 6, e, i, count, across, observations, k + first)
-    _write_row(j, 7, e, i, count, across, observations, k + first)
+    _write_row(a, 0, e, i, count, across, observations, k, scattered, starts)
+    _write_row(b, 1, e, i, count, across, observations, k, scattered, starts)
+    _write_row(c, 2, e, i, count, across, observations, k, scattered, starts)
+    _write_row(d, 3, e, i, count, across, observations, k, scattered, starts)
+    _write_row(f, 4, e, i, count, across, observations, k, scattered, starts)
+    _write_row(g, 5, e, i, count, across, observations, k, scattered, starts)
+    _write_row(h, 6, e, i, count, across, observations, k, scattered, starts)
+    _write_row(j, 7, e, i, count, across, observations, k, scattered, starts)
 
 
 @compiled
@@ -131,8 +195,11 @@ def _write_row(
     across: int,
     observations: FloatArray,
     k: int,
+    scattered: bool,
+    starts: FloatArray,
 ) -> None:
     """Write eight numbers to one of ``count`` observations, if there are so many."""
     if lane < count:
         o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-        store(o, k, row)
+        start = natural(int(starts[lane])) if scattered else 0
+        store(o, start + k, row)

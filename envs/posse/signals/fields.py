@@ -23,7 +23,7 @@ from typing import Any, Final
 
 from posse.numeric import compiled
 from posse.registry import FIELDS, Function
-from posse.scenarios.scenario import Scenario
+from posse.scenarios import Scenario
 
 Bound = float | Callable[[Scenario], float]
 

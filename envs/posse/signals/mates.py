@@ -1,9 +1,10 @@
-"""What trackers observe of their team-mates where the radio is perfect: eight at once, a lane each.
+"""What robots observe of team-mates, the nearest first: eight robots at once, a lane each.
 
-Of a small team that is observed as a whole, each team-mate is worked out once and written to its
-place. Where there are fewer places than team-mates, or the team is large, the nearest are listed
-first (:mod:`posse.signals.nearest`), and then the nearest of all eight are written together, after
-them the second nearest, and so on.
+Where the radio is perfect, team-mates are seen where they are. Of a small team that is observed as
+a whole, each is worked out once and written to its place. Where there are fewer places than
+team-mates, or the team is large, the nearest are listed first (:mod:`posse.signals.nearest`), and
+then the nearest of all eight are written together, after them the second nearest, and so on. So are
+they, too, where they are known from what was heard of them, and to a target that is an agent.
 """
 
 from __future__ import annotations
@@ -17,77 +18,101 @@ from posse.numeric import (
     FloatArray,
     Lanes,
     Record,
-    Records,
     choose,
     compiled,
+    counts,
     eight,
-    greater,
     load,
     load_fields,
     root,
     store,
     transpose,
 )
-from posse.rules.discs import natural, within_one
-from posse.rules.state import POSE
-from posse.signals.nearest import list_nearest
+from posse.rules.discs import natural
+from posse.rules.state import POSE, WorldArrays
+from posse.signals.columns import write_rows, write_scattered
+from posse.signals.nearest import keep_nearest, list_nearest
+from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
-from posse.signals.team import number_behind, seen_at, stride_of, write_rows
-
-MATE: Final = 9
-"""Numbers that are observed of a team-mate, what it said apart."""
+from posse.signals.team import number_behind, seen_at, stride_of, way_behind
+from posse.signals.views import View, mate_heard, mate_now
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
-_MINUS_ONE: Final = np.float32(-1.0)
-_TINY: Final = np.float32(1e-9)
 
 
 @compiled
 def observe_mates(
     c: Record,
-    tracker: Records,
+    worlds: WorldArrays,
     e: int,
     i: int,
     count: int,
     across: int,
-    message: FloatArray,
+    v: View,
+    writers: Writers,
     s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates of observers from k on, the nearest first.
+    """Write the nearest mates of ``count`` trackers, the first of them i of world e, from k on.
 
-    They are ``count`` trackers, the first of them i of world e, whose team stands in its rows
+    Where the radio is perfect, the team stands in its rows
     (:func:`posse.signals.team.lay_out_team`).
     """
     mates, places = natural(c.num_trackers - 1), natural(c.neighbours)
+    if places == 0:
+        return
+    if c.perfect_radio == 0:
+        _observe_heard(c, worlds, e, i, count, across, v, writers, s, observations, k)
+        return
     if mates <= places and mates < MOST_IN_TEAM:
-        _observe_whole_team(c, e, i, count, across, s, observations, k)
-    elif places > 0:
-        _observe_nearest(c, tracker, e, i, count, across, s, observations, k)
+        _observe_whole_team(c, e, i, count, across, v, writers, s, observations, k)
+    else:
+        most = min(mates, places)
+        list_nearest(mates + 1, most, i, count, across, s)
+        _observe_listed(c, worlds, e, i, count, across, False, most, v, writers, s, observations, k)
     if c.message_size > 0 or mates < places:
         for lane in range(count):
-            to = natural(e + lane * across)
-            o = observations[to, natural(i + lane * (1 - across))]
-            _write_the_rest(c, message[to, 0], o, k)
+            to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+            _write_the_rest(c, mates, worlds.message[to, 0], writers, observations[to, who], k)
 
 
-@compiled(seldom=True)
-def _write_the_rest(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
-    """Write what team-mates said, of (N, m), to their places, and that others are empty."""
-    for place in range(c.neighbours):
-        start = natural(k + place * (MATE + c.message_size))
-        if place < c.num_trackers - 1:
-            number = min(natural(int(o[start])), natural(c.num_trackers - 1))
-            copy_message(c, said[number], o, start)
-        else:
-            leave_empty(c, o, start)
+@compiled
+def _observe_whole_team(
+    c: Record,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    v: View,
+    writers: Writers,
+    s: Record,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write every team-mate: each has a place."""
+    n, size = natural(c.num_trackers), np.float32(writers.mate_width + c.message_size)
+    stride = stride_of(across)
+    _find_places(n, i, across, s)
+    for m in range(n - 1):
+        at = natural(stride * (i + m + 1))
+        dx, dy = way_behind(i, m, across, s)
+        mate = mate_now(
+            v, number_behind(n, i, m, across, s), dx, dy,
+            load(s.team_cos, at), load(s.team_sin, at),
+            load(s.team_speed, at), load(s.team_turn_rate, at),
+        )  # fmt: skip
+        writers.mate(c, v, mate, s.mate_columns)
+        store(s.start, 0, load(s.place, WIDTH * m) * size + np.float32(k))
+        write_scattered(
+            s.mate_columns, writers.mate_width, e, i, count, across, observations, s.start
+        )
 
 
 @compiled
 def _find_places(n: int, i: int, across: int, s: Record) -> None:
-    """Write how far each team-mate is from its observers, and how many are nearer.
+    """Write how many team-mates are nearer to its observers than each, m + 1 places behind them.
 
     Or as near, and of a lower number.
     """
@@ -105,183 +130,164 @@ def _find_places(n: int, i: int, across: int, s: Record) -> None:
 
 
 @compiled
-def _observe_whole_team(
+def _observe_listed(
     c: Record,
+    worlds: WorldArrays,
     e: int,
     i: int,
     count: int,
     across: int,
+    heard: bool,
+    most: int,
+    v: View,
+    writers: Writers,
     s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write every team-mate of observers from k on: each has a place."""
-    n, size = natural(c.num_trackers), np.float32(MATE + c.message_size)
-    stride = stride_of(across)
-    own = natural(stride * i)
-    _find_places(n, i, across, s)
-    for m in range(n - 1):
-        at = own + natural(stride * (m + 1))
-        ahead, left = seen_at(i, m, across, s)
-        mates = _describe_mates(
-            load(s.team_cos, own), load(s.team_sin, own), number_behind(n, i, m, across, s),
-            ahead, left, load(s.distance, WIDTH * m),
-            load(s.team_cos, at), load(s.team_sin, at), load(s.team_speed, at),
-        )  # fmt: skip
-        store(s.turn_rates, 0, load(s.team_turn_rate, at))
-        store(s.start, 0, load(s.place, WIDTH * m) * size + np.float32(k))
-        _write_mates(mates, e, i, count, across, s, observations)
-
-
-@compiled
-def _observe_nearest(
-    c: Record,
-    tracker: Records,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    s: Record,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write the nearest team-mates of observers from k on, as many as there are places."""
-    n, size = natural(c.num_trackers), natural(MATE + c.message_size)
-    places = min(n - 1, natural(c.neighbours))
-    own = natural(stride_of(across) * i)
-    list_nearest(n, places, i, count, across, s)
-    for place in range(natural(places)):
-        listed = WIDTH * place
-        # Not kept from place to place: to load them again costs less than registers do.
-        own_x, own_y = load(s.team_x, own), load(s.team_y, own)
-        hc, hs = load(s.team_cos, own), load(s.team_sin, own)
-        x, y, heading_x, heading_y, speed, turn_rate, _, _ = _columns_of(
-            tracker, listed, e, count, across, s
+    """Write ``most`` team-mates of each list: as they are now, or as they were heard of."""
+    size = natural(writers.mate_width + c.message_size)
+    for place in range(natural(most)):
+        x, y, cosine, sine, speed, turn_rate, step, _ = transpose(
+            _pose(worlds, heard, place, 0, e, i, count, across, s),
+            _pose(worlds, heard, place, 1, e, i, count, across, s),
+            _pose(worlds, heard, place, 2, e, i, count, across, s),
+            _pose(worlds, heard, place, 3, e, i, count, across, s),
+            _pose(worlds, heard, place, 4, e, i, count, across, s),
+            _pose(worlds, heard, place, 5, e, i, count, across, s),
+            _pose(worlds, heard, place, 6, e, i, count, across, s),
+            _pose(worlds, heard, place, 7, e, i, count, across, s),
         )
-        dx, dy = x - own_x, y - own_y
-        ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
-        mates = _describe_mates(
-            hc, hs, load(s.listed, listed), ahead, left, root(ahead * ahead + left * left),
-            heading_x, heading_y, speed,
+        number, dx, dy = load(s.listed, WIDTH * place), x - v.x, y - v.y
+        if heard:
+            age = (v.step - counts(step)) * c.dt
+            mate = mate_heard(v, number, age, dx, dy, cosine, sine, speed, turn_rate)
+        else:
+            mate = mate_now(v, number, dx, dy, cosine, sine, speed, turn_rate)
+        writers.mate(c, v, mate, s.mate_columns)
+        write_rows(
+            s.mate_columns, writers.mate_width, e, i, count, across, observations,
+            natural(k + place * size),
         )  # fmt: skip
-        store(s.turn_rates, 0, turn_rate)
-        at = natural(k + place * size)
-        write_rows(mates, e, i, count, across, observations, at)
-        for lane in range(count):
-            o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-            o[at + MATE - 1] = s.turn_rates[lane]
-
-
-@compiled
-def _describe_mates(
-    hc: Lanes,
-    hs: Lanes,
-    numbers: Lanes,
-    ahead: Lanes,
-    left: Lanes,
-    metres: Lanes,
-    heading_x: Lanes,
-    heading_y: Lanes,
-    speed: Lanes,
-) -> tuple[Lanes, ...]:
-    """Return what robots observe of eight team-mates, of each as it stands in an observation.
-
-    Number, age (0), range, bearing and heading (cosine and sine, ego), speed. From how the robots
-    head, who the team-mates are, where they are as the robots see it, and their headings in the
-    common frame.
-    """
-    per_metre = _ONE / greater(metres, _TINY)
-    return transpose(
-        numbers, eight(_ZERO), metres,
-        within_one(ahead * per_metre), within_one(left * per_metre),
-        within_one(heading_x * hc + heading_y * hs), within_one(heading_y * hc - heading_x * hs),
-        speed,
-    )  # fmt: skip
-
-
-@compiled
-def _columns_of(
-    tracker: Records, listed: int, e: int, count: int, across: int, s: Record
-) -> tuple[Lanes, ...]:
-    """Return :func:`posse.signals.team.team_columns` of the poses of those that are listed."""
-    return transpose(
-        _pose(tracker, listed, 0, e, count, across, s),
-        _pose(tracker, listed, 1, e, count, across, s),
-        _pose(tracker, listed, 2, e, count, across, s),
-        _pose(tracker, listed, 3, e, count, across, s),
-        _pose(tracker, listed, 4, e, count, across, s),
-        _pose(tracker, listed, 5, e, count, across, s),
-        _pose(tracker, listed, 6, e, count, across, s),
-        _pose(tracker, listed, 7, e, count, across, s),
-    )
 
 
 @compiled
 def _pose(
-    tracker: Records, listed: int, lane: int, e: int, count: int, across: int, s: Record
-) -> Lanes:
-    """Return the pose of whom a lane's list names, and what follows on it.
-
-    The last of ``count`` lanes stands in for those that there are not.
-    """
-    number = natural(int(s.listed[listed + min(lane, count - 1)]))
-    return load_fields(tracker[natural(e + lane * across), number], POSE)
-
-
-@compiled
-def _write_mates(
-    mates: tuple[Lanes, ...],
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    s: Record,
-    observations: FloatArray,
-) -> None:
-    """Write what each of ``count`` observers observes of one team-mate, from where _START says."""
-    first, second, third, fourth, fifth, sixth, seventh, eighth = mates
-    _write_mate(first, 0, e, i, count, across, s, observations)
-    _write_mate(second, 1, e, i, count, across, s, observations)
-    _write_mate(third, 2, e, i, count, across, s, observations)
-    _write_mate(fourth, 3, e, i, count, across, s, observations)
-    _write_mate(fifth, 4, e, i, count, across, s, observations)
-    _write_mate(sixth, 5, e, i, count, across, s, observations)
-    _write_mate(seventh, 6, e, i, count, across, s, observations)
-    _write_mate(eighth, 7, e, i, count, across, s, observations)
-
-
-@compiled
-def _write_mate(
-    fields: Lanes,
+    worlds: WorldArrays,
+    heard: bool,
+    place: int,
     lane: int,
     e: int,
     i: int,
     count: int,
     across: int,
     s: Record,
+) -> Lanes:
+    """Return the pose of whom a lane's list names, and what follows on it.
+
+    The last of ``count`` lanes stands in for those that there are not.
+    """
+    there = min(lane, count - 1)
+    number = natural(int(s.listed[WIDTH * place + there]))
+    to, who = natural(e + there * across), natural(i + there * (1 - across))
+    if heard:
+        return load_fields(worlds.heard[to, who, number], POSE)
+    return load_fields(worlds.tracker[to, number], POSE)
+
+
+@compiled
+def _observe_heard(
+    c: Record,
+    worlds: WorldArrays,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    v: View,
+    writers: Writers,
+    s: Record,
     observations: FloatArray,
+    k: int,
 ) -> None:
-    """Write what one of ``count`` observers observes of a team-mate, if there are so many."""
-    if lane >= count:
-        return
-    o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-    start = natural(int(s.start[lane]))
-    store(o, start, fields)
-    o[start + MATE - 1] = s.turn_rates[lane]
+    """Write the nearest team-mates from what trackers last heard of each, and what they said."""
+    most = 0
+    for lane in range(count):
+        to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+        filled = _list_heard(c, worlds, to, who, lane, s)
+        s.filled[lane] = np.float32(filled)
+        most = max(most, filled)
+    _observe_listed(c, worlds, e, i, count, across, True, most, v, writers, s, observations, k)
+    for lane in range(count):
+        to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+        filled, o = natural(int(s.filled[lane])), observations[to, who]
+        if c.message_size > 0 or filled < c.neighbours:
+            _write_the_rest(c, filled, worlds.heard_message[to, who], writers, o, k)
 
 
 @compiled
-def copy_message(c: Record, said: FloatArray, o: FloatArray, k: int) -> None:
-    """Write what a team-mate said, (m,), into its place, which begins at k."""
-    for q in range(c.message_size):
-        o[k + MATE + q] = said[q]
+def _list_heard(c: Record, worlds: WorldArrays, e: int, i: int, lane: int, s: Record) -> int:
+    """List whom tracker i of world e has heard of, the nearest first; return how many they are."""
+    t, step, filled = worlds.tracker[e, i], worlds.world[e].step, 0
+    for j in range(natural(c.num_trackers)):
+        h = worlds.heard[e, i, j]
+        if j != i and h.step >= 0 and step - h.step <= c.forget_steps:
+            dx, dy = h.x - t.x, h.y - t.y
+            filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
+    for place in range(natural(c.neighbours)):
+        s.listed[WIDTH * place + lane] = s.who[place] if place < filled else _ZERO
+    return filled
 
 
 @compiled
-def leave_empty(c: Record, o: FloatArray, k: int) -> None:
-    """Write a place that no team-mate fills, from k on."""
-    for q in range(k + 3, k + MATE + c.message_size):
-        o[q] = _ZERO
-    o[k] = _MINUS_ONE
-    o[k + 1] = _MINUS_ONE
-    o[k + 2] = _MINUS_ONE
+def observe_trackers(
+    c: Record,
+    worlds: WorldArrays,
+    e: int,
+    v: View,
+    writers: Writers,
+    s: Record,
+    observations: FloatArray,
+    k: int,
+) -> None:
+    """Write the nearest trackers of a target that is an agent, from k on; it hears nothing."""
+    w, n, filled = worlds.world[e], natural(c.num_trackers), 0
+    for j in range(n):
+        t = worlds.tracker[e, j]
+        dx, dy = t.x - w.x, t.y - w.y
+        if c.neighbours > 0:
+            filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
+    size, o = natural(writers.mate_width + c.message_size), observations[e, n]
+    for place in range(natural(c.neighbours)):
+        start = natural(k + place * size)
+        if place < filled:
+            number = natural(int(s.who[place]))
+            t = worlds.tracker[e, number]
+            mate = mate_heard(
+                v, eight(np.float32(number)), eight(_ZERO), t.x - v.x, t.y - v.y,
+                eight(t.heading_cos), eight(t.heading_sin), eight(t.speed), eight(t.turn_rate),
+            )  # fmt: skip
+            writers.mate(c, v, mate, s.mate_columns)
+            write_rows(s.mate_columns, writers.mate_width, e, n, 1, 0, observations, start)
+        else:
+            writers.empty(o, start)
+        for q in range(c.message_size):
+            o[start + writers.mate_width + q] = _ZERO
+
+
+@compiled(seldom=True)
+def _write_the_rest(
+    c: Record, filled: int, said: FloatArray, writers: Writers, o: FloatArray, k: int
+) -> None:
+    """Write what the first ``filled`` team-mates said, of (N, m), and the places that are empty."""
+    size = natural(writers.mate_width + c.message_size)
+    for place in range(natural(c.neighbours)):
+        start = natural(k + place * size)
+        message = start + writers.mate_width
+        if place < filled:
+            number = natural(int(o[start]))  # what a team-mate's fields begin with
+            for q in range(c.message_size):
+                o[message + q] = said[number, q]
+        else:
+            writers.empty(o, start)
+            for q in range(c.message_size):
+                o[message + q] = _ZERO

@@ -13,8 +13,8 @@ import numpy as np
 
 from posse.numeric import Lanes, Record, choose, compiled, greater
 from posse.rules.discs import within_one
+from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.scenarios.scenario import Scenario
 from posse.signals.fields import SLACK, field, setting
 from posse.signals.views import View, ego
 

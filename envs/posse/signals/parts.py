@@ -5,10 +5,17 @@ from __future__ import annotations
 import functools
 from typing import Any, NamedTuple
 
+import posse.signals.mate_fields
 import posse.signals.own_fields  # noqa: F401 (declares the built-in fields)
 from posse.registry import FIELDS
-from posse.scenarios.scenario import Scenario
-from posse.signals.columns import own_writer, settings_writer, width_of
+from posse.scenarios import Scenario
+from posse.signals.columns import (
+    empty_writer,
+    mate_writer,
+    own_writer,
+    settings_writer,
+    width_of,
+)
 from posse.signals.fields import FieldDeclaration
 
 
@@ -17,11 +24,18 @@ class Parts(NamedTuple):
 
     fields: tuple[FieldDeclaration, ...]
     """Of an observation, but for sonar and team-mates."""
+    mate_fields: tuple[FieldDeclaration, ...]
+    """Of a team-mate, but for what it said."""
 
     @property
     def width(self) -> int:
         """Numbers of an observation before the sonar's."""
         return width_of(self.fields)
+
+    @property
+    def mate_width(self) -> int:
+        """Numbers of a team-mate, what it said apart."""
+        return width_of(self.mate_fields)
 
 
 class Writers(NamedTuple):
@@ -31,14 +45,24 @@ class Writers(NamedTuple):
     """(c, columns): writes the columns that are always the same."""
     own: Any
     """(c, v, columns): writes the columns of eight observers."""
+    mate: Any
+    """(c, v, m, columns): writes the columns of eight team-mates."""
+    empty: Any
+    """(o, k): writes the place of a team-mate that nobody fills."""
     width: int
     """Numbers of an observation before the sonar's."""
+    mate_width: int
+    """Numbers of a team-mate, what it said apart."""
 
 
 @functools.cache
 def built_in_parts() -> Parts:
     """Return the parts that every scenario has."""
-    return Parts(tuple(field for field in FIELDS.built_in() if field.subject != "mate"))
+    fields = FIELDS.built_in()
+    return Parts(
+        fields=tuple(field for field in fields if field.subject != "mate"),
+        mate_fields=tuple(field for field in fields if field.subject == "mate"),
+    )
 
 
 def parts_for(scenario: Scenario) -> Parts:
@@ -49,4 +73,11 @@ def parts_for(scenario: Scenario) -> Parts:
 @functools.cache
 def writers_for(parts: Parts) -> Writers:
     """Return the functions that write parts."""
-    return Writers(settings_writer(parts.fields), own_writer(parts.fields), parts.width)
+    return Writers(
+        settings_writer(parts.fields),
+        own_writer(parts.fields),
+        mate_writer(parts.mate_fields),
+        empty_writer(parts.mate_fields),
+        parts.width,
+        parts.mate_width,
+    )

@@ -16,20 +16,23 @@ def columns_for(width: int) -> Fields:
     return (("columns", WIDTH * width),)
 
 
-def observing(worlds: int) -> Fields:
-    """Return the fields for observing one world, or eight together."""
+def observing(mate_width: int, worlds: int) -> Fields:
+    """Return the fields for observing one world, or eight together.
+
+    Args:
+        mate_width: Numbers of a team-mate, what it said apart.
+        worlds: 1 or 8.
+    """
     # A team is there twice, and then comes room for the last block: of one world, or of eight.
     row = (2 * WIDTH * MOST_IN_TEAM if worlds > 1 else 2 * TEAM) + WIDTH
     return (
         # Of eight observers.
         ("step", WIDTH),  # control steps since the start
         ("fix_step", WIDTH),
-        ("sees", WIDTH),
-        ("touching", WIDTH),
-        ("working", WIDTH),
         # Of eight team-mates.
-        ("turn_rates", WIDTH),
+        ("mate_columns", WIDTH * mate_width),
         ("start", WIDTH),  # where in an observation each belongs
+        ("filled", WIDTH),  # how many team-mates an observer knows of
         # Of a team that is observed as a whole.
         ("distance", WIDTH * MOST_IN_TEAM),  # how far each mate is, m
         ("place", WIDTH * MOST_IN_TEAM),  # how many are nearer

@@ -11,7 +11,6 @@ import numpy as np
 
 from posse.numeric import (
     WIDTH,
-    FloatArray,
     Lanes,
     Record,
     Records,
@@ -104,43 +103,3 @@ def seen_at(i: int, m: int, across: int, s: Record) -> tuple[Lanes, Lanes]:
     dx, dy = way_behind(i, m, across, s)
     hc, hs = load(s.team_cos, own), load(s.team_sin, own)
     return dx * hc + dy * hs, dy * hc - dx * hs
-
-
-@compiled
-def write_rows(
-    rows: tuple[Lanes, ...],
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write eight numbers to each of ``count`` observations, from k on."""
-    a, b, c, d, f, g, h, j = rows
-    # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, e, i, count, across, observations, k)
-    _write_row(b, 1, e, i, count, across, observations, k)
-    _write_row(c, 2, e, i, count, across, observations, k)
-    _write_row(d, 3, e, i, count, across, observations, k)
-    _write_row(f, 4, e, i, count, across, observations, k)
-    _write_row(g, 5, e, i, count, across, observations, k)
-    _write_row(h, 6, e, i, count, across, observations, k)
-    _write_row(j, 7, e, i, count, across, observations, k)
-
-
-@compiled
-def _write_row(
-    row: Lanes,
-    lane: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write eight numbers to one of ``count`` observations, if there are so many."""
-    if lane < count:
-        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-        store(o, k, row)

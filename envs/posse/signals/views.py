@@ -16,19 +16,23 @@ from posse.numeric import (
     Mask,
     Record,
     Records,
+    choose,
     compiled,
+    counts,
     eight,
+    greater,
     load,
     root,
 )
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural
-from posse.rules.state import FIX, NEVER, POSE, WorldArrays
+from posse.rules.state import CONDITION, FIX, NEVER, POSE, WorldArrays
 from posse.signals.team import own_numbers, team_columns
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
+_TINY: Final = np.float32(1e-9)
 _NOBODY: Final = np.uint64(0)
 
 
@@ -90,6 +94,75 @@ def ego(v: View, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
     return x * v.heading_cos + y * v.heading_sin, y * v.heading_cos - x * v.heading_sin
 
 
+class Mate(NamedTuple):
+    """A team-mate of each of eight observers: as it is now, or as it was heard of last."""
+
+    number: Lanes
+    age: Lanes
+    """Of what is known of it, s."""
+    dx: Lanes
+    """Where it was, from here, common frame, m."""
+    dy: Lanes
+    distance: Lanes
+    """m."""
+    ahead: Lanes
+    """The direction of where it was, ego; rounding may carry it past 1."""
+    left: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    """m/s."""
+    turn_rate: Lanes
+    """rad/s."""
+
+
+@compiled
+def mate_now(
+    v: View,
+    number: Lanes,
+    dx: Lanes,
+    dy: Lanes,
+    heading_cos: Lanes,
+    heading_sin: Lanes,
+    speed: Lanes,
+    turn_rate: Lanes,
+) -> Mate:
+    """Return a team-mate as it is now."""
+    ahead, left = ego(v, dx, dy)
+    distance = root(ahead * ahead + left * left)
+    per_metre = _ONE / greater(distance, _TINY)
+    return Mate(
+        number, eight(_ZERO), dx, dy, distance, ahead * per_metre, left * per_metre,
+        heading_cos, heading_sin, speed, turn_rate,
+    )  # fmt: skip
+
+
+@compiled
+def mate_heard(
+    v: View,
+    number: Lanes,
+    age: Lanes,
+    dx: Lanes,
+    dy: Lanes,
+    heading_cos: Lanes,
+    heading_sin: Lanes,
+    speed: Lanes,
+    turn_rate: Lanes,
+) -> Mate:
+    """Return a team-mate as it was heard of last.
+
+    In another order of rounding than :func:`mate_now`: to change either would change results.
+    """
+    distance = root(dx * dx + dy * dy)
+    apart = distance > _ZERO
+    per_metre = _ONE / choose(apart, distance, _ONE)
+    ahead, left = ego(v, dx * per_metre, dy * per_metre)
+    return Mate(
+        number, age, dx, dy, distance, choose(apart, ahead, _ONE), choose(apart, left, _ZERO),
+        heading_cos, heading_sin, speed, turn_rate,
+    )  # fmt: skip
+
+
 @compiled
 def view_of_trackers(
     c: Record, worlds: WorldArrays, e: int, i: int, count: int, across: int, s: Record
@@ -99,22 +172,22 @@ def view_of_trackers(
         to = natural(e + lane * across)
         t = worlds.tracker[to, natural(i + lane * (1 - across))]
         s.step[lane] = np.float32(worlds.world[to].step)
-        s.fix_step[lane], s.sees[lane] = np.float32(t.fix_step), np.float32(t.sees)
-        s.touching[lane] = np.float32(t.touching)
-        s.working[lane] = np.float32(t.broken_at == NEVER)
+        s.fix_step[lane] = np.float32(t.fix_step)
     own_x, own_y, hc, hs, speed, turn_rate, max_speed, max_turn_rate = team_columns(
         worlds.tracker, e, i, across, POSE
     )
     x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(
         worlds.tracker, e, i, across, FIX
     )
+    broken_at, _, _, _, sees, _, touching, _ = team_columns(worlds.tracker, e, i, across, CONDITION)
+    working = choose(counts(broken_at) == np.float32(NEVER), _ONE, _ZERO)
     dx, dy, fixed_at = x - own_x, y - own_y, load(s.fix_step, 0)
     return View(
         own_numbers(i, across, s), own_x, own_y, hc, hs, speed, turn_rate,
-        load(s.touching, 0), load(s.working, 0), load(s.step, 0),
+        counts(touching), working, load(s.step, 0),
         max_speed, max_turn_rate,
         max_speed * c.per_acceleration, max_turn_rate * c.per_turn_acceleration,
-        fixed_at >= _ZERO, load(s.sees, 0), fixed_at, dx, dy, root(dx * dx + dy * dy),
+        fixed_at >= _ZERO, counts(sees), fixed_at, dx, dy, root(dx * dx + dy * dy),
         cosine, sine, frame_cos, frame_sin, vx, vy,
     )  # fmt: skip
 

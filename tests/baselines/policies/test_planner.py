@@ -34,9 +34,7 @@ def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
 def test_playing_ahead_is_worth_more_than_the_scripted_team(name: str) -> None:
     planned = play(posse.batch(name, 6, split="validation"), load("planner"))
     team = load("ddcs-distributed")
-    scripted = play(
-        posse.batch(name, 6, split="validation", message_size=team.message_size), team
-    )
+    scripted = play(posse.batch(name, 6, split="validation", message_size=team.message_size), team)
     assert planned["safe_score"].mean() >= scripted["safe_score"].mean() + 0.05
     assert planned["contact_free"].all()
 
@@ -51,7 +49,7 @@ def test_a_new_episode_is_played_as_if_it_were_the_first() -> None:
     planner, batch = Planner(QUICK), posse.batch("radio", 3, seed=5)
     batch.reset()
     memory, start = begin(planner, batch), batch.save()
-    attempts = []
+    attempts: list[Any] = []
     for _ in range(2):
         observations = batch.restore(start)
         attempts.append([])

@@ -17,6 +17,7 @@ from posse.rules.discs import BLOCK, lay_out_constants
 from posse.rules.scratch import new_scratch
 from posse.rules.state import TRACKER, config_record
 from posse.signals.nearest import list_nearest
+from posse.signals.parts import built_in_parts
 from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.team import lay_out_team
 
@@ -56,7 +57,7 @@ def listed(trackers: Teams, places: int, across: int) -> tuple[Numbers, Numbers]
     lists = np.full((worlds, n, places), -1, np.float32)
     certain = np.zeros((worlds, n), np.float32)
     # What nobody has written must not count.
-    scratch = new_scratch(scratch_for(1, 8 if across else 1))
+    scratch = new_scratch(scratch_for(built_in_parts(), 8 if across else 1))
     scratch.view(np.float32)[:] = np.nan
     config = config_record(posse.get_scenario("constant"))
     beams = np.zeros((2, 0), np.float32)

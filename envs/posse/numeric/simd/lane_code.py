@@ -22,6 +22,7 @@ from posse.numeric.simd.lanes import (
     WIDTH,
     bits,
     choose,
+    counts,
     eight,
     fetch,
     greater,
@@ -124,6 +125,10 @@ def _emit_tag(builder: Any, value: Any) -> Any:
     return builder.sitofp(tags, _FLOATS)
 
 
+def _emit_counts(builder: Any, value: Any) -> Any:
+    return builder.sitofp(builder.bitcast(value, _INTEGERS), _FLOATS)
+
+
 def _emit_least(builder: Any, value: Any) -> Any:
     lesser_of = _pick("<")
     for size in (4, 2, 1):  # the upper half comes to lie over the lower
@@ -174,6 +179,7 @@ _declare(eight, _LANES, (types.float32,), _spread)
 _declare(transpose, types.UniTuple(_LANES, WIDTH), (_LANES,) * WIDTH, _emit_transpose)
 _declare(tagged, _LANES, (_LANES, types.intp), _emit_tagged)
 _declare(tag, _LANES, (_LANES,), _emit_tag)
+_declare(counts, _LANES, (_LANES,), _emit_counts)
 _declare(least, types.float32, (_LANES,), _emit_least)
 _declare(bits, types.intp, (_MASK,), _emit_bits)
 _declare(lowest_bit, types.intp, (types.intp,), _emit_lowest_bit)

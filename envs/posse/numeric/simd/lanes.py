@@ -91,6 +91,11 @@ def tag(value: Lanes) -> Lanes:
     return (np.asarray(value, np.float32).view(np.uint32) & np.uint32(63)).astype(np.float32)
 
 
+def counts(value: Lanes) -> Lanes:
+    """Return whole numbers, int32 that were loaded as they stand in a record, as float32."""
+    return np.asarray(value, np.float32).view(np.int32).astype(np.float32)
+
+
 def bits(mask: Mask) -> int:
     """Return the mask as a number: its lowest bit is the first lane, its eighth the last."""
     return sum(1 << k for k, true in enumerate(np.broadcast_to(mask, WIDTH)) if true)

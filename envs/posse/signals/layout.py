@@ -1,0 +1,140 @@
+"""The observation of one robot: a flat float32 vector, its fields by name.
+
+First the fields of what it knows of itself, its task and the target (:mod:`.own_fields`), then the
+sonar, then a place for each team-mate (:mod:`.mate_fields`), with what it said. A quantity that is
+not known holds the field's ``unknown`` value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.numeric import FloatArray
+from posse.scenarios import Scenario
+from posse.signals.fields import SLACK, Field
+from posse.signals.parts import parts_for
+
+
+def _sonar_fields(s: Scenario) -> list[Field]:
+    """Return the sonar's field, which :func:`posse.rules.senses.sonar.ping` writes."""
+    if s.sonar_beams == 0:
+        return []
+    return [
+        Field(
+            "sonar", s.sonar_beams, "m", 0, s.sonar_range * SLACK,
+            "Distance from its rim to anything, each beam from straight ahead to the left; "
+            "sonar_range where nothing is near.",
+        )
+    ]  # fmt: skip
+
+
+def _message_fields(s: Scenario) -> list[Field]:
+    """Return the field of what a team-mate said, which :mod:`posse.signals.mates` writes."""
+    if s.message_size == 0:
+        return []
+    return [
+        Field(
+            "neighbour_message", s.message_size, "1", -1, 1, "What its policy added.", 0,
+            of_neighbour=True,
+        )
+    ]  # fmt: skip
+
+
+class ObservationLayout:
+    """Where each field lies in the flat observation of a scenario, and what it may hold.
+
+    Attributes:
+        fields: Every :class:`Field`, in order; those of a team-mate once.
+        size: F, length of the flat observation.
+        neighbours: Places for team-mates.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        parts = parts_for(scenario)
+        single = [*(field.of(scenario) for field in parts.fields), *_sonar_fields(scenario)]
+        repeated = [
+            *(field.of(scenario) for field in parts.mate_fields),
+            *_message_fields(scenario),
+        ]
+        self.fields: tuple[Field, ...] = (*single, *repeated)
+        self.neighbours = scenario.neighbours
+        self._repeated_from = sum(field.size for field in single)
+        self._stride = sum(field.size for field in repeated)
+        self.size = self._repeated_from + self.neighbours * self._stride
+        self.offsets: dict[str, int] = {}
+        offset = 0
+        for field in self.fields:
+            self.offsets[field.name] = offset
+            offset += field.size
+
+    @property
+    def stride(self) -> int:
+        """Length of one team-mate's part."""
+        return self._stride
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest value of every entry, each (F,) float32."""
+
+        def stack(values: list[tuple[Field, float]]) -> list[float]:
+            single = [v for f, v in values if not f.of_neighbour for _ in range(f.size)]
+            repeated = [v for f, v in values if f.of_neighbour for _ in range(f.size)]
+            return single + repeated * self.neighbours
+
+        low = stack([(field, field.low) for field in self.fields])
+        high = stack([(field, field.high) for field in self.fields])
+        return np.array(low, np.float32), np.array(high, np.float32)
+
+    def views(self, observations: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
+        """Return named views of flat observations (..., F), sharing their memory.
+
+        A field of size 1 is (...), one of size k is (..., k); a team-mate's field has one more
+        axis before, (..., places) or (..., places, k).
+
+        Raises:
+            ValueError: The last axis is not F long.
+        """
+        if observations.shape[-1] != self.size:
+            raise ValueError(
+                f"observations of shape {observations.shape} do not fit: the last axis of "
+                f"{self.scenario.name!r} is {self.size} long"
+            )
+        mates = observations[..., self._repeated_from :].reshape(
+            *observations.shape[:-1], self.neighbours, self._stride
+        )
+        views: dict[str, npt.NDArray[Any]] = {}
+        for field in self.fields:
+            start = self.offsets[field.name]
+            source = observations
+            if field.of_neighbour:
+                source, start = mates, start - self._repeated_from
+            part = source[..., start : start + field.size]
+            views[field.name] = part[..., 0] if field.size == 1 else part
+        return views
+
+    def flatten(self, views: Mapping[str, npt.ArrayLike]) -> FloatArray:
+        """Return the flat observations (..., F) of named values; the inverse of :meth:`views`.
+
+        Raises:
+            ValueError: A field is missing, unknown, or of a shape that does not fit.
+        """
+        names = [field.name for field in self.fields]
+        if set(views) != set(names):
+            odd = sorted(set(views) ^ set(names))
+            raise ValueError(f"fields missing or unknown: {', '.join(odd)}")
+        leading = np.shape(views["speed"])
+        flat = np.empty((*leading, self.size), np.float32)
+        for name, part in self.views(flat).items():
+            value = np.asarray(views[name], np.float32)
+            if value.shape != part.shape:
+                raise ValueError(f"{name} has shape {value.shape}, wanted {part.shape}")
+            part[...] = value
+        return flat
+
+    def describe(self) -> list[dict[str, Any]]:
+        """Return every field as a plain dictionary, in order, for files and tables."""
+        return [{**field.__dict__, "offset": self.offsets[field.name]} for field in self.fields]

@@ -1,0 +1,103 @@
+"""Who observes what, and when.
+
+Trackers observe eight at once, a lane each (:mod:`posse.signals.views`): one tracker of eight
+worlds (``across`` is 1) or, where there are fewer worlds or the team is large, the trackers of one
+(0). The sonar, and a target that is an agent, are looked after world by world.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import WIDTH, FloatArray, Record, Records, compiled
+from posse.rules.discs import natural
+from posse.rules.senses.sonar import ping
+from posse.rules.state import WorldArrays
+from posse.signals.columns import write_rows
+from posse.signals.mates import observe_mates, observe_trackers
+from posse.signals.parts import Writers
+from posse.signals.scratch import MOST_IN_TEAM
+from posse.signals.team import lay_out_team
+from posse.signals.views import view_of_target, view_of_trackers
+
+TOGETHER: Final = WIDTH
+"""Worlds that are observed together."""
+
+_ZERO: Final = np.float32(0.0)
+
+
+@compiled
+def _observe_some(
+    c: Record,
+    worlds: WorldArrays,
+    e: int,
+    i: int,
+    count: int,
+    across: int,
+    writers: Writers,
+    s: Record,
+    observations: FloatArray,
+) -> None:
+    """Write what ``count`` trackers, the first of them i of world e, observe, the sonar apart."""
+    view = view_of_trackers(c, worlds, e, i, count, across, s)
+    writers.own(c, view, s.columns)
+    write_rows(s.columns, writers.width, e, i, count, across, observations, 0)
+    k = writers.width + natural(c.sonar_beams)
+    observe_mates(c, worlds, e, i, count, across, view, writers, s, observations, k)
+
+
+@compiled
+def observe_together(
+    c: Record,
+    worlds: WorldArrays,
+    first: int,
+    count: int,
+    writers: Writers,
+    s: Record,
+    observations: FloatArray,
+) -> None:
+    """Write what trackers of ``count`` worlds, at most eight, observe, the sonar apart."""
+    n = natural(c.num_trackers)
+    observes_team = c.perfect_radio != 0 and c.neighbours > 0
+    if count == TOGETHER and n <= MOST_IN_TEAM:
+        if observes_team:
+            lay_out_team(worlds.tracker, first, 1, s)
+        for i in range(n):
+            _observe_some(c, worlds, first, i, WIDTH, 1, writers, s, observations)
+        return
+    for e in range(first, first + count):
+        if observes_team:
+            lay_out_team(worlds.tracker, e, 0, s)
+        for i in range(0, n, WIDTH):
+            _observe_some(c, worlds, e, i, min(WIDTH, n - i), 0, writers, s, observations)
+
+
+@compiled
+def observe_sonar(
+    c: Record, trackers: Records, s: Record, observations: FloatArray, first: int
+) -> None:
+    """Write the sonar of every tracker of a world to (rows, F), from ``first`` on.
+
+    Where every disc is stands in ``s`` (:func:`posse.rules.discs.lay_out`).
+    """
+    for i in range(natural(c.num_trackers)):
+        t = trackers[i]
+        pose = (t.x, t.y, t.heading_cos, t.heading_sin)
+        ping(c, pose, i, s.gap[i], s, observations[i], first)
+
+
+@compiled(seldom=True)
+def observe_target(
+    c: Record, worlds: WorldArrays, e: int, writers: Writers, s: Record, observations: FloatArray
+) -> None:
+    """Write what a target that is an agent observes; it knows where trackers are."""
+    w, n = worlds.world[e], natural(c.num_trackers)
+    view = view_of_target(c, w, worlds.obstacle[e])
+    writers.own(c, view, s.columns)
+    write_rows(s.columns, writers.width, e, n, 1, 0, observations, 0)
+    pose = (w.x, w.y, w.heading_cos, w.heading_sin)
+    ping(c, pose, n, _ZERO, s, observations[e, n], writers.width)
+    k = writers.width + natural(c.sonar_beams)
+    observe_trackers(c, worlds, e, view, writers, s, observations, k)
