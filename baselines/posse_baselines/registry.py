@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
 

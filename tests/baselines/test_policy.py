@@ -22,7 +22,7 @@ from posse_baselines import (
     stack_agents,
 )
 from posse_baselines.ddcs import DDCS
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import LearnedPolicy
 
 NAMES = policy_names()
 PLAYS_BY_THE_RULES = [name for name in NAMES if not load(name).reads_state]

@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 
 import posse
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.network import LearnedPolicy, Network
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training import demo
 
 

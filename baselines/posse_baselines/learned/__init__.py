@@ -1,1 +1,10 @@
-"""Learned policies, which play without torch."""
+"""Learned policies: neural networks stored as plain numbers, played without torch."""
+
+from __future__ import annotations
+
+from posse_baselines.learned.encoder import Encoder
+from posse_baselines.learned.encoding import Encoding
+from posse_baselines.learned.network import Network
+from posse_baselines.learned.policy import LearnedPolicy
+
+__all__ = ["Encoder", "Encoding", "LearnedPolicy", "Network"]

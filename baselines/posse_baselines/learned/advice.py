@@ -1,10 +1,10 @@
-"""A scripted policy that a learned one listens to.
+"""A scripted adviser beside a learned policy (residual policy learning).
 
-At each step the adviser proposes a motion. The learner's network is given the proposal beside the
-observation, and what it answers is added: its action is the proposal plus twice the answer, cut to
-[-1, 1]. An answer of zero is the adviser itself, and no action is out of reach. The adviser's
-messages go out as they are, and what it remembers is its own: so the learner needs no memory, and
-begins where the script ends (residual policy learning: Silver et al. 2018, Johannink et al. 2019).
+At each step the adviser proposes a motion. The network reads the proposal together with the
+observation; the action is the proposal plus twice the network's output, clipped to [-1, 1]. An
+output of zero reproduces the adviser, and every action stays reachable. The adviser's messages are
+sent unchanged, and its memory is its own, so the network needs no memory. References: Silver et
+al. 2018, Johannink et al. 2019.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Memory, Policy, PolicyError, begin
 
 REACH: Final = np.float32(2.0)
-"""What the network's answer is multiplied by: from one end of [-1, 1] to the other."""
+"""Factor of the network's output: spans the whole of [-1, 1] from either end."""
 MOTION: Final = 2
-"""Numbers of an action that move the tracker, and that a proposal adds to the inputs."""
+"""Numbers of an action that move the tracker; a proposal adds as many inputs."""
 
 
 @runtime_checkable
 class Adviser(Policy, Protocol):
-    """A policy that can say what it remembers, so that a training can be cut and gone on with."""
+    """A policy whose memory can be saved, as resuming a training run requires."""
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return what it remembers, as arrays (E, ...) by name that share its memory."""
+        """Return the memory as arrays (E, ...) by name; views, not copies."""
         ...
 
 
@@ -37,31 +37,34 @@ def check_adviser(name: str, policy: Policy) -> Adviser:
     """Return a policy as an adviser.
 
     Raises:
-        PolicyError: It reads the state of the worlds, or cannot say what it remembers.
+        PolicyError: It reads the state of the worlds, or its memory cannot be saved.
     """
     if policy.reads_state:
-        raise PolicyError(f"{name!r} cannot advise: it reads what no tracker can know")
+        raise PolicyError(
+            f"{name!r} cannot be an adviser: it reads the state of the worlds, which no tracker "
+            "observes"
+        )
     if not isinstance(policy, Adviser):
-        raise PolicyError(f"{name!r} cannot advise: it has no method arrays(memory)")
+        raise PolicyError(f"{name!r} cannot be an adviser: it has no method arrays(memory)")
     return policy
 
 
-def advised(proposals: FloatArray, answers: FloatArray) -> FloatArray:
-    """Return actions (..., 2 + m) from proposals (..., 2 + m) and a network's answers (..., 2)."""
+def advised(proposals: FloatArray, outputs: FloatArray) -> FloatArray:
+    """Return actions (..., 2 + m) for proposals (..., 2 + m) and network outputs (..., 2)."""
     actions = proposals.copy()
-    actions[..., :MOTION] += REACH * answers
+    actions[..., :MOTION] += REACH * outputs
     return np.clip(actions, np.float32(-1.0), np.float32(1.0))
 
 
 class Advice:
-    """An adviser at work in a batch.
+    """The adviser's memory and latest proposals for one batch.
 
     Args:
-        adviser: Who proposes.
-        batch: The worlds, in which episodes begin at different times.
+        adviser: The policy that proposes.
+        batch: The worlds; their episodes may begin at different times.
 
     Attributes:
-        proposals: (E, N, 2 + m), for the observations last seen.
+        proposals: (E, N, 2 + m), for the latest observations.
     """
 
     def __init__(self, adviser: Adviser, batch: Batch) -> None:
@@ -73,12 +76,12 @@ class Advice:
         )
 
     def follow(self, observations: FloatArray) -> None:
-        """See the observations (E, N, F) that the last actions led to."""
+        """Compute proposals for the observations (E, N, F) after a step."""
         proposals, self._memory = self._adviser.act(observations, self._memory)
         self.proposals[...] = proposals
 
     def restart(self, observations: FloatArray, mask: BoolArray) -> None:
-        """See the first observations of the episodes that begin in the worlds of a mask (E,)."""
+        """Compute proposals for the first observations of the worlds in a mask (E,)."""
         others = ~mask
         kept = {name: array[others] for name, array in self.arrays().items()}
         self._memory = self._adviser.restart(self._memory, mask)
@@ -87,5 +90,5 @@ class Advice:
             array[others] = kept[name]
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return what the adviser remembers, as arrays by name that share its memory."""
+        """Return the adviser's memory and the proposals as arrays by name; views, not copies."""
         return {**self._adviser.arrays(self._memory), "proposals": self.proposals}

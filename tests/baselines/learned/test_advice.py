@@ -9,9 +9,8 @@ import pytest
 
 import posse
 from posse_baselines import Policy, PolicyError, load
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.advice import Advice, advised, check_adviser
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.network import LearnedPolicy, Network
 from posse_baselines.policy import play
 
 DDCS = "ddcs-distributed"
@@ -84,7 +83,7 @@ def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was() -> No
 
 
 def test_who_cannot_advise() -> None:
-    with pytest.raises(PolicyError, match="no tracker can know"):
+    with pytest.raises(PolicyError, match="no tracker observes"):
         check_adviser("planner", load("planner"))
 
     class Mute:

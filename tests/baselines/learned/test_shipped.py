@@ -12,8 +12,7 @@ import pytest
 
 import posse
 from posse_baselines import PolicyError, load, policy_names
-from posse_baselines.learned.encoding import Encoder, Encoding
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.registry import SHIPPED, shipped
 from posse_training import evaluate
 from posse_training.runs.ship import CHECK_WORLDS, LARGEST, check_scenarios, make_check, replay
@@ -142,7 +141,7 @@ def card_of(policy: LearnedPolicy) -> dict[str, Any]:
 
 def seeker(gain: float = 1.0) -> LearnedPolicy:
     """A network that turns towards its own slot, and drives on: one layer, written by hand."""
-    from posse_baselines.learned.network import Network
+    from posse_baselines.learned import Network
 
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "slots")
     weight = np.zeros((2, encoding.size), np.float32)

@@ -9,8 +9,7 @@ import pytest
 import posse
 from posse.scenarios.named import _BY_NAME
 from posse_baselines import PolicyError
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.network import LearnedPolicy, Network
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
 from posse_training.reports import sweeps
 from posse_training.reports.compare import Settings, compare

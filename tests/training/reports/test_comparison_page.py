@@ -11,8 +11,7 @@ import pytest
 from benchmarks import comparison
 
 import posse
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.network import LearnedPolicy, Network
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training import evaluate
 from posse_training.reports.statistics import Estimate, difference_over_seeds, paired_difference
 

@@ -11,7 +11,7 @@ import pytest
 import tyro
 from rich.console import Console
 
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.runs.settings import SettingsError, TrainSettings, default_settings

@@ -23,7 +23,7 @@ from stable_baselines3 import PPO
 
 import posse
 from posse_baselines import BasePolicy, PolicyError, load
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import LearnedPolicy
 from posse_training.reports.evaluation import evaluate
 from posse_training.runs import checkpoint
 from posse_training.runs import train as module

@@ -12,7 +12,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor
 
 import posse
-from posse_baselines.learned.encoding import Encoder, Encoding
+from posse_baselines.learned import Encoder, Encoding
 from posse_training.sb3.normalisation import Normaliser
 from posse_training.sb3.vec_env import TeamVecEnv
 

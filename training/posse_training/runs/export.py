@@ -16,8 +16,8 @@ from torch import nn
 
 import posse
 from posse_baselines.learned.advice import MOTION, Adviser
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.network import LearnedPolicy, Network
+from posse_baselines.learned import Encoding
+from posse_baselines.learned import LearnedPolicy, Network
 from posse_training.runs.provenance import commit
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.normalisation import LIMIT, Normaliser

@@ -20,7 +20,7 @@ import tyro
 from rich.console import Console
 
 from posse import Scenario, get_scenario
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import LEARNED, SHIPPED
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import mean

@@ -26,8 +26,8 @@ from torch import nn
 import posse
 from posse_baselines import load
 from posse_baselines.learned.advice import Adviser, check_adviser
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.network import LearnedPolicy
+from posse_baselines.learned import Encoding
+from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policy import PolicyError
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import mean

@@ -21,7 +21,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 import posse
 from posse import Scenario
 from posse.numeric import FloatArray
-from posse_baselines.learned.encoding import Encoder, Encoding
+from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.policy import Policy, begin
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.normalisation import RunningStatistics

@@ -20,7 +20,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 from posse import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned.advice import MOTION, Advice, Adviser, advised
-from posse_baselines.learned.encoding import Encoder, Encoding
+from posse_baselines.learned import Encoder, Encoding
 from posse_training.sb3.world_state import StateWriter
 
 _NEVER: Final = -1

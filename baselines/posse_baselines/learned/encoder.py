@@ -1,0 +1,76 @@
+"""Encodings, compiled: from observations to network inputs."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import ObservationLayout
+from posse.numeric import FloatArray, Numbers, OwnArrays, compiled, kernel, worlds_of
+from posse_baselines.learned.encoding import Columns, Encoding
+from posse_baselines.learned.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
+from posse_baselines.parallel import MOST_THREADS, over_worlds
+
+
+@compiled
+def encode_row(
+    row: FloatArray,
+    columns: Columns,
+    unknown: FloatArray,
+    offsets: npt.NDArray[np.int64],
+    slots: FloatArray,
+    with_features: int,
+    scratch: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the network inputs (size,) of one tracker's observation (F,) to ``out``."""
+    start = 0
+    if with_features:
+        start = NUM_FEATURES
+        write_features(row, offsets, slots, scratch, out[:start])
+    for k in range(len(columns)):
+        c = columns[k]
+        out[start + k] = row[c] if c >= 0 else unknown[k]
+
+
+@kernel
+def _encode_rows(
+    rows: FloatArray,
+    columns: Columns,
+    unknown: FloatArray,
+    offsets: npt.NDArray[np.int64],
+    slots: FloatArray,
+    with_features: int,
+    scratch: FloatArray,
+    out: FloatArray,
+    thread: int,
+    turns: Numbers,
+) -> None:
+    s = scratch[thread]
+    for r in worlds_of(thread, turns):
+        encode_row(rows[r], columns, unknown, offsets, slots, with_features, s, out[r])
+
+
+class Encoder(OwnArrays):
+    """An encoding applied to the observations of one layout.
+
+    Raises:
+        PolicyError: The layout does not fit.
+    """
+
+    def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
+        self.encoding = encoding
+        columns, unknown = encoding.columns(layout)
+        offsets, slots = feature_tables(layout)
+        self._scratch = np.empty((MOST_THREADS, SCRATCH), np.float32)
+        self.tables = (columns, unknown, offsets, slots, int(encoding.kind == "slots"))
+        """The arguments of :func:`encode_row` between the observation and the scratch memory."""
+
+    def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Return (..., F) observations as (rows, size), written to ``out`` if given."""
+        rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
+        if out is None:
+            out = np.empty((len(rows), self.encoding.size), np.float32)
+        # The threads share out rows as if each were a world of one tracker.
+        over_worlds(_encode_rows, (rows, *self.tables, self._scratch, out), len(rows), 1)
+        return out

@@ -1,0 +1,47 @@
+"""Networks of arbitrary weights, as policies."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import posse
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
+
+
+def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) -> Network:
+    generator = np.random.default_rng(seed)
+    sizes = (inputs, 24, 16, outputs)
+
+    def draw(*shape: int) -> Any:
+        return generator.normal(size=shape).astype(np.float32)
+
+    network = Network(
+        mean=draw(inputs),
+        scale=np.abs(draw(inputs)),
+        limit=5.0,
+        weights=tuple(draw(b, a) / np.float32(a**0.5) for a, b in itertools.pairwise(sizes)),
+        biases=tuple(draw(b) for b in sizes[1:]),
+        activation="tanh",
+        output="clip",
+    )
+    return replace(network, **changes)
+
+
+def policy_for(
+    layout: posse.ObservationLayout, kind: str = "slots", **changes: Any
+) -> LearnedPolicy:
+    encoding = Encoding.of(layout, kind)
+    return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
+
+
+def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides: Any) -> Any:
+    batch = posse.batch(scenario, worlds, seed=3, **overrides)
+    observations = batch.reset()
+    generator = np.random.default_rng(0)
+    for _ in range(steps):
+        observations, *_ = batch.step(generator.uniform(-1, 1, batch.action_shape))
+    return batch, observations
