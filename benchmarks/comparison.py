@@ -17,9 +17,11 @@ import tyro
 import posse
 from posse_baselines import load
 from posse_baselines.registry import shipped
-from posse_training.reports.compare import Comparison, compare
 from posse_training.reports.compare import Settings as CompareSettings
-from posse_training.reports.contenders import Plays, play, read_contenders
+from posse_training.reports.compare import compare
+from posse_training.reports.comparison import Comparison
+from posse_training.reports.contenders import play, read_contenders
+from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate
 from posse_training.runs.provenance import commit
 
@@ -112,7 +114,7 @@ def report(
         "",
         row(
             "scenario", "learned", "trained on it", "score", "better DDCS model", "its score",
-            "difference", "better in", "bound",
+            "difference", "improvement", "bound",
         ),
         "|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
@@ -182,7 +184,7 @@ def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
         "|---|---|---|---|",
     ]
     for group in read_contenders(settings.groups):
-        card: Mapping[str, Any] = group.policies[0].card  # type: ignore[attr-defined]
+        card: Mapping[str, Any] = group.policies[0].card  # type: ignore[union-attr]
         trained = {part["name"] for part in card["scenarios"]}
         for scenario in (name for name in settings.scenarios if name in trained):
             mine = play(group, scenario, settings.episodes, settings.seed, settings.split)

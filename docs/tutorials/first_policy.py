@@ -9,7 +9,7 @@ from pathlib import Path
 
 from posse_baselines import load
 from posse_training import evaluate
-from posse_training.runs.settings import default_settings
+from posse_training.runs import default_settings
 from posse_training.runs.train import train
 
 parser = argparse.ArgumentParser()

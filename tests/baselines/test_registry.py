@@ -34,7 +34,7 @@ def test_only_the_planner_reads_the_state() -> None:
         ("nothing-like-it", "policies are: random, idle, pursuit"),
         ("no_such_module:Team", "cannot import 'no_such_module'"),
         ("posse_baselines.ddcs:DDSC", "has no 'DDSC' .did you mean 'DDCS'"),
-        ("posse_baselines.ddcs:Settings", "is no policy: it must have name"),
+        ("posse_baselines.ddcs:Settings", "is not a policy: it must have name"),
     ],
 )
 def test_a_policy_that_is_not_there_is_named_with_what_is(name: str, message: str) -> None:
@@ -45,5 +45,5 @@ def test_a_policy_that_is_not_there_is_named_with_what_is(name: str, message: st
 def test_a_file_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "policy.pkl"
     path.write_bytes(b"")
-    with pytest.raises(PolicyError, match="is no policy file: known kinds are"):
+    with pytest.raises(PolicyError, match="is not a policy file: known suffixes are"):
         load(path)

@@ -16,12 +16,9 @@ from stable_baselines3 import PPO
 import posse
 import posse_baselines
 from posse_training.cli import COMMANDS, main
-from posse_training.runs.settings import (
-    ALGORITHMS,
-    SettingsError,
-    TrainSettings,
-    default_settings,
-)
+from posse_training.errors import SettingsError
+from posse_training.runs import TrainSettings, default_settings
+from posse_training.runs.ranges import ALGORITHMS
 
 
 def test_listing_the_scenarios_does_not_load_torch() -> None:
@@ -59,9 +56,9 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         (["watch", "pursuit", "--world", "-1"], "world=-1"),
         (["watch", "pursuit", "--split", "tests"], "unknown split 'tests'"),
         (["watch", "pursuit", "--gif", "film.mp4"], "must end in .gif"),
-        (["watch", "numpy:ndarray"], "cannot be made without arguments"),
+        (["watch", "numpy:ndarray"], "cannot be created without arguments"),
         (["reproduce", "--seed", "-1"], "seed=-1"),
-        (["compare"], "nobody to compare"),
+        (["compare"], "No policies given"),
         (["compare", "pursuit", "--seed", "-1"], "seed=-1"),
         (["compare", "pursuit", "--episodes", "0"], "episodes=0"),
     ],
@@ -100,7 +97,7 @@ def test_who_stops_a_training_is_told_how_to_go_on(
     monkeypatch.setattr("posse_training.runs.train.resume", stopped)
     for arguments in (["--folder", str(tmp_path)], ["--resume", str(tmp_path)]):
         assert main(["train", *arguments]) == 130
-        assert f"to go on: posse train --resume {tmp_path}" in capsys.readouterr().err
+        assert f"to resume: posse train --resume {tmp_path}" in capsys.readouterr().err
 
 
 def test_watch_writes_a_film(tmp_path: Path) -> None:
@@ -120,7 +117,7 @@ class TestSettings:
     @pytest.mark.parametrize(
         ("changes", "message"),
         [
-            ({"steps": 0}, "steps=0 must be at least 1"),
+            ({"steps": 0}, "steps=0 is invalid: it must be at least 1"),
             ({"minibatch": 1}, "minibatch=1"),
             ({"discount": 1.5}, "discount=1.5"),
             ({"hidden": ()}, "hidden"),

@@ -1,7 +1,7 @@
-"""Learning, evaluation and reports: what needs more than the worlds and their policies."""
+"""Training, evaluation and reports."""
 
 from __future__ import annotations
 
-from posse_training.reports.evaluation import Results, evaluate
+from posse_training.reports import Results, evaluate
 
 __all__ = ["Results", "evaluate"]

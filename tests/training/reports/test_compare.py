@@ -11,12 +11,10 @@ from posse.scenarios.named import _BY_NAME
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
-from posse_training.reports import sweeps
 from posse_training.reports.compare import Settings, compare
 from posse_training.reports.contenders import read_contenders
 from posse_training.reports.statistics import difference_over_seeds
-from posse_training.reports.sweeps import BOUND, SWEEPS, Sweep, play_sweeps
-from posse_training.runs.settings import SettingsError
+from posse_training.reports.sweeps import BOUND, SWEEPS
 
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
@@ -40,13 +38,13 @@ def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
 def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None:
     for named, message in (
         ("idel", "unknown policy 'idel'"),
-        ("mine=", "'mine=' is no group of policies"),
-        ("mine=idle,,pursuit", "is no group of policies"),
-        ("idle=pursuit", "two policies are called 'idle'"),
+        ("mine=", "'mine=' is not a group of policies"),
+        ("mine=idle,,pursuit", "is not a group of policies"),
+        ("idle=pursuit", "two policies have the label 'idle'"),
     ):
         with pytest.raises(PolicyError, match=message):
             compare(Settings(("idle", named), ("constant",), out=tmp_path))
-    with pytest.raises(PolicyError, match="nobody to compare"):
+    with pytest.raises(PolicyError, match="No policies given"):
         compare(Settings((), ("constant",), out=tmp_path))
     with pytest.raises(posse.ScenarioError, match="unknown scenario 'konstant'"):
         compare(Settings(("idle",), ("constant", "konstant"), out=tmp_path))
@@ -61,22 +59,6 @@ def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "constant" in row, "no cell is broken where lines have no end"
     assert row.count("]") == 5, "five estimates with their intervals"
     assert not list(tmp_path.glob("*.png"))
-
-
-def test_a_comparison_replaces_the_one_before_and_nothing_else(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "summary.json").write_text("[]")  # of somebody else
-    first = Settings(("idle", "pursuit"), ("constant",), 2, out=tmp_path, sweep_episodes=0)
-    compare(first)
-    before = {path.name for path in tmp_path.iterdir()}
-    assert {"constant-pursuit.csv", "constant-pursuit.json", "profile.png"} <= before
-    with pytest.raises(SettingsError, match="episodes=0"):
-        compare(replace(first, episodes=0))
-    assert {path.name for path in tmp_path.iterdir()} == before
-    compare(replace(first, policies=("idle",), figures=False))
-    assert {path.name for path in tmp_path.iterdir()} == {
-        "notes.txt", "summary.json", "constant-idle.csv", "constant-idle.json",
-    }  # fmt: skip
 
 
 def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
@@ -157,39 +139,11 @@ def test_a_split_that_was_trained_on_is_named(
     assert "was trained on the split 'test'" in capsys.readouterr().err
 
 
-class TestSweeps:
-    @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
-    def test_every_value_is_possible_and_the_own_one_is_among_them(self, sweep: Sweep) -> None:
-        for value in sweep.values:
-            assert getattr(sweep.at(value), sweep.setting) == value
-        assert sweep.own in sweep.values
-        assert sweep.at(sweep.values[0]) != sweep.at(sweep.values[-1])
-
-    def test_points_are_scores_at_their_settings(self) -> None:
-        from posse_training import evaluate
-
-        sweep = Sweep("size", "constant", "num_trackers", (3, 12), "trackers")
-        left_out: list[tuple[str, str, str]] = []
-        points = play_sweeps(
-            read_contenders(("idle", "pursuit")), 4, 5, "validation",
-            lambda *told: left_out.append(told), (sweep,),
-        )  # fmt: skip
-        assert [(p.value, p.policy) for p in points] == [
-            (size, policy) for size in (3, 12) for policy in ("idle", "pursuit", BOUND)
-        ]
-        alone = evaluate(
-            "pursuit", "constant", 4, 5, split="validation", num_trackers=12, progress=False
-        )
-        assert points[4].score.value == pytest.approx(alone["score"].mean())
-        assert points[5].score.value == pytest.approx(alone["bound"].mean())
-        assert left_out == []
-
-
 def test_figures_are_drawn_with_the_oracle_beside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     few = tuple(replace(sweep, values=sweep.values[:1]) for sweep in SWEEPS)
-    monkeypatch.setattr(sweeps.play_sweeps, "__defaults__", (few,))
+    monkeypatch.setattr("posse_training.reports.compare.SWEEPS", few)
     options = ["--scenarios", "constant", "--episodes", "3", "--sweep-episodes", "2"]
     assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
     names = {"profile", "scenarios", "team-size", "radio-loss", "target-speed", "recovery"}

@@ -14,8 +14,11 @@ from rich.console import Console
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.cli import main
-from posse_training.runs.settings import SettingsError, TrainSettings, default_settings
-from posse_training.runs.ship import CHOICE_SEED, Settings, command_of, replay, ship
+from posse_training.errors import SettingsError
+from posse_training.runs import TrainSettings, default_settings
+from posse_training.runs.check import replay
+from posse_training.runs.command import command_of
+from posse_training.runs.ship import CHOICE_SEED, Settings, ship
 from posse_training.runs.train import train
 
 SETTINGS = TrainSettings(
@@ -83,10 +86,10 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
             ship(Settings(folders, name, worlds=2, out=tmp_path))
         return str(caught.value)
 
-    assert "different training seeds" in refused(runs[0], runs[0])
+    assert "must have different training seeds" in refused(runs[0], runs[0])
     assert "must begin with 'learned-'" in refused(*runs, name="smart")
-    assert "at least one run folder" in refused()
-    assert "is no run folder" in refused(tmp_path)
+    assert "No run folders given" in refused()
+    assert "is not a run folder" in refused(tmp_path)
     other = tmp_path / "other"
     train(replace(SETTINGS, seed=4, hidden=(4,), folder=other), console=Console(file=StringIO()))
     assert "differ in hidden" in refused(runs[0], other)
@@ -127,4 +130,4 @@ def test_the_command_says_how_each_seed_did(
     shown = capsys.readouterr().out
     assert all(f"training seed {seed}: " in shown for seed in (1, 2, 3))
     assert main(["ship", str(tmp_path), *options]) == 2
-    assert "is no run folder" in capsys.readouterr().err
+    assert "is not a run folder" in capsys.readouterr().err

@@ -210,7 +210,7 @@ class TestMethods:
     @pytest.mark.parametrize(
         ("batches", "message"),
         [
-            ([], "at least one batch"),
+            ([], "no batches given"),
             ([{"autoreset": "same_step"}], 'autoreset="disabled"'),
             ([{"autoreset": "disabled", "target_motion": "agent"}], "the target"),
             (

@@ -1,112 +1,74 @@
-"""Who takes part in a comparison: a policy, or one training's policies from several seeds."""
+"""Who takes part in a comparison: one policy, or one policy for each of several training seeds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import Any, Final
 
 from posse import Scenario
 from posse_baselines import Policy, PolicyError, load
-from posse_training.reports.evaluation import Results, evaluate
-from posse_training.reports.statistics import (
-    Estimate,
-    difference_over_seeds,
-    interquartile_mean,
-    mean,
-    middle_mean,
-    over_seeds,
-    paired_difference,
-    share,
-)
+from posse_baselines.registry import is_code, is_file
+from posse_training.reports.evaluation import evaluate
+from posse_training.reports.plays import Plays
+
+LONGEST_LABEL: Final = 100
+"""Characters of a label, at most."""
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A policy under the name that reports give it, or one for each training seed."""
+    """A policy under its label in reports, or one policy for each training seed.
+
+    Attributes:
+        label: The label.
+        policies: Loaded policies; a text is ``package.module:Class``, loaded by whoever plays it.
+    """
 
     label: str
-    policies: tuple[Policy, ...]
+    policies: tuple[Policy | str, ...]
 
 
 def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
-    """Return who is meant by names, files, ``package.module:Class``, or ``LABEL=FILE,FILE,...``.
+    """Return the contenders of names, files, ``package.module:Class`` or ``LABEL=FILE,FILE,...``.
 
-    What comes from a file goes by the name on its card, where nobody else does.
+    The label of a file is the name on its card, unless another contender has it.
 
     Raises:
-        PolicyError: Nobody, a policy that cannot be loaded, a group without files, or two of one
-            label.
+        PolicyError: No contender, a policy that cannot be loaded, a group without files, a label
+            that cannot be printed, or that two contenders share.
     """
     if not texts:
-        raise PolicyError("nobody to compare: name a policy or more, the first is compared with")
+        raise PolicyError("No policies given. Pass at least one; the first is the baseline.")
     found: list[Contender] = []
     stated = {text.partition("=")[0] for text in texts}
     for text in texts:
-        label, sign, members = text.partition("=")
+        label, sign, members = (text, "", "") if is_file(text) else text.partition("=")
         if sign and not (label and all(members.split(","))):
-            raise PolicyError(f"{text!r} is no group of policies: write LABEL=FILE,FILE,...")
+            raise PolicyError(
+                f"{text!r:.120} is not a group of policies: write LABEL=FILE,FILE,..."
+            )
         taken = {other.label for other in found}
         if label in taken:
             raise PolicyError(
-                f"two policies are called {label!r}: give one another label, LABEL=..."
+                f"two policies have the label {label!r:.120}: give one another label, LABEL=..."
             )
         names = members.split(",") if sign else [text]
-        policies = tuple(load(name) for name in names)
-        if not sign and Path(text).is_file() and policies[0].name not in taken | stated:
-            label = policies[0].name
+        policies = tuple(name if is_code(name) else load(name) for name in names)
+        if not sign and is_file(text) and not isinstance(policies[0], str):
+            name = policies[0].name
+            label = name if name not in taken | stated else label
+        _check_label(label)
         found.append(Contender(label, policies))
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class Plays:
-    """What a contender did in a number of worlds: results for each training seed."""
-
-    label: str
-    results: tuple[Results, ...]
-
-    @property
-    def scenario(self) -> Scenario:
-        """What was played."""
-        return self.results[0].scenario
-
-    def __getitem__(self, metric: str) -> npt.NDArray[np.float64]:
-        """Return a metric, (S, W): training seeds by worlds."""
-        return np.stack([result[metric] for result in self.results])
-
-    def mean(self, metric: str) -> Estimate:
-        """Return the mean of a metric that every episode has, seeds and worlds resampled."""
-        values = self[metric]
-        return mean(values[0]) if len(values) == 1 else over_seeds(values)
-
-    def interquartile_mean(self, metric: str) -> Estimate:
-        """Return the mean of the middle half of all episodes."""
-        values = self[metric]
-        return (
-            interquartile_mean(values[0]) if len(values) == 1 else over_seeds(values, middle_mean)
+def _check_label(label: str) -> None:
+    if len(label) > LONGEST_LABEL or not label.isprintable():
+        raise PolicyError(
+            f"the label {label[:60]!r}... ({len(label):,} characters) must have at most "
+            f"{LONGEST_LABEL} printable characters: give it another one, LABEL=..."
         )
-
-    def share(self, happened: Sequence[npt.NDArray[np.bool_]]) -> Estimate:
-        """Return the share of episodes in which something happened; (W,) for each seed."""
-        return share(happened[0]) if len(happened) == 1 else over_seeds(np.stack(happened))
-
-    def difference(self, reference: Plays) -> Estimate:
-        """Return the mean difference of the score, world by world."""
-        mine, theirs = self["score"], reference["score"]
-        if len(mine) == len(theirs) == 1:
-            return paired_difference(mine[0], theirs[0])
-        return difference_over_seeds(mine, theirs)
-
-    def improvement(self, reference: Plays) -> Estimate:
-        """Return how often this one is better in a world; a tie is half a time."""
-        mine, theirs = self["score"][:, None], reference["score"][None]
-        better = ((mine > theirs) + 0.5 * (mine == theirs)).mean(axis=1)
-        return mean(better[0]) if len(better) == 1 else over_seeds(better)
 
 
 def play(
@@ -117,17 +79,21 @@ def play(
     split: str,
     *,
     progress: bool = True,
+    time_limit: float | None = None,
     **overrides: Any,
 ) -> Plays:
-    """Play the same worlds with every policy of a contender; as :func:`evaluate`.
+    """Play the same worlds with every policy of a contender; see :func:`evaluate`.
 
     Raises:
-        PolicyError: One that cannot play this scenario.
+        PolicyError: A policy that cannot play this scenario.
     """
     return Plays(
         contender.label,
         tuple(
-            evaluate(policy, scenario, episodes, seed, split=split, progress=progress, **overrides)
+            evaluate(
+                policy, scenario, episodes, seed, split=split, progress=progress,
+                time_limit=time_limit, **overrides,
+            )
             for policy in contender.policies
         ),
-    )
+    )  # fmt: skip

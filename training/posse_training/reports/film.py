@@ -1,4 +1,4 @@
-"""Moving pictures: policies side by side on the same world, as a GIF."""
+"""Films: policies side by side on the same world, as a GIF."""
 
 from __future__ import annotations
 
@@ -8,22 +8,15 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
-from PIL import Image
 
 from posse import Batch, Scenario, get_scenario
 from posse.rendering.renderer import LEAST_SIZE, Renderer
-from posse.rendering.style import GRID, PALETTE
+from posse.rendering.style import GRID
 from posse_baselines.policy import Policy, PolicyError, begin
-from posse_training.runs.settings import SettingsError
+from posse_training.errors import SettingsError
+from posse_training.reports.gif import Frame, write_gif
 
-Frame = npt.NDArray[np.uint8]
-
-_BLENDS: Final = 40  # colours for what fades and for anti-aliased edges
-_TRANSPARENT: Final = 255
-_SAMPLED: Final = 12  # frames that the palette is made from
 _SEAM: Final = 2  # px between panels
-_LAST_SHOWN: Final = 1.5  # s, before the film starts over
 
 
 def film(
@@ -43,14 +36,14 @@ def film(
     """Film one world, played by each policy, and write it as an animated GIF.
 
     Args:
-        policies: (label, policy) of each panel, left to right; the label stands above it.
-        scenario: By name or as a value; its messages are made as long as each policy needs.
-        path: Where to write, ending in ``.gif``; folders are made, a file there is replaced.
-        seed: Of the world.
-        world: Its index.
+        policies: (label, policy) of each panel, left to right; the label is its title.
+        scenario: A scenario or its name; its messages are made as long as each policy needs.
+        path: File to write, ending in ``.gif``; folders are created, an old file is replaced.
+        seed: Seed of the world.
+        world: Index of the world.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        seconds: Simulated time to film at most, s; less where every episode ends before.
-        speed: Simulated seconds in a second of the film; rounded, since a GIF counts in 1/100 s.
+        seconds: Simulated time to film, s; less if every episode ends before.
+        speed: Simulated seconds per second of film; rounded, since a GIF counts in 1/100 s.
         every: Control steps between two frames.
         size: Side of a panel, px; default: 560 for one, 400 for more.
         **overrides: Settings of the scenario.
@@ -59,7 +52,7 @@ def film(
         The path.
 
     Raises:
-        SettingsError: No policy, a path that does not end in ``.gif``, a number out of its range.
+        SettingsError: No policies, a path that does not end in ``.gif``, a number out of range.
         PolicyError: A policy that does not fit the scenario.
     """
     path = Path(path)
@@ -88,12 +81,12 @@ def film(
 def _panel(
     batch: Batch, policy: Policy, renderer: Renderer, steps: int, every: int
 ) -> Iterator[Frame]:
-    """Play an episode; yield every so-manieth frame, the first and the last among them."""
+    """Play an episode; yield one frame in ``every``, including the first and the last."""
     memory = begin(policy, batch)
     observations = batch.reset()
     for step in range(steps + 1):
         over = bool(batch.worlds["over"][0]) or step == steps
-        # What the trackers have in mind when they chose this step's actions.
+        # The annotations are those of the decision on this step's actions.
         if not over:
             actions, memory = policy.act(observations, memory)
         if over or step % every == 0:
@@ -108,7 +101,7 @@ def _panel(
 
 
 def _side_by_side(panels: Sequence[Iterator[Frame]]) -> Iterator[Frame]:
-    """Join the panels' frames; one that has ended goes on showing its last."""
+    """Join the panels' frames; a panel that has ended repeats its last frame."""
     last: list[Frame | None] = [None] * len(panels)
     for frames in itertools.zip_longest(*panels):
         last = [
@@ -122,81 +115,6 @@ def _side_by_side(panels: Sequence[Iterator[Frame]]) -> Iterator[Frame]:
         yield np.concatenate(strip, axis=1)
 
 
-def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
-    """Write frames (H, W, 3) as a GIF that repeats for ever, ``frame_time`` s each.
-
-    All frames share one palette and are not dithered, so that flat colours stay flat; what a frame
-    shares with the one before is left transparent, and costs next to nothing.
-    """
-    palette = _Palette(frames)
-    images: list[Image.Image] = []
-    before: Frame | None = None
-    for frame in frames:
-        indices = palette.indices(frame)
-        changed = indices if before is None else np.where(indices == before, _TRANSPARENT, indices)
-        before = indices
-        image = Image.fromarray(changed.astype(np.uint8))
-        image.putpalette(palette.entries.tobytes())
-        images.append(image)
-    # In 1/1000 s; a GIF counts in 1/100, and players slow down what is faster than two of them.
-    shown_for = max(2, round(frame_time * 100)) * 10
-    times = [shown_for] * len(images)
-    times[-1] = max(shown_for, round(_LAST_SHOWN * 1000))
-    images[0].save(
-        path,
-        save_all=True,
-        append_images=images[1:],
-        duration=times,
-        loop=0,
-        disposal=1,  # each frame is laid over the one before
-        transparency=_TRANSPARENT,
-        optimize=False,
-    )
-
-
-class _Palette:
-    """The colours of all frames of a film: at most 255, since one index stands for transparent.
-
-    The flat colours of which a picture is composed are among them as they are, however small their
-    areas; the blends between them share what is left.
-
-    Attributes:
-        entries: (K, 3) red, green, blue.
-    """
-
-    def __init__(self, frames: Sequence[Frame]) -> None:
-        chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLED).round().astype(int))
-        codes, counts = np.unique([_codes(frames[k]) for k in chosen], return_counts=True)
-        # By the logarithm of its area: the rim of a robot matters as much as that of an arena.
-        blends = _colours(np.repeat(codes, np.log2(counts).astype(int) + 1))
-        image = Image.fromarray(blends[None]).quantize(_BLENDS, method=Image.Quantize.MEDIANCUT)
-        shared = np.reshape(image.getpalette() or [], (-1, 3))[:_BLENDS]
-        self.entries = np.concatenate([np.array(PALETTE), shared]).astype(np.uint8)
-        self._index = np.full(1 << 24, _TRANSPARENT, np.uint8)  # by code, as far as met
-
-    def indices(self, frame: Frame) -> Frame:
-        """Return the (H, W) indices of the entries nearest to a frame's colours."""
-        codes = _codes(frame)
-        found = self._index[codes]
-        new = np.unique(codes[found == _TRANSPARENT])
-        if len(new):
-            apart = _colours(new)[:, None].astype(np.int32) - self.entries
-            self._index[new] = (apart**2).sum(axis=-1).argmin(axis=-1)
-            found = self._index[codes]
-        return found
-
-
-def _codes(frame: Frame) -> npt.NDArray[np.int32]:
-    """Return the (H, W) colours of a frame as 0xRRGGBB."""
-    codes: npt.NDArray[np.int32] = frame.astype(np.int32) @ np.array([1 << 16, 1 << 8, 1], np.int32)
-    return codes
-
-
-def _colours(codes: npt.NDArray[np.int32]) -> Frame:
-    """Return (..., 3) red, green, blue of colours coded as 0xRRGGBB."""
-    return np.stack([codes >> 16, (codes >> 8) & 255, codes & 255], axis=-1).astype(np.uint8)
-
-
 def _check(
     policies: Sequence[tuple[str, Policy]],
     path: Path,
@@ -206,7 +124,7 @@ def _check(
     size: int | None,
 ) -> None:
     if not policies:
-        raise SettingsError("nothing to film: give at least one (label, policy)")
+        raise SettingsError("No policies given. Pass at least one (label, policy).")
     if path.suffix.lower() != ".gif":
         raise SettingsError(f"path={str(path)!r} must end in .gif: no other format is written")
     for name, value in (("seconds", seconds), ("speed", speed)):

@@ -1,4 +1,4 @@
-"""Policies beyond the settings that they were made for: one setting varied, all else as it is."""
+"""Policies beyond their training settings: one setting of a scenario is varied."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Final
 
 from posse import Scenario, get_scenario
-from posse_baselines import PolicyError
-from posse_training.reports.contenders import Contender, Plays, play
-from posse_training.reports.evaluation import progress_bar
+from posse_training.reports.contenders import Contender
+from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate
 
 BOUND: Final = "bound"
-"""Stands for a policy's name where a point is the attainable bound."""
+"""Takes the place of a policy's name where a point is the bound."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A setting of a scenario and the values that it takes."""
+    """A setting of a scenario and its values."""
 
     name: str
     scenario: str
@@ -30,11 +29,11 @@ class Sweep:
 
     @property
     def own(self) -> float:
-        """The value that the scenario itself has, which policies are trained with."""
+        """The value in the scenario itself, which policies are trained with."""
         return float(getattr(get_scenario(self.scenario), self.setting))
 
     def at(self, value: float) -> Scenario:
-        """Return the scenario with the setting at a value."""
+        """Return the scenario with another value of the setting."""
         return get_scenario(self.scenario, **{self.setting: value})
 
 
@@ -63,45 +62,31 @@ class Point:
 
 def play_sweeps(
     contenders: Sequence[Contender],
-    episodes: int,
-    seed: int,
-    split: str,
-    left_out: Callable[[str, str, str], None],
+    attempt: Callable[[Contender, Sweep, float], Plays | None],
     sweeps: Sequence[Sweep] = SWEEPS,
 ) -> list[Point]:
-    """Play every sweep with everybody; the same worlds of a value for each.
+    """Play every sweep with every contender, each value on the same worlds.
 
-    The bound depends on where a target flees, and so on the team a little: it is that of the last
-    contender, as the oracle is where there is one.
+    The bound depends on where the target flees to, and so slightly on the team: it is that of the
+    last contender, which is the oracle if there is one.
 
     Args:
         contenders: Who plays.
-        episodes: Worlds at each value.
-        seed: Of the worlds.
-        split: Of the worlds.
-        left_out: Told of a policy that cannot play a value: its label, what, and why.
-        sweeps: Which.
+        attempt: Plays a contender at a value of a sweep; returns ``None`` if it cannot.
+        sweeps: Which to play.
     """
     points = []
-    with progress_bar() as bar:
-        task = bar.add_task("", total=sum(len(s.values) for s in sweeps) * len(contenders))
-        for sweep in sweeps:
-            for value in sweep.values:
-                bound: Estimate | None = None
-                for contender in contenders:
-                    bar.update(task, description=f"{contender.label}, {sweep.name} {value:g}")
-                    bar.advance(task)
-                    try:
-                        plays = play(
-                            contender, sweep.at(value), episodes, seed, split, progress=False
-                        )
-                    except PolicyError as error:
-                        left_out(contender.label, f"{sweep.name} {value:g}", str(error))
-                        continue
-                    points.append(Point(sweep.name, value, contender.label, plays.mean("score")))
-                    bound = plays.mean("bound")
-                if bound is not None:
-                    points.append(Point(sweep.name, value, BOUND, bound))
+    for sweep in sweeps:
+        for value in sweep.values:
+            bound: Estimate | None = None
+            for contender in contenders:
+                plays = attempt(contender, sweep, value)
+                if plays is None:
+                    continue
+                points.append(Point(sweep.name, value, contender.label, plays.mean("score")))
+                bound = plays.mean("bound")
+            if bound is not None:
+                points.append(Point(sweep.name, value, BOUND, bound))
     return points
 
 
@@ -115,21 +100,4 @@ def write_points(path: Path, points: Sequence[Point]) -> None:
 
 
 LEADER_LOSS: Final = "leader-loss"
-"""The scenario whose recovery is drawn."""
-
-
-def play_leader_loss(
-    contenders: Sequence[Contender],
-    episodes: int,
-    seed: int,
-    split: str,
-    left_out: Callable[[str, str, str], None],
-) -> list[Plays]:
-    """Play the loss of a leader with everybody who can."""
-    found = []
-    for contender in contenders:
-        try:
-            found.append(play(contender, LEADER_LOSS, episodes, seed, split))
-        except PolicyError as error:
-            left_out(contender.label, LEADER_LOSS, str(error))
-    return found
+"""The scenario whose recovery times are drawn."""

@@ -1,1 +1,8 @@
-"""Training runs: settings, checkpoints, export, shipping."""
+"""Training runs: settings, training, checkpoints, and policies that ship."""
+
+from __future__ import annotations
+
+from posse_training.runs.defaults import default_settings
+from posse_training.runs.settings import TrainSettings, read_settings
+
+__all__ = ["TrainSettings", "default_settings", "read_settings"]

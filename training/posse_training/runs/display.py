@@ -1,4 +1,4 @@
-"""What is seen of a training while it runs: a live display, or lines where there is no terminal."""
+"""Progress of a training run: a live display, or lines where there is no terminal."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _WIDTH: Final = 40
 
 
 class Display:
-    """Shows progress, time left, and the policy's score on validation worlds beside another's.
+    """Shows progress, time left, and scores on the validation worlds.
 
     Args:
-        settings: Of the training.
+        settings: Of the run.
         console: Where to show it.
     """
 
@@ -57,24 +57,24 @@ class Display:
             self._live.stop()
 
     def note(self, text: str) -> None:
-        """Say what is going on."""
+        """Show what the run is doing."""
         self._note = text
         if self._live is None:
-            self._console.print(text)
+            self._console.print(text, markup=False)
 
     def begin(self, steps: int, curve: list[dict[str, float]]) -> None:
-        """Take note that learning begins, or goes on after ``steps`` steps."""
+        """Start the clock: training begins, or resumes after ``steps`` steps."""
         self._started = time.monotonic()
         self._from_steps = self._steps = steps
         self._curve = list(curve)
         self._note = ""
 
     def beside(self, score: float | None) -> None:
-        """Show another policy's score on the same worlds."""
+        """Show the score of ``settings.beside`` on the same worlds."""
         self._beside = score
 
     def progress(self, steps: int, training_score: float | None) -> None:
-        """Show how far it is, and the mean score of the latest episodes played in training."""
+        """Show the steps made, and the mean score of the latest training episodes."""
         self._steps = steps
         self._training_score = training_score
 
@@ -82,7 +82,7 @@ class Display:
         """Show a score on validation worlds."""
         self._curve.append(point)
         if self._live is None:
-            self._console.print(self._line(point))
+            self._console.print(self._line(point), markup=False)
 
     def _line(self, point: dict[str, float]) -> str:
         line = (
@@ -96,7 +96,7 @@ class Display:
 
     @property
     def rate(self) -> float:
-        """Steps a second since learning began."""
+        """Steps per second since the clock was started."""
         elapsed = time.monotonic() - self._started
         return (self._steps - self._from_steps) / elapsed if elapsed > 0 else 0.0
 
@@ -113,7 +113,7 @@ class Display:
         table.add_column()
         table.add_row(
             "steps",
-            f"{self._steps:,} of {s.steps:,}   {self.rate:,.0f} a second   "
+            f"{self._steps:,} of {s.steps:,}   {self.rate:,.0f} per second   "
             f"{_clock(self.time_left)} left",
         )
         table.add_row("", ProgressBar(total=s.steps, completed=self._steps, width=_WIDTH))
@@ -128,15 +128,15 @@ class Display:
             scores = [p["score"] for p in self._curve[-_WIDTH:]]
             table.add_row("", Text(sparkline(scores, self._beside), style="cyan"))
         if s.beside is not None and self._beside is not None:
-            table.add_row(s.beside, f"{self._beside:.3f}")
+            table.add_row(Text(s.beside, style="bold"), f"{self._beside:.3f}")
         if self._note:
-            table.add_row("", self._note)
+            table.add_row("", Text(self._note))
         title = f"{s.algorithm} on {s.scenario}, seed {s.seed}"
         return Panel(Group(table), title=title, expand=False)
 
 
 def sparkline(scores: list[float], beside: float | None = None) -> str:
-    """Return scores as a row of bars, the tallest being the best score, or ``beside`` if higher."""
+    """Return scores as a row of bars; full height is the best score, or ``beside`` if higher."""
     top = max([*scores, beside or 0.0, 1e-9])
     return "".join(_BARS[min(7, max(0, int(8 * score / top)))] for score in scores)
 

@@ -1,4 +1,4 @@
-"""From what was learned with torch to a policy that plays without it."""
+"""From a torch model to a policy that plays without torch, and its card."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 import posse
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.advice import MOTION, Adviser
-from posse_baselines.learned import Encoding
-from posse_baselines.learned import LearnedPolicy, Network
 from posse_training.runs.provenance import commit
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.normalisation import LIMIT, Normaliser
-from posse_training.sb3.tanh import QuickTanh
+from posse_training.sb3.speedups import QuickTanh
 
 
 def export(
@@ -30,19 +29,19 @@ def export(
     card: Mapping[str, Any],
     adviser: Adviser | None = None,
 ) -> LearnedPolicy:
-    """Return what a model has learned as a policy that plays without torch.
+    """Return a model as a policy that plays without torch.
 
-    It acts by the mode of the distribution. Its actions are the model's
-    (``predict(..., deterministic=True)``), to rounding.
+    Its actions are the mode of the distribution, equal to the model's
+    ``predict(..., deterministic=True)`` to rounding.
 
     Args:
         model: PPO, SAC or TD3, with a :class:`Normaliser` before its networks.
-        encoding: What the model was given of an observation.
-        card: What is to be known of the policy.
-        adviser: Whose proposals the model was given, if any.
+        encoding: Which inputs the model reads from an observation.
+        card: The policy's card.
+        adviser: The policy whose proposals the model reads, if any.
 
     Raises:
-        TypeError: A model whose networks are not plain feed-forward ones.
+        TypeError: The model's networks are not plain feed-forward ones.
     """
     modules, output = _actor(model)
     layers = [module for module in modules if isinstance(module, nn.Linear)]
@@ -65,7 +64,7 @@ def export(
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], str]:
-    """Return the layers from normalised input to action, and how the output is bounded."""
+    """Return the layers from normalised input to action, and the function that bounds it."""
     policy: Any = model.policy
     if hasattr(policy, "mlp_extractor"):
         return [*_flat(policy.mlp_extractor.policy_net), policy.action_net], "clip"
@@ -90,7 +89,7 @@ def make_card(
     steps: int,
     curve: list[dict[str, float]],
 ) -> dict[str, Any]:
-    """Return the card of a policy: what it was trained on, how, by what, and how well it did."""
+    """Return a policy's card: its training scenarios, settings, software and scores."""
     scenarios = settings.scenarios
     kind = settings.scenario.replace(",", "+")
     best = max(curve, key=lambda point: point["score"], default=None)

@@ -1,4 +1,4 @@
-"""Which sources a figure or a policy was made with."""
+"""The commit of the sources, for figures and policies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def commit() -> str | None:
-    """Return the commit of the sources, with ``+`` where they were changed; ``None``: unknown."""
+    """Return the commit of the sources, with ``+`` if they have changes; ``None``: unknown."""
     here = Path(__file__).parent
 
     def git(*arguments: str) -> str:
@@ -17,7 +17,7 @@ def commit() -> str | None:
         return done.stdout.strip()
 
     try:
-        # Pages and results that are being made do not count.
+        # Changes of pages and results do not count.
         sources = [f":/{root}" for root in ("envs", "baselines", "training")]
         changed = git("status", "--porcelain", "--", *sources, ":(exclude,top)**/shipped/*")
         return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")

@@ -1,75 +1,75 @@
-"""Everything that a training is a function of: one typed, frozen class, and its defaults."""
+"""The settings of a training run: one typed, frozen class."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from posse import Scenario, get_scenario
 from posse_baselines import load
+from posse_baselines.registry import ships_or_is_file
+from posse_training.errors import SettingsError
+from posse_training.runs.ranges import check_ranges
 
-ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
-
-
-class SettingsError(ValueError):
-    """A setting that no training can have."""
+__all__ = ["SettingsError", "TrainSettings", "read_settings"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainSettings:
-    """Settings of a training; the defaults depend on scenario and algorithm.
+    """Settings of a training run; the defaults depend on scenario and algorithm.
 
     A *step* is one control step of one tracker.
+
+    Raises:
+        SettingsError: A value out of its range; the message names it, the range and the fix.
     """
 
     scenario: str = "smart"
-    """What to train on: a scenario, or several with commas between them."""
+    """Scenario to train on, or several separated by commas."""
     algorithm: Literal["ppo", "mappo", "sac", "td3"] = "ppo"
-    """mappo is ppo with a value function that sees the state of the world."""
+    """mappo is ppo with a value function that reads the state of the world."""
     steps: int = 20_000_000
-    """Steps to train for."""
+    """Steps to train for, at least; rollouts are completed."""
     seed: int = 1
-    """Of the worlds, the networks and the exploration."""
+    """Seed of the worlds, the networks and the exploration."""
     folder: Path | None = None
-    """Where everything is written; default: runs/train/SCENARIO-ALGORITHM-SEED."""
+    """Run folder; default: runs/train/SCENARIO-ALGORITHM-SEED."""
 
     # The worlds
     num_worlds: int = 256
-    """Worlds stepped together, of all scenarios and team sizes taken together."""
+    """Worlds stepped together, over all scenarios and team sizes."""
     team_sizes: tuple[int, ...] = ()
-    """Numbers of trackers to train with; none: the scenario's own."""
+    """Numbers of trackers to train with; default: the scenario's own."""
     num_neighbours: int | None = None
-    """Team-mates that the policy reads, nearest first; default: as many as there are places."""
+    """Team-mates that the policy reads, nearest first; default: as many as are observed."""
     message_size: int = 0
-    """Numbers that a tracker may tell its team-mates in each step."""
+    """Numbers that a tracker adds to its broadcast in each step."""
     overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
-    """Settings of the scenario that are to be other than it has them."""
+    """Settings of the scenario to change, by name."""
     reward_weights: dict[str, float] = field(default_factory=dict)
-    """Weight of each reward term; none: the scenario's own."""
+    """Weight of each reward term; default: the scenario's own."""
 
     # The networks
     encoding: Literal["plain", "slots"] = "slots"
-    """What the policy is given: the observation, or what follows from it as well."""
+    """Network inputs: the observation, or features computed from it as well."""
     hidden: tuple[int, ...] = (64, 64)
-    """Widths of the hidden layers, of policy and value function alike."""
+    """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
-    """Between the layers."""
+    """Activation between the layers."""
 
-    # What every algorithm has
+    # All algorithms
     learning_rate: float = 3e-4
-    """At the start."""
+    """Learning rate at the start."""
     final_learning_rate: float = 3e-5
-    """At the end; in between it falls linearly."""
+    """Learning rate at the end; it falls linearly in between."""
     discount: float = 0.99
-    """Of rewards, for each control step."""
+    """Discount of rewards for each control step, γ."""
     minibatch: int = 8192
-    """Steps in one gradient."""
+    """Steps in one gradient, about: a rollout is divided evenly."""
 
     # ppo and mappo
     rollout: int = 64
@@ -77,55 +77,56 @@ class TrainSettings:
     epochs: int = 4
     """Passes over a rollout."""
     gae_lambda: float = 0.95
-    """Of generalized advantage estimation."""
+    """λ of generalized advantage estimation."""
     clip: float = 0.2
-    """Of the probability ratio."""
+    """Largest change of the probability ratio in an update."""
     entropy: float = 0.0
     """Weight of the policy's entropy."""
     value_weight: float = 0.5
     """Weight of the value function's error."""
     log_deviation: float = -0.5
-    """Logarithm of the actions' deviation at the start."""
+    """Logarithm of the actions' standard deviation at the start."""
 
     # sac and td3
     replay: int = 400_000
-    """Steps that are remembered."""
+    """Steps in the replay buffer."""
     learning_starts: int = 20_000
-    """Steps of random actions before learning."""
+    """Steps of random actions before learning starts."""
     gradients: int = 4
-    """Gradients for each control step of the batch."""
+    """Gradient steps for each control step of the batch."""
 
     # A warm start
     imitate: str | None = None
-    """A policy to begin as a copy of; what posse_baselines.load takes."""
+    """Policy to begin as a copy of: a name, a file or package.module:Class."""
     imitate_rounds: int = 8
-    """Rounds of play and fit; in the first the expert drives, then more and more the copy."""
+    """Rounds of play and fit; the copy acts in a growing share of the worlds."""
 
     advise: str | None = None
-    """A scripted policy whose proposals the policy is given, and which its actions are added to."""
+    """Scripted policy whose proposals are network inputs, and to which the output is added."""
 
-    # Looking after it
+    # Evaluation, checkpoints and logs
     evaluate_every: int = 1_000_000
-    """Steps between two looks at validation worlds."""
+    """Steps between two evaluations on validation worlds."""
     evaluate_worlds: int = 64
-    """Validation worlds that the policy is chosen on."""
+    """Validation worlds of each scenario; the best policy on them is kept."""
     beside: str | None = "ddcs-distributed"
-    """A policy whose score on the same worlds is shown beside it."""
+    """Policy whose score on the same worlds is shown for comparison."""
     checkpoint_every: int = 1_000_000
-    """Steps that are lost at most when the training is killed."""
+    """Steps between two checkpoints: a killed run loses at most these."""
     threads: int = 1
-    """Threads for torch. From one seed, results agree for one and the same number."""
+    """Threads for torch; results are reproducible for the same number."""
     tensorboard: bool = True
-    """Log for TensorBoard, if it is installed."""
+    """Write TensorBoard logs, if it is installed."""
     wandb: str | None = None
-    """A Weights & Biases project to log to, if it is installed."""
+    """Weights & Biases project to log to; needs the package wandb."""
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_ranges(self)
+        _check_together(self)
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
-        """Every scenario and team size to train on, one each, messages and rewards set."""
+        """Every scenario and team size to train on, with messages and reward weights set."""
         overrides: dict[str, Any] = {**self.overrides, "message_size": self.message_size}
         if self.advise is not None:
             overrides["message_size"] = load(self.advise).message_size
@@ -140,12 +141,12 @@ class TrainSettings:
 
     @property
     def on_policy(self) -> bool:
-        """Whether the algorithm learns from its own latest rollout."""
+        """Whether the algorithm learns from its latest rollout only."""
         return self.algorithm in ("ppo", "mappo")
 
     @property
     def run_folder(self) -> Path:
-        """Where everything is written."""
+        """The folder that the run is written to."""
         name = f"{self.scenario.replace(',', '+')}-{self.algorithm}-{self.seed}"
         return self.folder or Path("runs/train") / name
 
@@ -160,102 +161,89 @@ class TrainSettings:
         """Return the settings of :meth:`to_dict`.
 
         Raises:
-            SettingsError: An unknown setting, or an impossible value.
+            SettingsError: An unknown setting, or an invalid value.
         """
+        if not isinstance(values, Mapping):
+            raise SettingsError(f"settings must map names to values, got {values!r:.80}")
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
                 raise SettingsError(
-                    f"unknown setting {name!r}; settings are: {', '.join(sorted(known))}"
+                    f"unknown setting {name!r:.80}; settings are: {', '.join(sorted(known))}"
                 )
         fitted = dict(values)
         for name in ("hidden", "team_sizes"):
-            if name in fitted:
+            if isinstance(fitted.get(name), list):
                 fitted[name] = tuple(fitted[name])
-        if fitted.get("folder") is not None:
+        if isinstance(fitted.get("folder"), str):
             fitted["folder"] = Path(fitted["folder"])
         return cls(**fitted)
 
 
-def default_settings(
-    scenario: str = "smart", algorithm: str = "ppo", *, own: bool = True
-) -> TrainSettings:
-    """Return the settings that a scenario is trained with unless told otherwise.
-
-    They are kept in ``posse_training/defaults``, a file for each scenario; ``all.toml`` holds for
-    every scenario. In each, the table ``all`` holds for every algorithm, the others for one.
-    Without the scenario's ``own`` these are what holds for every scenario.
-
-    Raises:
-        SettingsError: An unknown algorithm, or a default that no training can have.
-    """
-    if algorithm not in ALGORITHMS:
-        raise SettingsError(
-            f"unknown algorithm {algorithm!r}; algorithms are: {', '.join(ALGORITHMS)}"
-        )
-    values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
-    folder = resources.files("posse_training") / "defaults"
-    name = "mixture" if "," in scenario else scenario
-    for file in (folder / "all.toml", *([folder / f"{name}.toml"] if own else ())):
-        if file.is_file():
-            tables = tomllib.loads(file.read_text(encoding="utf-8"))
-            for table in ("all", algorithm):
-                values.update(tables.get(table, {}))
-    return TrainSettings.from_dict(values)
-
-
-def read_settings(path: Path) -> TrainSettings:
-    """Return the settings that a run folder's ``settings.json`` holds.
-
-    Raises:
-        SettingsError: There is no such file, or it is damaged.
-    """
-    try:
-        return TrainSettings.from_dict(json.loads(path.read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise SettingsError(f"{path.parent} is no run folder: it has no {path.name}") from None
-    except (OSError, TypeError, json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise SettingsError(f"{path} is damaged: {error}") from error
-
-
-_AT_LEAST: Final[dict[str, float]] = {
-    "steps": 1, "seed": 0, "num_worlds": 1, "message_size": 0, "minibatch": 2, "rollout": 1,
-    "epochs": 1, "replay": 1, "learning_starts": 0, "gradients": 1, "imitate_rounds": 1,
-    "evaluate_every": 1, "evaluate_worlds": 1, "checkpoint_every": 1, "threads": 1,
-    "learning_rate": 0, "final_learning_rate": 0, "entropy": 0, "value_weight": 0, "clip": 0,
-}  # fmt: skip
-
-
-def _check(s: TrainSettings) -> None:
-    if s.algorithm not in ALGORITHMS:
-        raise SettingsError(
-            f"unknown algorithm {s.algorithm!r}; algorithms are: {', '.join(ALGORITHMS)}"
-        )
-    for name, least in _AT_LEAST.items():
-        value = getattr(s, name)
-        if not value >= least:
-            raise SettingsError(f"{name}={value!r} must be at least {least:g}")
-    for name in ("discount", "gae_lambda"):
-        value = getattr(s, name)
-        if not 0 <= value <= 1:
-            raise SettingsError(f"{name}={value!r} must lie in [0, 1]")
-    if not s.hidden or min(s.hidden) < 1:
-        raise SettingsError(
-            f"hidden={s.hidden!r} must name at least one layer, each at least 1 wide"
-        )
+def _check_together(s: TrainSettings) -> None:
+    """Raise if settings that are valid on their own exclude each other."""
     if s.imitate is not None and not s.on_policy:
-        raise SettingsError(f"imitate={s.imitate!r} goes with ppo and mappo, not {s.algorithm}")
+        raise SettingsError(
+            f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out"
+        )
+    if s.advise is not None and (s.imitate is not None or s.message_size):
+        raise SettingsError(
+            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
+            "its adviser, which sends the messages"
+        )
+    for name, instead in _ELSEWHERE.items():
+        if name in s.overrides and (name != "num_trackers" or s.team_sizes):
+            raise SettingsError(f"overrides cannot set {name!r}: use {instead} instead")
     parts = s.scenarios
     if s.num_worlds < len(parts):
         raise SettingsError(
             f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and "
             "team sizes"
         )
-    if s.advise is not None and (s.imitate is not None or s.message_size):
+    if len({p.sonar_beams for p in parts}) > 1:
         raise SettingsError(
-            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
-            "its adviser, whose messages go out"
+            "scenarios that are trained on together need equal sonar_beams: set it in overrides"
         )
-    layouts = {(p.sonar_beams, p.message_size) for p in parts}
-    if len(layouts) > 1:
-        raise SettingsError("scenarios that are trained on together need equal sonar_beams")
+
+
+_ELSEWHERE = {
+    "name": "the setting scenario",
+    "message_size": "the setting message_size",
+    "reward_weights": "the setting reward_weights",
+    "num_trackers": "the setting team_sizes",
+}
+
+
+def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
+    """Return the settings of a run folder's ``settings.json``.
+
+    Args:
+        path: The file.
+        trust_code: Accept policies named ``package.module:Class``, whose code is then imported.
+
+    Raises:
+        SettingsError: There is no such file, it is damaged, or it names code to import.
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        if not trust_code:
+            _refuse_code(path, values)
+        return TrainSettings.from_dict(values)
+    except FileNotFoundError:
+        raise SettingsError(f"{path.parent} is not a run folder: it has no {path.name}") from None
+    except RecursionError:
+        raise SettingsError(f"{path} is damaged: its values are nested too deeply") from None
+    except (OSError, TypeError, json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"{path} is damaged: {error}") from error
+
+
+def _refuse_code(path: Path, values: Any) -> None:
+    """Raise if a settings file names a policy that is neither shipped nor a policy file."""
+    for name in ("advise", "imitate", "beside"):
+        policy = values.get(name) if isinstance(values, Mapping) else None
+        if policy is not None and not ships_or_is_file(policy):
+            raise SettingsError(
+                f"{path} names {policy!r:.80} as {name!r}, which is neither a shipped policy nor a "
+                "policy file. To load it would import code that a file asks for. If you trust the "
+                "file, resume with --trust-code"
+            )

@@ -1,1 +1,12 @@
-"""Learning with stable-baselines3."""
+"""Training with stable-baselines3; needs the extra ``training``."""
+
+from __future__ import annotations
+
+from posse_training.errors import require
+
+require("training", "torch", "stable_baselines3")
+
+from posse_training.sb3.normalisation import Normaliser, RunningStatistics  # noqa: E402
+from posse_training.sb3.vec_env import TeamVecEnv  # noqa: E402
+
+__all__ = ["Normaliser", "RunningStatistics", "TeamVecEnv"]

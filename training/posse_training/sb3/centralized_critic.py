@@ -1,8 +1,7 @@
-"""MAPPO: the policy sees a tracker's observation, the value function the state of the world.
+"""MAPPO: the policy reads a tracker's observation, the value function the state of the world.
 
 The state is appended to the observation (:class:`posse_training.sb3.vec_env.TeamVecEnv`,
-``see_state``), and the networks are wired so that no path leads from it to an action. Everything
-else is stable-baselines3's PPO.
+``see_state``); the policy network does not read that part. The rest is stable-baselines3's PPO.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from torch import nn
 
 
 class SplitNetworks(nn.Module):
-    """One network that reads the first numbers of its input, and one that reads all of them."""
+    """A policy network on the first numbers of the input, a value network on all of them."""
 
     def __init__(
         self, size: int, private_size: int, hidden: list[int], activation: type[nn.Module]
@@ -28,28 +27,28 @@ class SplitNetworks(nn.Module):
         self.value_net = nn.Sequential(*create_mlp(size, 0, hidden, activation))
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return what policy and value are read from."""
+        """Return the latent vectors of policy and value."""
         return self.forward_actor(features), self.forward_critic(features)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Return what the policy is read from: it depends on the tracker's own numbers alone."""
+        """Return the policy's latent vector, a function of the tracker's own numbers only."""
         latent: torch.Tensor = self.policy_net(features[:, : self.private_size])
         return latent
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """Return what the value is read from."""
+        """Return the value's latent vector."""
         latent: torch.Tensor = self.value_net(features)
         return latent
 
 
 class CentralizedCriticPolicy(ActorCriticPolicy):
-    """An actor and a critic, of which the critic alone reads the state of the world.
+    """An actor and a critic; only the critic reads the state of the world.
 
     Args:
-        *args: As stable-baselines3's actor-critic policy takes them.
-        private_size: Numbers at the front of an observation that the actor may read.
-        hidden: Widths of the hidden layers, of the actor's and the critic's alike.
-        **kwargs: As stable-baselines3's actor-critic policy takes them.
+        *args: Arguments of stable-baselines3's actor-critic policy.
+        private_size: Numbers at the front of an observation that the actor reads.
+        hidden: Widths of the hidden layers of both networks.
+        **kwargs: Arguments of stable-baselines3's actor-critic policy.
     """
 
     def __init__(

@@ -1,51 +1,33 @@
-"""A warm start: the policy begins as a copy of one that is there already.
+"""A warm start: the policy begins as a copy of another one.
 
-Dataset aggregation (Ross, Gordon and Bagnell, 2011): in the first round the expert drives and is
-copied; in each further round the copy drives in more of the worlds, and the expert says what it
-would have done there. So the copy is right in the states that *it* gets into, not only in those
-that an expert does. At the end the value function is fitted to what the copy earns, or the first
-updates would undo what was copied.
+Dataset aggregation (Ross, Gordon and Bagnell, 2011): in the first round the expert acts and is
+copied; in later rounds the copy acts in more and more of the worlds, labelled with the expert's
+actions. The copy is thus right in the states that *it* visits. At the end the value function is
+fitted to the copy's returns; otherwise the first updates would undo the copy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-import posse
-from posse import Scenario
-from posse.numeric import FloatArray
-from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.policy import Policy, begin
+from posse_baselines.learned import Encoding
+from posse_baselines.policy import Policy
 from posse_training.runs.settings import TrainSettings
+from posse_training.sb3.expert_play import play_round
 from posse_training.sb3.normalisation import RunningStatistics
-from posse_training.sb3.world_state import StateWriter
 
 WORLDS: Final = 64
-"""Worlds that a round plays, of all scenarios taken together."""
+"""Worlds played in a round, over all scenarios."""
 FIRST_WORLD: Final = 1_000_000
-"""Index of the first of them: none that the learning proper begins with."""
-_EVERY: Final = 5  # of so many control steps, one is kept: neighbours in time are much alike
+"""Index of the first of them, beyond the worlds that training begins with."""
 _GRADIENTS: Final = 300  # in each round, at least
 _MINIBATCH: Final = 4096
 _LEARNING_RATE: Final = 1e-3
-_SETTLED: Final = 3.0  # discounted horizons before the end from which returns are not yet complete
-
-
-@dataclass
-class _Round:
-    """What one round of play yields, rows of all worlds and trackers."""
-
-    inputs: FloatArray
-    actions: FloatArray
-    value_inputs: FloatArray
-    returns: FloatArray
 
 
 def imitate(
@@ -59,24 +41,26 @@ def imitate(
     """Make a PPO model's policy a copy of the expert.
 
     Args:
-        model: Of stable-baselines3; its networks and normaliser are changed, its optimiser is not.
+        model: A stable-baselines3 model; its networks and normaliser are changed, its optimiser is
+            not.
         settings: Of the training.
-        encoding: What the model is given of an observation.
-        expert: Whom to copy.
-        statistics: Of the inputs; those of the expert's round are added.
-        report: Told after each round: its number, how many there are, mean squared error.
+        encoding: Which inputs the model reads from an observation.
+        expert: The policy to copy.
+        statistics: Input statistics; those of the first round are added.
+        report: Called after each round with its number, the number of rounds and the mean squared
+            error.
     """
     policy: Any = model.policy
     generator = np.random.default_rng(settings.seed)
     optimiser = torch.optim.Adam(policy.parameters(), lr=_LEARNING_RATE)
-    rounds: list[_Round] = []
+    rounds = []
     total = settings.imitate_rounds
     for k in range(total):
         share = 1.0 - k / max(1, total - 1)
         scenarios = settings.scenarios
         worlds = max(1, WORLDS // len(scenarios))
         played = [
-            _play(
+            play_round(
                 policy, settings, encoding, expert, scenario, generator, share, worlds,
                 FIRST_WORLD + (k * len(scenarios) + s) * worlds,
             )
@@ -101,7 +85,7 @@ def imitate(
 
 
 def _passes(rows: int) -> int:
-    """Return how often to go through the data of a round."""
+    """Return the number of passes over a round's data."""
     return -(-_GRADIENTS // -(-rows // _MINIBATCH))
 
 
@@ -113,7 +97,7 @@ def _fit(
     targets: torch.Tensor,
     error_of: Callable[[Any, torch.Tensor, torch.Tensor], torch.Tensor],
 ) -> float:
-    """Go through the data once in a random order; return the mean error."""
+    """Make one pass over the data in random order; return the mean error."""
     order = torch.from_numpy(generator.permutation(len(inputs)))
     total = 0.0
     for rows in torch.split(order, _MINIBATCH):
@@ -133,76 +117,3 @@ def _action_error(policy: Any, inputs: torch.Tensor, actions: torch.Tensor) -> t
 
 def _value_error(policy: Any, inputs: torch.Tensor, returns: torch.Tensor) -> torch.Tensor:
     return torch.nn.functional.mse_loss(policy.predict_values(inputs).flatten(), returns)
-
-
-def _play(
-    policy: Any,
-    settings: TrainSettings,
-    encoding: Encoding,
-    expert: Policy,
-    scenario: Scenario,
-    generator: np.random.Generator,
-    share: float,
-    worlds: int,
-    first_world: int,
-) -> _Round:
-    """Play one episode in each world, the expert driving in a share of them."""
-    parts = 2 + settings.message_size
-    longest = max(settings.message_size, expert.message_size)
-    batch = posse.Batch(
-        scenario.replace(message_size=longest),
-        worlds,
-        seed=settings.seed,
-        first_world=first_world,
-    )
-    state = None
-    if settings.algorithm == "mappo":
-        # Room for as much as the model's own worlds have.
-        state = StateWriter(
-            batch,
-            max(s.num_trackers for s in settings.scenarios),
-            max(s.num_obstacles for s in settings.scenarios),
-        )
-    encoder = Encoder(encoding, batch.layout)
-    size = encoding.size + (state.size if state else 0)
-    driven = generator.random(worlds) < share
-    observations = batch.reset()
-    memory = begin(expert, batch)
-    trackers = scenario.num_trackers
-    inputs, chosen, rewards = [], [], []
-    for _ in range(scenario.horizon):
-        x = np.empty((worlds * trackers, size), np.float32)
-        encoder.encode(observations, x)
-        if state:
-            state.write(x[:, encoding.size :])
-        wanted, memory = expert.act(observations, memory)
-        actions = wanted.copy()
-        if not driven.all():
-            with torch.no_grad():
-                own = policy._predict(torch.from_numpy(x), deterministic=False).numpy()
-            own = own.reshape(worlds, trackers, parts)[~driven]
-            actions[~driven, :, :parts] = np.clip(own, -1, 1)
-            # The expert's messages go on: it is asked what it would do in a team of its own kind.
-            said = expert.message_size
-            actions[~driven, :, 2 : 2 + said] = wanted[~driven, :, 2 : 2 + said]
-        observations, reward, terminated, truncated, _ = batch.step(actions)
-        inputs.append(x)
-        chosen.append(wanted[:, :, :parts].reshape(-1, parts))
-        rewards.append(reward)
-        if (terminated | truncated).all():
-            break
-    steps = len(inputs)
-    returns = np.zeros((steps, worlds * trackers), np.float32)
-    ahead: npt.NDArray[np.float32] = np.zeros(worlds * trackers, np.float32)
-    for t in reversed(range(steps)):
-        ahead = rewards[t].reshape(-1) + np.float32(settings.discount) * ahead
-        returns[t] = ahead
-    complete = int(steps - _SETTLED / max(1e-3, 1 - settings.discount))
-    kept = inputs[::_EVERY]
-    known = max(0, -(-complete // _EVERY))
-    return _Round(
-        np.concatenate(kept),
-        np.concatenate(chosen[::_EVERY]),
-        np.concatenate([*kept[:known], np.empty((0, size), np.float32)]),
-        returns[::_EVERY][:known].reshape(-1),
-    )

@@ -1,8 +1,8 @@
-"""Inputs brought to mean 0 and deviation 1, by statistics that travel with the policy as numbers.
+"""Input normalisation to mean 0 and deviation 1.
 
-The statistics are buffers of a layer inside the policy. So replay buffers and rollouts hold the
-observations themselves, a policy is never separated from its statistics, and they change only
-between rollouts: a rollout is learned from with the very numbers that it was played with.
+The statistics are buffers of a layer inside the policy: rollouts and replay buffers store raw
+observations, a policy is never separated from its statistics, and the statistics change only
+between rollouts, so that a rollout is learned from with the statistics it was played with.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn
 
 LIMIT: Final = 10.0
-"""Greatest absolute value of a normalised input."""
+"""Largest absolute value of a normalised input."""
 _LEAST_DEVIATION: Final = 1e-3
 _REMEMBERED: Final = 2_000_000.0
-"""Rows after which the newest begin to outweigh the oldest."""
+"""Largest count: from there on, new rows weigh more than old ones."""
 
 
 class Normaliser(BaseFeaturesExtractor):
-    """x → clip((x - mean) * scale, ±limit), the statistics being buffers."""
+    """A layer: x → clip((x - mean) * scale, ±LIMIT); mean and scale are buffers."""
 
     mean: torch.Tensor
     scale: torch.Tensor
@@ -41,7 +41,7 @@ class Normaliser(BaseFeaturesExtractor):
 
 
 class RunningStatistics:
-    """Mean and deviation of all rows that were added, (size,) each."""
+    """Running mean and variance of rows, (size,) each, in float64."""
 
     def __init__(self, size: int) -> None:
         self.count = 0.0
@@ -49,7 +49,7 @@ class RunningStatistics:
         self.variance = np.ones(size)
 
     def add(self, rows: npt.NDArray[np.float32]) -> None:
-        """Take account of rows (..., size)."""
+        """Add rows (..., size) to the statistics."""
         flat = rows.reshape(-1, rows.shape[-1])
         count = len(flat)
         mean = flat.mean(axis=0, dtype=np.float64)
@@ -64,7 +64,7 @@ class RunningStatistics:
 
     @property
     def scale(self) -> npt.NDArray[np.float64]:
-        """What a difference from the mean is multiplied by, (size,); 0 where nothing varies."""
+        """1 / deviation, (size,); 0 for inputs that do not vary."""
         deviation = np.sqrt(self.variance)
         return np.where(deviation < _LEAST_DEVIATION, 0.0, 1 / np.maximum(deviation, 1e-12))
 
@@ -81,6 +81,6 @@ class RunningStatistics:
         return {"count": np.array([self.count]), "mean": self.mean, "variance": self.variance}
 
     def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
-        """Take the statistics of :meth:`save`."""
+        """Set the statistics to those of :meth:`save`."""
         self.count = float(saved["count"][0])
         self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()

@@ -1,7 +1,7 @@
-"""The state of a world as a centralized critic reads it: what is true, whoever may know it.
+"""The state of a world as a centralized critic reads it, whatever the trackers can observe.
 
-Everything is in the slot frame of the target (ahead, left), so that where on the plane it happens
-does not matter. The tracker whose value is asked for comes first, the others follow by number.
+All vectors are in the target's slot frame (ahead, left), so that the state does not depend on the
+position in the plane. The tracker whose value is estimated comes first, the others by number.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from posse import Batch
 from posse.numeric import FloatArray, Records, kernel
 from posse.rules.score import place
-from posse.rules.state import NEVER
+from posse.rules.state import NEVER, config_record
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -70,13 +70,11 @@ class StateWriter:
 
     Args:
         batch: The worlds.
-        places: Trackers that the state has room for.
-        obstacles: Obstacles that it has room for.
+        places: Number of trackers in a state; missing ones are zeros.
+        obstacles: Number of obstacles in a state; missing ones are zeros.
     """
 
     def __init__(self, batch: Batch, places: int, obstacles: int) -> None:
-        from posse.rules.state import config_record
-
         self._batch = batch
         self._config = config_record(batch.scenario)
         self._places = places

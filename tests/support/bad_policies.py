@@ -1,0 +1,111 @@
+"""Policies that fail in every way that a policy can."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+import posse
+from posse_baselines import BasePolicy
+
+
+class _Still(BasePolicy):
+    """Moves nobody."""
+
+    name = "still"
+
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        worlds, trackers = observations.shape[:2]
+        width = 2 + memory.scenario.message_size
+        return np.zeros((worlds, trackers, width), np.float32), memory
+
+
+class Still(_Still):
+    """Nothing is wrong with this one."""
+
+
+class Raises(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        raise ZeroDivisionError("[bold]by zero[/bold]")
+
+
+class RaisesUnpicklable(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        class LocalError(Exception):
+            def __reduce__(self) -> Any:
+                raise TypeError("never pickled")
+
+        raise LocalError("local")
+
+
+class Nan(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        actions, memory = super().act(observations, memory)
+        return actions * np.float32(np.nan), memory
+
+
+class WrongShape(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        actions, memory = super().act(observations, memory)
+        return actions[:, :1], memory
+
+
+class NoActions(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        return None, memory
+
+
+class Sleeps(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        while True:
+            time.sleep(1)
+
+
+class SleepsInC(_Still):
+    """Hangs outside the interpreter and with its lock, so that no thread could stop it."""
+
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        ctypes.PyDLL(None).sleep(600)
+        raise AssertionError
+
+
+class Slow(_Still):
+    """Never hangs in a step, but takes too long for all of them."""
+
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        time.sleep(0.3)
+        return super().act(observations, memory)
+
+
+class Exits(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        sys.exit(0)
+
+
+class Crashes(_Still):
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        os._exit(9)
+
+
+class FailsOnSmart(_Still):
+    """Fails in one scenario only."""
+
+    def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
+        if layout.scenario.name == "smart":
+            raise RuntimeError("not this one")
+        return super().begin(layout, num_worlds)
+
+
+class HangsOnLoad(_Still):
+    def __init__(self) -> None:
+        time.sleep(600)
+
+
+class RaisesOnLoad(_Still):
+    def __init__(self) -> None:
+        raise LookupError("no weights")

@@ -1,0 +1,72 @@
+"""Trainings of a second, and what they leave."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from safetensors.numpy import load_file
+
+from posse_training.runs import TrainSettings
+from posse_training.runs.checkpoint import read_checkpoint
+
+HORIZON = 40
+ALGORITHMS = ("ppo", "mappo", "sac", "td3")
+
+
+def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:
+    """Settings of a training that takes a second."""
+    settings = TrainSettings(
+        scenario="constant",
+        algorithm=algorithm,  # type: ignore[arg-type]
+        steps=1280,
+        seed=3,
+        folder=folder,
+        num_worlds=4,
+        team_sizes=(2,),
+        overrides={"horizon": HORIZON, "settle_time": 1.0},
+        hidden=(16, 16),
+        minibatch=64,
+        rollout=20,
+        epochs=2,
+        replay=2000,
+        learning_starts=80,
+        gradients=1,
+        evaluate_every=640,
+        evaluate_worlds=3,
+        beside=None,
+        checkpoint_every=320,
+        tensorboard=False,
+    )
+    return replace(settings, **changes)
+
+
+def quiet() -> Console:
+    return Console(file=StringIO())
+
+
+def numbers(folder: Path) -> dict[str, Any]:
+    """Everything that a finished training leaves, but the time it took."""
+    arrays, state = read_checkpoint(folder)
+    state.pop("seconds")
+    for point in state["curve"]:
+        point.pop("seconds")
+    return {"arrays": arrays, "state": state, "last": load_file(folder / "last.safetensors")}
+
+
+def assert_equal(mine: dict[str, Any], theirs: dict[str, Any]) -> None:
+    assert mine["state"] == theirs["state"]
+    for part in ("arrays", "last"):
+        assert set(mine[part]) == set(theirs[part])
+        for name, array in mine[part].items():
+            assert array.tobytes() == theirs[part][name].tobytes(), name
+
+
+ADVISED: dict[str, Any] = {
+    "scenario": "field",
+    "advise": "ddcs-distributed",
+    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
+}

@@ -1,0 +1,73 @@
+"""``posse train``: train a team, or resume a training run."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from posse_training.errors import require
+from posse_training.runs.defaults import default_settings
+from posse_training.runs.settings import TrainSettings
+
+_NEEDED = ("training", "torch", "stable_baselines3")
+
+
+@dataclass(frozen=True)
+class _Which:
+    """The settings that the defaults of all others depend on."""
+
+    scenario: str = "smart"
+    algorithm: str = "ppo"
+
+
+@dataclass(frozen=True)
+class _Resume:
+    """Resume a training run."""
+
+    resume: Path
+    """Run folder."""
+    steps: int | None = None
+    """Total steps to train for; default: as the run was started with."""
+    trust_code: bool = False
+    """Import policies that the folder's settings.json names as package.module:Class."""
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Train a team, or resume a training run: ``posse train --resume DIR``."""
+    if any(a == "--resume" or a.startswith("--resume=") for a in arguments):
+        which = tyro.cli(_Resume, prog="posse train", args=arguments)
+        require(*_NEEDED)
+        from posse_training.runs.train import resume
+
+        with _how_to_resume(which.resume):
+            print(resume(which.resume, steps=which.steps, trust_code=which.trust_code))
+        return
+    asked = [a for a in arguments if a not in ("-h", "--help")]
+    some, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
+    settings = tyro.cli(
+        TrainSettings,
+        prog="posse train",
+        description="Train a team. To resume a run: posse train --resume DIR",
+        default=default_settings(some.scenario, some.algorithm),
+        args=arguments,
+    )
+    require(*_NEEDED)
+    from posse_training.runs.train import train
+
+    with _how_to_resume(settings.run_folder):
+        print(train(settings))
+
+
+@contextmanager
+def _how_to_resume(folder: Path) -> Iterator[None]:
+    """Print how to resume a run that the user interrupts."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(f"\nto resume: posse train --resume {folder}", file=sys.stderr)
+        raise

@@ -1,0 +1,57 @@
+"""Errors whose message is for the user: it names the value, what is allowed and the fix."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Final
+
+
+class SettingsError(ValueError):
+    """An invalid setting of a command."""
+
+
+class RunFolderError(RuntimeError):
+    """A run folder that cannot be used; the message says why and what to do."""
+
+
+class CheckpointError(RuntimeError):
+    """A checkpoint that cannot be written or read."""
+
+
+class ComparisonError(RuntimeError):
+    """A comparison that cannot be written to its folder; the message says why and what to do."""
+
+
+class TrainedSplitError(ValueError):
+    """An evaluation on worlds that the policy was trained on."""
+
+
+class TimeLimitError(RuntimeError):
+    """An evaluation that exceeded its time limit."""
+
+
+class MissingExtraError(ImportError):
+    """A package that only an extra installs; the message says which."""
+
+
+OWN: Final = (
+    SettingsError, RunFolderError, CheckpointError, ComparisonError, TrainedSplitError,
+    TimeLimitError, MissingExtraError,
+)  # fmt: skip
+"""All errors of this module."""
+
+
+def require(extra: str, *packages: str) -> None:
+    """Import packages that an extra installs.
+
+    Raises:
+        MissingExtraError: One of them is not installed, or cannot be imported.
+    """
+    for package in packages:
+        try:
+            importlib.import_module(package)
+        except ImportError as error:
+            raise MissingExtraError(
+                f"{package} cannot be imported ({error}). Install what this needs: "
+                f"pip install 'posse[{extra}]'"
+            ) from error

@@ -1,0 +1,59 @@
+"""Folders that one process at a time may write to."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Final
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+LOCK: Final = "lock"
+"""Name of the lock file in a folder."""
+
+
+class InUseError(RuntimeError):
+    """A folder that another process holds.
+
+    Attributes:
+        holder: The process number, or "another process".
+    """
+
+    def __init__(self, folder: Path, holder: str) -> None:
+        super().__init__(f"{folder} is in use by process {holder}")
+        self.holder = holder
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder, made if missing: no other process can hold it meanwhile.
+
+    The operating system releases the lock when the process ends, however it ends.
+
+    Raises:
+        InUseError: Another process holds it.
+        OSError: The folder cannot be written to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / LOCK).open("a+", encoding="utf-8") as file:
+        _hold(file, folder)
+        file.seek(0)
+        file.truncate()
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+        yield
+
+
+def _hold(file: IO[str], folder: Path) -> None:
+    if fcntl is None:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        file.seek(0)
+        raise InUseError(folder, file.read().strip() or "another process") from error

@@ -1,0 +1,97 @@
+"""What a comparison found: estimates, their table and their summary."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.table import Table
+from rich.text import Text
+
+from posse_training.reports.plays import Plays
+from posse_training.reports.statistics import Estimate
+from posse_training.reports.sweeps import Point
+
+
+@dataclass
+class Comparison:
+    """Everything that was played, and who could not play what."""
+
+    reference: str
+    """The policy that differences are to."""
+    plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
+    """By scenario and policy."""
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    """The estimates of each, and the files of its rows."""
+    left_out: list[dict[str, str]] = field(default_factory=list)
+    """Policies that do not fit: ``policy``, ``what`` they cannot play, and ``why``."""
+    failed: list[dict[str, str]] = field(default_factory=list)
+    """Policies that raised, returned invalid actions, crashed or exceeded the time limit."""
+    points: list[Point] = field(default_factory=list)
+    """Of the sweeps."""
+    figures: list[Path] = field(default_factory=list)
+    """The files that were drawn."""
+
+
+class _Worlds(Protocol):
+    """Which worlds were played."""
+
+    @property
+    def seed(self) -> int: ...
+    @property
+    def split(self) -> str: ...
+    @property
+    def episodes(self) -> int: ...
+
+
+def summary(plays: Plays, reference: Plays | None) -> dict[str, Estimate | int | None]:
+    """Return the estimates of one policy on one scenario; differences are to the reference."""
+    return {
+        "seeds": len(plays.results),
+        "score": plays.mean("score"),
+        "interquartile_mean": plays.interquartile_mean("score"),
+        "bound": plays.mean("bound"),
+        "settled": plays.share([result.settled for result in plays.results]),
+        "no_contact": plays.share([result.contacts == 0 for result in plays.results]),
+        "difference": None if reference is None else plays.difference(reference),
+        "improvement": None if reference is None else plays.improvement(reference),
+    }
+
+
+def write_summary(found: Comparison, path: Path, worlds: _Worlds) -> None:
+    """Write all estimates as JSON."""
+    rows = [
+        {k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()}
+        for row in found.rows
+    ]
+    whole = {
+        "seed": worlds.seed,
+        "split": worlds.split,
+        "episodes": worlds.episodes,
+        "comparison": rows,
+        "left_out": found.left_out,
+        "failed": found.failed,
+    }
+    path.write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
+
+
+def table(found: Comparison, worlds: _Worlds) -> Table:
+    """Return the estimates as a table."""
+    shown = Table(
+        title=Text(
+            f"{worlds.episodes:,} worlds each, split {worlds.split}, seed {worlds.seed}; "
+            f"95 % intervals; differences to {found.reference}, paired by world"
+        )
+    )
+    columns = ("score", "settled", "no_contact", "difference", "improvement")
+    for column in ("scenario", "policy"):
+        shown.add_column(column, overflow="fold", min_width=len(column) + 2)
+    for column in columns:
+        shown.add_column(column.replace("_", " "))
+    for row in found.rows:
+        cells = [str(row[column]) if row[column] is not None else "" for column in columns]
+        many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
+        shown.add_row(Text(row["scenario"]), Text(row["policy"] + many), *map(Text, cells))
+    return shown

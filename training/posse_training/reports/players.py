@@ -1,0 +1,157 @@
+"""Play contenders such that the failure of one costs only its own rows.
+
+Policies that ship and policy files are played in this process. A ``package.module:Class`` is code
+that may hang or crash: it is loaded and played in a process of its own, which is ended when it
+exceeds the time limit.
+"""
+
+from __future__ import annotations
+
+import traceback
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import posse
+import posse_baselines
+import posse_training
+from posse import Scenario
+from posse_baselines import PolicyError
+from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
+from posse_training.reports.contenders import Contender
+from posse_training.reports.evaluation import evaluate, progress_bar
+from posse_training.reports.plays import Plays
+from posse_training.reports.results import Results
+from posse_training.reports.worker import Worker
+
+_OURS: Final = tuple(
+    str(Path(module.__file__ or "").parent) for module in (posse, posse_baselines, posse_training)
+)
+_LONGEST: Final = 300  # characters of an error in a summary
+
+
+class PlayError(RuntimeError):
+    """A policy that raised, returned invalid actions, exceeded the time limit or crashed."""
+
+
+class Players:
+    """Plays contenders; a context manager that ends the process of code policies.
+
+    Args:
+        time_limit: Time for all episodes of one policy on one scenario, s.
+    """
+
+    def __init__(self, time_limit: float) -> None:
+        self._limit = time_limit
+        self._worker = Worker()
+        self._ended: dict[str, str] = {}
+
+    def __enter__(self) -> Players:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._worker.end()
+
+    def check(self, contender: Contender) -> None:
+        """Load the code policies of a contender.
+
+        Raises:
+            PolicyError: One cannot be loaded within the time limit.
+        """
+        for policy in contender.policies:
+            if isinstance(policy, str):
+                try:
+                    self._worker.call(_check, (policy,), self._limit)
+                except (TimeLimitError, EOFError) as error:
+                    raise PolicyError(f"{policy!r} cannot be loaded: {error}") from error
+
+    def play(
+        self, contender: Contender, scenario: Scenario, episodes: int, seed: int, split: str
+    ) -> Plays:
+        """Play the same worlds with every policy of a contender.
+
+        Raises:
+            PolicyError: A policy does not fit the scenario.
+            PlayError: A policy failed, or was ended by the time limit before.
+        """
+        if contender.label in self._ended:
+            raise PlayError(self._ended[contender.label])
+        results = []
+        for policy in contender.policies:
+            try:
+                if isinstance(policy, str):
+                    results.append(self._elsewhere(policy, scenario, episodes, seed, split))
+                else:
+                    results.append(
+                        evaluate(
+                            policy, scenario, episodes, seed, split=split, time_limit=self._limit
+                        )
+                    )
+            except (PolicyError, SettingsError, TrainedSplitError):
+                raise
+            except EOFError as error:
+                raise PlayError(str(error)) from error
+            except TimeLimitError as error:
+                # The next scenario would most likely take as long.
+                self._ended[contender.label] = f"not played: on {scenario.name} {error}"
+                raise PlayError(str(error)) from error
+            except Exception as error:
+                raise PlayError(describe(error)) from error
+        return Plays(contender.label, tuple(results))
+
+    def _elsewhere(
+        self, policy: str, scenario: Scenario, episodes: int, seed: int, split: str
+    ) -> Results:
+        """Play a code policy in the worker's process."""
+        with progress_bar() as bar:
+            task = bar.add_task(f"{policy} on {scenario.name}", total=None)
+            found = self._worker.call(
+                _evaluate, (policy, scenario, episodes, seed, split, self._limit), self._limit,
+                lambda steps: bar.advance(task, steps),
+            )  # fmt: skip
+        assert isinstance(found, Results)
+        return found
+
+
+def _check(report: Any, policy: str) -> None:
+    """Load a policy in the worker's process."""
+    try:
+        posse_baselines.load(policy)
+    except PolicyError as error:
+        raise PolicyError(str(error)) from None  # without what may not survive pickling
+
+
+def _evaluate(
+    report: Any, policy: str, scenario: Scenario, episodes: int, seed: int, split: str, limit: float
+) -> Results:
+    """Evaluate in the worker's process."""
+    try:
+        return evaluate(
+            policy, scenario, episodes, seed, split=split, progress=report, time_limit=limit
+        )
+    except TimeLimitError:
+        raise
+    except PolicyError as error:
+        raise PolicyError(str(error)) from None  # a subclass may not survive pickling
+    except Exception as error:
+        raise PlayError(describe(error)) from None
+
+
+def describe(error: BaseException) -> str:
+    """Return an error in one line: its message, and where in the policy's code it was raised."""
+    if isinstance(error, PlayError):
+        return str(error)
+    message = " ".join(str(error).split())
+    if len(message) > _LONGEST:
+        message = f"{message[:_LONGEST]}..."
+    where = ""
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        if not frame.filename.startswith(_OURS):
+            where = f" ({frame.filename}, line {frame.lineno})"
+            break
+    return f"{type(error).__name__}: {message}{where}"

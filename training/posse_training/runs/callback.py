@@ -1,0 +1,198 @@
+"""What a run does between rollouts: statistics, evaluations on validation worlds, checkpoints."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+
+from posse_baselines.learned import LearnedPolicy
+from posse_baselines.learned.policy_file import write_atomically
+from posse_training.errors import CheckpointError
+from posse_training.runs.checkpoint import Arrays, write_checkpoint
+from posse_training.runs.display import Display
+from posse_training.runs.export import export, make_card
+from posse_training.runs.folder import BEST, CURVE, LAST
+from posse_training.runs.model_state import (
+    model_state,
+    random_state,
+    restore_model,
+    restore_random_state,
+)
+from posse_training.runs.models import make_adviser
+from posse_training.runs.settings import TrainSettings
+from posse_training.runs.validation import validate
+from posse_training.sb3.normalisation import RunningStatistics
+from posse_training.sb3.vec_env import TeamVecEnv
+
+_STATISTICS_EVERY: Final = 8  # one step of a rollout in so many is added to the statistics
+
+
+class TrainingCallback(BaseCallback):
+    """Statistics, evaluations and checkpoints of a run.
+
+    All of it happens between rollouts, where a run can be interrupted and resumed.
+
+    Args:
+        settings: Of the run.
+        folder: Its folder.
+        env: Its worlds.
+        model: Its model.
+        statistics: Input statistics, applied to the model between rollouts.
+        display: Shows progress.
+
+    Attributes:
+        curve: One point for each evaluation: steps, seconds, score and its interval.
+    """
+
+    def __init__(
+        self,
+        settings: TrainSettings,
+        folder: Path,
+        env: TeamVecEnv,
+        model: BaseAlgorithm,
+        statistics: RunningStatistics,
+        display: Display,
+    ) -> None:
+        super().__init__()
+        self.settings = settings
+        self.folder = folder
+        self.env = env
+        self.model = model
+        self.statistics = statistics
+        self.display = display
+        self.curve: list[dict[str, float]] = []
+        self._seconds_before = 0.0
+        self._started = time.monotonic()
+        # A copy or an adviser may already be better than what a short run makes of it.
+        warm = settings.imitate is not None or settings.advise is not None
+        self._next_evaluation = 0 if warm else settings.evaluate_every
+        self._next_checkpoint = 0
+        self._rollouts = 0
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        buffer = getattr(self.model, "rollout_buffer", None)
+        if buffer is not None:
+            self.statistics.add(buffer.observations[::_STATISTICS_EVERY])
+        elif self._rollouts % _STATISTICS_EVERY == 0:
+            self.statistics.add(np.asarray(self.model._last_obs))
+        self._rollouts += 1
+
+    def _on_rollout_start(self) -> None:
+        if self.settings.on_policy or self._rollouts % 100 == 0:
+            self.statistics.apply(self.model.policy)
+        steps = self.model.num_timesteps
+        if steps >= self._next_evaluation:
+            self._next_evaluation = steps - steps % self.settings.evaluate_every
+            self._next_evaluation += self.settings.evaluate_every
+            self._evaluate()
+        if steps >= self._next_checkpoint:
+            self._next_checkpoint = steps + self.settings.checkpoint_every
+            self._checkpoint()
+        self.display.progress(steps, self._training_score())
+
+    def _training_score(self) -> float | None:
+        episodes = self.model.ep_info_buffer or ()
+        return float(np.mean([e["score"] for e in episodes])) if episodes else None
+
+    def _policy(self) -> LearnedPolicy:
+        card = make_card(
+            self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.curve
+        )
+        return export(self.model, self.env.encoding, card, make_adviser(self.settings))
+
+    def _seconds(self) -> float:
+        return self._seconds_before + time.monotonic() - self._started
+
+    def _evaluate(self) -> None:
+        """Evaluate on the validation worlds; keep the policy if it is the best so far."""
+        point = {
+            "steps": float(self.model.num_timesteps),
+            "seconds": self._seconds(),
+            **validate(self.settings, self._policy()),
+        }
+        best = max((p["score"] for p in self.curve), default=-1.0)
+        self.curve.append(point)
+        self._write(BEST if point["score"] > best else None)
+        self.model.logger.record("validation/score", point["score"])
+        self.display.progress(self.model.num_timesteps, self._training_score())
+        self.display.evaluated(point)
+
+    def _write(self, name: str | None) -> None:
+        """Write the curve, and the policy under a name if there is one."""
+        text = io.StringIO()
+        writer = csv.DictWriter(text, ["steps", "seconds", "score", "low", "high"])
+        writer.writeheader()
+        writer.writerows(self.curve)
+        try:
+            write_atomically(self.folder / CURVE, text.getvalue().encode())
+            if name is not None:
+                self._policy().save(self.folder / name)
+        except OSError as error:
+            raise CheckpointError(
+                f"cannot write to {self.folder}: {error.strerror or error}. Make room, then resume "
+                f"with: posse train --resume {self.folder}"
+            ) from error
+
+    def _checkpoint(self) -> None:
+        arrays: Arrays = {}
+        state: dict[str, Any] = {
+            "curve": self.curve,
+            "seconds": self._seconds(),
+            "next_evaluation": self._next_evaluation,
+            "next_checkpoint": self._next_checkpoint,
+            "rollouts": self._rollouts,
+        }
+        for name, (part, values) in {
+            "model": model_state(self.model),
+            "random": random_state(),
+            "worlds": (self.env.save(), {}),
+            "statistics": (self.statistics.save(), {}),
+        }.items():
+            state[name] = values
+            arrays |= {f"{name}/{key}": array for key, array in part.items()}
+        write_checkpoint(self.folder, arrays, state)
+
+    def restore(self, arrays: Arrays, state: dict[str, Any]) -> None:
+        """Go back to where a checkpoint was written.
+
+        Raises:
+            CheckpointError: The checkpoint does not fit the settings.
+        """
+
+        def part(name: str) -> Arrays:
+            start = f"{name}/"
+            return {k.removeprefix(start): a for k, a in arrays.items() if k.startswith(start)}
+
+        try:
+            self.env.restore(part("worlds"))
+            self.statistics.restore(part("statistics"))
+            restore_model(self.model, part("model"), state["model"])
+            restore_random_state(part("random"), state["random"])
+            self.curve = list(state["curve"])
+            self._seconds_before = float(state["seconds"])
+            self._next_evaluation = int(state["next_evaluation"])
+            self._next_checkpoint = int(state["next_checkpoint"])
+            self._rollouts = int(state["rollouts"])
+        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise CheckpointError(
+                f"the checkpoint in {self.folder} does not fit its settings: {error}. Restore "
+                "settings.json, or start the training again in another --folder"
+            ) from error
+
+    def finish(self) -> None:
+        """Evaluate once more, and write the last policy and checkpoint."""
+        self.statistics.apply(self.model.policy)
+        if not self.curve or self.curve[-1]["steps"] < self.model.num_timesteps:
+            self._evaluate()
+        self._write(LAST)
+        self._checkpoint()

@@ -1,0 +1,45 @@
+"""Default settings of a training run, by scenario and algorithm."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from typing import Any
+
+from posse_training.errors import SettingsError
+from posse_training.runs.ranges import ALGORITHMS
+from posse_training.runs.settings import TrainSettings
+
+
+def default_settings(
+    scenario: str = "smart", algorithm: str = "ppo", *, own: bool = True
+) -> TrainSettings:
+    """Return the default settings of a scenario.
+
+    They are kept in ``posse_training/defaults``, one file for each scenario; ``all.toml`` holds
+    for every scenario. In each, the table ``all`` holds for every algorithm, the others for one.
+
+    Args:
+        scenario: A scenario's name, or several separated by commas.
+        algorithm: One of the algorithms.
+        own: Whether to apply the scenario's own file.
+
+    Raises:
+        SettingsError: An unknown algorithm, or an invalid default.
+    """
+    if algorithm not in ALGORITHMS:
+        raise SettingsError(
+            f"unknown algorithm {algorithm!r:.80}; algorithms are: {', '.join(ALGORITHMS)}"
+        )
+    values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
+    folder = resources.files("posse_training") / "defaults"
+    files = [folder / "all.toml"]
+    if "," in scenario:
+        files += [folder / "mixture.toml"] if own else []
+    elif own and scenario in {file.name.removesuffix(".toml") for file in folder.iterdir()}:
+        files.append(folder / f"{scenario}.toml")
+    for file in files:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        for table in ("all", algorithm):
+            values.update(tables.get(table, {}))
+    return TrainSettings.from_dict(values)

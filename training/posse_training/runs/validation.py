@@ -1,0 +1,66 @@
+"""What a run is judged and normalised by: validation scores and first input statistics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from posse_baselines import load
+from posse_baselines.policy import PolicyError
+from posse_training.reports.evaluation import evaluate
+from posse_training.reports.statistics import mean
+from posse_training.runs.display import Display
+from posse_training.runs.models import make_env
+from posse_training.runs.settings import TrainSettings
+from posse_training.sb3.normalisation import RunningStatistics
+from posse_training.sb3.vec_env import TeamVecEnv
+
+VALIDATION_SEED: Final = 0
+_WARM_WORLDS: Final = 32
+_WARM_REACH: Final = 0.1  # of random outputs that are added to an adviser's proposals
+_HELD: Final = 20  # steps for which a random action is held, so that trackers move somewhere
+
+
+def first_statistics(
+    settings: TrainSettings, env: TeamVecEnv, statistics: RunningStatistics
+) -> None:
+    """Gather input statistics from one episode of random actions in a few worlds."""
+    few = replace(settings, num_worlds=max(_WARM_WORLDS, len(settings.scenarios)))
+    warm = make_env(few)
+    generator = np.random.default_rng(settings.seed)
+    statistics.add(warm.reset())
+    shape = (warm.num_envs, *warm.action_shape)
+    reach = 1.0 if settings.advise is None else _WARM_REACH
+    for step in range(max(batch.scenario.horizon for batch in warm.batches)):
+        if step % _HELD == 0:
+            actions = generator.uniform(-reach, reach, shape).astype(np.float32)
+        statistics.add(np.asarray(warm.step(actions)[0]))
+
+
+def score_beside(settings: TrainSettings, display: Display) -> float | None:
+    """Return the score of ``settings.beside`` on the validation worlds; ``None``: not available."""
+    if settings.beside is None:
+        return None
+    display.note(f"evaluating {settings.beside} on the validation worlds")
+    try:
+        return validate(settings, load(settings.beside))["score"]
+    except PolicyError as error:
+        display.note(f"no score of {settings.beside}: {error}")
+        return None
+
+
+def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
+    """Return a policy's mean score on the validation worlds, with its 95 % interval."""
+    scores = np.concatenate(
+        [
+            evaluate(
+                policy, scenario, settings.evaluate_worlds, VALIDATION_SEED,
+                split="validation", progress=False,
+            )["score"]
+            for scenario in settings.scenarios
+        ]
+    )  # fmt: skip
+    estimate = mean(scores)
+    return {"score": estimate.value, "low": estimate.low, "high": estimate.high}
