@@ -6,6 +6,7 @@ import ctypes
 import os
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,14 @@ class SleepsInC(_Still):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         ctypes.PyDLL(None).sleep(600)
         raise AssertionError
+
+
+class HangsWithPid(SleepsInC):
+    """Hangs, and says in which process."""
+
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
+        return super().act(observations, memory)
 
 
 class Slow(_Still):

@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 
 from posse_baselines import PolicyError
+from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.reports.compare import Settings, compare
 
+ROOT = Path(__file__).parents[3]
 BAD = "tests.support.bad_policies:"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """Compile what the time limits below are not meant for."""
+    for policy in ("idle", "pursuit"):
+        evaluate(policy, "constant", 2, progress=False)
 
 
 def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
@@ -56,14 +68,54 @@ def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
 
 def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     started = time.monotonic()
-    settings = settings_for(tmp_path, "Sleeps", "SleepsInC", "Slow", limit=6.0)
+    settings = settings_for(tmp_path, "Sleeps", "SleepsInC", "Slow", limit=4.0)
     found = compare(settings)
     assert time.monotonic() - started < 90
     assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
     assert len(found.failed) == 3
-    assert all("exceeded the time limit of 6 s" in row["why"] for row in found.failed)
+    assert all("exceeded the time limit of 4 s" in row["why"] for row in found.failed)
     with pytest.raises(PolicyError, match="HangsOnLoad' cannot be loaded: it exceeded the time"):
         compare(settings_for(tmp_path, "HangsOnLoad", limit=5.0))
+
+
+HANG = """
+import sys
+from pathlib import Path
+from posse_training.reports.compare import Settings, compare
+if __name__ == "__main__":
+    compare(Settings(("tests.support.bad_policies:HangsWithPid",), ("constant",), 1,
+                     out=Path(sys.argv[1], "out"), figures=False, time_limit=3.0))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_hanging_policy_does_not_outlive_a_killed_comparison(tmp_path: Path) -> None:
+    pid_file = tmp_path / "pid"
+    running = subprocess.Popen(
+        [sys.executable, "-c", HANG, str(tmp_path)],
+        env={**os.environ, "PID_FILE": str(pid_file), "PYTHONPATH": os.pathsep.join(sys.path)},
+        cwd=ROOT,
+    )
+    while not pid_file.exists() or not pid_file.read_text():
+        assert running.poll() is None
+        time.sleep(0.01)
+    running.kill()
+    running.wait()
+    pid = int(pid_file.read_text())
+    ends = time.monotonic() + 60
+    while alive(pid) and time.monotonic() < ends:
+        time.sleep(0.1)
+    assert not alive(pid)
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    stat = Path(f"/proc/{pid}/stat")
+    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
 
 
 def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
