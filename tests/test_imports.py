@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-LEARNING = {"posse_training", "sb3_contrib", "stable_baselines3", "tensordict", "torch", "torchrl"}
+LEARNING = {"posse_training", "stable_baselines3", "tensordict", "torch", "torchrl"}
 FORBIDDEN = {
     "envs/posse": LEARNING | {"matplotlib", "posse_baselines", "rich", "tyro"},
     "baselines/posse_baselines": LEARNING,

@@ -1,21 +1,10 @@
-"""Policies that play without torch: scripted ones, and shipped learned ones."""
+"""Policies that play without torch: scripted ones and shipped learned ones."""
 
 from __future__ import annotations
 
+from posse_baselines.playing import Played, play, rollout, split_agents, stack_agents
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
-from posse_baselines.policy import (
-    BasePolicy,
-    Memory,
-    Played,
-    Policy,
-    PolicyError,
-    StateReader,
-    begin,
-    play,
-    rollout,
-    split_agents,
-    stack_agents,
-)
+from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin
 from posse_baselines.registry import load, policy_names
 from posse_baselines.tracker_env import register
 from posse_baselines.tuning import Tunable

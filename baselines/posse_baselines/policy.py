@@ -1,20 +1,18 @@
-"""What a policy is, and how one is played: in a batch, or beside a PettingZoo environment.
+"""The interface of a policy.
 
 A policy drives the whole team, batch first (E worlds, N trackers, F numbers an observation, m
 numbers a message)::
 
     memory = policy.begin(batch.layout, batch.num_worlds)
     actions, memory = policy.act(observations, memory)      # (E, N, F) -> (E, N, 2 + m)
-    memory = policy.restart(memory, mask)                   # worlds whose episode begins anew
+    memory = policy.restart(memory, mask)                   # worlds whose episode restarts
 
-What a policy remembers is in ``memory`` alone: one policy object may play in any number of batches.
-The memory given to ``act`` or ``restart`` is used up: go on with the one that is returned.
+All that a policy remembers is in ``memory``: one policy object may play any number of batches. The
+memory passed to ``act`` or ``restart`` must not be used again; use the one that is returned.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -24,25 +22,25 @@ from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray
 
 Memory = Any
-"""What a policy remembers of its worlds; only the policy itself looks into it."""
+"""What a policy remembers of its worlds; opaque to all but the policy."""
 Annotations = dict[str, npt.NDArray[Any]]
-"""What trackers have in mind, by name, (E, N) or (E, N, k) each; for drawing and for tests."""
+"""Internal quantities of the trackers by name, (E, N) or (E, N, k), for drawing and tests."""
 
 
 class PolicyError(ValueError):
-    """A policy that cannot play in the place it was given."""
+    """A policy that is unknown, damaged, or does not fit the scenario."""
 
 
 @runtime_checkable
 class Policy(Protocol):
-    """Whatever drives a team of trackers.
+    """Drives a team of trackers.
 
     Attributes:
-        name: What results call it.
-        message_size: Numbers that it adds to each broadcast; the scenario's ``message_size`` has to
+        name: Its name in results.
+        message_size: Numbers that it adds to each broadcast; the scenario's ``message_size`` must
             be at least that.
-        reads_state: Whether it reads the state of the worlds, which no tracker could know. Such a
-            policy is a reference, and has to be shown the batch (:func:`begin` does so).
+        reads_state: Whether it reads the state of the worlds, which no tracker observes. Such a
+            policy is a reference, and needs access to the batch (:func:`begin` provides it).
     """
 
     name: str
@@ -62,11 +60,11 @@ class Policy(Protocol):
         ...
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with the worlds of a mask (E,) as :meth:`begin` made them."""
+        """Return the memory with the worlds of a mask (E,) reset to those of :meth:`begin`."""
         ...
 
     def annotations(self, memory: Memory) -> Annotations:
-        """Return what the trackers have in mind; empty where there is nothing to tell."""
+        """Return internal quantities of the trackers; empty if there are none."""
         ...
 
 
@@ -75,12 +73,12 @@ class StateReader(Policy, Protocol):
     """A policy that reads the state of the worlds."""
 
     def watch(self, batch: Batch) -> None:
-        """Take the batch whose state is to be read from now on."""
+        """Set the batch whose state is read from now on."""
         ...
 
 
 class BasePolicy:
-    """What most policies have in common: nothing to remember, nothing to say."""
+    """Defaults of most policies: no memory beyond the layout, no messages, no annotations."""
 
     name: str = ""
     message_size: int = 0
@@ -92,19 +90,19 @@ class BasePolicy:
         return layout
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with the worlds of a mask (E,) begun anew."""
+        """Return the memory with the worlds of a mask (E,) restarted."""
         return memory
 
     def annotations(self, memory: Memory) -> Annotations:
-        """Return what the trackers have in mind."""
+        """Return internal quantities of the trackers."""
         return {}
 
     def leaders(self, memory: Memory) -> npt.NDArray[Any] | None:
-        """Return whom each tracker follows, (E, N), -1 for nobody; ``None``: there is no lead."""
+        """Return the leader of each tracker, (E, N), -1: none; ``None``: no leaders."""
         return self.annotations(memory).get("leader")
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return what the policy remembers, as arrays (E, ...) by name that share its memory."""
+        """Return the memory as arrays (E, ...) by name; views, not copies."""
         return {}
 
     def __repr__(self) -> str:
@@ -112,12 +110,12 @@ class BasePolicy:
 
 
 def message_size_of(layout: ObservationLayout) -> int:
-    """Return m, how many numbers a policy may add to each broadcast."""
+    """Return m, the numbers that a policy may add to each broadcast."""
     return layout.scenario.message_size
 
 
 def check_fits(policy: Policy | BasePolicy, layout: ObservationLayout) -> None:
-    """Raise if a policy has more to say than the scenario's messages hold.
+    """Raise if a policy's messages are longer than the scenario's.
 
     Raises:
         PolicyError: ``message_size`` of the scenario is too small.
@@ -153,7 +151,7 @@ def check_observations(
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
-    """Return the memory of a policy for a batch; one that reads the state is shown the batch.
+    """Return the memory of a policy for a batch; one that reads the state is given the batch.
 
     Raises:
         PolicyError: The policy does not fit the batch.
@@ -161,111 +159,3 @@ def begin(policy: Policy, batch: Batch) -> Memory:
     if isinstance(policy, StateReader):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)
-
-
-# --- a batch -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Played:
-    """One control step that was played."""
-
-    actions: FloatArray
-    """(E, N, 2 + m), what the policy chose."""
-    observations: FloatArray
-    """(E, N, F), after the step."""
-    rewards: FloatArray
-    terminated: BoolArray
-    truncated: BoolArray
-    infos: dict[str, Any]
-    memory: Memory
-    """The policy's, before it acts on ``observations``."""
-
-
-def rollout(batch: Batch, policy: Policy, *, seed: int | None = None) -> Iterator[Played]:
-    """Reset a batch and play it without end, one :class:`Played` a control step.
-
-    With autoreset disabled it ends when every world has; otherwise the caller stops.
-
-    Raises:
-        PolicyError: The policy does not fit the batch, or the target is an agent, too.
-    """
-    if batch.scenario.num_agents != batch.scenario.num_trackers:
-        raise PolicyError(
-            f"the target of {batch.scenario.name!r} is an agent, and a policy drives trackers only"
-        )
-    memory = begin(policy, batch)
-    observations = batch.reset(seed=seed)
-    begins = np.zeros(batch.num_worlds, np.bool_)
-    while True:
-        actions, memory = policy.act(observations, memory)
-        observations, rewards, terminated, truncated, infos = batch.step(actions)
-        ended = terminated | truncated
-        # In the mode "next_step", the step after the end is what begins the next episode.
-        begins = begins if batch.autoreset == "next_step" else ended
-        if begins.any():
-            memory = policy.restart(memory, begins)
-        begins = ended
-        yield Played(actions, observations, rewards, terminated, truncated, infos, memory)
-        if batch.autoreset == "disabled" and ended.any():
-            if not ended.all():
-                raise PolicyError(
-                    "episodes of this batch end at different steps: play it with an autoreset mode"
-                )
-            return
-
-
-def play(
-    batch: Batch, policy: Policy, *, seed: int | None = None
-) -> dict[str, npt.NDArray[np.float64]]:
-    """Play one episode in every world and return its metrics by name, (E,) each.
-
-    Raises:
-        PolicyError: The policy does not fit the batch.
-    """
-    metrics: dict[str, npt.NDArray[np.float64]] = {}
-    waiting = np.ones(batch.num_worlds, np.bool_)
-    for step in rollout(batch, policy, seed=seed):
-        if "metrics" not in step.infos:
-            continue
-        ended = waiting & step.infos["_metrics"]
-        for name, values in step.infos["metrics"].items():
-            column = metrics.setdefault(name, np.full(batch.num_worlds, np.nan))
-            column[ended] = values[ended]
-        waiting &= ~ended
-        if not waiting.any():
-            break
-    return metrics
-
-
-# --- PettingZoo ----------------------------------------------------------------------------------
-
-
-def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
-    """Return the trackers' observations of a parallel environment as a batch of one, (1, N, F).
-
-    Trackers are taken by number, ``tracker_0`` first, whatever the order of the mapping; a target
-    that is an agent is left out.
-
-    Raises:
-        PolicyError: There is no tracker, or one is missing.
-    """
-    names = [name for name in observations if name.startswith("tracker_")]
-    wanted = [f"tracker_{i}" for i in range(len(names))]
-    if not names or set(names) != set(wanted):
-        raise PolicyError(
-            f"observations of {sorted(observations)} are not those of a team: "
-            "tracker_0, tracker_1, ... without a gap"
-        )
-    return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
-
-
-def split_agents(
-    actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]
-) -> dict[str, FloatArray]:
-    """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
-    return {
-        name: actions[0, int(name.removeprefix("tracker_"))]
-        for name in agents
-        if name.startswith("tracker_")
-    }

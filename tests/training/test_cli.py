@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,6 @@ from stable_baselines3 import PPO
 import posse
 import posse_baselines
 from posse_training.cli import COMMANDS, main
-from posse_training.errors import SettingsError
-from posse_training.runs import TrainSettings, default_settings
-from posse_training.runs.ranges import ALGORITHMS
 
 
 def test_listing_the_scenarios_does_not_load_torch() -> None:
@@ -105,34 +101,6 @@ def test_watch_writes_a_film(tmp_path: Path) -> None:
     options = ["--scenario", "paper-distributed", "--num-trackers", "2", "--gif", str(path)]
     assert main(["watch", "pursuit", *options]) == 0
     assert path.read_bytes()[:4] == b"GIF8"
-
-
-class TestSettings:
-    @pytest.mark.parametrize("algorithm", ALGORITHMS)
-    @pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio"])
-    def test_every_scenario_has_defaults(self, scenario: str, algorithm: str) -> None:
-        settings = default_settings(scenario, algorithm)
-        assert TrainSettings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
-
-    @pytest.mark.parametrize(
-        ("changes", "message"),
-        [
-            ({"steps": 0}, "steps=0 is invalid: it must be at least 1"),
-            ({"minibatch": 1}, "minibatch=1"),
-            ({"discount": 1.5}, "discount=1.5"),
-            ({"hidden": ()}, "hidden"),
-            ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
-            ({"imitate": "pursuit", "algorithm": "sac"}, "imitate"),
-            ({"learning_rate": float("nan")}, "learning_rate=nan"),
-        ],
-    )
-    def test_impossible_settings(self, changes: dict[str, Any], message: str) -> None:
-        with pytest.raises(SettingsError, match=message):
-            replace(TrainSettings(), **changes)
-
-    def test_unknown_settings(self) -> None:
-        with pytest.raises(SettingsError, match="unknown setting 'stepz'"):
-            TrainSettings.from_dict({"stepz": 3})
 
 
 @pytest.mark.parametrize("name", ["posse/Solo-v0", "posse/Tracker-v0"])

@@ -1,4 +1,4 @@
-"""``make demo``: a table of scores, a film of each target motion, and scripted against learned."""
+"""``make demo``: a table of scores, and a film of the best team for each target motion."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from rich.table import Table
 
 from posse import ObservationLayout, get_scenario
 from posse_baselines import Policy, load, policy_names
-from posse_training.reports.evaluation import Results, evaluate, progress_bar
+from posse_training.reports import Results, evaluate
+from posse_training.reports.evaluation import progress_bar
 from posse_training.reports.film import film
 from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")
 POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed")
 LEARNED: Final = "learned-smart"
-"""Plays on the target that it was trained on, if it is shipped."""
+"""Plays the scenario that it was trained on, if it is shipped."""
 UNCOMPILED: Final = ("random", "idle")
-"""Policies that have next to nothing to compile."""
+"""Policies that compile in no time."""
 EPISODES: Final = 500
 SEED: Final = 7
 FOLDER: Final = Path("runs/demo")
@@ -36,8 +37,8 @@ FOLDER: Final = Path("runs/demo")
 def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
     """Play every policy in every scenario, print the table, and film the best.
 
-    A second process compiles the policies while this one compiles the worlds, and films what has
-    been played while this one plays on.
+    A second process compiles the policies while this one compiles the worlds; then it renders the
+    films while this one plays.
 
     Args:
         episodes: Worlds for each policy and scenario.
@@ -76,16 +77,16 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
     console.print(table(results))
     for title, path in paths.items():
         console.print(f"{title}: {path}")
-    console.print(f"{time.perf_counter() - started:.0f} s in all")
+    console.print(f"total time: {time.perf_counter() - started:.0f} s")
 
 
 def _mute() -> None:
-    """Have the second process say nothing; what goes wrong there is raised here."""
-    sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (for as long as the process lives)
+    """Silence the second process; its errors are raised in this one."""
+    sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (open until the process ends)
 
 
 def compile_policies(policies: Sequence[Policy]) -> None:
-    """Have each policy act once, so that what it is compiled to is on disk."""
+    """Call each policy once, so that its compiled code is cached on disk."""
     for policy in policies:
         layout = ObservationLayout(get_scenario("smart", message_size=policy.message_size))
         observations = np.zeros((1, layout.scenario.num_trackers, layout.size), np.float32)
@@ -93,7 +94,7 @@ def compile_policies(policies: Sequence[Policy]) -> None:
 
 
 def shown(scenario: str, results: Mapping[tuple[str, str], Results]) -> list[str]:
-    """Return who is filmed: the best scripted team, beside it the learned one if it played."""
+    """Return the policies to film: the best scripted one, and the learned one if it played."""
     best = max(POLICIES, key=lambda name: results[scenario, name]["score"].mean())
     return [best, LEARNED] if (scenario, LEARNED) in results else [best]
 
@@ -103,7 +104,7 @@ def table(results: dict[tuple[str, str], Results]) -> Table:
     episodes = next(iter(results.values())).episodes
     made = Table(
         title=f"{episodes} worlds each, split test, seed {SEED}; 95 % intervals",
-        box=box.HORIZONTALS,  # no bars: they would cut off figures where a line has 80 characters
+        box=box.HORIZONTALS,  # no vertical bars: the figures need all of 80 characters
         collapse_padding=True,
         pad_edge=False,
     )

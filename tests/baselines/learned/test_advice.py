@@ -11,7 +11,7 @@ import posse
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.advice import Advice, advised, check_adviser
-from posse_baselines.policy import play
+from posse_baselines.playing import play
 
 DDCS = "ddcs-distributed"
 SAID = load(DDCS).message_size

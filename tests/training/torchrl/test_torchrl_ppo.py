@@ -10,8 +10,7 @@ import pytest
 import torch
 
 import posse
-from posse_training.torchrl.env import TRACKERS, PosseEnv
-from posse_training.torchrl.ppo import (
+from posse_training.torchrl.agent import (
     ACTION,
     DRAWN,
     OBSERVATION,
@@ -19,12 +18,9 @@ from posse_training.torchrl.ppo import (
     VALUE,
     Agent,
     RunningScale,
-    Settings,
-    objectives,
-    roll_out,
-    spread_flags,
-    train,
 )
+from posse_training.torchrl.env import TRACKERS, PosseEnv
+from posse_training.torchrl.ppo import Settings, objectives, roll_out, spread_flags, train
 
 SHORT: dict[str, Any] = {"horizon": 10, "settle_time": 0.5, "start_distance": (1.0, 2.5)}
 SMALL = Settings(num_worlds=16, rollout_steps=10, updates=2, minibatches=2, hidden=(8,))

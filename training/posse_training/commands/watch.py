@@ -9,6 +9,8 @@ from typing import Annotated
 
 import tyro
 
+from posse_training.errors import SettingsError
+
 
 @dataclass(frozen=True)
 class _Watch:
@@ -58,7 +60,10 @@ def main(arguments: Sequence[str]) -> None:
     for _ in range(settings.horizon):
         actions, memory = policy.act(observations, memory)
         observations, *_ = batch.step(actions)
-        renderer.draw(batch, annotations=policy.annotations(memory))
+        try:
+            renderer.draw(batch, annotations=policy.annotations(memory))
+        except RuntimeError as error:  # no window can be opened
+            raise SettingsError(f"{error}; or write a film: --gif film.gif") from error
         if renderer.closed:
             break
     renderer.close()

@@ -1,6 +1,6 @@
-"""Intervals around the numbers: every estimate is printed with how sure it is.
+"""Estimates with 95 % confidence intervals.
 
-All from ``scipy.stats``; the bootstrap is seeded, so that a table is the same each time it is made.
+All intervals come from ``scipy.stats``; the bootstrap is seeded, so that tables are reproducible.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Statistic = Callable[[Values], Any]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its 95 % interval and the number of episodes behind it."""
+    """A value with its 95 % interval and the number of episodes that it is estimated from."""
 
     value: float
     low: float
@@ -40,7 +40,7 @@ class Estimate:
 
 
 def _finite(values: npt.ArrayLike) -> Values:
-    """Return the values that are numbers; ``nan`` stands for "never happened"."""
+    """Return the finite values; ``nan`` means "never happened"."""
     array = np.asarray(values, np.float64).reshape(-1)
     return array[np.isfinite(array)]
 
@@ -64,7 +64,7 @@ def _bootstrap(values: Values, statistic: Any) -> Estimate:
 
 
 def mean(values: npt.ArrayLike) -> Estimate:
-    """Return the mean of the values that are numbers, with a bootstrap interval."""
+    """Return the mean of the finite values, with a bootstrap interval."""
     return _bootstrap(_finite(values), np.mean)
 
 
@@ -82,7 +82,7 @@ def paired_difference(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
     """Return the mean of first - second over the same worlds, with a bootstrap interval.
 
     Raises:
-        ValueError: The two do not have as many episodes.
+        ValueError: Different numbers of episodes.
     """
     a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
     if a.shape != b.shape:
@@ -91,7 +91,7 @@ def paired_difference(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
 
 
 def probability_of_improvement(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
-    """Return how often the first is better in a world, ties counted half, with an interval."""
+    """Return the share of worlds in which the first is better, ties counted half."""
     a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
     return mean((a > b) + 0.5 * (a == b))
 
@@ -111,13 +111,13 @@ def share(happened: npt.ArrayLike) -> Estimate:
 
 
 def over_seeds(values: npt.ArrayLike, statistic: Statistic = np.mean) -> Estimate:
-    """Return a statistic of what S training seeds scored on the same W worlds, (S, W).
+    """Return a statistic of the scores of S training seeds on the same W worlds, (S, W).
 
     The interval is for another training on other worlds: seeds and worlds are resampled, each as a
-    whole. S seeds scatter about their own mean by (S - 1) / S of their variance, and are first
-    spread by as much. With few seeds the interval is still too narrow, as every bootstrap of few
-    values is: where seeds are all of the uncertainty, with 3 of them it holds the truth in some
-    80 % of the cases, with 5 in 88 %, with 10 in 91 %.
+    whole. The sample variance of S seeds is (S - 1) / S of the true one on average, which is
+    corrected for. As with any bootstrap of few values, the interval is still too narrow with few
+    seeds: if seeds are the only source of variance, its coverage is about 80 % with 3 seeds, 88 %
+    with 5 and 91 % with 10.
 
     Raises:
         ValueError: Not (S, W) numbers, at least one of each.
@@ -129,10 +129,10 @@ def over_seeds(values: npt.ArrayLike, statistic: Statistic = np.mean) -> Estimat
 def difference_over_seeds(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
     """Return the mean of first - second, with seeds and worlds resampled as in :func:`over_seeds`.
 
-    Each is of one policy, (W,), or of several training seeds, (S, W); the worlds are the same.
+    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds.
 
     Raises:
-        ValueError: The two do not have as many worlds.
+        ValueError: Different numbers of worlds.
     """
     mine, theirs = _seeds_by_worlds(first), _seeds_by_worlds(second)
     if mine.shape[1] != theirs.shape[1]:
@@ -143,12 +143,12 @@ def difference_over_seeds(first: npt.ArrayLike, second: npt.ArrayLike) -> Estima
 def _seeds_by_worlds(values: npt.ArrayLike) -> Values:
     array = np.atleast_2d(np.asarray(values, np.float64))
     if array.ndim != 2 or array.size == 0 or not np.isfinite(array).all():
-        raise ValueError(f"what seeds scored on worlds must be (S, W) numbers, got {array.shape}")
+        raise ValueError(f"scores must be finite numbers of shape (S, W), got {array.shape}")
     return array
 
 
 def _resample(parts: Sequence[Values], statistic: Callable[..., float]) -> Estimate:
-    """Return a statistic of parts (S, W), each with seeds of its own, all on the same worlds."""
+    """Return a statistic of parts (S, W): each has its own seeds, all have the same worlds."""
     worlds = parts[0].shape[1]
     spread = []
     for part in parts:

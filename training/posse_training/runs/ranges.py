@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from posse_training.errors import SettingsError
@@ -78,6 +79,8 @@ def check_ranges(settings: TrainSettings) -> None:
             _fail(name, value, f"it must be a text of 1 to {_LONGEST} characters")
     _check_sequence("hidden", settings.hidden, range(1, _LAYERS + 1), _WIDEST)
     _check_sequence("team_sizes", settings.team_sizes, range(101), 4096)
+    if settings.folder is not None and not isinstance(settings.folder, Path):
+        _fail("folder", settings.folder, "it must be a path")
     for name in ("overrides", "reward_weights"):
         if not isinstance(getattr(settings, name), dict):
             _fail(name, getattr(settings, name), "it must map names to values")

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from posse import Scenario, get_scenario
-from posse_baselines import load
+from posse import Scenario, ScenarioError, get_scenario
+from posse_baselines import PolicyError, load
 from posse_baselines.registry import ships_or_is_file
 from posse_training.errors import SettingsError
 from posse_training.runs.ranges import check_ranges
@@ -233,7 +233,9 @@ def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
         raise SettingsError(f"{path.parent} is not a run folder: it has no {path.name}") from None
     except RecursionError:
         raise SettingsError(f"{path} is damaged: its values are nested too deeply") from None
-    except (OSError, TypeError, json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (SettingsError, ScenarioError, PolicyError):
+        raise
+    except (OSError, TypeError, ValueError) as error:
         raise SettingsError(f"{path} is damaged: {error}") from error
 
 

@@ -1,16 +1,16 @@
-"""A batch of worlds as one TorchRL environment: the batch's natural form for TorchRL users.
+"""A batch of worlds as one TorchRL environment.
 
-TorchRL steps batches and resets parts of them, which is what the engine does, so the adapter only
-names things. E = worlds, N = trackers, F = observation length, m = message size::
+TorchRL steps batches and resets parts of them, as the engine does, so the adapter only renames.
+E = worlds, N = trackers, F = observation length, m = message size::
 
     TensorDict (E,)
         ("agents", "observation")       (E, N, F) float32
         ("agents", "action")            (E, N, 2 + m) float32 in [-1, 1]
         ("agents", "reward")            (E, N, 1) float32
-        "score"                         (E, 1) float32, of the present step; 0 at the start
+        "score"                         (E, 1) float32, of the latest step; 0 at the start
         "done", "terminated", "truncated"   (E, 1) bool
 
-Where the target is an agent too, it has a group of its own, ``"target"``, with N = 1.
+If the target is an agent, it has its own group ``"target"``, with N = 1.
 """
 
 from __future__ import annotations
@@ -27,30 +27,29 @@ import posse
 from posse.adapters.actions import agent_names
 
 TRACKERS: Final = "agents"
-"""The group of the trackers, by the name that TorchRL's multi-agent examples use."""
+"""Group of the trackers, named as in TorchRL's multi-agent examples."""
 TARGET: Final = "target"
-"""The group of a target that is an agent."""
+"""Group of a target that is an agent."""
 
 
 class PosseEnv(EnvBase):
     """A batch of E worlds of one scenario, ``batch_size=[E]``.
 
-    Worlds whose episodes end are reset by TorchRL (rollouts and collectors do so by themselves), a
-    part of the batch at a time. On the CPU the tensors share the memory of the engine's arrays,
-    which are never overwritten while a tensor holds them; on a GPU, whose engine overwrites its
-    arrays, they are copied there.
+    TorchRL's rollouts and collectors reset the worlds whose episodes end. On the CPU the tensors
+    share the memory of the engine's arrays, which are not overwritten while a tensor refers to
+    them; on a GPU they are copies, since the engine there reuses its arrays.
 
     Args:
         scenario: A scenario, or the name of one.
         num_worlds: E, at least 1.
-        device: Where tensors live. On ``"cuda"`` the worlds do too, and nothing goes by way of the
-            host: it needs the extra ``cuda``. For any other device than the CPU, the worlds are
-            stepped there, and each step costs a copy each way.
+        device: Device of the tensors. On ``"cuda"`` the worlds are stepped there as well, which
+            needs the extra ``cuda``. For other devices the worlds are stepped on the CPU, and
+            each step costs a copy each way.
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
-            and any setting of the scenario. The mode of automatic resets is not among them.
+            and any setting of the scenario, but not ``autoreset``.
 
     Attributes:
-        batch: The engine, for its layout, its state and its metrics.
+        batch: The engine, with the layout, the state and the metrics.
         group_map: The agents' names by group.
 
     Raises:
@@ -68,8 +67,8 @@ class PosseEnv(EnvBase):
     ) -> None:
         if "autoreset" in settings:
             raise TypeError(
-                f"autoreset={settings['autoreset']!r} cannot be chosen: TorchRL resets the worlds "
-                "that are done by itself; leave it out"
+                f"autoreset={settings['autoreset']!r} cannot be set: TorchRL itself resets worlds "
+                "that are done; leave it out"
             )
         engine = "cuda" if torch.device(device).type == "cuda" else "cpu"
         self.batch = posse.batch(
@@ -116,13 +115,13 @@ class PosseEnv(EnvBase):
         ).to(self.device)
 
     def _set_seed(self, seed: int | None) -> None:
-        """Have the next reset of all worlds start over from episode 0 of a seed."""
+        """Make the next reset of all worlds restart from episode 0 of a seed."""
         self._seed = seed
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
 
-        ``seed`` and ``options`` (start poses) may be given to :meth:`reset` as they are to
+        ``seed`` and ``options`` (start poses) of :meth:`reset` are those of
         :meth:`posse.Batch.reset`.
         """
         options = dict(kwargs.get("options") or {})
@@ -139,9 +138,9 @@ class PosseEnv(EnvBase):
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         if tensordict.get("_step", None) is not None:
             raise NotImplementedError(
-                "the worlds of a PosseEnv are stepped together, none can wait for the others: "
-                "use rollout(..., break_when_any_done=False), which resets those that are done, "
-                "and not break_when_all_done=True"
+                "the worlds of a PosseEnv are always stepped together: use rollout(..., "
+                "break_when_any_done=False), which resets worlds that are done, instead of "
+                "break_when_all_done=True"
             )
         actions = [tensordict.get((group, "action")) for group in self._rows]
         together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
@@ -171,9 +170,9 @@ class PosseEnv(EnvBase):
         """Return an array of the engine as a tensor on the device."""
         if isinstance(array, np.ndarray):
             return torch.from_numpy(array).to(self.device)
-        # The engine's next step but one overwrites it.
+        # The engine overwrites it two steps later.
         return torch.as_tensor(array, device=self.device).clone()
 
     def _array(self, tensor: torch.Tensor) -> Any:
-        """Return a tensor as the engine takes it."""
+        """Return a tensor in the form that the engine takes."""
         return tensor.contiguous() if tensor.device.type == "cuda" else tensor.cpu().numpy()

@@ -1,73 +1,65 @@
 """PPO on TorchRL over a batch of worlds: one policy for all trackers, torch from end to end.
 
-Reads top to bottom in the order in which it runs. Every tensor stays on one device, the CPU or
-another. Each tracker learns from its own observations and rewards (independent PPO with shared
-weights); E = worlds, N = trackers, T = steps of a rollout.
+The file reads in the order it runs. All tensors stay on one device. Each tracker learns from its
+own observations and rewards (independent PPO with shared weights); E = worlds, N = trackers, T =
+steps of a rollout.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
-from tensordict.nn import (
-    AddStateIndependentNormalScale,
-    TensorDictModule,
-    TensorDictSequential,
-)
+from tensordict.nn import TensorDictSequential
 from torch import nn
 from torchrl.envs.utils import ExplorationType, set_exploration_type
-from torchrl.modules import (
-    IndependentNormal,
-    ProbabilisticActor,
-    ValueOperator,
-)
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
+from posse_training.torchrl.agent import (
+    ACTION,
+    DRAWN,
+    LOG_PROBABILITY,
+    LOSSES,
+    OBSERVATION,
+    REWARD,
+    REWARD_NEXT,
+    VALUE,
+    Agent,
+)
 from posse_training.torchrl.env import TRACKERS, PosseEnv
-
-OBSERVATION: Final = (TRACKERS, "observation")
-ACTION: Final = (TRACKERS, "action")
-DRAWN: Final = (TRACKERS, "drawn")
-"""What the policy drew from its normal distribution; the action is that, cut to [-1, 1]."""
-REWARD: Final = (TRACKERS, "reward")
-REWARD_NEXT: Final = ("next", *REWARD)
-LOG_PROBABILITY: Final = (TRACKERS, "action_log_prob")
-VALUE: Final = (TRACKERS, "state_value")
-LOSSES: Final = ("loss_objective", "loss_critic", "loss_entropy")
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to learn.
+    """Settings of a training run.
 
     Raises:
-        ValueError: A setting that nothing can be learnt with.
+        ValueError: A setting out of its range.
     """
 
     num_worlds: int = 1024
     rollout_steps: int = 32
     """T, steps between two updates."""
     updates: int = 60
-    """Rollouts to learn from; agent-steps in all are updates x T x E x N."""
+    """Number of rollouts; agent-steps in all are updates x T x E x N."""
     epochs: int = 4
     """Passes over a rollout."""
     minibatches: int = 8
-    """Parts that a pass is split into."""
+    """Minibatches of a pass."""
     learning_rate: float = 3e-4
     discount: float = 0.99
     trace: float = 0.95
     """λ of generalised advantage estimation."""
     clip: float = 0.2
-    """How far the ratio of probabilities may leave 1."""
+    """Largest deviation of the probability ratio from 1."""
     entropy: float = 0.001
     """Weight of the entropy bonus."""
     gradient_norm: float = 0.5
-    """Greatest norm of a gradient."""
+    """Largest norm of a gradient."""
     hidden: tuple[int, ...] = (64, 64)
     seed: int = 0
 
@@ -82,95 +74,17 @@ class Settings:
             else:
                 allowed, right = "above 0", value > 0
             if not right:
-                raise ValueError(f"{name}={value!r} is not possible: it must be {allowed}")
-
-
-class RunningScale(nn.Module):
-    """Brings observations (..., F) to mean 0 and deviation 1, by all that has been seen.
-
-    The statistics are part of the weights, so that a policy is never played with others.
-    """
-
-    mean: torch.Tensor
-    variance: torch.Tensor
-    count: torch.Tensor
-
-    def __init__(self, size: int) -> None:
-        super().__init__()
-        self.register_buffer("mean", torch.zeros(size))
-        self.register_buffer("variance", torch.ones(size))
-        self.register_buffer("count", torch.zeros(()))
-
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Return the observations scaled, within ±10."""
-        return ((observations - self.mean) / (self.variance + 1e-8).sqrt()).clamp(-10.0, 10.0)
-
-    @torch.no_grad()
-    def update(self, observations: torch.Tensor) -> None:
-        """Take more observations into account (Chan, Golub and LeVeque's pairwise form)."""
-        flat = observations.reshape(-1, observations.shape[-1])
-        new, total = len(flat), self.count + len(flat)
-        apart = flat.mean(0) - self.mean
-        squares = self.variance * self.count + flat.var(0, correction=0) * new
-        self.variance.copy_((squares + apart**2 * self.count * new / total) / total)
-        self.mean.add_(apart * new / total)
-        self.count.copy_(total)
-
-
-class Agent(nn.Module):
-    """The policy and the critic of every tracker.
-
-    Attributes:
-        actor: Adds what it draws, and the log-probability of that, to a tensordict.
-        critic: Adds values.
-        scale: What both see observations through.
-    """
-
-    def __init__(self, env: PosseEnv, hidden: tuple[int, ...]) -> None:
-        super().__init__()
-        size = env.observation_spec[OBSERVATION].shape[-1]
-        width = env.full_action_spec[ACTION].shape[-1]
-        self.scale = RunningScale(size)
-        policy = nn.Sequential(
-            self.scale, *_layers(size, hidden, width, 0.01), AddStateIndependentNormalScale(width)
-        )
-        value = nn.Sequential(self.scale, *_layers(size, hidden, 1, 1.0))
-        parameters = [(TRACKERS, "loc"), (TRACKERS, "scale")]
-        self.actor = ProbabilisticActor(
-            TensorDictModule(policy, [OBSERVATION], parameters),
-            in_keys=parameters,
-            out_keys=[DRAWN],
-            distribution_class=IndependentNormal,
-            return_log_prob=True,
-            log_prob_key=LOG_PROBABILITY,
-        )
-        self.critic = ValueOperator(value, in_keys=[OBSERVATION], out_keys=[VALUE])
-
-
-def _layers(size: int, hidden: tuple[int, ...], out: int, gain: float) -> list[nn.Module]:
-    """Return a perceptron's layers; ``gain`` scales the last one's weights at the start."""
-    layers: list[nn.Module] = []
-    for width in hidden:
-        layers += [_linear(size, width, 2**0.5), nn.Tanh()]
-        size = width
-    return [*layers, _linear(size, out, gain)]
-
-
-def _linear(size: int, width: int, gain: float) -> nn.Linear:
-    layer = nn.Linear(size, width)
-    nn.init.orthogonal_(layer.weight, gain)
-    nn.init.zeros_(layer.bias)
-    return layer
+                raise ValueError(f"{name}={value!r} is invalid: it must be {allowed}")
 
 
 @torch.no_grad()
 def roll_out(
     env: PosseEnv, actor: TensorDictSequential, carried: TensorDictBase, steps: int
 ) -> tuple[TensorDictBase, TensorDictBase]:
-    """Play for some steps; return them (E, T), and what the next rollout goes on from."""
+    """Play some steps; return them (E, T), and the tensordict that the next rollout starts from."""
     made = []
     for _ in range(steps):
-        with set_exploration_type(ExplorationType.RANDOM):  # an actor plays its means otherwise
+        with set_exploration_type(ExplorationType.RANDOM):  # otherwise the actor returns its means
             carried = actor(carried)
         carried[ACTION] = carried[DRAWN].clamp(-1.0, 1.0)
         made_step, carried = env.step_and_maybe_reset(carried)
@@ -179,9 +93,9 @@ def roll_out(
 
 
 def spread_flags(rollout: TensorDictBase) -> None:
-    """Give every tracker its world's flags, (E, T, N, 1), beside its reward.
+    """Copy each world's flags to its trackers, (E, T, N, 1), beside their rewards.
 
-    Truncated stays apart from terminated: at a truncation the value of what comes next counts.
+    Truncation stays distinct from termination: a truncated step is bootstrapped.
     """
     shape = rollout[REWARD_NEXT].shape
     for flag in ("done", "terminated"):
@@ -197,17 +111,18 @@ def train(
     report: Callable[[dict[str, float]], None] | None = None,
     **overrides: Any,
 ) -> Agent:
-    """Learn to play a scenario.
+    """Train an agent on a scenario.
 
     Args:
         scenario: A scenario's name.
-        settings: How to learn.
-        device: Where everything lives; on ``"cuda"`` the worlds too (:class:`PosseEnv`).
-        report: Given the figures of each update: ``score`` (mean over the rollout's steps),
+        settings: Settings of the run.
+        device: Device of all tensors; on ``"cuda"`` also of the worlds (:class:`PosseEnv`).
+        report: Called with the figures of each update: ``score`` (mean over the rollout's steps),
             ``reward``, the losses, ``gradient_norm``, ``agent_steps`` so far.
         overrides: Settings of the scenario.
 
-    The same seed gives the same agent on the same device.
+    Returns:
+        The agent; the same seed gives the same agent on the same device.
     """
     settings = settings or Settings()
     torch.manual_seed(settings.seed)
@@ -217,7 +132,7 @@ def train(
     optimizer = torch.optim.Adam(agent.parameters(), settings.learning_rate)
 
     carried = env.reset()
-    # An episode to look around in: what is the same in every world at the start is not later on.
+    # Input statistics of a whole episode: early steps are much the same in every world.
     for _ in range(0, env.batch.scenario.horizon, settings.rollout_steps):
         rollout, carried = roll_out(env, agent.actor, carried, settings.rollout_steps)
         agent.scale.update(rollout[OBSERVATION])
@@ -226,7 +141,7 @@ def train(
         rollout, carried = roll_out(env, agent.actor, carried, settings.rollout_steps)
         agent_steps += rollout[REWARD_NEXT].numel()
         figures = learn(agent, rollout, loss, advantage, optimizer, settings)
-        # After learning, so that the actions are judged as they were when they were chosen.
+        # After the update, which must use the statistics that the actions were sampled with.
         agent.scale.update(rollout[OBSERVATION])
         if report is not None:
             report({**figures, "agent_steps": float(agent_steps)})
@@ -234,7 +149,7 @@ def train(
 
 
 def objectives(agent: Agent, settings: Settings) -> tuple[ClipPPOLoss, GAE]:
-    """Return the loss and the estimate of advantages, told where each tracker's numbers lie."""
+    """Return the loss and the advantage estimator, with the keys of the trackers' tensors."""
     loss = ClipPPOLoss(
         agent.actor,
         agent.critic,
@@ -267,7 +182,7 @@ def learn(
     optimizer: torch.optim.Optimizer,
     settings: Settings,
 ) -> dict[str, float]:
-    """Improve the agent by a rollout (E, T); return the figures to report."""
+    """Update the agent with a rollout (E, T); return the figures to report."""
     spread_flags(rollout)
     with torch.no_grad():
         advantage(rollout)
@@ -294,7 +209,7 @@ def learn(
 
 
 def parts_of(steps: TensorDictBase, settings: Settings) -> Iterator[TensorDictBase]:
-    """Yield the parts of every pass over the steps (E T,), each pass in an order of its own."""
+    """Yield the minibatches of all passes over the steps (E T,), each pass in random order."""
     for _ in range(settings.epochs):
         order = torch.randperm(len(steps), device=steps.device)
         for chosen in order.chunk(settings.minibatches):

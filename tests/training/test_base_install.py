@@ -1,0 +1,76 @@
+"""Without the packages of an extra, commands either work or say what to install."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXTRA = ("torch", "stable_baselines3", "tensordict", "torchrl", "tensorboard", "moviepy", "wandb")
+BLOCKED = f"""
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {EXTRA!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Blocker())
+"""
+
+
+def run(code: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run code in a process in which no package of an extra can be imported."""
+    return subprocess.run(
+        [sys.executable, "-c", f"{BLOCKED}\n{code}", *arguments],
+        capture_output=True, text=True, check=False, cwd=cwd,
+    )  # fmt: skip
+
+
+MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"
+
+
+@pytest.mark.parametrize(
+    "arguments", [["train"], ["train", "--scenario", "smart"], ["train", "--resume", "somewhere"]]
+)
+def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> None:
+    done = run(MAIN, *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "pip install 'posse[training]'" in done.stderr
+    assert "torch cannot be imported" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("package", ["posse_training.sb3", "posse_training.torchrl"])
+def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
+    done = run(f"import {package}", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "pip install 'posse[training]'" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["scenarios"],
+        ["train", "--help"],
+        ["ship", "--help"],
+        ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0"],
+        ["watch", "idle", "--scenario", "paper-distributed", "--gif", "film.gif"],
+        ["reproduce", "--starts", "2"],
+        ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
+    ],
+    ids=lambda arguments: " ".join(arguments[:2]),
+)
+def test_all_else_works_without_extras(tmp_path: Path, arguments: list[str]) -> None:
+    done = run(MAIN, *arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_shipping_needs_no_torch(tmp_path: Path) -> None:
+    done = run(MAIN, "ship", "nowhere", "--name", "learned-x", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "nowhere is not a run folder" in done.stderr
