@@ -38,6 +38,11 @@ def policy_for(
     return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
 
 
+def any_policy(scenario: str = "smart") -> LearnedPolicy:
+    """A policy of the name "mine" for a scenario."""
+    return policy_for(posse.ObservationLayout(posse.get_scenario(scenario)))
+
+
 def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides: Any) -> Any:
     batch = posse.batch(scenario, worlds, seed=3, **overrides)
     observations = batch.reset()

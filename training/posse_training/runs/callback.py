@@ -31,6 +31,7 @@ from posse_training.runs.validation import validate
 from posse_training.sb3.normalisation import RunningStatistics
 from posse_training.sb3.vec_env import TeamVecEnv
 
+_POINT: Final = ("steps", "seconds", "score", "low", "high")  # of the curve
 _STATISTICS_EVERY: Final = 8  # one step of a rollout in so many is added to the statistics
 
 
@@ -130,7 +131,7 @@ class TrainingCallback(BaseCallback):
     def _write(self, name: str | None) -> None:
         """Write the curve, and the policy under a name if there is one."""
         text = io.StringIO()
-        writer = csv.DictWriter(text, ["steps", "seconds", "score", "low", "high"])
+        writer = csv.DictWriter(text, _POINT)
         writer.writeheader()
         writer.writerows(self.curve)
         try:
@@ -178,12 +179,12 @@ class TrainingCallback(BaseCallback):
             self.statistics.restore(part("statistics"))
             restore_model(self.model, part("model"), state["model"])
             restore_random_state(part("random"), state["random"])
-            self.curve = list(state["curve"])
+            self.curve = [{name: float(point[name]) for name in _POINT} for point in state["curve"]]
             self._seconds_before = float(state["seconds"])
             self._next_evaluation = int(state["next_evaluation"])
             self._next_checkpoint = int(state["next_checkpoint"])
             self._rollouts = int(state["rollouts"])
-        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        except Exception as error:  # whatever a state of other settings, or a forged one, raises
             raise CheckpointError(
                 f"the checkpoint in {self.folder} does not fit its settings: {error}. Restore "
                 "settings.json, or start the training again in another --folder"

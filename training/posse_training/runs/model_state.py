@@ -93,16 +93,30 @@ def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:
 
 
 def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]) -> None:
-    """Set a model of the same settings to the state of :func:`model_state`."""
+    """Set a model of the same settings to the state of :func:`model_state`.
+
+    Raises:
+        ValueError: Arrays of other shapes.
+    """
+    for name, shape in (
+        ("last_obs", (model.n_envs, *(model.observation_space.shape or ()))),
+        ("last_starts", (model.n_envs,)),
+    ):
+        if arrays[name].shape != shape:
+            raise ValueError(f"{name} has the shape {arrays[name].shape}, wanted {shape}")
     for name, values in unflatten_tensors(state["parts"], arrays).items():
         _find(model, name).load_state_dict(values)
+        _check_optimiser(name, _find(model, name))
     for name, values in unflatten_tensors(state["tensors"], arrays).items():
         _find(model, name).data.copy_(values)
-    model.num_timesteps = state["num_timesteps"]
-    model._episode_num = state["episode_num"]
-    model._n_updates = state["n_updates"]
-    model._current_progress_remaining = state["progress"]
-    model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
+    model.num_timesteps = int(state["num_timesteps"])
+    model._episode_num = int(state["episode_num"])
+    model._n_updates = int(state["n_updates"])
+    model._current_progress_remaining = float(state["progress"])
+    episodes = [
+        {key: episode[key] + 0 for key in ("r", "l", "score")} for episode in state["episodes"]
+    ]
+    model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
     model.action_space.np_random.bit_generator.state = state["action_space"]
     model._last_obs = arrays["last_obs"].copy()
@@ -112,6 +126,18 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
         buffer.pos, buffer.full = state["replay"]
         for name in _REPLAY:
             getattr(buffer, name)[: buffer.size()] = arrays[f"replay.{name}"]
+
+
+def _check_optimiser(name: str, part: Any) -> None:
+    """Raise if an optimiser's moments are not of the shapes of their parameters."""
+    if isinstance(part, torch.optim.Optimizer):
+        for parameter, values in part.state.items():
+            for key, value in values.items():
+                if key != "step" and value.shape != parameter.shape:
+                    raise ValueError(
+                        f"{key} of {name} has the shape {tuple(value.shape)}, wanted "
+                        f"{tuple(parameter.shape)}"
+                    )
 
 
 def _find(model: BaseAlgorithm, name: str) -> Any:

@@ -81,6 +81,15 @@ class RunningStatistics:
         return {"count": np.array([self.count]), "mean": self.mean, "variance": self.variance}
 
     def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
-        """Set the statistics to those of :meth:`save`."""
+        """Set the statistics to those of :meth:`save`.
+
+        Raises:
+            ValueError: They are of another size.
+        """
+        for name in ("mean", "variance"):
+            if saved[name].shape != self.mean.shape:
+                raise ValueError(
+                    f"{name} has the shape {saved[name].shape}, wanted {self.mean.shape}"
+                )
         self.count = float(saved["count"][0])
         self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()
