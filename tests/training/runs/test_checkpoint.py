@@ -69,14 +69,13 @@ def test_a_forged_state_is_refused_or_taken(run: Path, data: st.DataObject) -> N
 def test_forged_arrays(run: Path, tmp_path: Path, change: str) -> None:
     arrays, state = read_checkpoint(run)
     (tmp_path / "settings.json").write_bytes((run / "settings.json").read_bytes())
-    for name in list(arrays)[::5]:
+    for name in list(arrays)[::2]:
         forged = dict(arrays)
         if change == "missing":
             del forged[name]
         else:
             forged[name] = np.zeros((2, 3, 5, 7), np.float32)
         write_checkpoint(tmp_path, forged, state)
-        print(name, arrays[name].shape)
         with pytest.raises(CheckpointError, match="does not fit its settings"):
             resume(tmp_path, console=quiet())
 

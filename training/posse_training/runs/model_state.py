@@ -113,9 +113,7 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     model._episode_num = int(state["episode_num"])
     model._n_updates = int(state["n_updates"])
     model._current_progress_remaining = float(state["progress"])
-    episodes = [
-        {key: episode[key] + 0 for key in ("r", "l", "score")} for episode in state["episodes"]
-    ]
+    episodes = [{key: info[key] + 0 for key in ("r", "l", "score")} for info in state["episodes"]]
     model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
     model.action_space.np_random.bit_generator.state = state["action_space"]
@@ -133,7 +131,7 @@ def _check_optimiser(name: str, part: Any) -> None:
     if isinstance(part, torch.optim.Optimizer):
         for parameter, values in part.state.items():
             for key, value in values.items():
-                if key != "step" and value.shape != parameter.shape:
+                if value.numel() != 1 if key == "step" else value.shape != parameter.shape:
                     raise ValueError(
                         f"{key} of {name} has the shape {tuple(value.shape)}, wanted "
                         f"{tuple(parameter.shape)}"
