@@ -28,7 +28,7 @@ from posse.rules import contact, motion, score
 from posse.rules import discs as survey
 from posse.rules.scratch import new_scratch
 from posse.signals import observing
-from posse.signals.parts import Writers, built_in_parts, writers_for
+from posse.signals.parts import Writers, built_in_parts, rules_for, writers_for
 
 PARTS = (
     "motion", "where the discs are, and how near", "contact", "target sensor and radio", "score",
@@ -51,6 +51,7 @@ class Settings:
 
 
 SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
+SET_GOAL = rules_for(built_in_parts()).set_goal
 
 
 @kernel
@@ -65,7 +66,7 @@ def one_part(  # type: ignore[no-untyped-def]
     for e in range(len(worlds.world)):
         w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         if part == 0:
-            motion.motion(c, w, t, o, actions[e], scratch)
+            motion.motion(c, w, t, o, actions[e], SET_GOAL, scratch)
             continue
         survey.lay_out(c, w, t, o, scratch)  # what the other parts start from
         survey.find_gaps(c, scratch)

@@ -7,6 +7,8 @@ from typing import Any
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
+from posse.registry import TARGET_MOTIONS, DeclarationError
+from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
 from posse.signals.fields import Field
 from posse.signals.layout import ObservationLayout
@@ -70,18 +72,23 @@ def observation_fields(
 __all__ = [
     "METRICS",
     "REWARD_TERMS",
+    "TARGET_MOTIONS",
     "Batch",
+    "DeclarationError",
     "Field",
+    "Memory",
     "Metric",
     "ObservationLayout",
     "RewardTerm",
     "Scenario",
     "ScenarioError",
     "Snapshot",
+    "TargetMotion",
     "batch",
     "env",
     "get_scenario",
     "observation_fields",
     "parallel_env",
     "scenario_names",
+    "target_motion",
 ]

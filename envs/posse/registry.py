@@ -46,8 +46,8 @@ class Registry(Mapping[str, T], Generic[T]):
         Raises:
             DeclarationError: The name is taken, or the function has no docstring.
         """
-        if not name.isidentifier():
-            raise self.error(function, f"{name!r} is no name: use letters, digits and underscores")
+        if not name.replace("-", "_").isidentifier():
+            raise self.error(function, f"{name!r} is no name: use letters, digits, _ and -")
         taken = self._functions.get(name)
         if taken is not None:
             raise self.error(function, f"the name {name!r} is taken by {place_of(taken)}")
@@ -67,6 +67,18 @@ class Registry(Mapping[str, T], Generic[T]):
         """Return what posse itself declares, in order."""
         return tuple(thing for name, thing in self._things.items() if self.is_built_in(name))
 
+    def with_added(self, *names: str) -> tuple[T, ...]:
+        """Return what posse itself declares, then what is asked for by name beside it.
+
+        Raises:
+            KeyError: Nothing of a name has been declared; the message has near names.
+        """
+        added = dict.fromkeys(names)  # each once
+        return (
+            *self.built_in(),
+            *(self[name] for name in added if name not in self or not self.is_built_in(name)),
+        )
+
     def unknown(self, name: object) -> str:
         """Return the message that nothing of this name has been declared."""
         near = difflib.get_close_matches(str(name), self._things, n=3)
@@ -78,6 +90,8 @@ class Registry(Mapping[str, T], Generic[T]):
         )
 
     def __getitem__(self, name: str) -> T:
+        if name not in self._things:
+            raise KeyError(self.unknown(name))
         return self._things[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -89,3 +103,5 @@ class Registry(Mapping[str, T], Generic[T]):
 
 FIELDS: Final[Registry[Any]] = Registry("observation field")
 """Of :class:`posse.signals.fields.FieldDeclaration`."""
+TARGET_MOTIONS: Final[Registry[Any]] = Registry("target motion")
+"""Of :class:`posse.rules.targets.declaring.TargetMotion`."""

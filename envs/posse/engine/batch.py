@@ -24,13 +24,14 @@ from posse.engine.kernels import (
     STEP,
     TO_CLIP,
     Results,
-    advance,
     bad_action,
     first_over,
+    kernel_of,
     own_kernel,
     tables_of,
 )
 from posse.engine.scratch import scratch_for
+from posse.engine.user_parts import check_fields, explain
 from posse.numeric import (
     BoolArray,
     FloatArray,
@@ -170,16 +171,20 @@ class Batch:
     def _prepare(self) -> None:
         """Set what follows from the rest, and is not pickled."""
         scenario, (num_worlds, rows, size) = self.scenario, self.observation_shape
+        parts = parts_for(scenario)
+        check_fields(parts, self._arrays)
         self._tables = tables_of(scenario)
         self._observations = _Recycler((num_worlds, rows, size))
         self._rewards = _Recycler((num_worlds, rows))
         self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
-        self._untyped: Callable[..., int] = own_kernel(scenario) if self.own_kernel else advance
+        self._untyped: Callable[..., int] = (
+            own_kernel(scenario) if self.own_kernel else kernel_of(parts)
+        )
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
-        memory = scratch_for(parts_for(scenario), 8)
+        memory = scratch_for(parts, 8)
         self._scratch = [new_scratch(memory) for _ in range(threads)]
 
     def __getstate__(self) -> dict[str, Any]:
@@ -207,7 +212,7 @@ class Batch:
 
     @property
     def worlds(self) -> Records:
-        """The worlds' records, (E,) :data:`posse.rules.state.WORLD`."""
+        """The worlds' records, (E,) :func:`posse.rules.state.world_record`."""
         return self._arrays.world
 
     @property
@@ -524,7 +529,11 @@ class Batch:
         results = self._new_results()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         actions = np.empty(self.action_shape, np.float32)  # not read
-        self._run(orders, actions, results)
+        try:
+            self._run(orders, actions, results)
+        except Exception:
+            explain(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])
+            raise
         self._kernel = direct(self._untyped)  # by now there is one
         return results.observations
 

@@ -33,10 +33,11 @@ from posse.engine.kernels import (
 )
 from posse.engine.scratch import scratch_for
 from posse.numeric import BoolArray, FloatArray, Records
+from posse.rules.declared import Rules
 from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario
 from posse.signals.metrics import episode_metrics
-from posse.signals.parts import Parts, Writers, parts_for, writers_for
+from posse.signals.parts import Parts, Writers, parts_for, rules_for, writers_for
 from posse.signals.reward import REWARD_TERMS
 
 _CONFIG: Final[Any] = numba.config
@@ -99,6 +100,7 @@ def _stepping(parts: Parts) -> Any:
     """Return the kernel that steps worlds."""
     memory = scratch_for(parts, 1)
     settings, own, mate, empty, width, mate_width = writers_for(parts)
+    draw_motion, set_goal = rules_for(parts)
 
     @cuda.jit  # type: ignore[untyped-decorator]
     def advance(
@@ -118,8 +120,9 @@ def _stepping(parts: Parts) -> Any:
                 scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
             s = scratch[0]
             writers = Writers(settings, own, mate, empty, width, mate_width)
+            rules = Rules(draw_motion, set_goal)
             prepare(tables, writers, s)
-            over = advance_worlds(e, 1, tables, worlds, actions, results, orders, writers, s)
+            over = advance_worlds(e, 1, tables, worlds, actions, results, orders, rules, writers, s)
             results.flags[2, e] = over
             score[e] = worlds.world[e].score
             if over:
@@ -238,7 +241,7 @@ class CudaBatch(Batch):
 
     @property
     def worlds(self) -> Records:
-        """The worlds' records, (E,) :data:`posse.rules.state.WORLD`, as now, on the host."""
+        """The worlds' records, (E,) :func:`posse.rules.state.world_record`, as now, on the host."""
         records: Records = self._device_arrays.world.copy_to_host()
         return records
 

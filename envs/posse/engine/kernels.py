@@ -28,6 +28,7 @@ from posse.numeric import (
     parts_of,
 )
 from posse.rules.contact import meet
+from posse.rules.declared import Rules
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, natural
 from posse.rules.faults import apply_faults
 from posse.rules.motion import motion
@@ -43,10 +44,9 @@ from posse.rules.state import (
     reward_weights,
     slot_records,
 )
-from posse.rules.targets.target_motion import AGENT
 from posse.scenarios import Scenario
 from posse.signals.observing import TOGETHER, observe_sonar, observe_target, observe_together
-from posse.signals.parts import Parts, Writers, built_in_parts, parts_for, writers_for
+from posse.signals.parts import Parts, Writers, parts_for, rules_for, writers_for
 from posse.signals.reward import write_reward
 from posse.signals.scratch import MOST_IN_TEAM
 
@@ -127,17 +127,19 @@ def reward(
     """
     for i in range(c.num_trackers):
         rewards[i] = write_reward(c, w, trackers[i], weights, terms[i])
-    if c.motion == AGENT:
+    if c.target_agent != 0:
         rewards[c.num_trackers] = -w.score
         terms[c.num_trackers, :] = _ZERO
 
 
 @compiled
-def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, scratch: Record) -> None:
+def act(
+    c: Record, worlds: WorldArrays, e: int, actions: FloatArray, rules: Rules, scratch: Record
+) -> None:
     """Move everything in world e by a control step, and say what the actions say."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
-    motion(c, w, trackers, worlds.obstacle[e], actions, scratch)
+    motion(c, w, trackers, worlds.obstacle[e], actions, rules.set_goal, scratch)
     w.step += 1
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
@@ -184,6 +186,7 @@ def advance_worlds(
     actions: FloatArray,
     results: Results,
     orders: npt.NDArray[np.uint8],
+    rules: Rules,
     writers: Writers,
     scratch: Record,
 ) -> int:
@@ -210,10 +213,10 @@ def advance_worlds(
             w.episode += 1
             order = START
         if order == STEP:
-            act(c, worlds, e, actions[e], scratch)
+            act(c, worlds, e, actions[e], rules, scratch)
         elif order != LOOK:
             if order == START:
-                draw_start(c, w, trackers, obstacles)
+                draw_start(c, w, trackers, obstacles, rules.draw_motion)
             begin(
                 c, w, trackers, worlds.heard[e], worlds.broadcast[e],
                 worlds.heard_message[e], worlds.message[e],
@@ -236,7 +239,7 @@ def advance_worlds(
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
         observe_sonar(c, trackers, scratch, observations, writers.width)
-        if c.motion == AGENT:
+        if c.target_agent != 0:
             observe_target(c, worlds, e, writers, scratch, results.observations)
     observe_together(c, worlds, first, count, writers, scratch, results.observations)
     return over
@@ -265,6 +268,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
     Its configuration, slots and beams become constants in the code.
     """
     settings, own_fields, mate, empty, width, mate_width = writers_for(parts)
+    draw_motion, set_goal = rules_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
     @kernel
@@ -286,6 +290,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         )
         s = scratch[0]
         writers = Writers(settings, own_fields, mate, empty, width, mate_width)
+        rules = Rules(draw_motion, set_goal)
         if s.prepared[0] == _ZERO:
             prepare(used, writers, s)
             s.prepared[0] = _ONE
@@ -293,17 +298,23 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         for first, end in parts_of(thread, turns):
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
-                over += advance_worlds(e, count, used, worlds, actions, results, orders, writers, s)
+                over += advance_worlds(
+                    e, count, used, worlds, actions, results, orders, rules, writers, s
+                )
         return over
 
     return advance
 
 
-advance: Final = _stepping(built_in_parts(), None)
-"""Do what each world is ordered to, for the worlds of a thread; the one loop over a batch.
+@functools.cache
+def kernel_of(parts: Parts) -> Callable[..., int]:
+    """Return the kernel that steps worlds of any scenario that these parts are enough for.
 
-See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are over.
-"""
+    It does what each world is ordered to, for the worlds of a thread: the one loop over a batch.
+    See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are
+    over.
+    """
+    return _stepping(parts, None)
 
 
 @functools.lru_cache(maxsize=64)

@@ -30,6 +30,7 @@ from posse.numeric.simd.lanes import (
 )
 from posse.numeric.threads.turn_code import Numbers, parts_of, worlds_of
 from posse.numeric.threads.turns import all_at_once, by_turns, threads_for
+from posse.numeric.written import written
 
 __all__ = [
     "UNCOMPILED",
@@ -67,4 +68,5 @@ __all__ = [
     "threads_for",
     "transpose",
     "worlds_of",
+    "written",
 ]

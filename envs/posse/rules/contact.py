@@ -26,7 +26,6 @@ from posse.numeric import (
     root,
 )
 from posse.rules.discs import BLOCK, FAR, TOUCHING_GAP, blocks, natural
-from posse.rules.targets.target_motion import AGENT
 
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
@@ -164,7 +163,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     w.touching = target_touching
     w.near = target_near
     if c.walled and not target_near:
-        w.near = c.motion == AGENT or target_near_surroundings(c, w, s)
+        w.near = c.target_agent != 0 or target_near_surroundings(c, w, s)
     w.least_gap = smallest
 
 
@@ -192,7 +191,7 @@ def target_near_surroundings(c: Record, w: Record, s: Record) -> bool:
 
     Where the obstacles are stands in scratch memory (:func:`posse.rules.discs.lay_out`).
     """
-    # A scripted target seldom comes so near: only where trackers held it (target_motion.way_out),
+    # A scripted target seldom comes so near: only where trackers held it (walls.way_out),
     # or where it is so fast that a control step takes it across the free width that it keeps.
     way = TOUCHING_GAP + c.target_speed * c.dt
     if c.half_arena - c.radius - max(abs(w.x), abs(w.y)) <= way:

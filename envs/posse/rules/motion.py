@@ -6,7 +6,7 @@ others move by physics steps, target first, then trackers by number, each move s
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
 from posse.rules.kinematics import approach, arc
 from posse.rules.state import NEVER, POSE
-from posse.rules.targets.target_motion import AGENT, target_turn_rate
+from posse.rules.targets.steering import target_turn_rate
 from posse.scenarios.formation import follow_heading
 
 _ZERO: Final = np.float32(0.0)
@@ -165,15 +165,16 @@ def command_target(
     trackers: Records,
     obstacles: Records,
     actions: FloatArray,
+    set_goal: Any,
     scratch: Record,
 ) -> None:
     """Set the target's speed and turn rate for the control step."""
-    if c.motion == AGENT:
+    if c.target_agent != 0:
         action = actions[c.num_trackers]
         w.speed = _HALF * (action[0] + _ONE) * c.target_speed
         w.turn_rate = action[1] * c.target_turn_rate
     else:
-        w.turn_rate = target_turn_rate(c, w, trackers, obstacles, scratch)
+        w.turn_rate = target_turn_rate(c, w, trackers, obstacles, set_goal, scratch)
         w.speed = c.target_speed
 
 
@@ -184,6 +185,7 @@ def motion(
     trackers: Records,
     obstacles: Records,
     actions: FloatArray,
+    set_goal: Any,
     scratch: Record,
 ) -> None:
     """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
@@ -193,7 +195,7 @@ def motion(
     steps, each of them swept.
     """
     lay_out_actions(c, actions, scratch)
-    command_target(c, w, trackers, obstacles, actions, scratch)
+    command_target(c, w, trackers, obstacles, actions, set_goal, scratch)
     parts, time = 1, c.dt
     if c.whole_arcs == 0:
         parts, time = int(c.physics_steps), c.physics_dt

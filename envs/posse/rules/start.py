@@ -7,14 +7,14 @@ tries below is never used up.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from posse.numeric import Record, Records, compiled
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, between, episode_key, uniform
-from posse.rules.targets.target_motion import AGENT, draw_motion, has_free_circle
+from posse.rules.targets.walls import has_free_circle
 from posse.scenarios.limits import START_CLEARANCE
 
 _TRIES: Final = 2000
@@ -90,7 +90,7 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
             reach = o.radius + c.radius + _CLEARANCE
             if (o.x - w.x) * (o.x - w.x) + (o.y - w.y) * (o.y - w.y) < reach * reach:
                 clear = False
-        if clear and c.walled and c.motion != AGENT:
+        if clear and c.walled and c.target_agent == 0:
             clear = has_free_circle(
                 c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE
             ) or has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE)
@@ -122,7 +122,7 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
 def rest(c: Record, w: Record, trackers: Records) -> None:
     """Set everything that does not depend on a draw to what it is when an episode starts."""
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
-    w.speed = c.target_speed if c.motion != AGENT else _ZERO
+    w.speed = c.target_speed if c.target_agent == 0 else _ZERO
     w.turn_rate = _ZERO
     w.frame_cos, w.frame_sin = w.heading_cos, w.heading_sin
     w.goal_cos, w.goal_sin = w.heading_cos, w.heading_sin
@@ -152,7 +152,9 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
 
 
 @compiled(seldom=True)
-def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+def draw_start(
+    c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any
+) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)
     draw_obstacles(c, w, obstacles)

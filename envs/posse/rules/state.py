@@ -7,6 +7,7 @@ on any size: kernels compile once for all scenarios.
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any, Final, NamedTuple
 
@@ -14,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records
+from posse.registry import TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
-from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN, TARGET_MOTIONS
+from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
 from posse.signals.reward import REWARD_TERMS
 
 SPLITS: Final = ("train", "validation", "test")
@@ -47,7 +49,7 @@ CONFIG: Final = _record(
     ("message_size", _I), ("physics_steps", _I), ("horizon", _I), ("settle_steps", _I),
     ("outage_steps", _I), ("break_from", _I), ("break_until", _I), ("forget_steps", _I),
     ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("break_number", _I),
-    ("motion", _I),
+    ("motion", _I), ("mirrored", _I), ("target_agent", _I),
     ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
     ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
     ("dt", _F), ("physics_dt", _F),
@@ -66,7 +68,7 @@ CONFIG: Final = _record(
 )  # fmt: skip
 """A scenario as the kernels read it."""
 
-WORLD: Final = _record(
+_WORLD: Final = (
     ("seed", _U),  # the user's
     ("split", _I),  # index into SPLITS
     ("index", np.int64),  # which world of the seed
@@ -80,8 +82,6 @@ WORLD: Final = _record(
     ("speed", _F), ("turn_rate", _F),
     ("frame_cos", _F), ("frame_sin", _F),  # the slot frame, ψ
     ("goal_cos", _F), ("goal_sin", _F),  # where a scripted target wants to head
-    ("weave_amplitude", _F), ("weave_rate", _F), ("weave_phase", _F),  # accelerating motion
-    ("pressed", _F),  # smart motion: for how long the team has kept station, s; < 0: it darts
     ("touching", _U),  # trackers that touch the target, a bit each
     ("near", _I),  # 1: something may touch the target in the next step
     ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
@@ -98,7 +98,23 @@ WORLD: Final = _record(
     ("contacts_tracker", _I), ("contacts_obstacle", _I), ("contacts_target", _I),
     ("least_gap", _F),
 )  # fmt: skip
-"""One world: its identity, its target, its clock, its sums."""
+WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
+"""Fields that every world has, whatever is declared beside them."""
+
+
+def world_record(scenario: Scenario) -> np.dtype[Any]:
+    """Return the record of one world: its identity, its target, its clock, its sums.
+
+    And what the built-in motions of the target remember, and the scenario's own.
+    """
+    return _world_record(scenario.target_motion)
+
+
+@functools.cache
+def _world_record(motion: str) -> np.dtype[Any]:
+    motions = TARGET_MOTIONS.with_added(motion)
+    return _record(*_WORLD, *((m.name, _F) for each in motions for m in each.memory))
+
 
 TRACKER: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
@@ -160,7 +176,7 @@ class WorldArrays(NamedTuple):
     """Every array of a batch. With the scenario, they are its whole state."""
 
     world: Records
-    """(E,) :data:`WORLD`."""
+    """(E,) :func:`world_record`."""
     tracker: Records
     """(E, N) :data:`TRACKER`."""
     obstacle: Records
@@ -187,7 +203,7 @@ class WorldArrays(NamedTuple):
         ):
             tracker[limit], tracker[inverse] = values, 1 / np.array(values)
         return cls(
-            world=np.zeros(num_worlds, WORLD),
+            world=np.zeros(num_worlds, world_record(scenario)),
             tracker=tracker,
             obstacle=np.zeros((num_worlds, scenario.num_obstacles), OBSTACLE),
             heard=np.zeros((num_worlds, kept, kept), HEARD),
@@ -267,7 +283,10 @@ def config_record(scenario: Scenario) -> Records:
     c.radio_delay, c.breaks = s.radio_delay, s.breaks
     c.break_nearest = s.break_choice == BREAK_CHOICES[0]
     c.break_number = s.break_number if s.break_choice == BREAK_CHOICES[2] else -1
-    c.motion = TARGET_MOTIONS.index(s.target_motion)
+    motions = TARGET_MOTIONS.with_added(s.target_motion)
+    motion = TARGET_MOTIONS[s.target_motion]
+    c.motion, c.target_agent = motions.index(motion), motion.agent
+    c.mirrored = motion.mirrored and math.isfinite(s.arena)
     c.terminate_on_contact, c.walled = s.terminate_on_contact, math.isfinite(s.arena)
     c.sonar_beams = s.sonar_beams
     c.whole_arcs = s.whole_arcs

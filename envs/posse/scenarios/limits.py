@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-TARGET_MOTIONS: Final = ("constant", "accelerating", "smart", "agent")
 BREAK_CHOICES: Final = ("nearest", "drawn", "given")
 
 MAX_TRACKERS: Final = 64  # contacts and radio links are bits of one 64-bit word

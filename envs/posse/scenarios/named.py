@@ -3,104 +3,108 @@
 from __future__ import annotations
 
 import difflib
-from typing import Any, Final
+import functools
+from typing import Any
 
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError
 
-# Why each setting is what it is, and what it costs a team, stands in docs/scenarios.md.
-_PAPER: Final = Scenario(
-    name="paper",
-    horizon=80,
-    start_distance=(0.6, 1.8),
-    tracker_speed=1.5,
-    tracker_turn_rate=3.0,
-    target_speed=0.5,
-    formation_distance=0.8,
-    formation_spacing=0.8,
-    tolerance=0.2,
-)
-_SCENARIOS: Final = (
-    Scenario(name="constant"),
-    Scenario(name="accelerating", target_motion="accelerating"),
-    Scenario(
-        name="smart",
-        target_motion="smart",
-        tracker_turn_rate=1.2,
-        target_turn_rate=2.0,
-    ),
-    Scenario(
-        name="search",
-        version=2,
-        target_motion="accelerating",
-        tracker_turn_rate=1.2,
-        target_turn_rate=1.2,
-        arena=20.0,
-        start_distance=(4.0, 20.0),
-        sensing_range=3.0,
-    ),
-    Scenario(
-        name="obstacles",
-        version=2,
-        target_motion="smart",
-        tracker_turn_rate=1.8,
-        target_turn_rate=1.8,
-        arena=20.0,
-        num_obstacles=8,
-    ),
-    Scenario(
-        name="radio",
-        target_motion="smart",
-        tracker_turn_rate=1.5,
-        target_turn_rate=2.0,
-        start_distance=(2.0, 5.0),
-        sensing_range=4.0,
-        radio_range=6.0,
-        radio_delay=3,
-        radio_loss=0.3,
-    ),
-    Scenario(
-        name="leader-loss",
-        target_motion="accelerating",
-        tracker_turn_rate=1.1,
-        target_turn_rate=0.2,
-        formation_distance=2.4,
-        formation_spacing=2.4,
-        start_distance=(2.0, 3.9),
-        sensing_range=4.0,
-        breaks=1,
-        horizon=300,
-    ),
-    Scenario(
-        name="field",
-        version=2,
-        target_motion="smart",
-        tracker_turn_rate=1.5,
-        target_turn_rate=1.5,
-        arena=24.0,
-        num_obstacles=6,
-        start_distance=(4.0, 20.0),
-        sensing_range=6.0,
-        range_noise=0.02,
-        bearing_noise=0.02,
-        velocity_smoothing=0.5,
-        radio_range=8.0,
-        radio_delay=2,
-        radio_loss=0.2,
-        breaks=1,
-        break_choice="drawn",
-        sensor_outages=0.2,
-        radio_outages=0.2,
-    ),
-    _PAPER.replace(name="paper-centralized"),
-    _PAPER.replace(name="paper-distributed"),
-)
-_BY_NAME: Final = {scenario.name: scenario for scenario in _SCENARIOS}
+
+@functools.cache  # not before all that scenarios may name has been declared
+def _named() -> dict[str, Scenario]:
+    # Why each setting is what it is, and what it costs a team, stands in docs/scenarios.md.
+    paper = Scenario(
+        name="paper",
+        horizon=80,
+        start_distance=(0.6, 1.8),
+        tracker_speed=1.5,
+        tracker_turn_rate=3.0,
+        target_speed=0.5,
+        formation_distance=0.8,
+        formation_spacing=0.8,
+        tolerance=0.2,
+    )
+    scenarios = (
+        Scenario(name="constant"),
+        Scenario(name="accelerating", target_motion="accelerating"),
+        Scenario(
+            name="smart",
+            target_motion="smart",
+            tracker_turn_rate=1.2,
+            target_turn_rate=2.0,
+        ),
+        Scenario(
+            name="search",
+            version=2,
+            target_motion="accelerating",
+            tracker_turn_rate=1.2,
+            target_turn_rate=1.2,
+            arena=20.0,
+            start_distance=(4.0, 20.0),
+            sensing_range=3.0,
+        ),
+        Scenario(
+            name="obstacles",
+            version=2,
+            target_motion="smart",
+            tracker_turn_rate=1.8,
+            target_turn_rate=1.8,
+            arena=20.0,
+            num_obstacles=8,
+        ),
+        Scenario(
+            name="radio",
+            target_motion="smart",
+            tracker_turn_rate=1.5,
+            target_turn_rate=2.0,
+            start_distance=(2.0, 5.0),
+            sensing_range=4.0,
+            radio_range=6.0,
+            radio_delay=3,
+            radio_loss=0.3,
+        ),
+        Scenario(
+            name="leader-loss",
+            target_motion="accelerating",
+            tracker_turn_rate=1.1,
+            target_turn_rate=0.2,
+            formation_distance=2.4,
+            formation_spacing=2.4,
+            start_distance=(2.0, 3.9),
+            sensing_range=4.0,
+            breaks=1,
+            horizon=300,
+        ),
+        Scenario(
+            name="field",
+            version=2,
+            target_motion="smart",
+            tracker_turn_rate=1.5,
+            target_turn_rate=1.5,
+            arena=24.0,
+            num_obstacles=6,
+            start_distance=(4.0, 20.0),
+            sensing_range=6.0,
+            range_noise=0.02,
+            bearing_noise=0.02,
+            velocity_smoothing=0.5,
+            radio_range=8.0,
+            radio_delay=2,
+            radio_loss=0.2,
+            breaks=1,
+            break_choice="drawn",
+            sensor_outages=0.2,
+            radio_outages=0.2,
+        ),
+        paper.replace(name="paper-centralized"),
+        paper.replace(name="paper-distributed"),
+    )
+    return {scenario.name: scenario for scenario in scenarios}
 
 
 def scenario_names() -> tuple[str, ...]:
     """Return the names of all scenarios."""
-    return tuple(_BY_NAME)
+    return tuple(_named())
 
 
 def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
@@ -112,12 +116,12 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         found = scenario
-    elif scenario in _BY_NAME:
-        found = _BY_NAME[scenario]
+    elif scenario in _named():
+        found = _named()[scenario]
     else:
-        near = difflib.get_close_matches(str(scenario), _BY_NAME, n=3)
+        near = difflib.get_close_matches(str(scenario), _named(), n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
         raise ScenarioError(
-            f"unknown scenario {scenario!r}{hint}; scenarios are: {', '.join(_BY_NAME)}"
+            f"unknown scenario {scenario!r}{hint}; scenarios are: {', '.join(_named())}"
         )
     return found.replace(**overrides) if overrides else found

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from posse.registry import TARGET_MOTIONS
 from posse.scenarios.checks import check_together
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
@@ -24,7 +25,6 @@ from posse.scenarios.limits import (
     OPEN_PLANE_EXTENT,
     SAFE_MARGIN,
     SMALL,
-    TARGET_MOTIONS,
     WIDE,
 )
 from posse.scenarios.setting import (

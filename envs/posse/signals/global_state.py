@@ -1,7 +1,7 @@
 """Everything there is to know of a world, as one flat float32 vector: for critics that see it all.
 
 It holds what decides how the world goes on, chance apart: poses, speeds, the slot frame ψ, where
-the target is bound for and how long it has been pressed, obstacles, faults past and to come, every
+the target is bound for and what its motion remembers, obstacles, faults past and to come, every
 tracker's fix, and the radio: what was heard last, and what is in flight. What follows from these
 (sonar, contacts, occupied slots, whether the episode is over) is left out, and so are the sums
 behind the metrics. To add an entry, add its line to the function of its part below.
@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray
+from posse.registry import TARGET_MOTIONS
 from posse.rules.state import NEVER, WorldArrays, perfect_radio
-from posse.rules.targets.target_motion import DART_TURN, PATIENCE
 from posse.scenarios import Scenario
 
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
@@ -183,22 +183,20 @@ def _target_entries(s: Scenario) -> list[StateEntry]:
         )
         for name in (*_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin")
     ]
-    weave = s.target_turn_rate * _SLACK
-    dart = float(DART_TURN) / s.target_turn_rate * _SLACK
+    memory = [
+        StateEntry(
+            m.name, (), m.unit, m.bound("low", s), m.bound("high", s), m.meaning,
+            _scaled("world", m.name),
+        )
+        for motion in TARGET_MOTIONS.with_added(s.target_motion)
+        for m in motion.memory
+    ]  # fmt: skip
     times = (-1.0, (s.duration + s.control_step * s.breaks) * _SLACK)
     return [
         StateEntry("time", (), "s", 0, s.duration * _SLACK, "since the start",
                    _scaled("world", "step", dt)),
         *named,
-        StateEntry("weave_amplitude", (), "rad/s", 0, weave, "of an accelerating target",
-                   _scaled("world", "weave_amplitude")),
-        StateEntry("weave_rate", (), "rad/s", 0, 1, "of an accelerating target",
-                   _scaled("world", "weave_rate")),
-        StateEntry("weave_phase", (), "rad", 0, 2 * np.pi * _SLACK, "of an accelerating target",
-                   _scaled("world", "weave_phase")),
-        StateEntry("pressed", (), "s", -dart, float(PATIENCE),
-                   "of a smart target: how long the team has kept station; < 0: it darts",
-                   _scaled("world", "pressed")),
+        *memory,
         StateEntry("next_break", (), "s", *times, "when the nearest tracker breaks; -1: never",
                    _when("world", "break_step", dt)),
         StateEntry("breaks_left", (), "count", 0, s.breaks, "trackers that will yet break",

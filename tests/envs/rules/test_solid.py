@@ -15,9 +15,9 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import posse
+from posse.registry import TARGET_MOTIONS
 from posse.scenarios import ScenarioError
 from posse.scenarios.formation import FORMATIONS
-from posse.scenarios.limits import TARGET_MOTIONS
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]

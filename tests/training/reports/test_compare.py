@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse.scenarios.named import _BY_NAME
+from posse.scenarios.named import _named
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
@@ -111,13 +111,13 @@ def test_who_cannot_play_is_left_out_with_a_line(
     files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scenario = replace(posse.get_scenario("constant"), sonar_beams=4)
-    _BY_NAME["few-beams"] = scenario
+    _named()["few-beams"] = scenario
     try:
         command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
         options = ["--episodes", "2", "--no-figures", "--out", str(tmp_path / "out")]
         assert main([*command, *options]) == 0
     finally:
-        del _BY_NAME["few-beams"]
+        del _named()["few-beams"]
     shown = " ".join(capsys.readouterr().out.split())
     assert "left out: any-0 on few-beams:" in shown
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

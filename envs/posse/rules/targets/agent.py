@@ -1,0 +1,11 @@
+"""The target that a policy drives."""
+
+from __future__ import annotations
+
+from posse.numeric import Record
+from posse.rules.targets.declaring import target_motion
+
+
+@target_motion("agent", agent=True)
+def agent(c: Record, w: Record) -> None:
+    """A policy drives it, as it drives the trackers."""

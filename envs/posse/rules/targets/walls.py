@@ -1,0 +1,121 @@
+"""How a target keeps clear of walls and obstacles.
+
+In an arena the goal is mirrored near walls, and the target only takes a turn that leaves one of its
+two turning circles free, so that it can always go on turning for ever without touching anything.
+Trackers that block it, so that it turns on the spot, can leave it without a free circle: then it
+turns to the wider side until one is free, and is stopped by contact (:mod:`posse.rules.contact`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import Record, Records, compiled
+from posse.rules.kinematics import arc
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+_HALF: Final = np.float32(0.5)
+_ROUNDING: Final = np.float32(1e-3)  # m, far more than an episode of rounding adds up to
+_SOFT_WALL: Final = np.float32(2.0)  # a goal heading is mirrored this far before a wall, m
+
+
+@compiled(seldom=True)
+def mirror_at_walls(c: Record, w: Record) -> None:
+    """Mirror the goal heading at a wall that is near and ahead."""
+    inner = max(c.half_arena - _SOFT_WALL, c.half_arena * _HALF)
+    if (w.x > inner and w.goal_cos > _ZERO) or (w.x < -inner and w.goal_cos < _ZERO):
+        w.goal_cos = -w.goal_cos
+    if (w.y > inner and w.goal_sin > _ZERO) or (w.y < -inner and w.goal_sin < _ZERO):
+        w.goal_sin = -w.goal_sin
+
+
+@compiled
+def circle_is_free(
+    c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32
+) -> bool:
+    """Say whether a disc of the target's turning circle, rim included, is clear of everything."""
+    room = radius + c.safe_distance
+    if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:
+        return False
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        reach = room + o.radius
+        # The disc may also surround the obstacle, but then the path along its rim is not safe
+        # for every obstacle inside; a circle that holds one is not free.
+        if (o.x - x) * (o.x - x) + (o.y - y) * (o.y - y) < reach * reach:
+            return False
+    return True
+
+
+@compiled
+def has_free_circle(
+    c: Record,
+    obstacles: Records,
+    x: np.float32,
+    y: np.float32,
+    heading_cos: np.float32,
+    heading_sin: np.float32,
+    side: np.float32,
+    allowance: np.float32 = _ZERO,
+) -> bool:
+    """Say whether the turning circle to one side (+1 left, -1 right) is free, to an allowance."""
+    radius = c.target_speed / c.target_turn_rate
+    x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
+    return circle_is_free(c, obstacles, x, y, radius - allowance)
+
+
+@compiled(seldom=True)
+def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
+    """Return ``turn`` if a free turning circle remains after it, else the turn along a free one.
+
+    Where there is none, the turn that leads to one.
+    """
+    dx, dy, hc, hs = w.heading_cos, w.heading_sin, w.heading_cos, w.heading_sin
+    x, y = w.x, w.y
+    for _ in range(c.physics_steps):
+        dx, dy, hc, hs = arc(hc, hs, c.target_speed, turn, c.physics_dt)
+        x, y = x + dx, y + dy
+    if has_free_circle(c, obstacles, x, y, hc, hs, _ONE):
+        return turn
+    if has_free_circle(c, obstacles, x, y, hc, hs, -_ONE):
+        return turn
+    # The circle it follows stays free but for rounding, which must not make it change sides.
+    x, y, hc, hs = w.x, w.y, w.heading_cos, w.heading_sin
+    left = has_free_circle(c, obstacles, x, y, hc, hs, _ONE, _ROUNDING)
+    right = has_free_circle(c, obstacles, x, y, hc, hs, -_ONE, _ROUNDING)
+    if left and (turn >= _ZERO or not right):
+        side = _ONE
+    elif right:
+        side = -_ONE
+    else:
+        side = way_out(c, w, obstacles)
+    return np.float32(side * c.target_turn_rate)
+
+
+@compiled(seldom=True)
+def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
+    """Return to which side (+1 left, -1 right) to turn where neither turning circle is free."""
+    if w.speed == _ZERO:
+        # Blocked in the last step. To and fro it could stay so for ever; turning on the same way,
+        # it comes to every heading there is.
+        return _ONE if w.turn_rate >= _ZERO else -_ONE
+    radius = c.target_speed / c.target_turn_rate
+    aside_x, aside_y = -radius * w.heading_sin, radius * w.heading_cos
+    left = width_around(c, obstacles, w.x + aside_x, w.y + aside_y)
+    right = width_around(c, obstacles, w.x - aside_x, w.y - aside_y)
+    return _ONE if left >= right else -_ONE
+
+
+@compiled
+def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) -> np.float32:
+    """Return how far the nearest obstacle or wall is from a place, m."""
+    width = c.half_arena - max(abs(x), abs(y))
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy = o.x - x, o.y - y
+        width = min(width, np.float32(math.sqrt(dx * dx + dy * dy)) - o.radius)
+    return np.float32(width)

@@ -1,0 +1,130 @@
+"""Target motions, sensors and metrics from a user's own module: the chapter's examples, at work."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHAPTER = Path(__file__).parents[2] / "docs" / "extend_targets.md"
+MOST_LINES = {"spiral": 15}
+
+
+def examples() -> dict[str, str]:
+    """Return the chapter's modules by name."""
+    text = CHAPTER.read_text(encoding="utf-8")
+    return dict(re.findall(r'```python title="(\w+)\.py"\n(.*?)```', text, re.DOTALL))
+
+
+def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
+    """Run code beside modules of a user's own, in an interpreter of their own."""
+    for name, source in {**modules, "main": code}.items():
+        (folder / f"{name}.py").write_text(source, encoding="utf-8")
+    return subprocess.run(
+        [sys.executable, "main.py"], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def lines_of(source: str) -> int:
+    """Return how many lines hold code or a docstring."""
+    return sum(bool(line.strip()) for line in source.splitlines())
+
+
+@pytest.mark.parametrize("name", MOST_LINES)
+def test_an_example_is_short(name: str) -> None:
+    assert lines_of(examples()[name]) <= MOST_LINES[name]
+
+
+PLAY = """
+import numpy as np
+import posse
+import spiral
+from posse.signals.global_state import StateLayout
+
+batch = posse.batch("constant", 40, target_motion="spiral", num_trackers=2)
+batch.reset(seed=0)
+s, heading = batch.scenario, []
+for step in range(100):
+    heading.append(np.arctan2(batch.state["world_heading_sin"], batch.state["world_heading_cos"]))
+    batch.step(np.zeros(batch.action_shape))
+turned = np.unwrap(heading, axis=0)
+turned -= turned[0]
+side = batch.state["world_spiral_side"]
+assert set(side) == {-1.0, 1.0}
+times = s.control_step * np.arange(100)
+rates = s.target_turn_rate / (1 + 0.1 * times)
+expected = np.append(0, np.cumsum(rates[:-1] * s.control_step))
+np.testing.assert_allclose(turned, side * expected[:, None], atol=1e-3)
+layout = StateLayout(s)
+np.testing.assert_array_equal(
+    layout.views(layout.vector(batch.arrays))["spiral_side"], side
+)
+assert "spiral_side" not in StateLayout(posse.get_scenario("smart")).offsets
+print(sum(batch._untyped.stats.cache_hits.values()))
+"""
+
+
+def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
+    """And kept on disk, until their source changes."""
+    modules = examples()
+    for hits in ("0", "1"):
+        done = run(tmp_path, PLAY, **modules)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.split()[-1:] == [hits]
+    modules["spiral"] = modules["spiral"].replace("0.1 * w.step", "0.2 * w.step")
+    done = run(tmp_path, PLAY, **modules)
+    assert "Not equal to tolerance" in done.stderr, "an edited motion is compiled anew"
+
+
+DECLARATION = """
+import posse
+
+@posse.target_motion({declaration})
+def own(c, w{more}):
+    {docstring}
+    {line}
+
+posse.batch("constant", 1, target_motion="own").reset()
+"""
+MISTAKES = {
+    "a name that is taken": ({"declaration": '"smart"'}, r"own \(main.py:4\).*'smart' is taken by"),
+    "no docstring": ({"docstring": ""}, r"own \(main.py:4\): its docstring.* is missing"),
+    "another parameter": (
+        {"more": ", team"}, r"own \(main.py:4\): its parameters are \(c, w, team\), not \(c, w, tr",
+    ),
+    "an unknown field": (
+        {"line": "w.goal_cos = w.headig_cos"},
+        r"own \(main.py:4\): line 7: w has no field 'headig_cos'; it has heading_cos",
+    ),
+    "memory that is taken": (
+        {"declaration": '"own", memory=[posse.Memory("speed", "1", 0, 1, "?")]'},
+        r"own \(main.py:4\): a world has a field 'speed'",
+    ),
+    "a wrong type": (
+        {"line": 'w.goal_cos = "north"'}, r"own \(main.py:4\): line 7: .*to float32",
+    ),
+    "what the compiler cannot do": (
+        {"line": 'w.goal_cos = float(open("x").read())'},
+        r"own \(main.py:4\): line 7: Untyped global name 'open'",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_names_the_function_and_the_line(mistake: str, tmp_path: Path) -> None:
+    parts = {"declaration": '"own"', "more": "", "docstring": '"""Mistaken."""', "line": "pass"}
+    changed, message = MISTAKES[mistake]
+    done = run(tmp_path, DECLARATION.format(**{**parts, **changed}))
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("posse.registry.DeclarationError: target motion "), last
+    assert re.search(message, last), last
+
+
+def test_a_motion_that_is_not_declared_is_named_with_near_ones(tmp_path: Path) -> None:
+    code = 'import posse, spiral\nposse.batch("constant", 1, target_motion="spirall")'
+    done = run(tmp_path, code, **examples())
+    assert "unknown target_motion='spirall' (did you mean 'spiral'?)" in done.stderr
