@@ -51,7 +51,7 @@ class Settings:
 
 
 SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
-SET_GOAL = rules_for(built_in_parts()).set_goal
+RULES = rules_for(built_in_parts())
 
 
 @kernel
@@ -66,7 +66,7 @@ def one_part(  # type: ignore[no-untyped-def]
     for e in range(len(worlds.world)):
         w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         if part == 0:
-            motion.motion(c, w, t, o, actions[e], SET_GOAL, scratch)
+            motion.motion(c, w, t, o, actions[e], RULES.set_goal, scratch)
             continue
         survey.lay_out(c, w, t, o, scratch)  # what the other parts start from
         survey.find_gaps(c, scratch)
@@ -74,7 +74,7 @@ def one_part(  # type: ignore[no-untyped-def]
             contact.meet(c, w, t, o, scratch)
         elif part == 3:
             w.step += 1
-            world.sense(c, worlds, e, scratch)
+            world.sense(c, worlds, e, RULES, scratch)
         elif part == 4:
             score.occupy(c, w, t, tables.slots, scratch)
         elif part == 5:

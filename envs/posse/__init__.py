@@ -7,7 +7,8 @@ from typing import Any
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
-from posse.registry import TARGET_MOTIONS, DeclarationError
+from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
+from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
 from posse.signals.fields import Field
@@ -72,6 +73,7 @@ def observation_fields(
 __all__ = [
     "METRICS",
     "REWARD_TERMS",
+    "SENSORS",
     "TARGET_MOTIONS",
     "Batch",
     "DeclarationError",
@@ -82,6 +84,7 @@ __all__ = [
     "RewardTerm",
     "Scenario",
     "ScenarioError",
+    "Sensor",
     "Snapshot",
     "TargetMotion",
     "batch",
@@ -90,5 +93,6 @@ __all__ = [
     "observation_fields",
     "parallel_env",
     "scenario_names",
+    "sensor",
     "target_motion",
 ]

@@ -8,6 +8,7 @@ imported, and a scenario asks for it by name.
 from __future__ import annotations
 
 import difflib
+import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final, Generic, TypeVar
@@ -59,6 +60,22 @@ class Registry(Mapping[str, T], Generic[T]):
         """Return the error that a declared function cannot be used."""
         return DeclarationError(f"{self.kind} {place_of(function)}: {reason}")
 
+    def check_parameters(
+        self, function: Function, allowed: tuple[str, ...], least: int | None = None
+    ) -> None:
+        """Raise unless a function's parameters are those allowed, or the first ``least`` or more.
+
+        Raises:
+            DeclarationError: They are others.
+        """
+        names = tuple(inspect.signature(function).parameters)
+        least = len(allowed) if least is None else least
+        if len(names) < least or names != allowed[: len(names)]:
+            wanted = f"({', '.join(allowed)})"
+            if least < len(allowed):
+                wanted += f" or the first {least} or more of them"
+            raise self.error(function, f"its parameters are ({', '.join(names)}), not {wanted}")
+
     def is_built_in(self, name: str) -> bool:
         """Say whether posse itself declares it."""
         return self._functions[name].__module__.partition(".")[0] == _PACKAGE
@@ -103,5 +120,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
 FIELDS: Final[Registry[Any]] = Registry("observation field")
 """Of :class:`posse.signals.fields.FieldDeclaration`."""
+SENSORS: Final[Registry[Any]] = Registry("sensor")
+"""Of :class:`posse.rules.senses.declaring.Sensor`."""
 TARGET_MOTIONS: Final[Registry[Any]] = Registry("target motion")
 """Of :class:`posse.rules.targets.declaring.TargetMotion`."""

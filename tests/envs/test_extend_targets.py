@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 CHAPTER = Path(__file__).parents[2] / "docs" / "extend_targets.md"
-MOST_LINES = {"spiral": 15}
+MOST_LINES = {"spiral": 15, "bearing": 25}
 
 
 def examples() -> dict[str, str]:
@@ -41,15 +41,44 @@ def test_an_example_is_short(name: str) -> None:
 PLAY = """
 import numpy as np
 import posse
+import bearing
 import spiral
 from posse.signals.global_state import StateLayout
 
-batch = posse.batch("constant", 40, target_motion="spiral", num_trackers=2)
-batch.reset(seed=0)
-s, heading = batch.scenario, []
+batch = posse.batch(
+    "constant", 40, target_motion="spiral", sensor="bearing-only", sensing_range=6.0,
+    num_trackers=3, radio_loss=RADIO_LOSS,
+)
+s, layout = batch.scenario, StateLayout(batch.scenario)
+low, high = batch.layout.bounds()
+observations = batch.reset(seed=0)
+heading, ever, bearings, losses = [], 0, np.nan, 0
 for step in range(100):
-    heading.append(np.arctan2(batch.state["world_heading_sin"], batch.state["world_heading_cos"]))
-    batch.step(np.zeros(batch.action_shape))
+    state, o = batch.state, batch.layout.views(observations)
+    heading.append(np.arctan2(state["world_heading_sin"], state["world_heading_cos"]))
+    offset = state["world_x"][:, None] - state["tracker_x"]
+    offset = offset + 1j * (state["world_y"][:, None] - state["tracker_y"])
+    own = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
+    told = (o["target_bearing"][..., 0] + 1j * o["target_bearing"][..., 1]) * own
+    seen, known = o["target_seen"] > 0, o["target_known"] > 0
+    np.testing.assert_array_equal(seen, abs(offset) <= s.sensing_range)
+    ever = ever | seen
+    np.testing.assert_array_equal(known, ever)  # a bearing is not sent
+    error = np.angle(told / offset)[seen]
+    assert np.abs(error).max() <= 0.0601
+    assert error.std() > 0.01
+    kept = known & ~seen  # the direction stands, whoever moves
+    np.testing.assert_allclose(told[kept], np.broadcast_to(bearings, told.shape)[kept], atol=1e-4)
+    bearings, losses = told.copy(), losses + kept.sum()
+    assert (o["target_range"] == -1).all()
+    assert (abs(told[~known]) == 0).all()
+    for name in ("target_heading", "target_frame", "target_velocity"):
+        assert (o[name] == 0).all()
+    assert ((observations >= low) & (observations <= high)).all()
+    vector = layout.vector(batch.arrays)
+    assert ((vector >= layout.bounds()[0]) & (vector <= layout.bounds()[1])).all()
+    observations = batch.step(np.ones(batch.action_shape))[0]
+assert losses > 0
 turned = np.unwrap(heading, axis=0)
 turned -= turned[0]
 side = batch.state["world_spiral_side"]
@@ -58,7 +87,6 @@ times = s.control_step * np.arange(100)
 rates = s.target_turn_rate / (1 + 0.1 * times)
 expected = np.append(0, np.cumsum(rates[:-1] * s.control_step))
 np.testing.assert_allclose(turned, side * expected[:, None], atol=1e-3)
-layout = StateLayout(s)
 np.testing.assert_array_equal(
     layout.views(layout.vector(batch.arrays))["spiral_side"], side
 )
@@ -70,12 +98,12 @@ print(sum(batch._untyped.stats.cache_hits.values()))
 def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
     """And kept on disk, until their source changes."""
     modules = examples()
-    for hits in ("0", "1"):
-        done = run(tmp_path, PLAY, **modules)
+    for hits, loss in (("0", "0.0"), ("1", "0.1")):
+        done = run(tmp_path, PLAY.replace("RADIO_LOSS", loss), **modules)
         assert done.returncode == 0, done.stderr
         assert done.stdout.split()[-1:] == [hits]
     modules["spiral"] = modules["spiral"].replace("0.1 * w.step", "0.2 * w.step")
-    done = run(tmp_path, PLAY, **modules)
+    done = run(tmp_path, PLAY.replace("RADIO_LOSS", "0.0"), **modules)
     assert "Not equal to tolerance" in done.stderr, "an edited motion is compiled anew"
 
 

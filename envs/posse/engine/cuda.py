@@ -100,7 +100,7 @@ def _stepping(parts: Parts) -> Any:
     """Return the kernel that steps worlds."""
     memory = scratch_for(parts, 1)
     settings, own, mate, empty, width, mate_width = writers_for(parts)
-    draw_motion, set_goal = rules_for(parts)
+    draw_motion, set_goal, sees, measure = rules_for(parts)
 
     @cuda.jit  # type: ignore[untyped-decorator]
     def advance(
@@ -120,7 +120,7 @@ def _stepping(parts: Parts) -> Any:
                 scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
             s = scratch[0]
             writers = Writers(settings, own, mate, empty, width, mate_width)
-            rules = Rules(draw_motion, set_goal)
+            rules = Rules(draw_motion, set_goal, sees, measure)
             prepare(tables, writers, s)
             over = advance_worlds(e, 1, tables, worlds, actions, results, orders, rules, writers, s)
             results.flags[2, e] = over

@@ -81,10 +81,10 @@ class Results(NamedTuple):
 
 
 @compiled
-def sense(c: Record, worlds: WorldArrays, e: int, scratch: Record) -> None:
+def sense(c: Record, worlds: WorldArrays, e: int, rules: Rules, scratch: Record) -> None:
     """Let every tracker of world e look for the target, then tell and hear."""
     w, trackers = worlds.world[e], worlds.tracker[e]
-    seeing = look(c, w, trackers, scratch)
+    seeing = look(c, w, trackers, rules.sees, rules.measure, scratch)
     if c.perfect_radio:
         if seeing < c.num_trackers:  # else nobody has anything to hear
             share_fixes(c, trackers)
@@ -225,7 +225,7 @@ def advance_worlds(
         find_gaps(c, scratch)
         if order != LOOK:
             meet(c, w, trackers, obstacles, scratch)
-            sense(c, worlds, e, scratch)
+            sense(c, worlds, e, rules, scratch)
             occupy(c, w, trackers, tables.slots, scratch)
         if order == STEP:
             end_step(c, w, trackers, tables.slots)
@@ -268,7 +268,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
     Its configuration, slots and beams become constants in the code.
     """
     settings, own_fields, mate, empty, width, mate_width = writers_for(parts)
-    draw_motion, set_goal = rules_for(parts)
+    draw_motion, set_goal, sees, measure = rules_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
     @kernel
@@ -290,7 +290,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         )
         s = scratch[0]
         writers = Writers(settings, own_fields, mate, empty, width, mate_width)
-        rules = Rules(draw_motion, set_goal)
+        rules = Rules(draw_motion, set_goal, sees, measure)
         if s.prepared[0] == _ZERO:
             prepare(used, writers, s)
             s.prepared[0] = _ONE

@@ -6,6 +6,8 @@ import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from posse.rules.senses.declaring import Sensor, measuring, seeing
+from posse.rules.senses.sensing import add_noise
 from posse.rules.targets import TargetMotion
 from posse.rules.targets.declaring import drawing, setting_goals
 
@@ -17,9 +19,15 @@ class Rules(NamedTuple):
     """(c, w): draws what the target's motion depends on in an episode."""
     set_goal: Any
     """(c, w, trackers, obstacles, s): sets a scripted target's goal heading."""
+    sees: Any
+    """(c, w, t, dx, dy, s) -> whether a tracker's sensor has the target."""
+    measure: Any
+    """(c, w, number, dx, dy) -> where it has the target."""
 
 
 @functools.cache
-def rules_of(motions: Sequence[TargetMotion]) -> Rules:
-    """Return the functions for worlds whose targets move in one of these ways."""
-    return Rules(drawing(motions), setting_goals(motions))
+def rules_of(motions: Sequence[TargetMotion], sensors: Sequence[Sensor]) -> Rules:
+    """Return the functions for worlds of any of these motions and sensors."""
+    return Rules(
+        drawing(motions), setting_goals(motions), seeing(sensors), measuring(sensors, add_noise)
+    )

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records
-from posse.registry import TARGET_MOTIONS
+from posse.registry import SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
@@ -50,6 +50,8 @@ CONFIG: Final = _record(
     ("outage_steps", _I), ("break_from", _I), ("break_until", _I), ("forget_steps", _I),
     ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("break_number", _I),
     ("motion", _I), ("mirrored", _I), ("target_agent", _I),
+    ("sensor", _I), ("fix_bearing", _I),  # 1: a fix is a bearing, else a position
+    ("measured", _I),  # 0: sensors have the target where it is
     ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
     ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
     ("dt", _F), ("physics_dt", _F),
@@ -116,6 +118,15 @@ def _world_record(motion: str) -> np.dtype[Any]:
     return _record(*_WORLD, *((m.name, _F) for each in motions for m in each.memory))
 
 
+FIX_FIELDS: Final = (
+    ("fix_step", _I),  # when it was taken; -1: none yet
+    ("fix_x", _F), ("fix_y", _F),  # where the target was, m; a bearing: a unit vector
+    ("fix_cos", _F), ("fix_sin", _F),  # its heading; a bearing: 0
+    ("fix_frame_cos", _F), ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
+)  # fmt: skip
+"""A fix of the target, in the common frame. Its kind is the sensor's
+(:mod:`posse.rules.senses.declaring`)."""
+
 TRACKER: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
@@ -130,9 +141,7 @@ TRACKER: Final = _record(
     ("onsets", _I),  # contacts that began in this step
     ("touching_trackers", _U), ("touching_obstacles", _U),  # a bit each; bits 60 to 63: walls
     # its best fix of the target, seen or heard
-    ("fix_step", _I),  # when the fix was taken; -1: none yet
-    ("fix_x", _F), ("fix_y", _F), ("fix_cos", _F), ("fix_sin", _F),
-    ("fix_frame_cos", _F), ("fix_frame_sin", _F), ("fix_vx", _F), ("fix_vy", _F),
+    *FIX_FIELDS, ("fix_vx", _F), ("fix_vy", _F),  # m/s, from successive fixes
     # the score's and the rewards' view
     ("slot", _I),  # which slot it occupies, -1: none
     ("slot_distance", _F),  # to the nearest slot that nobody else occupies
@@ -165,9 +174,7 @@ BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
-    ("fix_step", _I),
-    ("fix_x", _F), ("fix_y", _F), ("fix_cos", _F), ("fix_sin", _F),
-    ("fix_frame_cos", _F), ("fix_frame_sin", _F),
+    *FIX_FIELDS,
 )  # fmt: skip
 """What a tracker sent, kept until it has been heard: (E, D + 1, N), by step modulo D + 1."""
 
@@ -287,6 +294,10 @@ def config_record(scenario: Scenario) -> Records:
     motion = TARGET_MOTIONS[s.target_motion]
     c.motion, c.target_agent = motions.index(motion), motion.agent
     c.mirrored = motion.mirrored and math.isfinite(s.arena)
+    sensor = SENSORS[s.sensor]
+    c.sensor = SENSORS.with_added(s.sensor).index(sensor)
+    c.fix_bearing = sensor.fix == "bearing"
+    c.measured = s.range_noise > 0 or s.bearing_noise > 0 or sensor.measure is not None
     c.terminate_on_contact, c.walled = s.terminate_on_contact, math.isfinite(s.arena)
     c.sonar_beams = s.sonar_beams
     c.whole_arcs = s.whole_arcs

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from posse.registry import TARGET_MOTIONS
+from posse.registry import SENSORS, TARGET_MOTIONS
 from posse.scenarios.checks import check_together
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
@@ -140,6 +140,9 @@ class Scenario:
     )  # fmt: skip
 
     # Sensing
+    sensor: str = text(
+        "range-bearing", "what the target sensor has of a target in sight", lambda: SENSORS
+    )
     sensing_range: float = number(
         math.inf, "m", 0, FAR, "a tracker sees the target up to this distance; inf: at any",
         above=True, infinite=True,

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray
-from posse.registry import TARGET_MOTIONS
+from posse.registry import SENSORS, TARGET_MOTIONS
 from posse.rules.state import NEVER, WorldArrays, perfect_radio
 from posse.scenarios import Scenario
 
@@ -160,6 +160,8 @@ def _limits(s: Scenario) -> dict[str, tuple[str, float, float]]:
     place = s.position_bound * _SLACK
     # A measured place is off by the noise, cut at three standard deviations, times the range.
     fix = (s.position_bound + 3 * (s.range_noise + s.bearing_noise) * s.range_bound) * _SLACK
+    if SENSORS[s.sensor].fix == "bearing":
+        fix = max(fix, _SLACK)  # a unit vector
     turn = max(*s.tracker_turn_rates, s.target_turn_rate) * _SLACK
     limits = {
         "x": ("m", -place, place),

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import Lanes, Record, choose, compiled, greater
+from posse.numeric import Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
@@ -222,6 +222,8 @@ def _farthest_fix(s: Scenario) -> float:
 @field("m", -1, _farthest_fix, unknown=-1)
 def target_range(c: Record, v: View) -> Lanes:
     """Distance of the fix from here."""
+    if c.fix_bearing != 0:
+        return eight(_MINUS_ONE)
     return choose(v.target_known, v.target_distance, _MINUS_ONE)
 
 

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import posse.signals.mate_fields
 import posse.signals.own_fields  # noqa: F401 (declares the built-in fields)
-from posse.registry import FIELDS, TARGET_MOTIONS, Registry
+from posse.registry import FIELDS, SENSORS, TARGET_MOTIONS, Registry
 from posse.rules.declared import Rules, rules_of
+from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
 from posse.scenarios import Scenario
 from posse.signals.columns import (
@@ -31,6 +32,8 @@ class Parts(NamedTuple):
     """Of a team-mate, but for what it said."""
     motions: tuple[TargetMotion, ...]
     """Of the target."""
+    sensors: tuple[Sensor, ...]
+    """That have the target in sight."""
 
     @property
     def width(self) -> int:
@@ -68,24 +71,27 @@ def built_in_parts() -> Parts:
         fields=tuple(field for field in fields if field.subject != "mate"),
         mate_fields=tuple(field for field in fields if field.subject == "mate"),
         motions=TARGET_MOTIONS.built_in(),
+        sensors=SENSORS.built_in(),
     )
 
 
 def parts_for(scenario: Scenario) -> Parts:
     """Return the parts for a scenario: the built-in ones, and those that it asks for by name."""
-    motions = TARGET_MOTIONS.with_added(scenario.target_motion)
-    return built_in_parts()._replace(motions=motions)
+    return built_in_parts()._replace(
+        motions=TARGET_MOTIONS.with_added(scenario.target_motion),
+        sensors=SENSORS.with_added(scenario.sensor),
+    )
 
 
 def added(parts: Parts) -> Iterator[tuple[Registry[Any], Any]]:
     """Yield what a user's modules have declared among parts, each with its registry."""
-    for registry, things in ((TARGET_MOTIONS, parts.motions),):
+    for registry, things in ((TARGET_MOTIONS, parts.motions), (SENSORS, parts.sensors)):
         yield from ((registry, thing) for thing in things if not registry.is_built_in(thing.name))
 
 
 def rules_for(parts: Parts) -> Rules:
     """Return the functions that parts of the rules are carried out by."""
-    return rules_of(parts.motions)
+    return rules_of(parts.motions, parts.sensors)
 
 
 @functools.cache

@@ -74,7 +74,7 @@ class View(NamedTuple):
     target_step: Lanes
     """Control step of the fix."""
     target_dx: Lanes
-    """Where the target was, from here, m."""
+    """Where the target was, from here, m; of a bearing alone: its direction, a unit vector."""
     target_dy: Lanes
     target_distance: Lanes
     target_cos: Lanes
@@ -181,7 +181,9 @@ def view_of_trackers(
     )
     broken_at, _, _, _, sees, _, touching, _ = team_columns(worlds.tracker, e, i, across, CONDITION)
     working = choose(counts(broken_at) == np.float32(NEVER), _ONE, _ZERO)
-    dx, dy, fixed_at = x - own_x, y - own_y, load(s.fix_step, 0)
+    dx, dy, fixed_at = x, y, load(s.fix_step, 0)
+    if c.fix_bearing == 0:
+        dx, dy = x - own_x, y - own_y
     return View(
         own_numbers(i, across, s), own_x, own_y, hc, hs, speed, turn_rate,
         counts(touching), working, load(s.step, 0),

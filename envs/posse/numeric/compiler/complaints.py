@@ -62,7 +62,7 @@ def why_not_compiled(
     Args:
         function: Plain, or compiled.
         arguments: The types of its arguments.
-        returns: ``"nothing"``, ``"number"``, or ``"truth"``.
+        returns: ``"nothing"``, ``"number"``, ``"pair"`` or ``"truth"``.
     """
     plain = getattr(function, "py_func", function)
     code = plain.__code__
@@ -79,6 +79,7 @@ def why_not_compiled(
     fits = {
         "nothing": isinstance(found, types.NoneType),
         "number": isinstance(found, (types.Number, types.Boolean)),
+        "pair": isinstance(found, types.BaseTuple) and len(found) == 2,
         "truth": isinstance(found, (types.Integer, types.Boolean)),
     }[returns]
     wrong = f"it returns {_short(str(found))}, not a {returns}".replace("a nothing", "nothing")

@@ -1,1 +1,9 @@
-"""What trackers sense and hear: target sensor, sonar, radio."""
+"""What trackers sense and hear: target sensor, sonar, radio.
+
+Kinds of target sensors are declared by name (:mod:`posse.rules.senses.declaring`).
+"""
+
+from posse.rules.senses.declaring import Sensor, sensor
+from posse.rules.senses.sensing import add_noise, in_sight
+
+__all__ = ["Sensor", "add_noise", "in_sight", "sensor"]

@@ -31,6 +31,8 @@ def radio_works(c: Record, w: Record, t: Record) -> bool:
 @compiled
 def share_fixes(c: Record, trackers: Records) -> None:
     """A radio without limits, where nobody breaks: everyone takes the newest fix there is."""
+    if c.fix_bearing != 0:
+        return
     best = 0
     for i in range(1, c.num_trackers):
         if trackers[i].fix_step > trackers[best].fix_step:
@@ -96,7 +98,7 @@ def hear(
             h.speed, h.turn_rate = b.speed, b.turn_rate
             for k in range(c.message_size):
                 heard_message[i, j, k] = message[slot, j, k]
-            if b.fix_step > t.fix_step:
+            if b.fix_step > t.fix_step and c.fix_bearing == 0:
                 take_fix(
                     c, t, b.fix_step, b.fix_x, b.fix_y,
                     b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from posse.numeric import (
 )
 from posse.rules.discs import BLOCK, blocks, columns, natural, store_rows
 from posse.rules.randomness import SENSOR_NOISE, normal_pair
+from posse.rules.senses.declaring import sensor
 from posse.rules.state import FIX, NEVER
 
 _ZERO: Final = np.float32(0.0)
@@ -31,11 +32,12 @@ _TINY: Final = np.float32(1e-9)
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of the velocity
 
 
-@compiled
+@sensor("range-bearing")
 def in_sight(c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> bool:
-    """Say whether a tracker's sensor has the target, which lies (dx, dy) from it.
+    """Range and bearing of a target that is in sight.
 
-    In range, in the field of view, the sensor alive, and no obstacle across the line of sight.
+    Which is in range, in the field of view, with no obstacle across the line of sight, while the
+    sensor works. Returns whether a tracker has the target, which lies (dx, dy) from it.
     """
     d2 = dx * dx + dy * dy
     if d2 > c.sensing_range * c.sensing_range:
@@ -116,31 +118,34 @@ def take_fix(
 
 
 @compiled
-def look(c: Record, w: Record, trackers: Records, s: Record) -> int:
+def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Record) -> int:
     """Let every tracker look for the target, and note the fix if it has it; return how many do.
 
     Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     n = natural(c.num_trackers)
-    noisy = c.range_noise > _ZERO or c.bearing_noise > _ZERO
+    measured = c.measured != 0
     seeing = 0
     for i in range(n):
         t = trackers[i]
         dx, dy = w.x - t.x, w.y - t.y
-        t.sees = t.broken_at == NEVER and in_sight(c, w, t, dx, dy, s)
+        t.sees = t.broken_at == NEVER and sees(c, w, t, dx, dy, s)
         seeing += t.sees
         s.fixed_at[i] = np.float32(t.fix_step)
-        if noisy and t.sees:
+        if measured and t.sees:
             s.seen_dx[i], s.seen_dy[i] = measure(c, w, i, dx, dy)
     if seeing == 0:
         return 0
     if w.detected_at < 0:
         w.detected_at = w.step
+    if c.fix_bearing != 0:
+        note_bearings(c, w, trackers, s)
+        return seeing
     for block in range(blocks(n)):
         i = BLOCK * block
         own_x, own_y, before = load(s.x, i), load(s.y, i), load(s.fixed_at, i)
         dx, dy = w.x - own_x, w.y - own_y
-        if noisy:
+        if measured:
             dx, dy = load(s.seen_dx, i), load(s.seen_dy, i)
         x, y = own_x + dx, own_y + dy
         old_x, old_y, _, _, _, _, old_vx, old_vy = columns(trackers, i, n, FIX)
@@ -160,11 +165,26 @@ def look(c: Record, w: Record, trackers: Records, s: Record) -> int:
     return seeing
 
 
+@compiled(seldom=True)
+def note_bearings(c: Record, w: Record, trackers: Records, s: Record) -> None:
+    """Note the bearings of those that have the target: fixes of no place."""
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.sees:
+            dx, dy = w.x - t.x, w.y - t.y
+            if c.measured != 0:
+                dx, dy = s.seen_dx[i], s.seen_dy[i]
+            per_metre = _ONE / max(np.float32(math.sqrt(dx * dx + dy * dy)), _TINY)
+            t.fix_step = w.step
+            t.fix_x, t.fix_y = dx * per_metre, dy * per_metre
+            t.fix_cos, t.fix_sin, t.fix_frame_cos, t.fix_frame_sin = _ZERO, _ZERO, _ZERO, _ZERO
+
+
 @compiled
-def measure(
+def add_noise(
     c: Record, w: Record, number: int, dx: np.float32, dy: np.float32
 ) -> tuple[np.float32, np.float32]:
-    """Return where a tracker's sensor, which is not exact, has the target that is (dx, dy) away."""
+    """Return what is (dx, dy) from a tracker as its sensor has it, with the scenario's noise."""
     first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
     scale = _ONE + c.range_noise * first
     turn = c.bearing_noise * second

@@ -95,9 +95,9 @@ def target_motion(
     """
 
     def declare(function: Function) -> Function:
-        _check_parameters(function, GOAL_PARAMETERS, least=2)
+        TARGET_MOTIONS.check_parameters(function, GOAL_PARAMETERS, least=2)
         if draw is not None:
-            _check_parameters(draw, GOAL_PARAMETERS[:2], least=2)
+            TARGET_MOTIONS.check_parameters(draw, GOAL_PARAMETERS[:2])
         _check_memory(function, memory)
         meaning = inspect.getdoc(function) or ""
         goal = compiled(function)
@@ -123,15 +123,6 @@ def _check_memory(function: Function, memory: Sequence[Memory]) -> None:
         if not each.name.isidentifier():
             raise TARGET_MOTIONS.error(function, f"{each.name!r} is no name for a memory")
         taken.add(each.name)
-
-
-def _check_parameters(function: Function, allowed: tuple[str, ...], least: int) -> None:
-    names = tuple(inspect.signature(function).parameters)
-    if len(names) < least or names != allowed[: len(names)]:
-        raise TARGET_MOTIONS.error(
-            function, f"its parameters are ({', '.join(names)}), not ({', '.join(allowed)})"
-            + (f" or the first {least} or more of them" if least < len(allowed) else "")
-        )  # fmt: skip
 
 
 def drawing(motions: Sequence[TargetMotion]) -> Any:
