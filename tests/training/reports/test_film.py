@@ -90,7 +90,7 @@ def test_a_film_ends_with_the_episode(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"policies": []}, "nothing to film"),
+        ({"policies": []}, "No policies given"),
         ({"path": "film.mp4"}, r"must end in \.gif"),
         ({"seconds": 0.0}, "seconds=0.0 must be"),
         ({"speed": float("nan")}, "speed=nan must be"),
