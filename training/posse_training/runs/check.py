@@ -1,18 +1,32 @@
-"""The check of a shipped policy: scores on a few fixed worlds, which tests play again."""
+"""The check of a shipped policy: scores on a few fixed worlds, which tests play again.
+
+    python -m posse_training.runs.check
+
+evaluates every shipped policy again, on the scenarios as they are now, and writes its card. Needed
+after a scenario's version rose, or an adviser changed. The policies themselves stay as trained.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
 
 from posse import Scenario, get_scenario
 from posse_baselines.learned import LearnedPolicy
+from posse_baselines.registry import SHIPPED
 from posse_training.reports.evaluation import evaluate
+from posse_training.runs.provenance import commit
 
 SPLIT: Final = "validation"
 CHECK_SEED: Final = 2
 CHECK_WORLDS: Final = 32
+AGAIN_SEED: Final = 3
+AGAIN_WORLDS: Final = 200
 _NOT_PLAYED: Final = {"name", "version", "reward_weights", "message_size"}
 """Fields of a scenario that change no score, or that a check states separately."""
 
@@ -66,3 +80,45 @@ def _settings_of(scenario: Scenario) -> dict[str, Any]:
         if field.name not in _NOT_PLAYED
         and getattr(scenario, field.name) != getattr(named, field.name)
     }
+
+
+def check_again(path: Path) -> LearnedPolicy:
+    """Evaluate a shipped policy on the present scenarios, and write what it scores to its card.
+
+    ``card["evaluated_again"]`` states the versions, the commit, and the mean score, safe score and
+    contact-free share over ``AGAIN_WORLDS`` worlds of each scenario.
+    """
+    policy = LearnedPolicy.from_file(path)
+    old = policy.card["check"]
+    scenarios = check_scenarios(old)
+    results = [
+        evaluate(policy, s, AGAIN_WORLDS, AGAIN_SEED, split=SPLIT, progress=False)
+        for s in scenarios
+    ]
+    again = {
+        "commit": commit(),
+        "split": SPLIT,
+        "seed": AGAIN_SEED,
+        "worlds": AGAIN_WORLDS,
+        "versions": {s.name: s.version for s in scenarios},
+        "trained_on_versions": policy.card.get("evaluated_again", {}).get(
+            "trained_on_versions", {play["scenario"]: play["version"] for play in old["plays"]}
+        ),
+        **{
+            name: float(np.mean([r[name].mean() for r in results]))
+            for name in ("score", "safe_score", "contact_free")
+        },
+    }
+    card = {**policy.card, "check": make_check(policy, scenarios), "evaluated_again": again}
+    policy.with_card(card).save(path)
+    return policy.with_card(card)
+
+
+if __name__ == "__main__":
+    console = Console()
+    for file in sorted(SHIPPED.glob("*.safetensors")):
+        again = check_again(file).card["evaluated_again"]
+        console.print(
+            f"{file.stem}: score {again['score']:.3f}, safe score {again['safe_score']:.3f}, "
+            f"contact-free {again['contact_free']:.2f}"
+        )
