@@ -28,7 +28,7 @@ from posse.rules import contact, motion, score
 from posse.rules import discs as survey
 from posse.rules.scratch import new_scratch
 from posse.signals import observing
-from posse.signals.parts import Writers, built_in_parts, rules_for, writers_for
+from posse.signals.parts import Writers, built_in_parts, rules_for, sums_for, writers_for
 
 PARTS = (
     "motion", "where the discs are, and how near", "contact", "target sensor and radio", "score",
@@ -52,6 +52,7 @@ class Settings:
 
 SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
 RULES = rules_for(built_in_parts())
+SUMS = sums_for(built_in_parts())
 
 
 @kernel
@@ -78,7 +79,8 @@ def one_part(  # type: ignore[no-untyped-def]
         elif part == 4:
             score.occupy(c, w, t, tables.slots, scratch)
         elif part == 5:
-            score.add_up(c, w, t, tables.slots)
+            SUMS.add(c, w, t, tables.slots)
+            score.settle(c, w)
         elif part == 6:
             world.reward(c, w, t, tables.weights, results.rewards[e], results.terms[e])
         elif part == 7:

@@ -13,7 +13,8 @@ from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
 from posse.signals.fields import Field
 from posse.signals.layout import ObservationLayout
-from posse.signals.metrics import METRICS, Metric
+from posse.signals.measuring import Metric, metric
+from posse.signals.metrics import METRICS
 from posse.signals.reward import REWARD_TERMS, RewardTerm
 
 __version__ = "0.1.0"
@@ -90,6 +91,7 @@ __all__ = [
     "batch",
     "env",
     "get_scenario",
+    "metric",
     "observation_fields",
     "parallel_env",
     "scenario_names",

@@ -120,6 +120,8 @@ class Registry(Mapping[str, T], Generic[T]):
 
 FIELDS: Final[Registry[Any]] = Registry("observation field")
 """Of :class:`posse.signals.fields.FieldDeclaration`."""
+METRICS: Final[Registry[Any]] = Registry("metric")
+"""Of :class:`posse.signals.measuring.Metric`."""
 SENSORS: Final[Registry[Any]] = Registry("sensor")
 """Of :class:`posse.rules.senses.declaring.Sensor`."""
 TARGET_MOTIONS: Final[Registry[Any]] = Registry("target motion")

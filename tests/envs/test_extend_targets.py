@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 CHAPTER = Path(__file__).parents[2] / "docs" / "extend_targets.md"
-MOST_LINES = {"spiral": 15, "bearing": 25}
+MOST_LINES = {"spiral": 15, "bearing": 25, "distance": 8}
 
 
 def examples() -> dict[str, str]:
@@ -42,17 +42,19 @@ PLAY = """
 import numpy as np
 import posse
 import bearing
+import distance
 import spiral
 from posse.signals.global_state import StateLayout
+from posse_training.reports.evaluation import evaluate
 
 batch = posse.batch(
     "constant", 40, target_motion="spiral", sensor="bearing-only", sensing_range=6.0,
-    num_trackers=3, radio_loss=RADIO_LOSS,
+    num_trackers=3, radio_loss=RADIO_LOSS, metrics=["target_distance"], horizon=101,
 )
 s, layout = batch.scenario, StateLayout(batch.scenario)
 low, high = batch.layout.bounds()
 observations = batch.reset(seed=0)
-heading, ever, bearings, losses = [], 0, np.nan, 0
+heading, ever, bearings, losses, distances = [], 0, np.nan, 0, []
 for step in range(100):
     state, o = batch.state, batch.layout.views(observations)
     heading.append(np.arctan2(state["world_heading_sin"], state["world_heading_cos"]))
@@ -77,8 +79,10 @@ for step in range(100):
     assert ((observations >= low) & (observations <= high)).all()
     vector = layout.vector(batch.arrays)
     assert ((vector >= layout.bounds()[0]) & (vector <= layout.bounds()[1])).all()
-    observations = batch.step(np.ones(batch.action_shape))[0]
+    distances += [abs(offset)] * (step > 0)
+    observations, *_, infos = batch.step(np.ones(batch.action_shape))
 assert losses > 0
+state = batch.state
 turned = np.unwrap(heading, axis=0)
 turned -= turned[0]
 side = batch.state["world_spiral_side"]
@@ -91,6 +95,20 @@ np.testing.assert_array_equal(
     layout.views(layout.vector(batch.arrays))["spiral_side"], side
 )
 assert "spiral_side" not in StateLayout(posse.get_scenario("smart")).offsets
+
+# The metric, at any time and at the end of the episode; beside the built-in ones, which it leaves.
+metrics = batch.metrics()
+assert list(metrics) == [metric.name for metric in posse.METRICS] + ["target_distance"]
+x, y = state["world_x"][:, None], state["world_y"][:, None]
+distances.append(np.hypot(x - state["tracker_x"], y - state["tracker_y"]))
+np.testing.assert_allclose(metrics["target_distance"], np.mean(distances, (0, 2)), rtol=1e-5)
+assert "metrics" not in infos
+infos = batch.step(np.ones(batch.action_shape))[-1]
+assert infos["metrics"]["target_distance"].shape == (40,)
+batch.step(np.ones(batch.action_shape))  # the next episode's start: sums begin anew
+assert (batch.state["world_target_distance_sum"] == 0).all()
+results = evaluate("idle", batch.scenario, 10, progress=False)
+assert np.isfinite(results["target_distance"]).all()
 print(sum(batch._untyped.stats.cache_hits.values()))
 """
 
@@ -98,10 +116,10 @@ print(sum(batch._untyped.stats.cache_hits.values()))
 def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
     """And kept on disk, until their source changes."""
     modules = examples()
-    for hits, loss in (("0", "0.0"), ("1", "0.1")):
+    for loss in ("0.0", "0.1"):
         done = run(tmp_path, PLAY.replace("RADIO_LOSS", loss), **modules)
         assert done.returncode == 0, done.stderr
-        assert done.stdout.split()[-1:] == [hits]
+    assert done.stdout.split()[-1:] == ["1"]
     modules["spiral"] = modules["spiral"].replace("0.1 * w.step", "0.2 * w.step")
     done = run(tmp_path, PLAY.replace("RADIO_LOSS", "0.0"), **modules)
     assert "Not equal to tolerance" in done.stderr, "an edited motion is compiled anew"
@@ -156,3 +174,40 @@ def test_a_motion_that_is_not_declared_is_named_with_near_ones(tmp_path: Path) -
     code = 'import posse, spiral\nposse.batch("constant", 1, target_motion="spirall")'
     done = run(tmp_path, code, **examples())
     assert "unknown target_motion='spirall' (did you mean 'spiral'?)" in done.stderr
+
+
+BLUR = "def blur(c, w, dx, dy):\n    return dx, dy\n\n"
+OTHERS = {
+    "a metric of other parameters": (
+        '@posse.metric("m")\ndef own(c, t):\n    """?"""',
+        r"metric own \(main.py:3\): its parameters are \(c, t\), not \(c, w\) or",
+    ),
+    "a metric per what there is not": (
+        '@posse.metric("m", per="second")\ndef own(c, w):\n    """?"""',
+        r"metric own \(main.py:3\): per='second' is none of: step, tracker_step, episode",
+    ),
+    "a metric whose sum is taken": (
+        '@posse.metric("m")\ndef score(c, w):\n    """?"""',
+        r"metric score \(main.py:3\): the name 'score' is taken by score \(.*metrics.py:",
+    ),
+    "a fix of no kind": (
+        '@posse.sensor("own", fix="range")\ndef own(c, w, t, dx, dy):\n    """?"""',
+        r"sensor own \(main.py:3\): fix='range' is no kind: position or bearing",
+    ),
+    "another parameter of measure": (
+        BLUR + '@posse.sensor("own", measure=blur)\ndef own(c, w, t, dx, dy):\n    """?"""',
+        r"sensor blur \(main.py:3\): its parameters are \(c, w, dx, dy\), not \(c, w, number, dx",
+    ),
+    "a metric that nobody declared": (
+        'posse.batch("constant", 1, metrics=["scor"])',
+        r"unknown metric 'scor' \(did you mean 'score'",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", OTHERS)
+def test_other_mistakes_name_the_function_and_the_line(mistake: str, tmp_path: Path) -> None:
+    code, message = OTHERS[mistake]
+    done = run(tmp_path, f"import posse\n\n{code}\n")
+    assert done.returncode == 1
+    assert re.search(message, done.stderr.strip().splitlines()[-1]), done.stderr

@@ -37,7 +37,7 @@ from posse.rules.declared import Rules
 from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario
 from posse.signals.metrics import episode_metrics
-from posse.signals.parts import Parts, Writers, parts_for, rules_for, writers_for
+from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
 from posse.signals.reward import REWARD_TERMS
 
 _CONFIG: Final[Any] = numba.config
@@ -101,6 +101,7 @@ def _stepping(parts: Parts) -> Any:
     memory = scratch_for(parts, 1)
     settings, own, mate, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
+    clear_sums, add_to_sums = sums_for(parts)
 
     @cuda.jit  # type: ignore[untyped-decorator]
     def advance(
@@ -121,8 +122,11 @@ def _stepping(parts: Parts) -> Any:
             s = scratch[0]
             writers = Writers(settings, own, mate, empty, width, mate_width)
             rules = Rules(draw_motion, set_goal, sees, measure)
+            sums = Sums(clear_sums, add_to_sums)
             prepare(tables, writers, s)
-            over = advance_worlds(e, 1, tables, worlds, actions, results, orders, rules, writers, s)
+            over = advance_worlds(
+                e, 1, tables, worlds, actions, results, orders, rules, sums, writers, s
+            )
             results.flags[2, e] = over
             score[e] = worlds.world[e].score
             if over:

@@ -32,7 +32,7 @@ from posse.rules.declared import Rules
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, natural
 from posse.rules.faults import apply_faults
 from posse.rules.motion import motion
-from posse.rules.score import add_up, occupy
+from posse.rules.score import occupy, settle
 from posse.rules.senses.radio import hear, send, share_fixes
 from posse.rules.senses.sensing import look
 from posse.rules.start import draw_start, rest
@@ -46,7 +46,7 @@ from posse.rules.state import (
 )
 from posse.scenarios import Scenario
 from posse.signals.observing import TOGETHER, observe_sonar, observe_target, observe_together
-from posse.signals.parts import Parts, Writers, parts_for, rules_for, writers_for
+from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
 from posse.signals.reward import write_reward
 from posse.signals.scratch import MOST_IN_TEAM
 
@@ -103,9 +103,11 @@ def begin(
     broadcast: Records,
     heard_message: FloatArray,
     message: FloatArray,
+    clear_sums: Any,
 ) -> None:
     """Bring a world whose poses are set to the start of an episode, but for what is sensed."""
     rest(c, w, trackers)
+    clear_sums(w)
     heard["step"][:] = -1
     heard_message[:] = _ZERO
     message[:] = _ZERO
@@ -149,9 +151,10 @@ def act(
 
 
 @compiled
-def end_step(c: Record, w: Record, trackers: Records, slots: Records) -> None:
+def end_step(c: Record, w: Record, trackers: Records, slots: Records, add_to_sums: Any) -> None:
     """Add the step to the episode's sums, and see whether the episode is over."""
-    add_up(c, w, trackers, slots)
+    add_to_sums(c, w, trackers, slots)
+    settle(c, w)
     if c.terminate_on_contact:
         for i in range(c.num_trackers):
             if trackers[i].touching:
@@ -187,6 +190,7 @@ def advance_worlds(
     results: Results,
     orders: npt.NDArray[np.uint8],
     rules: Rules,
+    sums: Sums,
     writers: Writers,
     scratch: Record,
 ) -> int:
@@ -219,7 +223,7 @@ def advance_worlds(
                 draw_start(c, w, trackers, obstacles, rules.draw_motion)
             begin(
                 c, w, trackers, worlds.heard[e], worlds.broadcast[e],
-                worlds.heard_message[e], worlds.message[e],
+                worlds.heard_message[e], worlds.message[e], sums.clear,
             )  # fmt: skip
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
@@ -228,7 +232,7 @@ def advance_worlds(
             sense(c, worlds, e, rules, scratch)
             occupy(c, w, trackers, tables.slots, scratch)
         if order == STEP:
-            end_step(c, w, trackers, tables.slots)
+            end_step(c, w, trackers, tables.slots, sums.add)
             reward(c, w, trackers, tables.weights, rewards, terms)
         else:
             if order != LOOK:
@@ -269,6 +273,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
     """
     settings, own_fields, mate, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
+    clear_sums, add_to_sums = sums_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
 
     @kernel
@@ -291,6 +296,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         s = scratch[0]
         writers = Writers(settings, own_fields, mate, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
+        sums = Sums(clear_sums, add_to_sums)
         if s.prepared[0] == _ZERO:
             prepare(used, writers, s)
             s.prepared[0] = _ONE
@@ -299,7 +305,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
                 over += advance_worlds(
-                    e, count, used, worlds, actions, results, orders, rules, writers, s
+                    e, count, used, worlds, actions, results, orders, rules, sums, writers, s
                 )
         return over
 

@@ -1,4 +1,4 @@
-"""The score, and the sums that the metrics are worked out from.
+"""The score: who occupies which slot.
 
 At each control step, score = occupied slots / working trackers, at most 1. A slot is occupied when
 a working tracker that touches nothing is within tolerance of it; who stands where is free.
@@ -13,7 +13,6 @@ import numpy as np
 
 from posse.numeric import Record, Records, compiled
 from posse.rules.discs import BLOCK, blocks, find_slots, natural
-from posse.rules.senses.radio import connected
 from posse.rules.state import NEVER
 
 _ZERO: Final = np.float32(0.0)
@@ -92,31 +91,8 @@ def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
 
 
 @compiled
-def add_up(c: Record, w: Record, trackers: Records, slots: Records) -> None:
-    """Add this step to the sums of the episode."""
-    w.score_sum += w.score
-    if w.contacts_tracker + w.contacts_obstacle + w.contacts_target == 0:
-        w.safe_score_sum += w.score
-    bound, error, effort, sight = 0, _ZERO, _ZERO, _ZERO
-    for i in range(c.num_trackers):
-        t = trackers[i]
-        if t.broken_at != NEVER:
-            continue
-        if t.could_arrive == 0:
-            t.could_arrive = could_arrive(c, w, t, slots)
-        bound += t.could_arrive
-        error += t.slot_distance
-        v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
-        effort += v * v + turn * turn
-        sight += np.float32(t.sees)
-    w.error_sum += error
-    w.effort_sum += effort
-    w.sight_sum += sight
-    w.tracker_steps += np.float32(w.working)
-    if w.working > 0:
-        w.bound_sum += np.float32(bound) / np.float32(w.working)
-    if c.perfect_radio or connected(c, w, trackers):
-        w.connected_sum += _ONE
+def settle(c: Record, w: Record) -> None:
+    """Note when the team has settled, and when it has recovered from a loss."""
     if w.held >= c.settle_steps:
         begun = w.step - w.held + 1
         if w.settled_at < 0:

@@ -120,7 +120,10 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
 
 @compiled
 def rest(c: Record, w: Record, trackers: Records) -> None:
-    """Set everything that does not depend on a draw to what it is when an episode starts."""
+    """Set everything that does not depend on a draw to what it is when an episode starts.
+
+    But for the sums behind the metrics.
+    """
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
     w.speed = c.target_speed if c.target_agent == 0 else _ZERO
     w.turn_rate = _ZERO
@@ -129,11 +132,6 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
     w.touching = np.uint64(0)
     w.working = c.num_trackers
     w.score = _ZERO
-    w.score_sum = 0.0
-    w.safe_score_sum = 0.0
-    w.error_sum = 0.0
-    w.effort_sum = 0.0
-    w.sight_sum, w.bound_sum, w.tracker_steps, w.connected_sum = _ZERO, _ZERO, _ZERO, _ZERO
     w.settled_at, w.detected_at, w.lost_at, w.recovered_at = -1, -1, -1, -1
     w.contacts_tracker, w.contacts_obstacle, w.contacts_target = 0, 0, 0
     w.least_gap = np.float32(1e6)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records
-from posse.registry import SENSORS, TARGET_MOTIONS
+from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
@@ -91,10 +91,7 @@ _WORLD: Final = (
     # what the metrics are worked out from
     ("working", _I),  # trackers that work
     ("score", _F),  # of the present step
-    ("score_sum", np.float64), ("safe_score_sum", np.float64),
-    ("error_sum", np.float64), ("effort_sum", np.float64),
-    ("sight_sum", _F),
-    ("bound_sum", _F), ("tracker_steps", _F), ("connected_sum", _F),
+    ("tracker_steps", _F),  # control steps, of all trackers that work
     ("held", _I),  # steps on end with every working tracker in a slot of its own
     ("settled_at", _I), ("detected_at", _I), ("lost_at", _I), ("recovered_at", _I),
     ("contacts_tracker", _I), ("contacts_obstacle", _I), ("contacts_target", _I),
@@ -107,15 +104,20 @@ WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
 def world_record(scenario: Scenario) -> np.dtype[Any]:
     """Return the record of one world: its identity, its target, its clock, its sums.
 
-    And what the built-in motions of the target remember, and the scenario's own.
+    And what motions of the target remember, and the sums behind metrics: of those that are built
+    in, and those that the scenario names.
     """
-    return _world_record(scenario.target_motion)
+    return _world_record(scenario.target_motion, scenario.metrics)
 
 
 @functools.cache
-def _world_record(motion: str) -> np.dtype[Any]:
+def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
     motions = TARGET_MOTIONS.with_added(motion)
-    return _record(*_WORLD, *((m.name, _F) for each in motions for m in each.memory))
+    return _record(
+        *_WORLD,
+        *(field for metric in METRICS.with_added(*metrics) for field in metric.fields),
+        *((memory.name, _F) for each in motions for memory in each.memory),
+    )
 
 
 FIX_FIELDS: Final = (

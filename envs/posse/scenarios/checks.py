@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from posse.registry import METRICS
 from posse.scenarios.formation import slot_offsets
 from posse.scenarios.limits import (
     FARTHEST,
@@ -33,6 +34,7 @@ def check_together(s: Scenario) -> None:
     _check_place(s)
     _check_rounding(s)
     _check_rewards(s)
+    _check_metrics(s)
 
 
 def _check_each(s: Scenario) -> None:
@@ -244,3 +246,9 @@ def _check_rewards(s: Scenario) -> None:
                 f"reward_weights[{name!r}]", weight,
                 f"a weight must lie in [-{MOST_WEIGHT:g}, {MOST_WEIGHT:g}]: scale all of them",
             )  # fmt: skip
+
+
+def _check_metrics(s: Scenario) -> None:
+    for name in s.metrics:
+        if name not in METRICS:
+            raise ScenarioError(f"metrics={s.metrics!r}: {METRICS.unknown(name)}")

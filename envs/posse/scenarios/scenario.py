@@ -32,6 +32,7 @@ from posse.scenarios.setting import (
     Setting,
     check,
     declare,
+    fail,
     flag,
     near,
     number,
@@ -215,6 +216,11 @@ class Scenario:
         above=True,
     )  # fmt: skip
 
+    # Beside the built-in ones
+    metrics: tuple[str, ...] = declare(
+        (), Setting("other", "1", "further metrics by name, which a module of your own declares")
+    )
+
     # Reward
     reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
         (("slot", 1.0), ("progress", 0.5), ("contact", -0.2)),
@@ -225,6 +231,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reward_weights", _weights(self.reward_weights))
+        object.__setattr__(self, "metrics", _names("metrics", self.metrics))
         for name, setting in self.settings().items():
             if setting.per_tracker and isinstance(getattr(self, name), list):
                 object.__setattr__(self, name, tuple(getattr(self, name)))
@@ -342,6 +349,13 @@ class Scenario:
         values = dataclasses.asdict(self)
         values["reward_weights"] = dict(self.reward_weights)
         return values
+
+
+def _names(setting: str, given: object) -> tuple[str, ...]:
+    """Return names as a tuple, each once, whatever list they came in."""
+    if not isinstance(given, (tuple, list)) or not all(isinstance(name, str) for name in given):
+        fail(setting, given, "it must be a tuple of names")
+    return tuple(dict.fromkeys(given))
 
 
 def _weights(given: object) -> tuple[tuple[str, float], ...]:

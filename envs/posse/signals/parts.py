@@ -6,9 +6,11 @@ import functools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+# These declare the built-in fields and metrics.
 import posse.signals.mate_fields
-import posse.signals.own_fields  # noqa: F401 (declares the built-in fields)
-from posse.registry import FIELDS, SENSORS, TARGET_MOTIONS, Registry
+import posse.signals.metrics
+import posse.signals.own_fields  # noqa: F401
+from posse.registry import FIELDS, METRICS, SENSORS, TARGET_MOTIONS, Registry
 from posse.rules.declared import Rules, rules_of
 from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
@@ -21,6 +23,7 @@ from posse.signals.columns import (
     width_of,
 )
 from posse.signals.fields import FieldDeclaration
+from posse.signals.measuring import Metric, adding, clearing
 
 
 class Parts(NamedTuple):
@@ -34,6 +37,8 @@ class Parts(NamedTuple):
     """Of the target."""
     sensors: tuple[Sensor, ...]
     """That have the target in sight."""
+    metrics: tuple[Metric, ...]
+    """Of an episode."""
 
     @property
     def width(self) -> int:
@@ -63,6 +68,15 @@ class Writers(NamedTuple):
     """Numbers of a team-mate, what it said apart."""
 
 
+class Sums(NamedTuple):
+    """The functions that work out what the metrics are made from, for compiled code."""
+
+    clear: Any
+    """(w): sets the sums to zero."""
+    add: Any
+    """(c, w, trackers, slots): adds a control step to them."""
+
+
 @functools.cache
 def built_in_parts() -> Parts:
     """Return the parts that every scenario has."""
@@ -72,6 +86,7 @@ def built_in_parts() -> Parts:
         mate_fields=tuple(field for field in fields if field.subject == "mate"),
         motions=TARGET_MOTIONS.built_in(),
         sensors=SENSORS.built_in(),
+        metrics=METRICS.built_in(),
     )
 
 
@@ -80,12 +95,18 @@ def parts_for(scenario: Scenario) -> Parts:
     return built_in_parts()._replace(
         motions=TARGET_MOTIONS.with_added(scenario.target_motion),
         sensors=SENSORS.with_added(scenario.sensor),
+        metrics=METRICS.with_added(*scenario.metrics),
     )
 
 
 def added(parts: Parts) -> Iterator[tuple[Registry[Any], Any]]:
     """Yield what a user's modules have declared among parts, each with its registry."""
-    for registry, things in ((TARGET_MOTIONS, parts.motions), (SENSORS, parts.sensors)):
+    kinds = (
+        (TARGET_MOTIONS, parts.motions),
+        (SENSORS, parts.sensors),
+        (METRICS, parts.metrics),
+    )
+    for registry, things in kinds:
         yield from ((registry, thing) for thing in things if not registry.is_built_in(thing.name))
 
 
@@ -105,3 +126,9 @@ def writers_for(parts: Parts) -> Writers:
         parts.width,
         parts.mate_width,
     )
+
+
+@functools.cache
+def sums_for(parts: Parts) -> Sums:
+    """Return the functions that work out the sums behind the metrics of parts."""
+    return Sums(clearing(parts.metrics), adding(parts.metrics))

@@ -118,6 +118,8 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"breaks": -1}, "0"),
     ({"break_choice": "neares"}, "nearest"),
     ({"sensor": "range-bearings"}, "range-bearing"),
+    ({"metrics": ["scor"]}, "score"),
+    ({"metrics": "score"}, "tuple of names"),
     ({"breaks": 2, "break_choice": "given"}, "break_number"),
     ({"break_number": 5, "break_choice": "given", "breaks": 1}, "0 to 4"),
     ({"break_window": (0.5, 1.5)}, "0, 1"),

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from posse.numeric import compiled, written
-from posse.registry import TARGET_MOTIONS, Function
+from posse.registry import METRICS, TARGET_MOTIONS, Function
 from posse.rules.state import WORLD_NAMES
 from posse.scenarios import Scenario
 
@@ -114,7 +114,7 @@ def target_motion(
 
 def _check_memory(function: Function, memory: Sequence[Memory]) -> None:
     taken = {each.name for motion in TARGET_MOTIONS.built_in() for each in motion.memory}
-    taken.update(WORLD_NAMES)
+    taken.update(WORLD_NAMES, (f"{name}_sum" for name in METRICS))
     for each in memory:
         if each.name in taken:
             raise TARGET_MOTIONS.error(
