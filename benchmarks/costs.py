@@ -22,7 +22,7 @@ from rich.table import Table
 
 import posse
 from posse.engine import kernels as world
-from posse.engine.scratch import scratch_for
+from posse.engine.scratch import SCRATCH
 from posse.numeric import kernel
 from posse.rules import contact, motion, score
 from posse.rules import discs as survey
@@ -50,7 +50,7 @@ class Settings:
     out: Path = Path("runs/bench/costs.json")
 
 
-SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
+OWN, MATE, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
 RULES = rules_for(built_in_parts())
 SUMS = sums_for(built_in_parts())
 
@@ -61,8 +61,8 @@ def one_part(  # type: ignore[no-untyped-def]
 ):
     """Do one part of a step in every world."""
     scratch = memory[0]
-    writers = Writers(SETTINGS, OWN, MATE, EMPTY, WIDTH, MATE_WIDTH)
-    world.prepare(tables, writers, scratch)
+    writers = Writers(OWN, MATE, EMPTY, WIDTH, MATE_WIDTH)
+    world.prepare(tables, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
         w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
@@ -124,7 +124,7 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
     advance = batch.stepper(actions, observations, rewards, terms)
     flags = np.empty((2, batch.num_worlds), np.bool_)
     results = world.Results(observations, rewards, terms, flags)
-    memory = new_scratch(scratch_for(built_in_parts(), 8))
+    memory = new_scratch(SCRATCH)
     arguments = (batch._tables, batch.arrays, actions, results, memory)
     costs = {"step": best(advance, seconds) / agents * 1e9}
     snapshot = batch.save()

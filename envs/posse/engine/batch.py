@@ -30,7 +30,7 @@ from posse.engine.kernels import (
     own_kernel,
     tables_of,
 )
-from posse.engine.scratch import scratch_for
+from posse.engine.scratch import SCRATCH
 from posse.engine.user_parts import check_fields, explain
 from posse.numeric import (
     BoolArray,
@@ -184,8 +184,7 @@ class Batch:
         self._score: FloatArray = self._arrays.world["score"]  # a view, made once
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
-        memory = scratch_for(parts, 8)
-        self._scratch = [new_scratch(memory) for _ in range(threads)]
+        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (

@@ -31,7 +31,7 @@ from posse.engine.kernels import (
     advance_worlds,
     prepare,
 )
-from posse.engine.scratch import scratch_for
+from posse.engine.scratch import SCRATCH_FOR_ONE
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.declared import Rules
 from posse.rules.state import SPLITS, WorldArrays
@@ -98,8 +98,7 @@ def _check(
 @functools.cache
 def _stepping(parts: Parts) -> Any:
     """Return the kernel that steps worlds."""
-    memory = scratch_for(parts, 1)
-    settings, own, mate, empty, width, mate_width = writers_for(parts)
+    own, mate, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
 
@@ -116,14 +115,14 @@ def _stepping(parts: Parts) -> Any:
         """Do what each world is ordered to; nothing where there is something to complain of."""
         e = cuda.grid(1)
         if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
-            scratch = cuda.local.array(1, memory)
+            scratch = cuda.local.array(1, SCRATCH_FOR_ONE)
             if _SIMULATED:
                 scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
             s = scratch[0]
-            writers = Writers(settings, own, mate, empty, width, mate_width)
+            writers = Writers(own, mate, empty, width, mate_width)
             rules = Rules(draw_motion, set_goal, sees, measure)
             sums = Sums(clear_sums, add_to_sums)
-            prepare(tables, writers, s)
+            prepare(tables, s)
             over = advance_worlds(
                 e, 1, tables, worlds, actions, results, orders, rules, sums, writers, s
             )

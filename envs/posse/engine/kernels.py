@@ -250,10 +250,9 @@ def advance_worlds(
 
 
 @compiled
-def prepare(tables: Tables, writers: Writers, scratch: Record) -> None:
+def prepare(tables: Tables, scratch: Record) -> None:
     """Write what is the same for all worlds to a thread's scratch memory."""
     lay_out_constants(tables.config[0], tables.beams, scratch)
-    writers.settings(tables.config[0], scratch.columns)
 
 
 def tables_of(scenario: Scenario) -> Tables:
@@ -271,7 +270,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
     Its configuration, slots and beams become constants in the code.
     """
-    settings, own_fields, mate, empty, width, mate_width = writers_for(parts)
+    own_fields, mate, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
@@ -294,11 +293,11 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             tables.weights,
         )
         s = scratch[0]
-        writers = Writers(settings, own_fields, mate, empty, width, mate_width)
+        writers = Writers(own_fields, mate, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
         sums = Sums(clear_sums, add_to_sums)
         if s.prepared[0] == _ZERO:
-            prepare(used, writers, s)
+            prepare(used, s)
             s.prepared[0] = _ONE
         over = 0
         for first, end in parts_of(thread, turns):

@@ -1,33 +1,49 @@
-"""Fields write columns, and one transposition writes the observations' rows.
+"""Fields give columns, and a transposition writes them to the observations' rows.
 
-A column is one number of a field for eight observers. Where each begins follows from the order of
-the declarations.
+A column is one number of a field for eight observers. Where in an observation each belongs follows
+from the order of the declarations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from posse.numeric import (
-    WIDTH,
-    FloatArray,
-    Lanes,
-    compiled,
-    eight,
-    load,
-    store,
-    transpose,
-)
+from posse.numeric import WIDTH, FloatArray, Lanes, compiled, eight, store, transpose, written
 from posse.rules.discs import natural
 from posse.signals.fields import FieldDeclaration
 
 _FEW: Final = 2
-"""Up to so many columns are written faster one by one than by a transposition."""
+"""Up to so many columns are written faster number by number than by a transposition."""
 
 Declarations = Sequence[FieldDeclaration]
+
+
+class Observers(NamedTuple):
+    """At most eight robots, the first of them robot i of world e.
+
+    They are one robot of several worlds (``across`` is 1) or several of one world (0).
+    """
+
+    e: int
+    i: int
+    number: int
+    across: int
+
+
+class Rows(NamedTuple):
+    """Where to write in the observations of eight robots."""
+
+    observers: Observers
+    observations: FloatArray
+    """(E, rows, F)."""
+    start: int
+    """Place in an observation that the first column goes to."""
+    starts: FloatArray
+    """(8,) or more: of each observer by itself, to be added where ``scattered``."""
+    scattered: bool
 
 
 def width_of(declarations: Declarations) -> int:
@@ -35,171 +51,107 @@ def width_of(declarations: Declarations) -> int:
     return sum(d.size for d in declarations)
 
 
-def settings_writer(declarations: Declarations) -> Callable[..., Any]:
-    """Return (c, columns), which writes the columns that are the same always."""
-    return _writer("settings", declarations, "c", "setting", "eight(np.float32({}))")
+def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Callable[..., Any]:
+    """Return a compiled function (*parameters, s, rows), which writes what the fields give.
+
+    Args:
+        declarations: The fields; those about a setting may stand anywhere among them.
+        parameters: ``("c", "v")``, or ``("c", "v", "m")`` for fields of a team-mate. Then comes
+            scratch memory.
+    """
+    lines, columns = [], 0
+    names: dict[str, Any] = {"np": np, "eight": eight, "block": _write_block, "one": _write_column}
+    for k, field in enumerate(declarations):
+        names[f"field_{k}"] = field.function
+        parts = [f"column_{columns + q}" for q in range(field.size)]
+        given = "c" if field.subject == "setting" else ", ".join(parameters)
+        lines.append(f"{', '.join(parts)} = field_{k}({given})")
+        if field.subject == "setting":
+            lines += [f"{part} = eight(np.float32({part}))" for part in parts]
+        columns += field.size
+        # As soon as there are eight, so that few have to be kept at a time.
+        for first in range(_written(columns - field.size), _written(columns), WIDTH):
+            lines.append(_block(first))
+    rest = columns % WIDTH
+    if rest > _FEW:
+        lines.append(_block(columns - WIDTH))  # some of them once more
+    else:
+        lines += [f"one(column_{k}, {k}, s, rows)" for k in range(columns - rest, columns)]
+    return written("write_rows", (*parameters, "s", "rows"), lines, names)
 
 
-def own_writer(declarations: Declarations) -> Callable[..., Any]:
-    """Return (c, v, columns), which writes the other columns of observers."""
-    return _writer("own", declarations, "c, v", "self", "{}")
+def _written(columns: int) -> int:
+    return columns // WIDTH * WIDTH
 
 
-def mate_writer(declarations: Declarations) -> Callable[..., Any]:
-    """Return (c, v, m, columns), which writes the columns of team-mates."""
-    return _writer("mate", declarations, "c, v, m", "mate", "{}")
+def _block(first: int) -> str:
+    columns = ", ".join(f"column_{first + q}" for q in range(WIDTH))
+    return f"block({columns}, {first}, rows)"
 
 
 def empty_writer(declarations: Declarations) -> Callable[..., Any]:
-    """Return (o, k), which writes the place of a team-mate that nobody fills, from k on."""
+    """Return a compiled function (o, k), which writes an empty place of a team-mate from k on."""
     values = [float(d.unknown or 0.0) for d in declarations for _ in range(d.size)]
-    lines = [f"    o[k + {q}] = np.float32({value})" for q, value in enumerate(values)]
-    return _function("empty", declarations, "o, k", lines, {"np": np})
-
-
-def _writer(
-    name: str, declarations: Declarations, arguments: str, subject: str, value: str
-) -> Callable[..., Any]:
-    """Return a compiled function that calls those of the fields about a subject, one by one.
-
-    Its lines are written out: to call one after the other from a tuple, numba would have to know
-    all of them as one type.
-    """
-    lines: list[str] = []
-    column = 0
-    names: dict[str, Any] = {"np": np, "store": store, "eight": eight}
-    for k, field in enumerate(declarations):
-        if field.subject == subject:
-            names[f"field_{k}"] = field.function
-            parts = [f"part_{q}" for q in range(field.size)]
-            lines.append(f"    {', '.join(parts)} = field_{k}({arguments})")
-            lines += [
-                f"    store(columns, {WIDTH * (column + q)}, {value.format(part)})"
-                for q, part in enumerate(parts)
-            ]
-        column += field.size
-    return _function(name, declarations, f"{arguments}, columns", lines, names)
-
-
-def _function(
-    name: str, declarations: Declarations, parameters: str, lines: list[str], names: dict[str, Any]
-) -> Callable[..., Any]:
-    """Return a compiled function of these lines, whose name says of which fields it is made."""
-    names["__name__"] = __name__
-    exec("\n".join([f"def write({parameters}):", *lines, "    return"]), names)
-    write: Callable[..., Any] = names["write"]
-    write.__qualname__ = f"{name}({', '.join(d.name for d in declarations)})"
-    return compiled(write)
-
-
-@compiled
-def write_rows(
-    columns: FloatArray,
-    width: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write columns to ``count`` observations, the first of robot i of world e, from k on."""
-    _write(columns, width, e, i, count, across, observations, k, False, columns)
-
-
-@compiled
-def write_scattered(
-    columns: FloatArray,
-    width: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    starts: FloatArray,
-) -> None:
-    """As :func:`write_rows`, to each observation from a place of its own on, (8,)."""
-    _write(columns, width, e, i, count, across, observations, 0, True, starts)
-
-
-@compiled
-def _write(
-    columns: FloatArray,
-    width: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-    scattered: bool,
-    starts: FloatArray,
-) -> None:
-    for block in range(width // WIDTH):
-        first = WIDTH * block
-        _write_block(
-            columns, first, e, i, count, across, observations, k + first, scattered, starts
-        )
-    if width % WIDTH > _FEW:  # the last eight, some of them again
-        first = width - WIDTH
-        _write_block(
-            columns, first, e, i, count, across, observations, k + first, scattered, starts
-        )
-    else:
-        for column in range(width - width % WIDTH, width):
-            for lane in range(count):
-                o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-                start = natural(int(starts[lane])) if scattered else 0
-                o[start + k + column] = columns[WIDTH * column + lane]
+    lines = [f"o[k + {q}] = np.float32({value})" for q, value in enumerate(values)]
+    return written("write_empty", ("o", "k"), lines, {"np": np})
 
 
 @compiled
 def _write_block(
-    columns: FloatArray,
+    a: Lanes,
+    b: Lanes,
+    c: Lanes,
+    d: Lanes,
+    f: Lanes,
+    g: Lanes,
+    h: Lanes,
+    j: Lanes,
     first: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-    scattered: bool,
-    starts: FloatArray,
+    rows: Rows,
 ) -> None:
-    """Write eight columns from ``first`` on to observations, from k on."""
-    at = WIDTH * first
-    a, b, c, d, f, g, h, j = transpose(
-        load(columns, at), load(columns, at + WIDTH),
-        load(columns, at + 2 * WIDTH), load(columns, at + 3 * WIDTH),
-        load(columns, at + 4 * WIDTH), load(columns, at + 5 * WIDTH),
-        load(columns, at + 6 * WIDTH), load(columns, at + 7 * WIDTH),
-    )  # fmt: skip
+    """Write eight columns, the first of them column ``first``."""
+    a, b, c, d, f, g, h, j = transpose(a, b, c, d, f, g, h, j)
     # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, e, i, count, across, observations, k, scattered, starts)
-    _write_row(b, 1, e, i, count, across, observations, k, scattered, starts)
-    _write_row(c, 2, e, i, count, across, observations, k, scattered, starts)
-    _write_row(d, 3, e, i, count, across, observations, k, scattered, starts)
-    _write_row(f, 4, e, i, count, across, observations, k, scattered, starts)
-    _write_row(g, 5, e, i, count, across, observations, k, scattered, starts)
-    _write_row(h, 6, e, i, count, across, observations, k, scattered, starts)
-    _write_row(j, 7, e, i, count, across, observations, k, scattered, starts)
+    _write_row(a, 0, first, rows)
+    _write_row(b, 1, first, rows)
+    _write_row(c, 2, first, rows)
+    _write_row(d, 3, first, rows)
+    _write_row(f, 4, first, rows)
+    _write_row(g, 5, first, rows)
+    _write_row(h, 6, first, rows)
+    _write_row(j, 7, first, rows)
 
 
 @compiled
-def _write_row(
-    row: Lanes,
-    lane: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    observations: FloatArray,
-    k: int,
-    scattered: bool,
-    starts: FloatArray,
-) -> None:
-    """Write eight numbers to one of ``count`` observations, if there are so many."""
-    if lane < count:
-        o = observations[natural(e + lane * across), natural(i + lane * (1 - across))]
-        start = natural(int(starts[lane])) if scattered else 0
-        store(o, start + k, row)
+def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
+    """Write eight numbers of one observer, if there are so many observers."""
+    if lane < rows.observers.number:
+        o = rows.observations[world_of(rows.observers, lane), robot_of(rows.observers, lane)]
+        store(o, _start(rows, lane) + first, row)
+
+
+@compiled
+def _write_column(column: Lanes, number: int, s: Any, rows: Rows) -> None:
+    """Write one column."""
+    store(s.column, 0, column)
+    for lane in range(rows.observers.number):
+        o = rows.observations[world_of(rows.observers, lane), robot_of(rows.observers, lane)]
+        o[_start(rows, lane) + number] = s.column[lane]
+
+
+@compiled
+def world_of(observers: Observers, lane: int) -> int:
+    """Return the world of the robot in a lane."""
+    return natural(observers.e + lane * observers.across)
+
+
+@compiled
+def robot_of(observers: Observers, lane: int) -> int:
+    """Return the number of the robot in a lane."""
+    return natural(observers.i + lane * (1 - observers.across))
+
+
+@compiled
+def _start(rows: Rows, lane: int) -> int:
+    scattered = natural(int(rows.starts[lane])) if rows.scattered else 0
+    return natural(rows.start) + scattered

@@ -30,12 +30,12 @@ from posse.numeric import (
 )
 from posse.rules.discs import natural
 from posse.rules.state import POSE, WorldArrays
-from posse.signals.columns import write_rows, write_scattered
+from posse.signals.columns import Observers, Rows, robot_of, world_of
 from posse.signals.nearest import keep_nearest, list_nearest
 from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.team import number_behind, seen_at, stride_of, way_behind
-from posse.signals.views import View, mate_heard, mate_now
+from posse.signals.views import View, ego, mate_heard, mate_now
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -45,17 +45,14 @@ _ONE: Final = np.float32(1.0)
 def observe_mates(
     c: Record,
     worlds: WorldArrays,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
+    observers: Observers,
     v: View,
     writers: Writers,
     s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest mates of ``count`` trackers, the first of them i of world e, from k on.
+    """Write the nearest team-mates of trackers from k on.
 
     Where the radio is perfect, the team stands in its rows
     (:func:`posse.signals.team.lay_out_team`).
@@ -64,27 +61,24 @@ def observe_mates(
     if places == 0:
         return
     if c.perfect_radio == 0:
-        _observe_heard(c, worlds, e, i, count, across, v, writers, s, observations, k)
+        _observe_heard(c, worlds, observers, v, writers, s, observations, k)
         return
     if mates <= places and mates < MOST_IN_TEAM:
-        _observe_whole_team(c, e, i, count, across, v, writers, s, observations, k)
+        _observe_whole_team(c, observers, v, writers, s, observations, k)
     else:
         most = min(mates, places)
-        list_nearest(mates + 1, most, i, count, across, s)
-        _observe_listed(c, worlds, e, i, count, across, False, most, v, writers, s, observations, k)
+        list_nearest(mates + 1, most, observers.i, observers.number, observers.across, s)
+        _observe_listed(c, worlds, observers, False, most, v, writers, s, observations, k)
     if c.message_size > 0 or mates < places:
-        for lane in range(count):
-            to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+        for lane in range(observers.number):
+            to, who = world_of(observers, lane), robot_of(observers, lane)
             _write_the_rest(c, mates, worlds.message[to, 0], writers, observations[to, who], k)
 
 
 @compiled
 def _observe_whole_team(
     c: Record,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
+    observers: Observers,
     v: View,
     writers: Writers,
     s: Record,
@@ -93,21 +87,20 @@ def _observe_whole_team(
 ) -> None:
     """Write every team-mate: each has a place."""
     n, size = natural(c.num_trackers), np.float32(writers.mate_width + c.message_size)
-    stride = stride_of(across)
+    _, i, _, across = observers
+    rows = Rows(observers, observations, k, s.start, True)
     _find_places(n, i, across, s)
     for m in range(n - 1):
-        at = natural(stride * (i + m + 1))
+        at = natural(stride_of(across) * (i + m + 1))
         dx, dy = way_behind(i, m, across, s)
+        ahead, left = seen_at(i, m, across, s)
         mate = mate_now(
-            v, number_behind(n, i, m, across, s), dx, dy,
+            number_behind(n, i, m, across, s), dx, dy, load(s.distance, WIDTH * m), ahead, left,
             load(s.team_cos, at), load(s.team_sin, at),
             load(s.team_speed, at), load(s.team_turn_rate, at),
         )  # fmt: skip
-        writers.mate(c, v, mate, s.mate_columns)
-        store(s.start, 0, load(s.place, WIDTH * m) * size + np.float32(k))
-        write_scattered(
-            s.mate_columns, writers.mate_width, e, i, count, across, observations, s.start
-        )
+        store(s.start, 0, load(s.place, WIDTH * m) * size)
+        writers.mate(c, v, mate, s, rows)
 
 
 @compiled
@@ -133,10 +126,7 @@ def _find_places(n: int, i: int, across: int, s: Record) -> None:
 def _observe_listed(
     c: Record,
     worlds: WorldArrays,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
+    observers: Observers,
     heard: bool,
     most: int,
     v: View,
@@ -149,26 +139,25 @@ def _observe_listed(
     size = natural(writers.mate_width + c.message_size)
     for place in range(natural(most)):
         x, y, cosine, sine, speed, turn_rate, step, _ = transpose(
-            _pose(worlds, heard, place, 0, e, i, count, across, s),
-            _pose(worlds, heard, place, 1, e, i, count, across, s),
-            _pose(worlds, heard, place, 2, e, i, count, across, s),
-            _pose(worlds, heard, place, 3, e, i, count, across, s),
-            _pose(worlds, heard, place, 4, e, i, count, across, s),
-            _pose(worlds, heard, place, 5, e, i, count, across, s),
-            _pose(worlds, heard, place, 6, e, i, count, across, s),
-            _pose(worlds, heard, place, 7, e, i, count, across, s),
+            _pose(worlds, heard, place, 0, observers, s),
+            _pose(worlds, heard, place, 1, observers, s),
+            _pose(worlds, heard, place, 2, observers, s),
+            _pose(worlds, heard, place, 3, observers, s),
+            _pose(worlds, heard, place, 4, observers, s),
+            _pose(worlds, heard, place, 5, observers, s),
+            _pose(worlds, heard, place, 6, observers, s),
+            _pose(worlds, heard, place, 7, observers, s),
         )
         number, dx, dy = load(s.listed, WIDTH * place), x - v.x, y - v.y
         if heard:
             age = (v.step - counts(step)) * c.dt
             mate = mate_heard(v, number, age, dx, dy, cosine, sine, speed, turn_rate)
         else:
-            mate = mate_now(v, number, dx, dy, cosine, sine, speed, turn_rate)
-        writers.mate(c, v, mate, s.mate_columns)
-        write_rows(
-            s.mate_columns, writers.mate_width, e, i, count, across, observations,
-            natural(k + place * size),
-        )  # fmt: skip
+            ahead, left = ego(v, dx, dy)
+            distance = root(ahead * ahead + left * left)
+            mate = mate_now(number, dx, dy, distance, ahead, left, cosine, sine, speed, turn_rate)
+        rows = Rows(observers, observations, natural(k + place * size), s.start, False)
+        writers.mate(c, v, mate, s, rows)
 
 
 @compiled
@@ -177,19 +166,16 @@ def _pose(
     heard: bool,
     place: int,
     lane: int,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
+    observers: Observers,
     s: Record,
 ) -> Lanes:
     """Return the pose of whom a lane's list names, and what follows on it.
 
     The last of ``count`` lanes stands in for those that there are not.
     """
-    there = min(lane, count - 1)
+    there = min(lane, observers.number - 1)
     number = natural(int(s.listed[WIDTH * place + there]))
-    to, who = natural(e + there * across), natural(i + there * (1 - across))
+    to, who = world_of(observers, there), robot_of(observers, there)
     if heard:
         return load_fields(worlds.heard[to, who, number], POSE)
     return load_fields(worlds.tracker[to, number], POSE)
@@ -199,10 +185,7 @@ def _pose(
 def _observe_heard(
     c: Record,
     worlds: WorldArrays,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
+    observers: Observers,
     v: View,
     writers: Writers,
     s: Record,
@@ -211,14 +194,14 @@ def _observe_heard(
 ) -> None:
     """Write the nearest team-mates from what trackers last heard of each, and what they said."""
     most = 0
-    for lane in range(count):
-        to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+    for lane in range(observers.number):
+        to, who = world_of(observers, lane), robot_of(observers, lane)
         filled = _list_heard(c, worlds, to, who, lane, s)
         s.filled[lane] = np.float32(filled)
         most = max(most, filled)
-    _observe_listed(c, worlds, e, i, count, across, True, most, v, writers, s, observations, k)
-    for lane in range(count):
-        to, who = natural(e + lane * across), natural(i + lane * (1 - across))
+    _observe_listed(c, worlds, observers, True, most, v, writers, s, observations, k)
+    for lane in range(observers.number):
+        to, who = world_of(observers, lane), robot_of(observers, lane)
         filled, o = natural(int(s.filled[lane])), observations[to, who]
         if c.message_size > 0 or filled < c.neighbours:
             _write_the_rest(c, filled, worlds.heard_message[to, who], writers, o, k)
@@ -266,8 +249,8 @@ def observe_trackers(
                 v, eight(np.float32(number)), eight(_ZERO), t.x - v.x, t.y - v.y,
                 eight(t.heading_cos), eight(t.heading_sin), eight(t.speed), eight(t.turn_rate),
             )  # fmt: skip
-            writers.mate(c, v, mate, s.mate_columns)
-            write_rows(s.mate_columns, writers.mate_width, e, n, 1, 0, observations, start)
+            rows = Rows(Observers(e, n, 1, 0), observations, start, s.start, False)
+            writers.mate(c, v, mate, s, rows)
         else:
             writers.empty(o, start)
         for q in range(c.message_size):

@@ -15,7 +15,7 @@ from posse.numeric import WIDTH, FloatArray, Record, Records, compiled
 from posse.rules.discs import natural
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
-from posse.signals.columns import write_rows
+from posse.signals.columns import Observers, Rows
 from posse.signals.mates import observe_mates, observe_trackers
 from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
@@ -41,11 +41,11 @@ def _observe_some(
     observations: FloatArray,
 ) -> None:
     """Write what ``count`` trackers, the first of them i of world e, observe, the sonar apart."""
-    view = view_of_trackers(c, worlds, e, i, count, across, s)
-    writers.own(c, view, s.columns)
-    write_rows(s.columns, writers.width, e, i, count, across, observations, 0)
+    observers = Observers(e, i, count, across)
+    view = view_of_trackers(c, worlds, observers, s)
+    writers.own(c, view, s, Rows(observers, observations, 0, s.start, False))
     k = writers.width + natural(c.sonar_beams)
-    observe_mates(c, worlds, e, i, count, across, view, writers, s, observations, k)
+    observe_mates(c, worlds, observers, view, writers, s, observations, k)
 
 
 @compiled
@@ -95,8 +95,7 @@ def observe_target(
     """Write what a target that is an agent observes; it knows where trackers are."""
     w, n = worlds.world[e], natural(c.num_trackers)
     view = view_of_target(c, w, worlds.obstacle[e])
-    writers.own(c, view, s.columns)
-    write_rows(s.columns, writers.width, e, n, 1, 0, observations, 0)
+    writers.own(c, view, s, Rows(Observers(e, n, 1, 0), observations, 0, s.start, False))
     pose = (w.x, w.y, w.heading_cos, w.heading_sin)
     ping(c, pose, n, _ZERO, s, observations[e, n], writers.width)
     k = writers.width + natural(c.sonar_beams)

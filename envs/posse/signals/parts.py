@@ -15,13 +15,7 @@ from posse.rules.declared import Rules, rules_of
 from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
 from posse.scenarios import Scenario
-from posse.signals.columns import (
-    empty_writer,
-    mate_writer,
-    own_writer,
-    settings_writer,
-    width_of,
-)
+from posse.signals.columns import empty_writer, row_writer, width_of
 from posse.signals.fields import FieldDeclaration
 from posse.signals.measuring import Metric, adding, clearing
 
@@ -54,12 +48,10 @@ class Parts(NamedTuple):
 class Writers(NamedTuple):
     """The functions that write what is told of a world, for compiled code."""
 
-    settings: Any
-    """(c, columns): writes the columns that are always the same."""
     own: Any
-    """(c, v, columns): writes the columns of eight observers."""
+    """(c, v, s, rows): writes what eight robots observe of themselves and of the target."""
     mate: Any
-    """(c, v, m, columns): writes the columns of eight team-mates."""
+    """(c, v, m, s, rows): writes what they observe of a team-mate."""
     empty: Any
     """(o, k): writes the place of a team-mate that nobody fills."""
     width: int
@@ -119,9 +111,8 @@ def rules_for(parts: Parts) -> Rules:
 def writers_for(parts: Parts) -> Writers:
     """Return the functions that write parts."""
     return Writers(
-        settings_writer(parts.fields),
-        own_writer(parts.fields),
-        mate_writer(parts.mate_fields),
+        row_writer(parts.fields, ("c", "v")),
+        row_writer(parts.mate_fields, ("c", "v", "m")),
         empty_writer(parts.mate_fields),
         parts.width,
         parts.mate_width,

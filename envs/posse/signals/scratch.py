@@ -11,18 +11,8 @@ MOST_IN_TEAM: Final = 16
 """Up to this team size, eight worlds are observed together."""
 
 
-def columns_for(width: int) -> Fields:
-    """Return the field for the columns of observations whose fields are ``width`` numbers."""
-    return (("columns", WIDTH * width),)
-
-
-def observing(mate_width: int, worlds: int) -> Fields:
-    """Return the fields for observing one world, or eight together.
-
-    Args:
-        mate_width: Numbers of a team-mate, what it said apart.
-        worlds: 1 or 8.
-    """
+def observing(worlds: int) -> Fields:
+    """Return the fields for observing one world, or eight together."""
     # A team is there twice, and then comes room for the last block: of one world, or of eight.
     row = (2 * WIDTH * MOST_IN_TEAM if worlds > 1 else 2 * TEAM) + WIDTH
     return (
@@ -30,7 +20,7 @@ def observing(mate_width: int, worlds: int) -> Fields:
         ("step", WIDTH),  # control steps since the start
         ("fix_step", WIDTH),
         # Of eight team-mates.
-        ("mate_columns", WIDTH * mate_width),
+        ("column", WIDTH),  # of an observation
         ("start", WIDTH),  # where in an observation each belongs
         ("filled", WIDTH),  # how many team-mates an observer knows of
         # Of a team that is observed as a whole.

@@ -25,8 +25,8 @@ from posse.numeric import (
     root,
 )
 from posse.rules.contact import touches_surroundings
-from posse.rules.discs import natural
 from posse.rules.state import CONDITION, FIX, NEVER, POSE, WorldArrays
+from posse.signals.columns import Observers, robot_of, world_of
 from posse.signals.team import own_numbers, team_columns
 
 _ZERO: Final = np.float32(0.0)
@@ -118,18 +118,18 @@ class Mate(NamedTuple):
 
 @compiled
 def mate_now(
-    v: View,
     number: Lanes,
     dx: Lanes,
     dy: Lanes,
+    distance: Lanes,
+    ahead: Lanes,
+    left: Lanes,
     heading_cos: Lanes,
     heading_sin: Lanes,
     speed: Lanes,
     turn_rate: Lanes,
 ) -> Mate:
-    """Return a team-mate as it is now."""
-    ahead, left = ego(v, dx, dy)
-    distance = root(ahead * ahead + left * left)
+    """Return a team-mate as it is now, (dx, dy) away: ``ahead`` and to the ``left``, all in m."""
     per_metre = _ONE / greater(distance, _TINY)
     return Mate(
         number, eight(_ZERO), dx, dy, distance, ahead * per_metre, left * per_metre,
@@ -164,15 +164,13 @@ def mate_heard(
 
 
 @compiled
-def view_of_trackers(
-    c: Record, worlds: WorldArrays, e: int, i: int, count: int, across: int, s: Record
-) -> View:
-    """Return the view of ``count`` trackers, the first of them i of world e."""
+def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
+    """Return the view of eight trackers."""
+    e, i, count, across = observers
     for lane in range(count):
-        to = natural(e + lane * across)
-        t = worlds.tracker[to, natural(i + lane * (1 - across))]
+        to, who = world_of(observers, lane), robot_of(observers, lane)
         s.step[lane] = np.float32(worlds.world[to].step)
-        s.fix_step[lane] = np.float32(t.fix_step)
+        s.fix_step[lane] = np.float32(worlds.tracker[to, who].fix_step)
     own_x, own_y, hc, hs, speed, turn_rate, max_speed, max_turn_rate = team_columns(
         worlds.tracker, e, i, across, POSE
     )

@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posse
-from posse.engine.scratch import scratch_for
+from posse.engine.scratch import SCRATCH, SCRATCH_FOR_ONE
 from posse.numeric import kernel
 from posse.rules.discs import BLOCK, lay_out_constants
 from posse.rules.scratch import new_scratch
 from posse.rules.state import TRACKER, config_record
 from posse.signals.nearest import list_nearest
-from posse.signals.parts import built_in_parts
 from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.team import lay_out_team
 
@@ -57,7 +56,7 @@ def listed(trackers: Teams, places: int, across: int) -> tuple[Numbers, Numbers]
     lists = np.full((worlds, n, places), -1, np.float32)
     certain = np.zeros((worlds, n), np.float32)
     # What nobody has written must not count.
-    scratch = new_scratch(scratch_for(built_in_parts(), 8 if across else 1))
+    scratch = new_scratch(SCRATCH if across else SCRATCH_FOR_ONE)
     scratch.view(np.float32)[:] = np.nan
     config = config_record(posse.get_scenario("constant"))
     beams = np.zeros((2, 0), np.float32)
