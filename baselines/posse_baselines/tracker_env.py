@@ -14,7 +14,6 @@ from posse.adapters.actions import ActionReader, single_action_space
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.adapters.spaces import box
 from posse.numeric import FloatArray, OwnArrays
-from posse.signals.reward import name_terms
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
@@ -129,7 +128,7 @@ class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
         self._observations = world.observations[None].copy()  # team-mates may keep what they saw
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": name_terms(*world.terms[self.number].tolist()),
+            "reward_terms": world.name_terms(*world.terms[self.number].tolist()),
             "working": bool(world.working()[self.number]),
         }
         terminated = truncated = False

@@ -11,11 +11,11 @@ from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
-from posse.signals.fields import Field
+from posse.signals.fields import Field, field
 from posse.signals.layout import ObservationLayout
 from posse.signals.measuring import Metric, metric
 from posse.signals.metrics import METRICS
-from posse.signals.reward import REWARD_TERMS, RewardTerm
+from posse.signals.reward import REWARD_TERMS, RewardTerm, reward_term
 
 __version__ = "0.1.0"
 
@@ -90,10 +90,12 @@ __all__ = [
     "TargetMotion",
     "batch",
     "env",
+    "field",
     "get_scenario",
     "metric",
     "observation_fields",
     "parallel_env",
+    "reward_term",
     "scenario_names",
     "sensor",
     "target_motion",

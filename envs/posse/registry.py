@@ -122,6 +122,8 @@ FIELDS: Final[Registry[Any]] = Registry("observation field")
 """Of :class:`posse.signals.fields.FieldDeclaration`."""
 METRICS: Final[Registry[Any]] = Registry("metric")
 """Of :class:`posse.signals.measuring.Metric`."""
+REWARD_TERMS: Final[Registry[Any]] = Registry("reward term")
+"""Of :class:`posse.signals.reward.RewardTerm`."""
 SENSORS: Final[Registry[Any]] = Registry("sensor")
 """Of :class:`posse.rules.senses.declaring.Sensor`."""
 TARGET_MOTIONS: Final[Registry[Any]] = Registry("target motion")

@@ -15,7 +15,6 @@ from posse.adapters.spaces import box
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.layout import ObservationLayout
-from posse.signals.reward import TERM_NAMES, name_terms
 
 
 class TeamEnv(gymnasium.Env[Any, Any]):
@@ -153,7 +152,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         info: dict[str, Any] = {
             "score": world.score,
             # Rows that already are an array: name_terms(*rows) would take longer.
-            "reward_terms": dict(zip(TERM_NAMES, world.terms.T.copy())),  # noqa: B905
+            "reward_terms": dict(zip(world.batch.term_names, world.terms.T.copy())),  # noqa: B905
         }
         if self._breakable:
             info["working"] = world.working()
@@ -230,7 +229,7 @@ class SoloEnv(TeamEnv):
         over = world.advance()
         info: dict[str, Any] = {
             "score": world.score,
-            "reward_terms": name_terms(*world.terms[0].tolist()),
+            "reward_terms": world.name_terms(*world.terms[0].tolist()),
         }
         terminated = truncated = False
         if over:

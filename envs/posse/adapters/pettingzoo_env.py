@@ -19,7 +19,6 @@ from posse.adapters.spaces import box
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.layout import ObservationLayout
-from posse.signals.reward import name_terms
 
 _Infos = dict[str, dict[str, Any]]
 
@@ -182,7 +181,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             world.check_running()
         world.actions.by_agent(actions)
         over = world.advance()
-        score = world.score
+        score, name_terms = world.score, world.name_terms
         infos: _Infos = {
             agent: {"score": score, "reward_terms": name_terms(*values)}
             # zip's default is right: as many of each, and this is the hot path.

@@ -17,7 +17,7 @@ from posse.numeric import FloatArray
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
-from posse.signals.reward import REWARD_TERMS
+from posse.signals.reward import namer
 
 RENDER_MODES: Final = ("human", "rgb_array")
 _OPTIONS: Final = ("tracker_pose", "target_pose")
@@ -80,11 +80,12 @@ class SingleWorld:
     def _prepare(self) -> None:
         # Made once: making a view or an array takes longer than reading it.
         self._score = self.batch.worlds["score"]
+        self.name_terms = namer(self.batch.term_names)
         self.actions = ActionReader(self.scenario, self._discrete)
         rows = (1, self.scenario.num_agents)
         self._written: tuple[FloatArray, ...] = tuple(
             np.zeros(shape, np.float32)
-            for shape in (self.batch.observation_shape, rows, (*rows, len(REWARD_TERMS)))
+            for shape in (self.batch.observation_shape, rows, (*rows, len(self.batch.term_names)))
         )
         self.observations, self.rewards, self.terms = (array[0] for array in self._written)
         self._make_ready()
@@ -93,7 +94,16 @@ class SingleWorld:
         self.advance = self.batch.stepper(self.actions.read, *self._written)
 
     def __getstate__(self) -> dict[str, Any]:
-        derived = ("_score", "actions", "_written", "observations", "rewards", "terms", "advance")
+        derived = (
+            "_score",
+            "name_terms",
+            "actions",
+            "_written",
+            "observations",
+            "rewards",
+            "terms",
+            "advance",
+        )
         kept = {k: v for k, v in self.__dict__.items() if k not in derived}
         return {**kept, "_renderer": None, "_state_layout": None}
 

@@ -52,7 +52,7 @@ from posse.scenarios.limits import SAFE_MARGIN
 from posse.signals.layout import ObservationLayout
 from posse.signals.metrics import episode_metrics
 from posse.signals.parts import parts_for
-from posse.signals.reward import REWARD_TERMS, TermsByName
+from posse.signals.reward import TermsByName
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _RECYCLED_FROM: Final = 1 << 16
@@ -120,6 +120,7 @@ class Batch:
 
     Attributes:
         layout: Where each field lies in an observation.
+        term_names: Names of the reward terms, in the order in which they are reported.
         observation_shape: (E, rows, F); rows = N, and one more where the target is an agent.
         action_shape: (E, rows, 2 + message_size).
 
@@ -176,7 +177,8 @@ class Batch:
         self._tables = tables_of(scenario)
         self._observations = _Recycler((num_worlds, rows, size))
         self._rewards = _Recycler((num_worlds, rows))
-        self._terms = _Recycler((num_worlds, rows, len(REWARD_TERMS)))
+        self.term_names = parts.term_names
+        self._terms = _Recycler((num_worlds, rows, len(self.term_names)))
         self._untyped: Callable[..., int] = (
             own_kernel(scenario) if self.own_kernel else kernel_of(parts)
         )
@@ -406,7 +408,7 @@ class Batch:
         observations, rewards, terms, (terminated, truncated) = results
         infos: dict[str, Any] = {
             "score": self._score.copy(),
-            "reward_terms": TermsByName(terms),
+            "reward_terms": TermsByName(self.term_names, terms),
         }
         if over:
             observations = self._end(observations, terminated | truncated, infos)
@@ -433,7 +435,7 @@ class Batch:
             actions: Where to read the actions from, (E, rows, 2 + message_size).
             observations: Where to write the observations, (E, rows, F).
             rewards: Where to write the rewards, (E, rows).
-            terms: Where to write the reward terms, (E, rows, K) in the order of ``REWARD_TERMS``.
+            terms: Where to write the reward terms, (E, rows, K) in the order of ``term_names``.
 
         Raises:
             ValueError: An array of another type, shape or layout.
@@ -443,7 +445,7 @@ class Batch:
             ("actions", actions, self.action_shape),
             ("observations", observations, self.observation_shape),
             ("rewards", rewards, rows),
-            ("terms", terms, (*rows, len(REWARD_TERMS))),
+            ("terms", terms, (*rows, len(self.term_names))),
         ):
             _check_array(name, array, shape)
         arguments = (

@@ -38,7 +38,6 @@ from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario
 from posse.signals.metrics import episode_metrics
 from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
-from posse.signals.reward import REWARD_TERMS
 
 _CONFIG: Final[Any] = numba.config
 
@@ -98,7 +97,7 @@ def _check(
 @functools.cache
 def _stepping(parts: Parts) -> Any:
     """Return the kernel that steps worlds."""
-    own, mate, empty, width, mate_width = writers_for(parts)
+    own, mate, reward, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
 
@@ -119,7 +118,7 @@ def _stepping(parts: Parts) -> Any:
             if _SIMULATED:
                 scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
             s = scratch[0]
-            writers = Writers(own, mate, empty, width, mate_width)
+            writers = Writers(own, mate, reward, empty, width, mate_width)
             rules = Rules(draw_motion, set_goal, sees, measure)
             sums = Sums(clear_sums, add_to_sums)
             prepare(tables, s)
@@ -163,15 +162,17 @@ def _choose(
 class _DeviceResults:
     """What one pass over the worlds writes, on the device."""
 
-    def __init__(self, observation_shape: tuple[int, int, int]) -> None:
+    def __init__(
+        self, observation_shape: tuple[int, int, int], term_names: tuple[str, ...]
+    ) -> None:
         worlds, rows, _ = observation_shape
         self.observations = cuda.device_array(observation_shape, np.float32)
         self.rewards = cuda.device_array((worlds, rows), np.float32)
-        self.terms = cuda.device_array((worlds, rows, len(REWARD_TERMS)), np.float32)
+        self.terms = cuda.device_array((worlds, rows, len(term_names)), np.float32)
         self.flags = cuda.device_array((3, worlds), np.bool_)
         self.score = cuda.device_array(worlds, np.float32)
         self.terminated, self.truncated, self.over = (self.flags[k] for k in range(3))
-        self.reward_terms = {t.name: self.terms[:, :, k] for k, t in enumerate(REWARD_TERMS)}
+        self.reward_terms = {name: self.terms[:, :, k] for k, name in enumerate(term_names)}
 
     def arrays(self) -> Results:
         """Return the arrays that the kernels of a CPU write, too."""
@@ -221,7 +222,7 @@ class CudaBatch(Batch):
         # In the mode "same_step" a step may take two sets.
         count = 4 if self.autoreset == "same_step" else 2
         self._results = itertools.cycle(
-            [_DeviceResults(self.observation_shape) for _ in range(count)]
+            [_DeviceResults(self.observation_shape, self.term_names) for _ in range(count)]
         )
         self._last, self._next = next(self._results), next(self._results)
 

@@ -41,13 +41,12 @@ from posse.rules.state import (
     WorldArrays,
     beam_directions,
     config_record,
-    reward_weights,
     slot_records,
 )
 from posse.scenarios import Scenario
 from posse.signals.observing import TOGETHER, observe_sonar, observe_target, observe_together
 from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
-from posse.signals.reward import write_reward
+from posse.signals.reward import weights_for
 from posse.signals.scratch import MOST_IN_TEAM
 
 _ZERO: Final = np.float32(0.0)
@@ -120,6 +119,7 @@ def reward(
     w: Record,
     trackers: Records,
     weights: FloatArray,
+    writers: Writers,
     rewards: FloatArray,
     terms: FloatArray,
 ) -> None:
@@ -128,7 +128,7 @@ def reward(
     A target that is an agent gets the negative of the team's score.
     """
     for i in range(c.num_trackers):
-        rewards[i] = write_reward(c, w, trackers[i], weights, terms[i])
+        rewards[i] = writers.reward(c, w, trackers[i], weights, terms[i])
     if c.target_agent != 0:
         rewards[c.num_trackers] = -w.score
         terms[c.num_trackers, :] = _ZERO
@@ -233,7 +233,7 @@ def advance_worlds(
             occupy(c, w, trackers, tables.slots, scratch)
         if order == STEP:
             end_step(c, w, trackers, tables.slots, sums.add)
-            reward(c, w, trackers, tables.weights, rewards, terms)
+            reward(c, w, trackers, tables.weights, writers, rewards, terms)
         else:
             if order != LOOK:
                 w.held, w.score = 0, _ZERO
@@ -261,7 +261,7 @@ def tables_of(scenario: Scenario) -> Tables:
         config_record(scenario),
         slot_records(scenario),
         beam_directions(scenario),
-        reward_weights(scenario),
+        weights_for(scenario),
     )
 
 
@@ -270,7 +270,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
     Its configuration, slots and beams become constants in the code.
     """
-    own_fields, mate, empty, width, mate_width = writers_for(parts)
+    own_fields, mate, terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
     own_config, own_slots, own_beams, _ = own or (None, None, None, None)
@@ -293,7 +293,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             tables.weights,
         )
         s = scratch[0]
-        writers = Writers(own_fields, mate, empty, width, mate_width)
+        writers = Writers(own_fields, mate, terms, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
         sums = Sums(clear_sums, add_to_sums)
         if s.prepared[0] == _ZERO:

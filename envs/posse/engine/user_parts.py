@@ -12,9 +12,11 @@ import numpy as np
 from posse.engine.kernels import Tables
 from posse.numeric import UNCOMPILED, Records
 from posse.numeric.compiler.complaints import Complaint, unknown_attribute, why_not_compiled
+from posse.numeric.simd.lane_code import tuple_of_lanes
 from posse.registry import DeclarationError, Function, Registry
 from posse.rules.state import CONFIG, TRACKER, WorldArrays
 from posse.signals.parts import Parts, added
+from posse.signals.views import Mate, View
 
 typeof: Final[Any] = numba.typeof
 
@@ -27,6 +29,7 @@ def check_fields(parts: Parts, worlds: WorldArrays) -> None:
     """
     fields = {
         "c": CONFIG.names or (), "w": worlds.world.dtype.names or (), "t": TRACKER.names or (),
+        "v": View._fields, "m": Mate._fields,
     }  # fmt: skip
     for registry, function, _ in _functions(parts):
         _raise(registry, function, unknown_attribute(function, fields))
@@ -46,10 +49,12 @@ def explain(parts: Parts, tables: Tables, worlds: WorldArrays, scratch: Records)
         "obstacles": worlds.obstacle[0], "slots": tables.slots, "s": scratch[0],
         "number": 0, "dx": np.float32(0), "dy": np.float32(0),
     }  # fmt: skip
+    types = {name: typeof(example) for name, example in examples.items()}
+    types |= {"v": tuple_of_lanes(View), "m": tuple_of_lanes(Mate)}
     for registry, function, returns in _functions(parts):
         names = inspect.signature(function).parameters
-        if all(name in examples for name in names):
-            arguments = [typeof(examples[name]) for name in names]
+        if all(name in types for name in names):
+            arguments = [types[name] for name in names]
             _raise(registry, function, why_not_compiled(function, arguments, returns))
 
 

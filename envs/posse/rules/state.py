@@ -19,7 +19,6 @@ from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
-from posse.signals.reward import REWARD_TERMS
 
 SPLITS: Final = ("train", "validation", "test")
 NEVER: Final = np.int32(2**30)
@@ -338,9 +337,3 @@ def config_record(scenario: Scenario) -> Records:
     c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
     c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
     return config
-
-
-def reward_weights(scenario: Scenario) -> FloatArray:
-    """Return the weight of each reward term, in the order of their declaration, (K,) float32."""
-    weights = dict(scenario.reward_weights)
-    return np.array([weights.get(term.name, 0.0) for term in REWARD_TERMS], np.float32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from posse.registry import METRICS
+from posse.registry import FIELDS, METRICS, REWARD_TERMS
 from posse.scenarios.formation import slot_offsets
 from posse.scenarios.limits import (
     FARTHEST,
@@ -15,8 +15,7 @@ from posse.scenarios.limits import (
     SAFE_MARGIN,
     START_CLEARANCE,
 )
-from posse.scenarios.setting import ScenarioError, fail, is_number, near
-from posse.signals.reward import REWARD_TERMS
+from posse.scenarios.setting import ScenarioError, fail, is_number
 
 if TYPE_CHECKING:
     from posse.scenarios.scenario import Scenario
@@ -33,6 +32,7 @@ def check_together(s: Scenario) -> None:
     _check_formation(s)
     _check_place(s)
     _check_rounding(s)
+    _check_fields(s)
     _check_rewards(s)
     _check_metrics(s)
 
@@ -231,14 +231,20 @@ def _spacing(value: float) -> float:
     return math.ulp(value) * 2.0**29  # a double has 29 more bits
 
 
+def _check_fields(s: Scenario) -> None:
+    for k, name in enumerate(s.extra_fields):
+        if name not in FIELDS:
+            raise ScenarioError(f"in extra_fields: {FIELDS.unknown(name)}")
+        if FIELDS.is_built_in(name):
+            fail("extra_fields", s.extra_fields, f"{name!r} is in every observation: leave it out")
+        if name in s.extra_fields[:k]:
+            fail("extra_fields", s.extra_fields, f"{name!r} is there twice")
+
+
 def _check_rewards(s: Scenario) -> None:
-    names = tuple(term.name for term in REWARD_TERMS)
     for name, weight in dict(s.reward_weights).items():
-        if name not in names:
-            raise ScenarioError(
-                f"unknown reward term {name!r} in reward_weights{near(str(name), names)}; "
-                f"terms are: {', '.join(names)}"
-            )
+        if name not in REWARD_TERMS:
+            raise ScenarioError(f"in reward_weights: {REWARD_TERMS.unknown(name)}")
         if not is_number(weight) or not math.isfinite(weight):
             fail(f"reward_weights[{name!r}]", weight, "a weight must be a finite number")
         if abs(weight) > MOST_WEIGHT:

@@ -216,7 +216,10 @@ class Scenario:
         above=True,
     )  # fmt: skip
 
-    # Beside the built-in ones
+    # Beside what is built in
+    extra_fields: tuple[str, ...] = declare(
+        (), Setting("other", "1", "observation fields of your own, by name: docs/extend.md")
+    )
     metrics: tuple[str, ...] = declare(
         (), Setting("other", "1", "further metrics by name, which a module of your own declares")
     )
@@ -230,6 +233,7 @@ class Scenario:
     )
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "extra_fields", _names("extra_fields", self.extra_fields))
         object.__setattr__(self, "reward_weights", _weights(self.reward_weights))
         object.__setattr__(self, "metrics", _names("metrics", self.metrics))
         for name, setting in self.settings().items():
@@ -352,10 +356,11 @@ class Scenario:
 
 
 def _names(setting: str, given: object) -> tuple[str, ...]:
-    """Return names as a tuple, each once, whatever list they came in."""
-    if not isinstance(given, (tuple, list)) or not all(isinstance(name, str) for name in given):
+    """Return names in a tuple, each once; a name alone is one of them."""
+    names = tuple(given) if isinstance(given, (list, tuple)) else (given,)
+    if not all(isinstance(name, str) for name in names):
         fail(setting, given, "it must be a tuple of names")
-    return tuple(dict.fromkeys(given))
+    return tuple(dict.fromkeys(names))
 
 
 def _weights(given: object) -> tuple[tuple[str, float], ...]:

@@ -78,9 +78,17 @@ class FieldDeclaration:
             of_neighbour=self.subject == "mate",
         )  # fmt: skip
 
+    @property
+    def functions(self) -> tuple[tuple[Function, str], ...]:
+        """The functions that it consists of, and what each returns."""
+        return ((self.function, f"{self.size} numbers" if self.size > 1 else "number"),)
+
     def _bound(self, name: str, scenario: Scenario) -> float:
         bound: Any = getattr(self, name)
-        value = bound(scenario) if callable(bound) else bound
+        try:
+            value = bound(scenario) if callable(bound) else bound
+        except Exception as error:  # a user's function
+            raise self._error(f"{name} of {scenario.name!r}: {error!r}") from error
         if not isinstance(value, (int, float)) or not math.isfinite(value):
             raise self._error(f"{name}={value!r} in {scenario.name!r} is not a finite number")
         return float(value)
@@ -113,10 +121,11 @@ def field(
     """
 
     def declare(function: Function) -> Function:
+        FIELDS.check_parameters(function, ("c", "v", "m"), least=1)
+        if size < 1:
+            raise FIELDS.error(function, f"size={size} must be at least 1")
         count = len(inspect.signature(function).parameters)
-        if count not in _SUBJECTS:
-            raise FIELDS.error(function, "its parameters must be (c), (c, v) or (c, v, m)")
-        name, meaning = function.__name__, (function.__doc__ or "").strip()
+        name, meaning = function.__name__, inspect.getdoc(function) or ""
         working = compiled(function)
         FIELDS.add(
             name,

@@ -1,7 +1,8 @@
 """The observation of one robot: a flat float32 vector, its fields by name.
 
-First the fields of what it knows of itself, its task and the target (:mod:`.own_fields`), then the
-sonar, then a place for each team-mate (:mod:`.mate_fields`), with what it said. A quantity that is
+First the fields of what it knows of itself, its task and the target (:mod:`.own_fields`, and those
+that the scenario asks for beside), then the sonar, then a place for each team-mate
+(:mod:`.mate_fields`, likewise), with what it said. A quantity that is
 not known holds the field's ``unknown`` value.
 """
 

@@ -10,7 +10,14 @@ from typing import Any, NamedTuple
 import posse.signals.mate_fields
 import posse.signals.metrics
 import posse.signals.own_fields  # noqa: F401
-from posse.registry import FIELDS, METRICS, SENSORS, TARGET_MOTIONS, Registry
+from posse.registry import (
+    FIELDS,
+    METRICS,
+    REWARD_TERMS,
+    SENSORS,
+    TARGET_MOTIONS,
+    Registry,
+)
 from posse.rules.declared import Rules, rules_of
 from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
@@ -18,14 +25,17 @@ from posse.scenarios import Scenario
 from posse.signals.columns import empty_writer, row_writer, width_of
 from posse.signals.fields import FieldDeclaration
 from posse.signals.measuring import Metric, adding, clearing
+from posse.signals.reward import RewardTerm, reward_writer, terms_for
+
+Declarations = tuple[FieldDeclaration, ...]
 
 
 class Parts(NamedTuple):
     """Declared things, in the order in which they are worked out."""
 
-    fields: tuple[FieldDeclaration, ...]
+    fields: Declarations
     """Of an observation, but for sonar and team-mates."""
-    mate_fields: tuple[FieldDeclaration, ...]
+    mate_fields: Declarations
     """Of a team-mate, but for what it said."""
     motions: tuple[TargetMotion, ...]
     """Of the target."""
@@ -33,6 +43,7 @@ class Parts(NamedTuple):
     """That have the target in sight."""
     metrics: tuple[Metric, ...]
     """Of an episode."""
+    reward_terms: tuple[RewardTerm, ...]
 
     @property
     def width(self) -> int:
@@ -44,6 +55,11 @@ class Parts(NamedTuple):
         """Numbers of a team-mate, what it said apart."""
         return width_of(self.mate_fields)
 
+    @property
+    def term_names(self) -> tuple[str, ...]:
+        """Of the reward terms."""
+        return tuple(term.name for term in self.reward_terms)
+
 
 class Writers(NamedTuple):
     """The functions that write what is told of a world, for compiled code."""
@@ -52,6 +68,8 @@ class Writers(NamedTuple):
     """(c, v, s, rows): writes what eight robots observe of themselves and of the target."""
     mate: Any
     """(c, v, m, s, rows): writes what they observe of a team-mate."""
+    reward: Any
+    """(c, w, t, weights, values) -> reward: writes the terms."""
     empty: Any
     """(o, k): writes the place of a team-mate that nobody fills."""
     width: int
@@ -72,33 +90,40 @@ class Sums(NamedTuple):
 @functools.cache
 def built_in_parts() -> Parts:
     """Return the parts that every scenario has."""
-    fields = FIELDS.built_in()
     return Parts(
-        fields=tuple(field for field in fields if field.subject != "mate"),
-        mate_fields=tuple(field for field in fields if field.subject == "mate"),
+        *_own_and_mates(FIELDS.built_in()),
         motions=TARGET_MOTIONS.built_in(),
         sensors=SENSORS.built_in(),
         metrics=METRICS.built_in(),
+        reward_terms=REWARD_TERMS.built_in(),
+    )
+
+
+def _own_and_mates(fields: Declarations) -> tuple[Declarations, Declarations]:
+    return (
+        tuple(field for field in fields if field.subject != "mate"),
+        tuple(field for field in fields if field.subject == "mate"),
     )
 
 
 def parts_for(scenario: Scenario) -> Parts:
     """Return the parts for a scenario: the built-in ones, and those that it asks for by name."""
-    return built_in_parts()._replace(
+    return Parts(
+        *_own_and_mates(FIELDS.with_added(*scenario.extra_fields)),
         motions=TARGET_MOTIONS.with_added(scenario.target_motion),
         sensors=SENSORS.with_added(scenario.sensor),
         metrics=METRICS.with_added(*scenario.metrics),
+        reward_terms=terms_for(scenario),
     )
 
 
 def added(parts: Parts) -> Iterator[tuple[Registry[Any], Any]]:
     """Yield what a user's modules have declared among parts, each with its registry."""
-    kinds = (
-        (TARGET_MOTIONS, parts.motions),
-        (SENSORS, parts.sensors),
-        (METRICS, parts.metrics),
-    )
-    for registry, things in kinds:
+    groups: tuple[tuple[Registry[Any], tuple[Any, ...]], ...] = (
+        (FIELDS, parts.fields), (FIELDS, parts.mate_fields), (REWARD_TERMS, parts.reward_terms),
+        (TARGET_MOTIONS, parts.motions), (SENSORS, parts.sensors), (METRICS, parts.metrics),
+    )  # fmt: skip
+    for registry, things in groups:
         yield from ((registry, thing) for thing in things if not registry.is_built_in(thing.name))
 
 
@@ -113,6 +138,7 @@ def writers_for(parts: Parts) -> Writers:
     return Writers(
         row_writer(parts.fields, ("c", "v")),
         row_writer(parts.mate_fields, ("c", "v", "m")),
+        reward_writer(parts.reward_terms),
         empty_writer(parts.mate_fields),
         parts.width,
         parts.mate_width,

@@ -1,23 +1,26 @@
 """The reward: named, unscaled terms. A scenario weighs them; ``info`` reports each by name.
 
-To add a term, write its function here under ``@reward_term``: it is then known to scenarios,
-computed by the kernels and reported, with nothing else to touch.
+A term is declared on its formula, here or in a module of your own. Those declared here are worked
+out and reported for every scenario, others for a scenario that weighs them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import functools
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, compiled
+from posse.numeric import FloatArray, Record, compiled, written
+from posse.registry import REWARD_TERMS as TERMS
+from posse.registry import Function
+from posse.scenarios import Scenario
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
-
-_Term = Callable[[Record, Record, Record], np.float32]
 
 
 @dataclass(frozen=True)
@@ -27,21 +30,29 @@ class RewardTerm:
     name: str
     unit: str
     meaning: str
-    function: _Term
+    function: Function
+
+    @property
+    def functions(self) -> tuple[tuple[Function, str], ...]:
+        """The functions that it consists of, and what each returns."""
+        return ((self.function, "number"),)
 
 
-_terms: list[RewardTerm] = []
+def reward_term(unit: str) -> Callable[[Function], Function]:
+    """Declare a function as a reward term of its name; its docstring is the meaning.
 
+    The function takes ``(c, w, t)``, the scenario as kernels read it, the world's record and a
+    tracker's (:mod:`posse.rules.state`), after the step, and returns a number.
 
-def reward_term(unit: str) -> Callable[[_Term], _Term]:
-    """Declare a function (config, world, tracker) -> float32 as a reward term of its name."""
+    Raises:
+        DeclarationError: The name is taken, the docstring is missing, or the parameters are others.
+    """
 
-    def declare(function: _Term) -> _Term:
-        meaning = (function.__doc__ or "").strip()
-        name = function.__name__
-        compiled_function = compiled(function)
-        _terms.append(RewardTerm(name, unit, meaning, compiled_function))
-        return compiled_function
+    def declare(function: Function) -> Function:
+        TERMS.check_parameters(function, ("c", "w", "t"))
+        name, working = function.__name__, compiled(function)
+        TERMS.add(name, RewardTerm(name, unit, inspect.getdoc(function) or "", working), working)
+        return working
 
     return declare
 
@@ -89,24 +100,45 @@ def team(c: Record, w: Record, t: Record) -> np.float32:
     return np.float32(w.score)
 
 
-REWARD_TERMS: Final = tuple(_terms)
-"""Every term, in the order in which they are reported."""
-TERM_NAMES: Final = tuple(term.name for term in REWARD_TERMS)
+REWARD_TERMS: Final[tuple[RewardTerm, ...]] = TERMS.built_in()
+"""The terms of every scenario, in the order in which they are reported."""
 
 
-def _naming() -> Callable[..., dict[str, float]]:
-    values = ", ".join(TERM_NAMES)
-    literal = ", ".join(f"{name!r}: {name}" for name in TERM_NAMES)
-    naming: Callable[..., dict[str, float]] = eval(f"lambda {values}: {{{literal}}}")
+def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
+    """Return the terms of a scenario: the built-in ones, then others that it weighs."""
+    return TERMS.with_added(*dict(scenario.reward_weights))
+
+
+def weights_for(scenario: Scenario) -> FloatArray:
+    """Return the weight of each term of a scenario, (K,) float32."""
+    weights = dict(scenario.reward_weights)
+    return np.array([weights.get(term.name, 0.0) for term in terms_for(scenario)], np.float32)
+
+
+def reward_writer(terms: Sequence[RewardTerm]) -> Any:
+    """Return (c, w, t, weights (K,), values (K,)) -> reward, compiled; it fills ``values``."""
+    lines = [f"values[{k}] = term_{k}(c, w, t)" for k in range(len(terms))]
+    lines.append("reward = ZERO")
+    # From the last on, as it always was: another order of rounding would change results.
+    lines.extend(
+        f"reward = float32(weights[{k}] * values[{k}] + reward)"
+        for k in range(len(terms) - 1, -1, -1)
+    )
+    functions = {f"term_{k}": term.function for k, term in enumerate(terms)}
+    names = {"ZERO": _ZERO, "float32": np.float32, **functions}
+    return written("reward", ("c", "w", "t", "weights", "values"), [*lines, "return reward"], names)
+
+
+@functools.cache
+def namer(names: tuple[str, ...]) -> Callable[..., dict[str, float]]:
+    """Return a function (a tracker's terms, in order) -> them by name.
+
+    Written out as a literal, which is made in half the time of ``dict(zip(...))``: to name the
+    terms is a third of a step of one world.
+    """
+    literal = ", ".join(f"{name!r}: {name}" for name in names)
+    naming: Callable[..., dict[str, float]] = eval(f"lambda {', '.join(names)}: {{{literal}}}")
     return naming
-
-
-name_terms = _naming()
-"""(a tracker's terms, in order) -> them by name.
-
-Written out as a literal, which is made in half the time of ``dict(zip(...))``: to name the terms is
-a third of a step of one world.
-"""
 
 
 class TermsByName(Mapping[str, FloatArray]):
@@ -115,48 +147,22 @@ class TermsByName(Mapping[str, FloatArray]):
     A view is made when it is asked for: to make all of them takes a third of a world's step.
     """
 
-    __slots__ = ("_terms",)
+    __slots__ = ("_names", "_terms")
 
-    def __init__(self, terms: FloatArray) -> None:
-        self._terms = terms
+    def __init__(self, names: tuple[str, ...], terms: FloatArray) -> None:
+        self._names, self._terms = names, terms
 
     def __getitem__(self, name: str) -> FloatArray:
-        if name not in TERM_NAMES:
+        if name not in self._names:
             raise KeyError(name)
-        term: FloatArray = self._terms[..., TERM_NAMES.index(name)]
+        term: FloatArray = self._terms[..., self._names.index(name)]
         return term
 
     def __iter__(self) -> Iterator[str]:
-        return iter(TERM_NAMES)
+        return iter(self._names)
 
     def __len__(self) -> int:
-        return len(TERM_NAMES)
+        return len(self._names)
 
     def __repr__(self) -> str:
         return repr(dict(self))
-
-
-def _chain(position: int) -> Any:
-    """Return a compiled function that writes this term and all that follow."""
-    if position == len(REWARD_TERMS):
-
-        def stop(
-            c: Record, w: Record, t: Record, weights: FloatArray, terms: FloatArray
-        ) -> np.float32:
-            return _ZERO
-
-        return compiled(stop)
-    function, rest = REWARD_TERMS[position].function, _chain(position + 1)
-
-    def write(
-        c: Record, w: Record, t: Record, weights: FloatArray, terms: FloatArray
-    ) -> np.float32:
-        value = function(c, w, t)
-        terms[position] = value
-        return np.float32(weights[position] * value + rest(c, w, t, weights, terms))
-
-    return compiled(write)
-
-
-write_reward = _chain(0)
-"""(config, world, tracker, weights (K,), terms (K,)) -> reward; fills ``terms``."""

@@ -7,15 +7,23 @@ import dis
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numba
 from numba.core import types
+
+from posse.numeric.simd.lane_code import LanesType
 
 _COLOURS: Final = re.compile(r"\x1b\[[0-9;]*m")
 _RECORD: Final = re.compile(r"Record\(.*?;\d+;(?:True|False)\)", re.DOTALL)
 _HEADING: Final = "Failed in nopython mode"
 _LONGEST: Final = 200
+_ARTICLES: Final = {
+    "nothing": "nothing",
+    "number": "a number",
+    "pair": "a pair",
+    "truth": "a truth",
+}
 
 
 class Complaint(NamedTuple):
@@ -62,7 +70,8 @@ def why_not_compiled(
     Args:
         function: Plain, or compiled.
         arguments: The types of its arguments.
-        returns: ``"nothing"``, ``"number"``, ``"pair"`` or ``"truth"``.
+        returns: ``"nothing"``, ``"number"``, ``"pair"``, ``"truth"``, or
+            how many numbers in a tuple, ``"3 numbers"``. Eight numbers at once count as one.
     """
     plain = getattr(function, "py_func", function)
     code = plain.__code__
@@ -70,20 +79,28 @@ def why_not_compiled(
         alone = numba.njit(error_model="numpy")(plain)
         alone.compile(tuple(arguments))
         form: Any = alone.overloads[tuple(arguments)]
-        found = form.signature.return_type
+        found: Any = form.signature.return_type
     except KeyError as error:  # how numba takes an unknown field
         return Complaint(code.co_firstlineno, f"a record that it reads has no field {error}")
     except Exception as error:  # whatever the compiler raises
         text = _COLOURS.sub("", str(error))
         return Complaint(_line(text, code), _reason(text))
+    count, _, numbers = returns.partition(" ")
     fits = {
         "nothing": isinstance(found, types.NoneType),
-        "number": isinstance(found, (types.Number, types.Boolean)),
+        "number": _is_number(found),
+        f"{count} {numbers}": isinstance(found, types.BaseTuple)
+        and str(len(found)) == count
+        and all(map(_is_number, cast("Iterable[Any]", found))),
         "pair": isinstance(found, types.BaseTuple) and len(found) == 2,
         "truth": isinstance(found, (types.Integer, types.Boolean)),
     }[returns]
-    wrong = f"it returns {_short(str(found))}, not a {returns}".replace("a nothing", "nothing")
+    wrong = f"it returns {_short(str(found))}, not {returns if numbers else _ARTICLES[returns]}"
     return None if fits else Complaint(code.co_firstlineno, wrong)
+
+
+def _is_number(found: Any) -> bool:
+    return isinstance(found, (types.Number, types.Boolean, LanesType))
 
 
 def _line(text: str, code: Any) -> int:

@@ -44,34 +44,46 @@ _BITS: Final = ir.VectorType(ir.IntType(1), WIDTH)
 _INTEGERS: Final = ir.VectorType(ir.IntType(32), WIDTH)
 
 
-class _LanesType(types.Type):
+class LanesType(types.Type):
+    """numba's type of eight float32."""
+
     def __init__(self) -> None:
         super().__init__(name="Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
         """Take a plain number for eight of itself (numba's name for it)."""
-        return Conversion.safe if other == types.float32 else None
+        if other == types.float32:
+            return Conversion.safe
+        return Conversion.unsafe if isinstance(other, (types.Float, types.Integer)) else None
 
 
-class _MaskType(types.Type):
+class MaskType(types.Type):
+    """numba's type of eight truth values."""
+
     def __init__(self) -> None:
         super().__init__(name="Mask")
 
 
-@register_model(_LanesType)
+@register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, of: Any) -> None:
         super().__init__(manager, of, _FLOATS)
 
 
-@register_model(_MaskType)
+@register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, of: Any) -> None:
         super().__init__(manager, of, _BITS)
 
 
-_LANES: Final = _LanesType()
-_MASK: Final = _MaskType()
+_LANES: Final = LanesType()
+_MASK: Final = MaskType()
+
+
+def tuple_of_lanes(kind: type) -> types.NamedTuple:
+    """Return numba's type of a named tuple whose fields are declared as Lanes or Mask."""
+    fields = kind.__annotations__.values()
+    return types.NamedTuple([_MASK if each == "Mask" else _LANES for each in fields], kind)
 
 
 def _spread(builder: Any, value: Any) -> Any:
@@ -80,9 +92,10 @@ def _spread(builder: Any, value: Any) -> Any:
     return builder.shuffle_vector(first, nothing, ir.Constant(_INTEGERS, [0] * WIDTH))
 
 
-@lower_cast(types.float32, _LanesType)
+@lower_cast(types.Float, LanesType)
+@lower_cast(types.Integer, LanesType)
 def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _spread(builder, value)
+    return _spread(builder, context.cast(builder, value, fromty, types.float32))
 
 
 def _declare(
@@ -106,6 +119,12 @@ def _pick(sign: str) -> Callable[..., Any]:
         return builder.select(builder.fcmp_ordered(sign, other, value), other, value)
 
     return emit
+
+
+def _emit_absolute(builder: Any, value: Any) -> Any:
+    kind = ir.FunctionType(value.type, [value.type])
+    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.fabs.v8f32")
+    return builder.call(function, [value])
 
 
 def _emit_root(builder: Any, value: Any) -> Any:
@@ -168,6 +187,8 @@ _declare(operator.add, _LANES, _TWO, lambda builder, a, b: builder.fadd(a, b))
 _declare(operator.sub, _LANES, _TWO, lambda builder, a, b: builder.fsub(a, b))
 _declare(operator.mul, _LANES, _TWO, lambda builder, a, b: builder.fmul(a, b))
 _declare(operator.truediv, _LANES, _TWO, lambda builder, a, b: builder.fdiv(a, b))
+_declare(operator.neg, _LANES, (_LANES,), lambda builder, a: builder.fneg(a))
+_declare(abs, _LANES, (_LANES,), _emit_absolute)
 _declare(operator.lt, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered("<", a, b))
 _declare(operator.le, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered("<=", a, b))
 _declare(operator.gt, _MASK, _TWO, lambda builder, a, b: builder.fcmp_ordered(">", a, b))

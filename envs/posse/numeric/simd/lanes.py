@@ -5,10 +5,11 @@ register. A formula that is written for a number, ``x * x + y * y``, then holds 
 beams, in the time of one. A float32 stands for eight of itself. Nothing is rounded otherwise than
 for a number alone: a lane does not depend on its neighbours.
 
-Lanes know ``+ - * /`` and ``< <= > >= ==``, which give masks; masks know ``&`` and ``|``. The
-functions below are what else there is; ``choose``, ``lesser``, ``greater`` and ``root`` take plain
-numbers, too, so that a formula need not be written twice. The bodies here are for where nothing is
-compiled, and work on numpy arrays; :mod:`posse.numeric.simd.lane_code` says what they compile to.
+Lanes know ``+ - * /``, ``abs`` and ``< <= > >= ==``, which give masks; masks know ``&`` and ``|``.
+The functions below are what else there is; ``choose``, ``lesser``, ``greater`` and ``root`` take
+plain numbers, too, so that a formula need not be written twice. The bodies here are for where
+nothing is compiled, and work on numpy arrays; :mod:`posse.numeric.simd.lane_code` says what they
+compile to.
 """
 
 from __future__ import annotations
