@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Numbers, Record, Records, compiled, kernel, worlds_of
+from posse.numeric import Blocks, FloatArray, Record, Records, compiled, kernel, worlds_of
 from posse_baselines.ddcs.leadership import settle_lead
 from posse_baselines.ddcs.memory import SEARCHING
 from posse_baselines.ddcs.messages import write_message
@@ -112,11 +112,11 @@ def decide_all(
     plays: Records,
     actions: FloatArray,
     thread: int,
-    turns: Numbers,
+    blocks: Blocks,
 ) -> None:
     """Write the actions of a thread's worlds."""
     f, s = offsets[0], settings[0]
-    for e in worlds_of(thread, turns):
+    for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
             decide(
                 f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.rules.state import beam_directions, slot_records
 from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs.controller import decide_all
@@ -21,7 +21,6 @@ from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.heading import BODY
 from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.laws.safeguard import DISC, PLAYS
-from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policy import (
     Annotations,
     BasePolicy,

@@ -6,10 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray, Numbers, OwnArrays, compiled, kernel, worlds_of
+from posse.numeric import (
+    MOST_THREADS,
+    Blocks,
+    FloatArray,
+    OwnArrays,
+    compiled,
+    kernel,
+    over_worlds,
+    worlds_of,
+)
 from posse_baselines.learned.encoding import Columns, Encoding
 from posse_baselines.learned.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
-from posse_baselines.parallel import MOST_THREADS, over_worlds
 
 
 @compiled
@@ -44,10 +52,10 @@ def _encode_rows(
     scratch: FloatArray,
     out: FloatArray,
     thread: int,
-    turns: Numbers,
+    blocks: Blocks,
 ) -> None:
     s = scratch[thread]
-    for r in worlds_of(thread, turns):
+    for r in worlds_of(thread, blocks):
         encode_row(rows[r], columns, unknown, offsets, slots, with_features, s, out[r])
 
 

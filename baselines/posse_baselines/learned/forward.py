@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Numbers, compiled, kernel, worlds_of
+from posse.numeric import Blocks, FloatArray, compiled, kernel, worlds_of
 from posse_baselines.learned.encoder import encode_row
 from posse_baselines.learned.features import SCRATCH
 
@@ -54,14 +54,14 @@ def act(
     scratch: FloatArray,
     actions: FloatArray,
     thread: int,
-    turns: Numbers,
+    blocks: Blocks,
 ) -> None:
     """Write the actions (E, N, 2 + m) of a thread's worlds."""
     widest = 0
     for k in range(len(sizes)):
         widest = max(widest, sizes[k])
     work = scratch[thread, :SCRATCH]
-    for e in worlds_of(thread, turns):
+    for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
             x = scratch[thread, SCRATCH : SCRATCH + widest]
             y = scratch[thread, SCRATCH + widest :]

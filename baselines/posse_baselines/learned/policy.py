@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
 from posse_baselines.learned.advice import MOTION, Adviser, advised, check_adviser
 from posse_baselines.learned.card import check_card
 from posse_baselines.learned.encoder import Encoder
@@ -24,7 +24,6 @@ from posse_baselines.learned.policy_file import (
     write_atomically,
     write_policy_file,
 )
-from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import (
     Annotations,

@@ -10,17 +10,17 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.numeric import (
+    Blocks,
     FloatArray,
-    Numbers,
     OwnArrays,
     Record,
     Records,
     compiled,
     kernel,
+    over_worlds,
     worlds_of,
 )
 from posse_baselines.laws.offsets import offsets_of
-from posse_baselines.parallel import over_worlds
 from posse_baselines.policy import (
     BasePolicy,
     Memory,
@@ -91,10 +91,10 @@ def pursue_all(
     observations: FloatArray,
     actions: FloatArray,
     thread: int,
-    turns: Numbers,
+    blocks: Blocks,
 ) -> None:
     """Write the actions of a thread's worlds."""
     f = offsets[0]
-    for e in worlds_of(thread, turns):
+    for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
             pursue(f, observations[e, i], actions[e, i])

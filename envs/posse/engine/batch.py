@@ -33,13 +33,13 @@ from posse.engine.kernels import (
 from posse.engine.scratch import SCRATCH
 from posse.engine.user_parts import check_fields, explain
 from posse.numeric import (
+    Blocks,
     BoolArray,
     FloatArray,
-    Numbers,
     Records,
-    all_at_once,
-    by_turns,
     direct,
+    divide,
+    run_threads,
     threads_for,
 )
 from posse.rules.scratch import new_scratch
@@ -451,7 +451,7 @@ class Batch:
         arguments = (
             self._tables, self._arrays, actions,
             Results(observations, rewards, terms, self._new_flags()), self._orders,
-            self._scratch[0], 0, all_at_once(self.num_worlds),
+            self._scratch[0], 0, divide(self.num_worlds, 1),
         )  # fmt: skip
         kernel = self._kernel
         return lambda: kernel(*arguments)
@@ -510,10 +510,10 @@ class Batch:
         kernel, scratch = self._kernel, self._scratch
         arguments = (self._tables, self._arrays, actions, results, orders)
 
-        def work(thread: int, turns: Numbers) -> int:
-            return kernel(*arguments, scratch[thread], thread, turns)
+        def work(thread: int, blocks: Blocks) -> int:
+            return kernel(*arguments, scratch[thread], thread, blocks)
 
-        return sum(by_turns(work, self.num_worlds, len(scratch)))
+        return sum(run_threads(work, self.num_worlds, len(scratch)))
 
     def _new_results(self) -> Results:
         """Return room for what a pass over the worlds writes."""

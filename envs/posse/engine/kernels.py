@@ -17,15 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import (
+    Blocks,
     BoolArray,
     FloatArray,
-    Numbers,
     Record,
     Records,
+    blocks_of,
     compiled,
     fetch,
     kernel,
-    parts_of,
 )
 from posse.rules.contact import meet
 from posse.rules.declared import Rules
@@ -284,7 +284,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         orders: npt.NDArray[np.uint8],
         scratch: Records,
         thread: int,
-        turns: Numbers,
+        blocks: Blocks,
     ) -> int:
         used = Tables(
             tables.config if own_config is None else own_config,
@@ -300,7 +300,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             prepare(used, s)
             s.prepared[0] = _ONE
         over = 0
-        for first, end in parts_of(thread, turns):
+        for first, end in blocks_of(thread, blocks):
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
                 over += advance_worlds(

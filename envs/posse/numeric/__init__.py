@@ -28,28 +28,37 @@ from posse.numeric.simd.lanes import (
     tagged,
     transpose,
 )
-from posse.numeric.threads.turn_code import Numbers, parts_of, worlds_of
-from posse.numeric.threads.turns import all_at_once, by_turns, threads_for
+from posse.numeric.threads import (
+    MOST_THREADS,
+    Blocks,
+    blocks_of,
+    divide,
+    over_worlds,
+    run_threads,
+    threads_for,
+    worlds_of,
+)
 from posse.numeric.written import written
 
 __all__ = [
+    "MOST_THREADS",
     "UNCOMPILED",
     "WIDTH",
+    "Blocks",
     "BoolArray",
     "FloatArray",
     "Lanes",
     "Mask",
-    "Numbers",
     "OwnArrays",
     "Record",
     "Records",
-    "all_at_once",
     "bits",
-    "by_turns",
+    "blocks_of",
     "choose",
     "compiled",
     "counts",
     "direct",
+    "divide",
     "eight",
     "fetch",
     "greater",
@@ -59,8 +68,9 @@ __all__ = [
     "load",
     "load_fields",
     "lowest_bit",
-    "parts_of",
+    "over_worlds",
     "root",
+    "run_threads",
     "store",
     "store_fields",
     "tag",

@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.rules.state import config_record, slot_records
 from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.heading import BODY
 from posse_baselines.laws.safeguard import DISC, PLAYS
-from posse_baselines.parallel import MOST_THREADS, over_worlds
 from posse_baselines.policies.planner.law import drive_all
 
 _MOST_DISCS = 32

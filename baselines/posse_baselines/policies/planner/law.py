@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 from posse.numeric import (
+    Blocks,
     BoolArray,
     FloatArray,
-    Numbers,
     Record,
     Records,
     compiled,
@@ -151,14 +154,14 @@ def drive_all(
     ways: Records,
     plans: Records,
     paths: FloatArray,
-    begun: Numbers,
+    begun: npt.NDArray[np.int64],
     worlds_per_path: int,
     actions: FloatArray,
     thread: int,
-    turns: Numbers,
+    blocks: Blocks,
 ) -> None:
     """Write the actions of those of a thread's worlds that are going on."""
-    for e in worlds_of(thread, turns):
+    for e in worlds_of(thread, blocks):
         if going[e]:
             shared = e // worlds_per_path
             drive(

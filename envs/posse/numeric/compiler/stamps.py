@@ -42,7 +42,9 @@ _COMPILERS: Final = (
 def _source(filename: str) -> Path | None:
     """The outermost package that a file belongs to; the file itself; None if there is no file."""
     path = Path(filename).resolve()
-    source = path if path.is_file() else None
+    if not path.is_file():  # code that was written by a program, or typed in
+        return None
+    source = path
     for directory in path.parents:
         if not (directory / "__init__.py").is_file():
             break

@@ -1,0 +1,200 @@
+"""Worlds spread over threads: each thread takes block after block of them, in compiled code.
+
+Waiters spin briefly, then block: to wake a blocked thread can take longer than a step of a thousand
+worlds, and to hand over Python's lock longer than one of a hundred.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import itertools
+import os
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from queue import SimpleQueue
+from typing import Any, Final, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.numeric.compiling import UNCOMPILED, compiled, kernel
+from posse.numeric.simd import atomics
+from posse.numeric.simd.lanes import WIDTH
+
+T = TypeVar("T")
+Blocks = npt.NDArray[np.int64]
+"""Worlds that are still to do: a row for each thread, (threads, 16)."""
+
+NEXT: Final = 0  # world that the next block begins with; first in its row, for atomics
+SIZE: Final = 1  # worlds of a block; 0: there is one thread, and one block
+END: Final = 2  # world after the last
+_BLOCKS_EACH: Final = 16
+_SERIAL_BELOW: Final = 2048  # robots; a second thread costs more than it saves
+_LOOKS: Final = 400_000  # some tenths of a millisecond
+_PAUSE: Final = 10_000  # until the caller is in its kernel, and has let go of Python's lock
+_ENDED: Final = 2**62
+_CORES: Final = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+MOST_THREADS: Final = len(_CORES)
+"""Threads that :func:`over_worlds` uses at most: as many as this process may use cores."""
+
+
+@functools.lru_cache(maxsize=64)
+def divide(num_worlds: int, threads: int) -> Blocks:
+    """Return worlds in blocks that nobody has taken; those of one thread may be used again."""
+    # Eights, where there are enough worlds: they are observed together.
+    grain = WIDTH if num_worlds >= threads * _BLOCKS_EACH * WIDTH // 2 else 1
+    edges = [num_worlds * k // (threads * grain) * grain for k in range(threads)] + [num_worlds]
+    blocks = np.zeros((threads, 16), np.int64)  # no two threads' rows share a cache line
+    blocks[:, NEXT], blocks[:, END] = edges[:-1], edges[1:]
+    if threads > 1:
+        blocks[:, SIZE] = max(1, num_worlds // (threads * _BLOCKS_EACH * grain)) * grain
+    return blocks
+
+
+@compiled
+def blocks_of(thread: int, blocks: Blocks) -> Iterator[tuple[int, int]]:
+    """Yield blocks that nobody has taken, until there are none: first world, world after the last.
+
+    A thread takes its own first, which lie in its core's cache from the step before; then others'.
+    """
+    if blocks[0, SIZE] == 0:
+        yield 0, blocks[0, END]
+    else:
+        for k in range(len(blocks)):
+            row = blocks[(thread + k) % len(blocks)]
+            while row[NEXT] < row[END]:
+                first = atomics.add(row, row[SIZE])
+                if first < row[END]:
+                    yield first, min(first + row[SIZE], row[END])
+
+
+@compiled
+def worlds_of(thread: int, blocks: Blocks) -> Iterator[int]:
+    """Yield the worlds of :func:`blocks_of`, one by one."""
+    for first, end in blocks_of(thread, blocks):
+        for e in range(first, end):  # noqa: UP028 (compiled code knows no yield from)
+            yield e
+
+
+@kernel
+def _spin(own: Blocks, counter: Blocks, target: int, looks: int, pause: int) -> None:
+    """Add one to a counter; then look until another has reached a target, and a pause longer."""
+    atomics.add(own, 1)
+    for _ in range(looks):
+        if atomics.read(counter) >= target:
+            for _ in range(pause):
+                atomics.read(counter)
+            return
+
+
+def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
+    """Return how many threads so many worlds are worth, at most ``most``."""
+    return 1 if num_worlds * robots_each < _SERIAL_BELOW else min(most, num_worlds)
+
+
+def over_worlds(
+    kernel: Callable[..., None], arguments: tuple[Any, ...], num_worlds: int, num_trackers: int
+) -> None:
+    """Call ``kernel(*arguments, thread, blocks)`` in at most ``MOST_THREADS`` threads."""
+    threads = threads_for(num_worlds, num_trackers, MOST_THREADS)
+    run_threads(functools.partial(kernel, *arguments), num_worlds, threads)
+
+
+def run_threads(work: Callable[[int, Blocks], T], num_worlds: int, threads: int) -> list[T]:
+    """Call ``work(thread, blocks)`` in at most so many threads; return what the calls returned.
+
+    Each takes worlds from :func:`worlds_of` or :func:`blocks_of`. The caller is thread 0, and alone
+    while another thread of the program uses the workers. If a signal handler raises, the error goes
+    on when all worlds are done, or none was begun: nothing is half done or written afterwards.
+    """
+    if threads == 1 or UNCOMPILED:
+        return [work(0, divide(num_worlds, 1))]
+    workers: list[_Worker] = []
+    try:
+        try:
+            return _share(work, divide(num_worlds, threads).copy(), workers)
+        except BaseException:
+            _end(workers)
+            raise
+    except BaseException:
+        _end(workers)  # a second error may have come before the first call could begin
+        raise
+
+
+def _share(work: Callable[[int, Blocks], T], blocks: Blocks, workers: list[_Worker]) -> list[T]:
+    while len(workers) < len(blocks) - 1:
+        try:
+            workers.append(_idle.pop())
+        except IndexError:
+            if len(_alive) >= max(len(blocks), MOST_THREADS) - 1:
+                break  # another thread of the program has them
+            workers.append(_Worker())
+    for thread, worker in enumerate(workers, 1):
+        worker.tasks.put(functools.partial(work, thread, blocks))
+        worker.given += 1
+    results = [work(0, blocks)]
+    for worker in workers:
+        _spin(np.zeros(1, np.int64), worker.done, int(worker.given[0]), worker.looks, 0)
+        result, error = worker.results.get()
+        if error is not None:
+            raise error
+        results.append(result)
+    while workers:
+        _idle.append(workers.pop())
+    return results
+
+
+class _Worker:
+    """A thread, the tasks that it was given, and what came of them."""
+
+    def __init__(self) -> None:
+        self.tasks: SimpleQueue[Callable[[], Any] | None] = SimpleQueue()
+        self.results: SimpleQueue[tuple[Any, BaseException | None]] = SimpleQueue()
+        self.given, self.done = np.zeros(1, np.int64), np.full(1, -1)
+        self.looks = _LOOKS if len(_alive) < MOST_THREADS - 1 else 0  # to spin takes a core
+        weakref.finalize(self, self.tasks.put, None)  # nobody can give it another task
+        arguments = self.tasks, self.results, self.given, self.done, self.looks
+        threading.Thread(target=_serve, args=arguments, name="posse", daemon=True).start()
+        _alive.add(self)
+
+
+def _serve(tasks: Any, results: Any, given: Any, done: Any, looks: int) -> None:
+    """Do what comes, until it is None. Knows no worker, so that one can be freed."""
+    for count in itertools.count(1):
+        _spin(done, given, count, looks, _PAUSE)  # counts the last task without Python's lock
+        task = tasks.get()
+        if task is None:
+            break
+        try:
+            outcome: Any = task(), None
+        except BaseException as error:  # for the caller to raise
+            outcome = None, error
+        del task  # it holds the step's arrays, whose memory is used again
+        results.put(outcome)
+    done[0] = _ENDED
+
+
+def _end(workers: list[_Worker]) -> None:
+    """Wait until workers have done what they were given and ended, whatever is raised meanwhile."""
+    while workers:
+        try:
+            for worker in workers:
+                worker.tasks.put(None)
+            # Not Thread.join: interrupted, it takes a thread that runs for one that has ended.
+            while any(worker.done[0] != _ENDED for worker in workers):
+                time.sleep(1e-4)
+            _alive.difference_update(workers)
+            workers.clear()
+        except BaseException:
+            continue
+
+
+_idle: Final[list[_Worker]] = []
+_alive: Final[weakref.WeakSet[_Worker]] = weakref.WeakSet()
+atexit.register(_end, _idle)
+if hasattr(os, "register_at_fork"):  # a forked process has none of these threads
+    os.register_at_fork(after_in_child=_idle.clear)
+    os.register_at_fork(after_in_child=_alive.clear)
