@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from posse.numeric.compiler.fingerprint import fingerprint
 from posse.numeric.compiling import compiled
 
 
@@ -17,8 +16,7 @@ def written(
 ) -> Callable[..., Any]:
     """Return a compiled function of these parameters and lines.
 
-    It is called after the functions that it calls, and after a hash of those that are not posse's:
-    kernels on disk are told apart by that.
+    It is called after the functions that it calls.
 
     Args:
         name: What it is called.
@@ -30,11 +28,6 @@ def written(
     scope: dict[str, Any] = {**names, "__name__": __name__}
     exec(f"def {name}({', '.join(parameters)}):\n{body}\n", scope)
     function: Callable[..., Any] = scope[name]
-    called = [_called(value) for value in names.values() if callable(value)]
+    called = [value.__qualname__ for value in names.values() if callable(value)]
     function.__qualname__ = f"{name}({', '.join(called)})"
     return compiled(function)
-
-
-def _called(function: Any) -> str:
-    own = getattr(function, "__module__", "").partition(".")[0] == __name__.partition(".")[0]
-    return function.__qualname__ if own else f"{function.__qualname__}@{fingerprint(function)}"
