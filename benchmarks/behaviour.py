@@ -20,7 +20,7 @@ class Settings:
     """Whom to look at, and where."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional] = (
-        "ddcs-distributed", "oracle", "learned-smart",
+        "ddcs-distributed", "planner", "learned-smart",
     )  # fmt: skip
     scenario: str = "smart"
     worlds: int = 200

@@ -28,8 +28,8 @@ observations, infos = env.reset(seed=1)
 print(f"{len(observations)} trackers, {len(observations['tracker_0'])} numbers each")
 
 # Is it worth playing? There should be room between the best scripted team and the bound, and the
-# oracle, which sees everything, should do clearly better than those who do not.
-for policy in ("pursuit", "ddcs-distributed", "oracle"):
+# planner, which reads the state, should do clearly better than those who do not.
+for policy in ("pursuit", "ddcs-distributed", "planner"):
     results = evaluate(
         policy, night, arguments.episodes, seed=0, split="validation", progress=False
     )

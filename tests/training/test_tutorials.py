@@ -73,8 +73,8 @@ def test_add_scenario(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
     shown = capsys.readouterr().out
     assert "4 trackers, " in shown
     scores = dict(re.findall(rf"^(\S+) +score {NUMBER}", shown, re.MULTILINE))
-    assert set(scores) == {"pursuit", "ddcs-distributed", "oracle"}
-    assert float(scores["pursuit"]) < float(scores["oracle"])
+    assert set(scores) == {"pursuit", "ddcs-distributed", "planner"}
+    assert float(scores["pursuit"]) < float(scores["planner"])
 
 
 def test_reward_term(tmp_path: Path) -> None:

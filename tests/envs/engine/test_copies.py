@@ -118,6 +118,7 @@ def test_faults_that_have_begun_stay_and_others_are_drawn_anew() -> None:
         begun = np.repeat(own[name] <= 300, 20, axis=0)
         np.testing.assert_array_equal(theirs[name][begun], np.repeat(own[name], 20, axis=0)[begun])
         coming = theirs[name][~begun]
+        assert not np.array_equal(coming, np.repeat(own[name], 20, axis=0)[~begun])
         assert (coming > 300).all()
         # A fifth has an outage at a uniform step of 600; of those with none by 300, a ninth.
         assert (coming < 600).mean() == pytest.approx(1 / 9, abs=0.015)

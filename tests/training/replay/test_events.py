@@ -65,7 +65,7 @@ def test_ticks_agree_with_the_metrics() -> None:
 
 
 def test_every_dart_of_a_smart_target_is_a_tick() -> None:
-    player = record(["oracle"], "smart", seed=1).players[0]
+    player = record(["planner"], "smart", seed=1).players[0]
     darts = [event.step for event in player.events if event.kind == "dart"]
     column = player.columns["target_dart"].values
     assert darts == (np.flatnonzero(np.diff(column) == 1) + 1).tolist()

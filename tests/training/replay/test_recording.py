@@ -26,7 +26,7 @@ def close(column: Any, frame: int, value: Any, angle: bool = False) -> None:
 
 @pytest.mark.parametrize(
     ("policy", "scenario"),
-    [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("oracle", "leader-loss")],
+    [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("planner", "leader-loss")],
 )
 def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -> None:
     player_of = load(policy)
