@@ -17,8 +17,8 @@ import tyro
 import posse
 from posse_baselines import load
 from posse_baselines.registry import shipped
+from posse_training.reports.compare import PLANNER, compare
 from posse_training.reports.compare import Settings as CompareSettings
-from posse_training.reports.compare import compare
 from posse_training.reports.comparison import Comparison
 from posse_training.reports.contenders import play, read_contenders
 from posse_training.reports.plays import Plays
@@ -29,11 +29,11 @@ SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith
 SCRIPTED = ("ddcs-distributed", "ddcs-centralized")
 MARK = "<!-- `make results` writes what follows -->"
 FIGURES = {
-    "scenarios": "Mean score of every team on every scenario.",
-    "profile": "Share of worlds with at least a score.",
-    "team-size": "Score against the size of the team.",
-    "radio-loss": "Score against the share of messages lost.",
-    "target-speed": "Score against the speed of the target.",
+    "scenarios": "Mean safe score of every team on every scenario.",
+    "profile": "Share of worlds with at least a safe score.",
+    "team-size": "Safe score against the size of the team.",
+    "radio-loss": "Safe score against the share of messages lost.",
+    "target-speed": "Safe score against the speed of the target.",
     "recovery": "Share of teams that have settled anew, by the time since their leader broke.",
 }
 
@@ -81,7 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found = compare(
         CompareSettings(
             (*SCRIPTED, *learned), settings.scenarios, settings.episodes, settings.seed,
-            settings.split, settings.rows, figures=True, sweep_episodes=settings.sweep_episodes,
+            settings.split, settings.rows, sweep_episodes=settings.sweep_episodes,
+            planner_episodes=settings.episodes,
         )
     )  # fmt: skip
     media = settings.page.parent / "media"
@@ -113,10 +114,11 @@ def report(
         "## Learned teams and the better DDCS model",
         "",
         row(
-            "scenario", "learned", "trained on it", "score", "better DDCS model", "its score",
-            "difference", "improvement", "bound",
+            "scenario", "learned", "trained on it", "safe score", "of the planner's", "score",
+            "contact-free", "better DDCS model", "its safe score", "difference", "improvement",
+            "bound",
         ),
-        "|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for scenario in settings.scenarios:
         best = better_ddcs(found, scenario)
@@ -128,7 +130,10 @@ def report(
             lines.append(
                 row(
                     scenario, f"`{name}`", "yes" if scenario in trained else "no",
-                    mine.mean("score"), f"`{best.label}`", best.mean("score"),
+                    mine.mean("safe_score"), f"{mine.ratio(found.plays[scenario, PLANNER]):.2f}",
+                    mine.mean("score"),
+                    percent(mine.share([result["contact_free"] == 1 for result in mine.results])),
+                    f"`{best.label}`", best.mean("safe_score"),
                     mine.difference(best), percent(mine.improvement(best)),
                     f"{mine.mean('bound').value:.3f}",
                 )
@@ -146,9 +151,9 @@ def report(
 
 
 def better_ddcs(found: Comparison, scenario: str) -> Plays:
-    """Return the plays of the DDCS model with the higher mean score on the very worlds played."""
+    """Return the plays of the DDCS model with the higher mean safe score on the same worlds."""
     plays = [found.plays[scenario, name] for name in SCRIPTED]
-    return max(plays, key=lambda play: play["score"].mean())
+    return max(plays, key=lambda play: play["safe_score"].mean())
 
 
 def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:

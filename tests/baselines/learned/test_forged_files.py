@@ -60,7 +60,7 @@ FIELD = ["speed", 1, "m/s", 0.0, False]
         ({"limit": 10**400}, "damaged"),
         ({"activation": []}, "unknown activation"),
         ({"adviser": "os:system"}, "its adviser 'os:system' is none of"),
-        ({"adviser": "oracle"}, "cannot be an adviser"),
+        ({"adviser": "planner"}, "cannot be an adviser"),
         ({"adviser": ["pursuit"]}, "damaged"),
         ({"adviser": "ddcs-distributed"}, "the network takes"),
         ({"encoding": None}, "inputs is damaged"),

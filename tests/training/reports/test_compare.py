@@ -12,6 +12,7 @@ from posse_baselines import PolicyError
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
 from posse_training.reports.compare import Settings, compare
+from posse_training.reports.comparison import table
 from posse_training.reports.contenders import read_contenders
 from posse_training.reports.statistics import difference_over_seeds
 from posse_training.reports.sweeps import BOUND, SWEEPS
@@ -19,20 +20,45 @@ from posse_training.reports.sweeps import BOUND, SWEEPS
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     names = ("idle", "pursuit")
-    settings = Settings(names, ("constant",), episodes=20, out=tmp_path, figures=False)
+    settings = Settings(
+        names, ("constant",), episodes=20, out=tmp_path, figures=False, planner_episodes=0
+    )
     rows = compare(settings).rows
     scores = {}
     for name in names:
         with (tmp_path / f"constant-{name}.csv").open(newline="") as file:
-            scores[name] = np.array([float(row["score"]) for row in csv.DictReader(file)])
+            scores[name] = np.array([float(row["safe_score"]) for row in csv.DictReader(file)])
     assert rows[0]["difference"] is None
     gap = scores["pursuit"] - scores["idle"]
     assert rows[1]["difference"].value == pytest.approx(gap.mean())
     assert rows[1]["improvement"].value == pytest.approx(((gap > 0) + 0.5 * (gap == 0)).mean())
     assert rows[1]["difference"].count == 20
     written = json.loads((tmp_path / "summary.json").read_text())
-    assert written["comparison"][1]["score"]["value"] == pytest.approx(scores["pursuit"].mean())
+    assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(
+        scores["pursuit"].mean()
+    )
     assert (written["seed"], written["split"]) == (7, "test")
+
+
+def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
+    settings = Settings(
+        ("idle", "pursuit", "ddcs-distributed"), ("smart",), episodes=4, out=tmp_path,
+        figures=False, planner_episodes=3,
+    )  # fmt: skip
+    found = compare(settings)
+    assert [row["policy"] for row in found.rows][-1] == "planner"
+    safe = {
+        row["policy"]: found.plays["smart", row["policy"]]["safe_score"][0] for row in found.rows
+    }
+    assert len(safe["planner"]) == 3, "it plays the first worlds of the others"
+    for row in found.rows:
+        share = safe[row["policy"]][:3].mean() / safe["planner"].mean()
+        assert row["of_planner"] == pytest.approx(share)
+        assert row["contact_free"].value in np.arange(5) / 4 or row["policy"] == "planner"
+    shown = list(table(found, settings).columns[1].cells)
+    ranked = sorted(safe, key=lambda policy: -safe[policy].mean())
+    assert [str(cell) for cell in shown] == ranked
+    assert ranked[0] == "planner"
 
 
 def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None:
@@ -53,11 +79,13 @@ def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None
 
 def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
-    assert main([*arguments, "--no-figures", "--out", str(tmp_path)]) == 0
+    assert (
+        main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
+    )
     lines = capsys.readouterr().out.splitlines()
     row = next(line for line in lines if " pursuit " in line)
     assert "constant" in row, "no cell is broken where lines have no end"
-    assert row.count("]") == 5, "five estimates with their intervals"
+    assert row.count("]") == 6, "six estimates with their intervals"
     assert not list(tmp_path.glob("*.png"))
 
 
@@ -92,18 +120,23 @@ def files(tmp_path: Path) -> list[str]:
 def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> None:
     group = f"mine={','.join(files)}"
     settings = Settings(
-        ("pursuit", group), ("constant",), episodes=15, out=tmp_path / "out", figures=False
+        ("pursuit", group),
+        ("constant",),
+        episodes=15,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
     )
     found = compare(settings)
     assert [(row["policy"], row["seeds"]) for row in found.rows] == [("pursuit", 1), ("mine", 3)]
     scores = []
     for k in (1, 2, 3):
         with (tmp_path / "out" / f"constant-mine-{k}.csv").open(newline="") as file:
-            scores.append([float(row["score"]) for row in csv.DictReader(file)])
+            scores.append([float(row["safe_score"]) for row in csv.DictReader(file)])
     assert len({tuple(row) for row in scores}) == 3
-    reference = found.plays["constant", "pursuit"]["score"]
+    reference = found.plays["constant", "pursuit"]["safe_score"]
     assert found.rows[1]["difference"] == difference_over_seeds(scores, reference)
-    better = np.array(scores) > reference
+    better = (np.array(scores) > reference) + 0.5 * (np.array(scores) == reference)
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
 
 
@@ -114,7 +147,15 @@ def test_who_cannot_play_is_left_out_with_a_line(
     _named()["few-beams"] = scenario
     try:
         command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
-        options = ["--episodes", "2", "--no-figures", "--out", str(tmp_path / "out")]
+        options = [
+            "--episodes",
+            "2",
+            "--no-figures",
+            "--planner-episodes",
+            "0",
+            "--out",
+            str(tmp_path / "out"),
+        ]
         assert main([*command, *options]) == 0
     finally:
         del _named()["few-beams"]
@@ -134,12 +175,20 @@ def test_a_split_that_was_trained_on_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     learned(1, "test").save(tmp_path / "mine.safetensors")
-    options = ["--scenarios", "constant", "--no-figures", "--out", str(tmp_path)]
+    options = [
+        "--scenarios",
+        "constant",
+        "--no-figures",
+        "--planner-episodes",
+        "0",
+        "--out",
+        str(tmp_path),
+    ]
     assert main(["compare", str(tmp_path / "mine.safetensors"), *options]) == 2
     assert "was trained on the split 'test'" in capsys.readouterr().err
 
 
-def test_figures_are_drawn_with_the_oracle_beside(
+def test_figures_are_drawn_with_the_planner_beside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     few = tuple(replace(sweep, values=sweep.values[:1]) for sweep in SWEEPS)
@@ -149,6 +198,6 @@ def test_figures_are_drawn_with_the_oracle_beside(
     names = {"profile", "scenarios", "team-size", "radio-loss", "target-speed", "recovery"}
     assert {path.stem for path in tmp_path.glob("*.png")} == names
     assert {path.stem for path in tmp_path.glob("*.svg")} == names
-    assert "oracle" in capsys.readouterr().out
+    assert "planner" in capsys.readouterr().out
     with (tmp_path / "sweeps.csv").open(newline="") as file:
-        assert {row["policy"] for row in csv.DictReader(file)} == {"pursuit", "oracle", BOUND}
+        assert {row["policy"] for row in csv.DictReader(file)} == {"pursuit", "planner", BOUND}

@@ -68,7 +68,7 @@ def test_a_full_disk_is_named_and_the_old_one_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
-    given = Settings(("idle",), ("constant",), 2, out=out, figures=False)
+    given = Settings(("idle",), ("constant",), 2, out=out, figures=False, planner_episodes=0)
     compare(given)
     before = contents(out)
 
@@ -88,7 +88,9 @@ def test_other_peoples_files_are_refused_before_anything_is_played(tmp_path: Pat
     (out / "notes.txt").write_text("mine")
     (out / "summary.json").write_text(json.dumps({"files": ["notes.txt"]}))
     with pytest.raises(ComparisonError, match=r"'notes\.txt', for example.*move them"):
-        compare(Settings(("idle",), ("constant",), 10**6, out=out, figures=False))
+        compare(
+            Settings(("idle",), ("constant",), 10**6, out=out, figures=False, planner_episodes=0)
+        )
     assert (out / "notes.txt").read_text() == "mine"
     only(out)
 
@@ -175,7 +177,7 @@ import sys
 from pathlib import Path
 from posse_training.reports.compare import Settings, compare
 compare(Settings(tuple(sys.argv[2].split(",")), ("constant", "smart"), 3, out=Path(sys.argv[1]),
-                 figures=False))
+                 figures=False, planner_episodes=0))
 """
 
 
@@ -208,7 +210,11 @@ def test_kill_9_leaves_the_old_comparison_and_a_rerun_is_as_if_nothing_was(tmp_p
 
 def test_files_are_readable_like_any_others(tmp_path: Path) -> None:
     (tmp_path / "plain").touch()
-    compare(Settings(("idle",), ("constant",), 1, out=tmp_path / "out", figures=False))
+    compare(
+        Settings(
+            ("idle",), ("constant",), 1, out=tmp_path / "out", figures=False, planner_episodes=0
+        )
+    )
     wanted = (tmp_path / "plain").stat().st_mode & 0o777
     assert {path.stat().st_mode & 0o777 for path in (tmp_path / "out").iterdir()} == {wanted}
 
@@ -228,7 +234,7 @@ class TestNames:
     def test_labels_that_clean_alike_are_kept_apart(self, tmp_path: Path) -> None:
         out = tmp_path / "out"
         policies = ("a/b=idle", "a:b=pursuit", "A_B=random")
-        compare(Settings(policies, ("constant",), 2, out=out, figures=False))
+        compare(Settings(policies, ("constant",), 2, out=out, figures=False, planner_episodes=0))
         summary = json.loads((out / "summary.json").read_text())
         files = {row["policy"]: row["files"] for row in summary["comparison"]}
         assert files == {

@@ -77,7 +77,7 @@ def test_the_page_says_what_was_played(page: Path, tmp_path: Path) -> None:
     assert "old" not in text
 
     def scores(who: str | LearnedPolicy, scenario: str) -> npt.NDArray[np.float64]:
-        return evaluate(who, scenario, 12, 2026, progress=False)["score"]
+        return evaluate(who, scenario, 12, 2026, progress=False)["safe_score"]
 
     for scenario in ("constant", "radio"):
         ddcs = max(

@@ -50,7 +50,7 @@ def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
 def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
     scores = [0.2, 0.4, 0.4, 0.9]
     figure = figures.profile(
-        {("smart", "pursuit"): plays_of("pursuit", "smart", score=scores, bound=[1.0] * 4)}
+        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}
     )
     x, y = line(figure, "pursuit")
     at = dict(zip(np.round(x, 4), y, strict=True))
@@ -63,9 +63,9 @@ def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
 def test_scores_and_bounds_stand_where_they_should() -> None:
     figure = figures.scores(
         {
-            (name, policy): plays_of(policy, name, score=[low, low + 0.2], bound=[0.9, 0.8])
+            (name, policy): plays_of(policy, name, safe_score=[low, low + 0.2], bound=[0.9, 0.8])
             for name, low in (("smart", 0.3), ("radio", 0.5))
-            for policy in ("oracle", "pursuit")
+            for policy in ("planner", "pursuit")
         }
     )
     (axis,) = figure.axes
@@ -76,7 +76,7 @@ def test_scores_and_bounds_stand_where_they_should() -> None:
             round(float(np.ravel(drawn.get_ydata())[0])),
         )
         for drawn in axis.lines
-        if drawn.get_marker() == STYLES["oracle"].marker
+        if drawn.get_marker() == STYLES["planner"].marker
     ]
     assert points == [(0.4, 0), (0.6, 1)]
     upright = [drawn for drawn in axis.lines if len(set(np.atleast_1d(drawn.get_xdata()))) == 1]
@@ -88,7 +88,7 @@ def test_a_sweep_shows_every_point_and_marks_the_scenarios_own_value() -> None:
     sweep = SWEEPS[0]
     points = [
         Point(sweep.name, value, policy, Estimate(score, score - 0.1, score + 0.1, 9))
-        for policy, base in (("pursuit", 0.1), ("oracle", 0.5), (BOUND, 0.9))
+        for policy, base in (("pursuit", 0.1), ("planner", 0.5), (BOUND, 0.9))
         for value in reversed(sweep.values)  # in whatever order
         for score in [base + value / 1000]
     ]
@@ -125,7 +125,7 @@ def test_a_policy_looks_the_same_whoever_else_is_there() -> None:
 
 
 def test_the_same_figure_is_the_same_file(tmp_path: Path) -> None:
-    plays = {("smart", "idle"): plays_of("idle", "smart", score=[0.1, 0.3], bound=[1.0, 1.0])}
+    plays = {("smart", "idle"): plays_of("idle", "smart", safe_score=[0.1, 0.3], bound=[1.0, 1.0])}
     for name in "ab":
         (tmp_path / name).mkdir()
         files = figures.draw(tmp_path / name, plays, [], [])

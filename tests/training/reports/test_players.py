@@ -31,7 +31,13 @@ def compiled() -> None:
 def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
     policies = ("idle", *(f"{BAD}{name}" for name in names), "pursuit")
     return Settings(
-        policies, ("constant",), episodes=2, out=tmp_path / "out", figures=False, time_limit=limit
+        policies,
+        ("constant",),
+        episodes=2,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+        time_limit=limit,
     )
 
 
@@ -60,7 +66,7 @@ def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
     """A process of its own changes no result."""
     settings = Settings(
         ("posse_baselines.policies.pursuit:Pursuit", "pursuit"), ("constant",), episodes=3,
-        out=tmp_path / "out", figures=False,
+        out=tmp_path / "out", figures=False, planner_episodes=0,
     )  # fmt: skip
     there, here = compare(settings).plays.values()
     assert (there["score"] == here["score"]).all()
@@ -84,7 +90,8 @@ from pathlib import Path
 from posse_training.reports.compare import Settings, compare
 if __name__ == "__main__":
     compare(Settings(("tests.support.bad_policies:HangsWithPid",), ("constant",), 1,
-                     out=Path(sys.argv[1], "out"), figures=False, time_limit=3.0))
+                     out=Path(sys.argv[1], "out"), figures=False, planner_episodes=0,
+                     time_limit=3.0))
 """
 
 
@@ -121,7 +128,7 @@ def alive(pid: int) -> bool:
 def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
     settings = Settings(
         (f"{BAD}Sleeps", "idle"), ("constant", "smart"), episodes=1, out=tmp_path / "out",
-        figures=False, time_limit=5.0,
+        figures=False, planner_episodes=0, time_limit=5.0,
     )  # fmt: skip
     first, second = compare(settings).failed
     assert first["what"] == "constant"
@@ -133,7 +140,7 @@ def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> No
 def test_a_failure_in_one_scenario_leaves_the_others(tmp_path: Path) -> None:
     settings = Settings(
         (f"{BAD}FailsOnSmart",), ("smart", "constant"), episodes=1, out=tmp_path / "out",
-        figures=False,
+        figures=False, planner_episodes=0,
     )  # fmt: skip
     found = compare(settings)
     assert [(row["what"], "not this one" in row["why"]) for row in found.failed] == [
@@ -143,7 +150,15 @@ def test_a_failure_in_one_scenario_leaves_the_others(tmp_path: Path) -> None:
 
 
 def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--scenarios", "constant", "--episodes", "1", "--no-figures"]
+    options = [
+        "--scenarios",
+        "constant",
+        "--episodes",
+        "1",
+        "--no-figures",
+        "--planner-episodes",
+        "0",
+    ]
     assert main(["compare", f"{BAD}Raises", "idle", *options, "--out", str(tmp_path / "a")]) == 1
     shown = " ".join(capsys.readouterr().out.split())
     assert f"failed: {BAD}Raises on constant: ZeroDivisionError: [bold]by zero[/bold]" in shown

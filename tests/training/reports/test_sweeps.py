@@ -33,5 +33,5 @@ def test_points_are_scores_at_their_settings() -> None:
     alone = evaluate(
         "pursuit", "constant", 4, 5, split="validation", num_trackers=12, progress=False
     )
-    assert points[4].score.value == pytest.approx(alone["score"].mean())
+    assert points[4].score.value == pytest.approx(alone["safe_score"].mean())
     assert points[5].score.value == pytest.approx(alone["bound"].mean())

@@ -86,7 +86,7 @@ def test_unknown_settings() -> None:
         ("hidden", str(10**9)),
         ("beside", "nobody"),
         ("imitate", "nobody"),
-        ("advise", "oracle"),
+        ("advise", "planner"),
         ("beside", ":x"),
         ("wandb", "project"),
         ("scenario", "x" * 5000),

@@ -46,15 +46,21 @@ class _Worlds(Protocol):
     def episodes(self) -> int: ...
 
 
-def summary(plays: Plays, reference: Plays | None) -> dict[str, Estimate | int | None]:
-    """Return the estimates of one policy on one scenario; differences are to the reference."""
+def summary(plays: Plays, reference: Plays | None) -> dict[str, Estimate | int | float | None]:
+    """Return the estimates of one policy on one scenario.
+
+    Differences are of the safe score, to the reference. ``of_planner``, the safe score as a share
+    of the planner's, is filled in once that has played.
+    """
     return {
         "seeds": len(plays.results),
+        "safe_score": plays.mean("safe_score"),
+        "of_planner": None,
         "score": plays.mean("score"),
-        "interquartile_mean": plays.interquartile_mean("score"),
+        "contact_free": plays.share([result["contact_free"] == 1 for result in plays.results]),
+        "interquartile_mean": plays.interquartile_mean("safe_score"),
         "bound": plays.mean("bound"),
         "settled": plays.share([result.settled for result in plays.results]),
-        "no_contact": plays.share([result.contacts == 0 for result in plays.results]),
         "difference": None if reference is None else plays.difference(reference),
         "improvement": None if reference is None else plays.improvement(reference),
     }
@@ -78,20 +84,36 @@ def write_summary(found: Comparison, path: Path, worlds: _Worlds) -> None:
 
 
 def table(found: Comparison, worlds: _Worlds) -> Table:
-    """Return the estimates as a table."""
+    """Return the estimates as a table, teams ranked by safe score on each scenario."""
     shown = Table(
         title=Text(
             f"{worlds.episodes:,} worlds each, split {worlds.split}, seed {worlds.seed}; "
-            f"95 % intervals; differences to {found.reference}, paired by world"
+            f"95 % intervals; differences of the safe score to {found.reference}, paired by world"
         )
     )
-    columns = ("score", "settled", "no_contact", "difference", "improvement")
+    columns = (
+        "safe_score", "of_planner", "score", "contact_free", "bound", "settled",
+        "difference", "improvement",
+    )  # fmt: skip
     for column in ("scenario", "policy"):
         shown.add_column(column, overflow="fold", min_width=len(column) + 2)
     for column in columns:
         shown.add_column(column.replace("_", " "))
-    for row in found.rows:
-        cells = [str(row[column]) if row[column] is not None else "" for column in columns]
+    played = list(dict.fromkeys(row["scenario"] for row in found.rows))
+    ranked = sorted(
+        found.rows, key=lambda row: (played.index(row["scenario"]), -row["safe_score"].value)
+    )
+    for row in ranked:
+        cells = [_cell(column, row[column]) for column in columns]
         many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
         shown.add_row(Text(row["scenario"]), Text(row["policy"] + many), *map(Text, cells))
     return shown
+
+
+def _cell(column: str, value: Estimate | float | None) -> str:
+    """Return a table's cell; the bound without its interval, for want of room."""
+    if column == "bound" and isinstance(value, Estimate):
+        value = value.value
+    if isinstance(value, float):
+        return f"{value:.3f}" if column == "bound" else f"{value:.2f}"
+    return "" if value is None else str(value)

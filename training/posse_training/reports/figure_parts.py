@@ -17,7 +17,7 @@ from posse_training.reports.sweeps import BOUND
 _MARKERS: Final = 6
 _LEGEND: Final = 124
 """Characters that fit side by side in a legend; a line and marker count as seven."""
-_TITLES: Final = {"oracle": "oracle (reads the state)"}
+_TITLES: Final = {"planner": "planner (reads the state)"}
 
 
 def panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]:

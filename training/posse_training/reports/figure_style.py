@@ -89,7 +89,7 @@ def in_order(policies: set[str]) -> list[str]:
     known = list(STYLES)
 
     def place(policy: str) -> tuple[int, int, str]:
-        if policy in (BOUND, "oracle"):
+        if policy in (BOUND, "planner"):
             return (2, -known.index(policy), policy)
         if policy not in known or policy.startswith("learned-"):
             return (0, known.index(policy) if policy in known else len(known), policy)
@@ -100,18 +100,18 @@ def in_order(policies: set[str]) -> list[str]:
 
 def reference_of(policies: Sequence[str]) -> str:
     """Return the policy whose worlds the bound is taken from."""
-    return "oracle" if "oracle" in policies else policies[0]
+    return "planner" if "planner" in policies else policies[0]
 
 
 def marker_of(policy: str) -> dict[str, Any]:
-    """Return the look of a point; the oracle's is hollow, since it reads the state."""
+    """Return the look of a point; the planner's is hollow, since it reads the state."""
     style = style_of(policy)
     return {
         "marker": style.marker,
         "color": style.colour,
-        "markerfacecolor": "white" if policy == "oracle" else style.colour,
-        "markeredgecolor": style.colour if policy == "oracle" or style.marker in "x_" else "white",
-        "markeredgewidth": 1.2 if policy == "oracle" or style.marker in "x_" else 0.5,
+        "markerfacecolor": "white" if policy == "planner" else style.colour,
+        "markeredgecolor": style.colour if policy == "planner" or style.marker in "x_" else "white",
+        "markeredgewidth": 1.2 if policy == "planner" or style.marker in "x_" else 0.5,
         "markersize": 7 if style.marker in "*PX^v<>" else 5.5,
         "linestyle": style.line,
     }

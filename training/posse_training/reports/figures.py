@@ -61,7 +61,7 @@ def draw(
 
 
 def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
-    """Draw the share of worlds that reach a score (performance profile), a panel a scenario."""
+    """Draw the share of worlds that reach a safe score (a performance profile) on each scenario."""
     names, policies = names_of(plays)
     columns = 4 if len(names) > 6 else min(3, len(names))
     rows = -(-len(names) // columns)
@@ -72,7 +72,7 @@ def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
         for k, policy in enumerate(policies):
             if (name, policy) not in plays:
                 continue
-            mine = plays[name, policy]["score"]
+            mine = plays[name, policy]["safe_score"]
             steps(axis, scores, _at_least(mine, scores), policy, (k + 0.5) / len(policies))
             if policy == reference_of(policies):
                 steps(axis, scores, _at_least(plays[name, policy]["bound"], scores), BOUND)
@@ -84,7 +84,7 @@ def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
         axis.label_outer()
         if k < len(names) and k + columns >= len(names):
             axis.tick_params(labelbottom=True)
-    figure.supxlabel("score τ", fontsize=9)
+    figure.supxlabel("safe score τ", fontsize=9)
     figure.supylabel("share of worlds with τ or more", fontsize=9)
     legend(figure, [*policies, BOUND])
     return figure
@@ -97,7 +97,7 @@ def _at_least(values: Any, scores: Any) -> Any:
 
 
 def scores(plays: Mapping[tuple[str, str], Plays]) -> Figure:
-    """Draw the mean score of every policy on every scenario, with its interval."""
+    """Draw the mean safe score of every policy on every scenario, with its interval."""
     names, policies = names_of(plays)
     figure, (axis,) = panels(1, 1, 0.9 + len(names) * (0.2 + 0.11 * len(policies)))
     apart = 0.8 / max(len(policies), 1)
@@ -108,7 +108,7 @@ def scores(plays: Mapping[tuple[str, str], Plays]) -> Figure:
             if (name, policy) not in plays:
                 continue
             found, style = plays[name, policy], style_of(policy)
-            score = found.mean("score")
+            score = found.mean("safe_score")
             y = row + (k - (len(policies) - 1) / 2) * apart
             axis.plot([score.low, score.high], [y, y], color=style.colour, linewidth=1.4)
             axis.plot(score.value, y, **marker_of(policy))
@@ -121,13 +121,13 @@ def scores(plays: Mapping[tuple[str, str], Plays]) -> Figure:
     axis.set_yticks(range(len(names)), names)
     axis.tick_params(axis="y", length=0)
     axis.grid(visible=False, axis="y")
-    axis.set(ylim=(len(names) - 0.5, -0.5), xlim=(0, 1), xlabel="mean score, 95 % interval")
+    axis.set(ylim=(len(names) - 0.5, -0.5), xlim=(0, 1), xlabel="mean safe score, 95 % interval")
     legend(figure, [*policies, BOUND], lines=False)
     return figure
 
 
 def sweep_figure(sweep: Sweep, points: Sequence[Point]) -> Figure:
-    """Draw the mean score of every policy against a setting, with its interval."""
+    """Draw the mean safe score of every policy against a setting, with its interval."""
     figure, (axis,) = panels(1, 1, 3.6)
     policies = in_order({point.policy for point in points})
     axis.axvline(sweep.own, color="0.75", linewidth=5, zorder=0)
@@ -148,7 +148,7 @@ def sweep_figure(sweep: Sweep, points: Sequence[Point]) -> Figure:
         axis.plot(x, [p.score.value for p in mine], **{**marker_of(policy), "linestyle": ""})
     axis.set(
         ylim=(0, 1), xticks=sweep.values, xlabel=sweep.label,
-        ylabel=f"mean score on {sweep.scenario}",
+        ylabel=f"mean safe score on {sweep.scenario}",
     )  # fmt: skip
     axis.annotate(
         f"as in {sweep.scenario}", (sweep.own, 1), (0, 3), textcoords="offset points",

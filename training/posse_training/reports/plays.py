@@ -55,14 +55,28 @@ class Plays:
         return share(happened[0]) if len(happened) == 1 else over_seeds(np.stack(happened))
 
     def difference(self, reference: Plays) -> Estimate:
-        """Return the mean difference of the score to the reference, paired by world."""
-        mine, theirs = self["score"], reference["score"]
+        """Return the mean difference of the safe score to the reference, paired by world."""
+        mine, theirs = self._paired(reference)
         if len(mine) == len(theirs) == 1:
             return paired_difference(mine[0], theirs[0])
         return difference_over_seeds(mine, theirs)
 
     def improvement(self, reference: Plays) -> Estimate:
-        """Return the probability of improvement on the reference in a world, ties counted half."""
-        mine, theirs = self["score"][:, None], reference["score"][None]
-        better = ((mine > theirs) + 0.5 * (mine == theirs)).mean(axis=1)
+        """Return the probability of improvement on the reference in a world, ties counted half.
+
+        By the safe score.
+        """
+        mine, theirs = self._paired(reference)
+        better = ((mine[:, None] > theirs) + 0.5 * (mine[:, None] == theirs)).mean(axis=1)
         return mean(better[0]) if len(better) == 1 else over_seeds(better)
+
+    def ratio(self, reference: Plays) -> float:
+        """Return the mean safe score as a share of the reference's, in the worlds of both."""
+        mine, theirs = self._paired(reference)
+        return float(mine.mean() / theirs.mean()) if theirs.any() else float("nan")
+
+    def _paired(self, other: Plays) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return the safe scores of both, (S, W) each, in the worlds that both played."""
+        mine, theirs = self["safe_score"], other["safe_score"]
+        both = min(mine.shape[1], theirs.shape[1])
+        return mine[:, :both], theirs[:, :both]

@@ -52,7 +52,7 @@ SWEEPS: Final = (
 
 @dataclass(frozen=True)
 class Point:
-    """The score of a policy, or the bound, at one value of a sweep."""
+    """The safe score of a policy, or the bound, at one value of a sweep."""
 
     sweep: str
     value: float
@@ -68,7 +68,7 @@ def play_sweeps(
     """Play every sweep with every contender, each value on the same worlds.
 
     The bound depends on where the target flees to, and so slightly on the team: it is that of the
-    last contender, which is the oracle if there is one.
+    last contender, which is the planner if there is one.
 
     Args:
         contenders: Who plays.
@@ -83,7 +83,7 @@ def play_sweeps(
                 plays = attempt(contender, sweep, value)
                 if plays is None:
                     continue
-                points.append(Point(sweep.name, value, contender.label, plays.mean("score")))
+                points.append(Point(sweep.name, value, contender.label, plays.mean("safe_score")))
                 bound = plays.mean("bound")
             if bound is not None:
                 points.append(Point(sweep.name, value, BOUND, bound))
@@ -94,7 +94,7 @@ def write_points(path: Path, points: Sequence[Point]) -> None:
     """Write points as CSV."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["sweep", "value", "policy", "score", "low", "high", "count"])
+        writer.writerow(["sweep", "value", "policy", "safe_score", "low", "high", "count"])
         for p in points:
             writer.writerow([p.sweep, p.value, p.policy, *p.score.to_dict().values()])
 
