@@ -48,6 +48,8 @@ class Settings:
     """What to play."""
     episodes: int = 500
     """Worlds for each policy and scenario."""
+    planner_episodes: int = 500
+    """Worlds that the planner plays, at least 1, of those of the others."""
     sweep_episodes: int = 100
     """Worlds at each point of the figures that vary a setting."""
     seed: int = 2026
@@ -82,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         CompareSettings(
             (*SCRIPTED, *learned), settings.scenarios, settings.episodes, settings.seed,
             settings.split, settings.rows, sweep_episodes=settings.sweep_episodes,
-            planner_episodes=settings.episodes,
+            planner_episodes=settings.planner_episodes,
         )
     )  # fmt: skip
     media = settings.page.parent / "media"

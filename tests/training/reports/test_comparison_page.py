@@ -58,6 +58,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def fill(page: Path, *more: str) -> str:
     options = ["--scenarios", "constant", "radio", "--episodes", "12", "--sweep-episodes", "0"]
+    options += ["--planner-episodes", "2"]
     rows = str(page.parent / "rows")
     comparison.main([*options, "--page", str(page), "--rows", rows, *more])
     return page.read_text()
