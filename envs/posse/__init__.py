@@ -11,6 +11,7 @@ from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
+from posse.scenarios.shown import shown
 from posse.signals.fields import Field, field
 from posse.signals.layout import ObservationLayout
 from posse.signals.measuring import Metric, metric
@@ -61,7 +62,7 @@ def _batch_class(device: str) -> type[Batch]:
 
         check_device()
         return CudaBatch
-    raise ValueError(f"unknown device {device!r}; devices are: cpu, cuda")
+    raise ValueError(f"unknown device {shown(device)}; devices are: cpu, cuda")
 
 
 def observation_fields(

@@ -13,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
+from posse.engine.arguments import to_float32
 from posse.engine.kernels import TO_CLIP, bad_action
 from posse.numeric import FloatArray, direct
 from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios.shown import shown
 
 SPEEDS: Final = (-1.0, 0.0, 1.0)
 """Speeds to choose from: at rest, half, full."""
@@ -41,7 +43,9 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
         ScenarioError: ``discrete`` with messages, which are not discrete.
     """
     if not isinstance(discrete, bool):
-        raise ScenarioError(f"discrete_actions={discrete!r} is not possible: it is True or False")
+        raise ScenarioError(
+            f"discrete_actions={shown(discrete)} is not possible: it is True or False"
+        )
     if not discrete:
         return spaces.Box(-1.0, 1.0, (2 + scenario.message_size,), np.float32)
     if scenario.message_size:
@@ -147,7 +151,7 @@ class ActionReader:
         known = f"agents are: {', '.join(self._agents)}"
         for agent in actions:
             if agent not in self._agents:
-                raise ValueError(f"action for unknown agent {agent!r}; {known}")
+                raise ValueError(f"action for unknown agent {shown(agent)}; {known}")
         for agent in self._agents:
             if agent not in actions:
                 raise ValueError(f"no action for {agent}: every agent needs one; {known}")
@@ -160,10 +164,12 @@ class ActionReader:
         wanted = "iu" if self._discrete else "fiu"
         if array.dtype.kind not in wanted:
             kind = "a whole number" if self._discrete else "real numbers"
-            raise ValueError(f"action of {agent} must be {kind}, got {action!r} ({array.dtype})")
+            raise ValueError(
+                f"action of {agent} must be {kind}, got {shown(action)} ({array.dtype})"
+            )
         if array.shape != self._shape[1:]:
             raise ValueError(f"action of {agent} has shape {array.shape}, wanted {self._shape[1:]}")
-        return array if self._discrete else array.astype(np.float32)
+        return array if self._discrete else to_float32(array)
 
     def _in_space(self, array: npt.NDArray[Any], agents: Sequence[str]) -> FloatArray:
         """Return rows of the right type and shape as the kernels take them, if in the space."""
@@ -176,7 +182,7 @@ class ActionReader:
                 )
             motions: FloatArray = MOTIONS[array][None]
             return motions
-        kernel = np.ascontiguousarray(array, np.float32)[None]
+        kernel = to_float32(np.ascontiguousarray(array))[None]
         position = bad_action(kernel)
         if position >= 0:
             i, k = divmod(position, kernel.shape[2])
@@ -191,5 +197,5 @@ class ActionReader:
 def _as_array(action: npt.ArrayLike, subject: str) -> npt.NDArray[Any]:
     try:
         return np.asarray(action)
-    except ValueError:
-        raise ValueError(f"{subject} is no array: {action!r}") from None
+    except Exception:  # of numpy, or of a foreign object's own conversion
+        raise ValueError(f"{subject} is no array: {shown(action)}") from None

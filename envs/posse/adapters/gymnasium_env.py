@@ -12,8 +12,10 @@ from gymnasium import spaces
 from posse.adapters.actions import MOTIONS, single_action_space
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.adapters.spaces import box
+from posse.engine.arguments import options_of, real_numbers
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios.shown import shown
 from posse.signals.layout import ObservationLayout
 
 
@@ -198,10 +200,10 @@ class SoloEnv(TeamEnv):
         Raises:
             ScenarioError: It is impossible, or asks for more trackers.
         """
-        if overrides.get("num_trackers", 1) != 1:
+        if not np.array_equal(overrides.get("num_trackers", 1), 1):
             raise ScenarioError(
-                f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has "
-                "one: use posse/Team-v0"
+                f"num_trackers={shown(overrides['num_trackers'])} does not fit posse/Solo-v0, "
+                "which has one: use posse/Team-v0"
             )
         return _with_scripted_target(scenario, horizon, {**overrides, "num_trackers": 1})
 
@@ -242,9 +244,11 @@ class SoloEnv(TeamEnv):
 
 def solo_options(options: dict[str, Any] | None) -> dict[str, Any] | None:
     """Return the options with a tracker's pose (3,) as a team's, (1, 3)."""
-    if options and "tracker_pose" in options and np.ndim(options["tracker_pose"]) == 1:
-        return {**options, "tracker_pose": np.asarray(options["tracker_pose"])[None]}
-    return options
+    found = options_of(options)
+    if found.get("tracker_pose") is not None:
+        pose = real_numbers("tracker_pose", found["tracker_pose"])
+        found["tracker_pose"] = pose[None] if pose.ndim == 1 else pose
+    return found
 
 
 def _with_scripted_target(
@@ -252,7 +256,7 @@ def _with_scripted_target(
 ) -> Scenario:
     settings = dict(overrides)
     if settings.pop("target", None) is not None:
-        raise ScenarioError(_NO_PLACE.format(f"target={overrides['target']!r}"))
+        raise ScenarioError(_NO_PLACE.format(f"target={shown(overrides['target'])}"))
     found = shortened(scenario, horizon, settings)
     if found.target_motion == "agent":
         raise ScenarioError(_NO_PLACE.format("target_motion='agent'"))

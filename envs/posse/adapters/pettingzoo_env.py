@@ -16,8 +16,10 @@ from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 from posse.adapters.actions import agent_names, single_action_space
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
 from posse.adapters.spaces import box
+from posse.engine.arguments import options_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios.shown import shown
 from posse.signals.layout import ObservationLayout
 
 _Infos = dict[str, dict[str, Any]]
@@ -150,9 +152,9 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         Raises:
             ValueError: A bad seed or option; nothing is changed.
         """
-        if options:
+        if options is not None:
             # PettingZoo's own tests send {"options": 1}, to see that options are taken.
-            options = {key: value for key, value in options.items() if key != "options"}
+            options = {key: value for key, value in options_of(options).items() if key != "options"}
         observations = self._world.reset(seed, options)
         self.agents = self.possible_agents.copy()
         if self.render_mode == "human":
@@ -239,12 +241,13 @@ def target_overrides(target: str | None, overrides: Mapping[str, Any]) -> dict[s
         return dict(overrides)
     if target != "agent":
         raise ScenarioError(
-            f"target={target!r} is not possible: the one choice is 'agent'; target_motion= chooses "
-            "among the scripted ones"
+            f"target={shown(target)} is not possible: the one choice is 'agent'; "
+            "target_motion= chooses among the scripted ones"
         )
     if overrides.get("target_motion", "agent") != "agent":
         raise ScenarioError(
-            f"target='agent' and target_motion={overrides['target_motion']!r} exclude each other"
+            f"target='agent' and target_motion={shown(overrides['target_motion'])} exclude each "
+            "other"
         )
     return {**overrides, "target_motion": "agent"}
 
@@ -256,6 +259,11 @@ class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):
         agent = self.agent_selection
         if not (self.terminations[agent] or self.truncations[agent]):
             self.env.check_action(agent, action)
+        elif action is not None:
+            raise ValueError(
+                f"action of {agent} must be None, as its episode is over, got {shown(action)}: "
+                "call step(None) for each agent that is left, or reset()"
+            )
         super().step(action)
 
 
@@ -263,6 +271,7 @@ class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
     """:class:`TeamParallelEnv` in turns: nothing moves before the last agent has acted."""
 
     def __init__(self, env: TeamParallelEnv) -> None:
+        self._has_reset = self._has_updated = False
         super().__init__(_InTurns(env))
 
     def __getattr__(self, name: str) -> Any:
@@ -270,12 +279,26 @@ class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
             raise AttributeError(name)
         return super().__getattr__(name)
 
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+        """Start an episode.
+
+        Raises:
+            ValueError: A bad seed or option; nothing is changed.
+        """
+        before = self._has_reset, self._has_updated
+        try:
+            super().reset(seed=seed, options=options)
+        except BaseException:
+            self._has_reset, self._has_updated = before
+            raise
+
     def step(self, action: Any) -> None:
         """Take the action of the agent whose turn it is.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
-            ValueError: A bad action; nothing is changed, and it is still that agent's turn.
+            ValueError: A bad action, or one that is not None for an agent whose episode is over;
+                nothing is changed, and it is still that agent's turn.
         """
         if not self._has_reset:
             raise ResetNeeded("step before reset: call reset() first")

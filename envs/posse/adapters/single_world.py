@@ -12,10 +12,13 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.adapters.actions import ActionReader
+from posse.engine.arguments import options_of
 from posse.engine.batch import Batch
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario, get_scenario
+from posse.scenarios.setting import is_number, is_one_of
+from posse.scenarios.shown import shown
 from posse.signals.global_state import StateLayout
 from posse.signals.reward import namer
 
@@ -134,9 +137,10 @@ class SingleWorld:
         Raises:
             ValueError: A bad seed or option; nothing is changed.
         """
-        for key in options or ():
+        options = options_of(options)
+        for key in options:
             if key not in _OPTIONS:
-                raise ValueError(f"unknown option {key!r}; options are: {', '.join(_OPTIONS)}")
+                raise ValueError(f"unknown option {shown(key)}; options are: {', '.join(_OPTIONS)}")
         if seed is None and not self._seeded:
             seed = secrets.randbits(32)
         observations = self.batch.reset(seed=seed, options=options)
@@ -210,9 +214,9 @@ def new_renderer(scenario: Scenario, render_mode: str) -> Any:
 
 def check_render_mode(render_mode: str | None) -> None:
     """Raise ValueError for a render mode that there is not."""
-    if render_mode is not None and render_mode not in RENDER_MODES:
+    if render_mode is not None and not is_one_of(RENDER_MODES, render_mode):
         raise ValueError(
-            f"unknown render_mode {render_mode!r}; modes are: {', '.join(RENDER_MODES)}, None"
+            f"unknown render_mode {shown(render_mode)}; modes are: {', '.join(RENDER_MODES)}, None"
         )
 
 
@@ -234,6 +238,6 @@ def shortened(
         return get_scenario(scenario, **changed)
     full = get_scenario(scenario, **changed)
     changed["horizon"] = horizon
-    if horizon > 0:
+    if is_number(horizon) and horizon > 0:
         changed["settle_time"] = min(full.settle_time, horizon * full.control_step)
     return get_scenario(scenario, **changed)

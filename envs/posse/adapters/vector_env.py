@@ -19,9 +19,11 @@ from posse.adapters.single_world import (
     frames_per_second,
     new_renderer,
 )
+from posse.engine.arguments import as_array
 from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
+from posse.scenarios.shown import shown
 from posse.signals.layout import ObservationLayout
 
 _MODES: Final = {
@@ -177,7 +179,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
 
     def _motions(self, actions: Any) -> npt.NDArray[Any]:
         """Return actions as the batch takes them, (E, N, 2 + m)."""
-        array = np.asarray(actions)
+        array = as_array("actions", actions)
         if array.shape != self.action_space.shape:
             raise ValueError(f"actions have shape {array.shape}, wanted {self.action_space.shape}")
         if not self._discrete:
@@ -289,4 +291,4 @@ def _check_mode(mode: AutoresetMode | str) -> AutoresetMode:
         return AutoresetMode(mode)
     except ValueError:
         known = ", ".join(repr(each.value) for each in AutoresetMode)
-        raise ValueError(f"unknown autoreset_mode {mode!r}; modes are: {known}") from None
+        raise ValueError(f"unknown autoreset_mode {shown(mode)}; modes are: {known}") from None

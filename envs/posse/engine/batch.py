@@ -16,6 +16,15 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.engine.arguments import (
+    MOST,
+    as_array,
+    check_count,
+    check_seed,
+    options_of,
+    real_numbers,
+    to_float32,
+)
 from posse.engine.copies import write_copies
 from posse.engine.kernels import (
     LOOK,
@@ -49,6 +58,8 @@ from posse.rules.state import (
 )
 from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import SAFE_MARGIN
+from posse.scenarios.setting import is_one_of
+from posse.scenarios.shown import shown
 from posse.signals.layout import ObservationLayout
 from posse.signals.metrics import episode_metrics
 from posse.signals.parts import parts_for
@@ -103,11 +114,12 @@ class Batch:
     Args:
         scenario: What the worlds are like.
         num_worlds: E, at least 1.
-        seed: Of every random draw. World i of a seed is the same world in every batch.
+        seed: Of every random draw, in [0, 2**63). World i of a seed is the same world in every
+            batch.
         split: ``"train"``, ``"validation"`` or ``"test"``: part of the key of every draw, so that
             no world of one is ever a world of another.
-        first_world: Index of the batch's first world; ``first_world=17, num_worlds=1`` replays
-            world 17 alone.
+        first_world: Index of the batch's first world; the last one's is below 2**63.
+            ``first_world=17, num_worlds=1`` replays world 17 alone.
         autoreset: What happens when an episode ends. ``"next_step"``: the following step starts
             the next episode and ignores its action; ``"same_step"``: the next episode starts at
             once and the last observation is ``infos["final_obs"]``; ``"disabled"``: the caller
@@ -141,21 +153,29 @@ class Batch:
         num_threads: int | None = None,
         own_kernel: bool = False,
     ) -> None:
-        _check_count("num_worlds", num_worlds, 1)
-        _check_count("first_world", first_world, 0)
-        if num_threads is not None:
-            _check_count("num_threads", num_threads, 1)
-        if not isinstance(own_kernel, bool):
-            raise ScenarioError(f"own_kernel={own_kernel!r} is not possible: it is True or False")
-        if split not in SPLITS:
-            raise ScenarioError(f"unknown split {split!r}; splits are: {', '.join(SPLITS)}")
-        if autoreset not in AUTORESET_MODES:
+        num_worlds = check_count("num_worlds", num_worlds, 1)
+        first_world = check_count("first_world", first_world, 0)
+        if first_world + num_worlds > MOST:
             raise ScenarioError(
-                f"unknown autoreset mode {autoreset!r}; modes are: {', '.join(AUTORESET_MODES)}"
+                f"first_world={first_world} and num_worlds={num_worlds} go beyond world 2**63 - 1: "
+                "lower first_world"
+            )
+        if num_threads is not None:
+            check_count("num_threads", num_threads, 1)
+        if not isinstance(own_kernel, bool):
+            raise ScenarioError(
+                f"own_kernel={shown(own_kernel)} is not possible: it is True or False"
+            )
+        if not is_one_of(SPLITS, split):
+            raise ScenarioError(f"unknown split {shown(split)}; splits are: {', '.join(SPLITS)}")
+        if not is_one_of(AUTORESET_MODES, autoreset):
+            raise ScenarioError(
+                f"unknown autoreset mode {shown(autoreset)}; modes are: "
+                + ", ".join(AUTORESET_MODES)
             )
         self.scenario = scenario
         self.num_worlds = num_worlds
-        self.seed = _check_seed(seed)
+        self.seed = check_seed(seed)
         self.split = split
         self.first_world = first_world
         self.autoreset = autoreset
@@ -165,7 +185,14 @@ class Batch:
         rows = scenario.num_agents
         self.observation_shape = (num_worlds, rows, self.layout.size)
         self.action_shape = (num_worlds, rows, 2 + scenario.message_size)
-        self._arrays = WorldArrays.allocate(scenario, num_worlds)
+        try:
+            self._arrays = WorldArrays.allocate(scenario, num_worlds)
+        except (MemoryError, ValueError, OverflowError):
+            each = WorldArrays.allocate(scenario, 1).bytes_per_world
+            raise ScenarioError(
+                f"num_worlds={num_worlds} of {each} bytes each are more than there is memory for: "
+                "lower it"
+            ) from None
         self._started = False
         self._prepare()
 
@@ -246,15 +273,23 @@ class Batch:
         return episode_metrics(self.scenario, self._arrays.world)
 
     def save(self) -> Snapshot:
-        """Return the worlds as they stand, for :meth:`restore`."""
+        """Return the worlds as they stand, for :meth:`restore`.
+
+        Raises:
+            ResetNeeded: Before the first :meth:`reset`, when there are no worlds to save.
+        """
+        self._check_started("save")
         return Snapshot(self.scenario, self._arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Go back to a snapshot and return its observations.
 
         Raises:
-            ValueError: The snapshot is of another scenario or number of worlds.
+            ValueError: No snapshot, or one of another scenario or number of worlds; nothing is
+                changed.
         """
+        if not isinstance(snapshot, Snapshot):
+            raise ValueError(f"restore takes what save() returned, got {shown(snapshot)}")
         if snapshot.scenario != self.scenario or len(snapshot.arrays.world) != self.num_worlds:
             raise ValueError(
                 f"a snapshot of {len(snapshot.arrays.world)} worlds of "
@@ -271,8 +306,7 @@ class Batch:
         Raises:
             ResetNeeded: Before the first :meth:`reset`.
         """
-        if not self._started:
-            raise ResetNeeded("observe before reset: call reset() first")
+        self._check_started("observe")
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
 
     def copies(
@@ -297,10 +331,9 @@ class Batch:
             ScenarioError: ``count`` below 1, or a negative seed.
             ValueError: ``into`` is this batch, or one of another scenario or number of worlds.
         """
-        _check_count("count", count, 1)
-        seed = _check_seed(seed)
-        if not self._started:
-            raise ResetNeeded("copies before reset: call reset() first")
+        check_count("count", count, 1)
+        seed = check_seed(seed)
+        self._check_started("copies")
         wanted = self.num_worlds * count
         if into is None:
             into = Batch(
@@ -308,7 +341,7 @@ class Batch:
                 num_threads=self.num_threads,
             )  # fmt: skip
         elif type(into) is not Batch or into is self:
-            raise ValueError(f"copies go into another Batch on the CPU, got {into!r}")
+            raise ValueError(f"copies go into another Batch on the CPU, got {shown(into)}")
         elif into.scenario != self.scenario or into.num_worlds != wanted:
             raise ValueError(
                 f"{count} copies of {self.num_worlds} worlds of {self.scenario.name!r} do not fit "
@@ -326,15 +359,16 @@ class Batch:
 
         Args:
             seed: Start over from episode 0 of this seed; ``None``: each world's next episode.
-            options: ``"reset_mask"`` (E,) bool: only these worlds; ``"tracker_pose"`` (N, 3) or
-                (E, N, 3) and ``"target_pose"`` (3,) or (E, 3): start from these (x, y, θ).
+            options: ``"reset_mask"`` (E,) bool: only these worlds, maybe none;
+                ``"tracker_pose"`` (N, 3) or (E, N, 3) and ``"target_pose"`` (3,) or (E, 3):
+                start from these (x, y, θ).
 
         Raises:
             ValueError: An unknown option, or one of a wrong shape, not finite, or that puts robots
                 inside each other, an obstacle or a wall, or leaves a scripted target no room to
                 turn. Nothing is changed.
         """
-        options = dict(options or {})
+        options = options_of(options)
         chosen = self.check_reset(seed, options)
         poses = self._check_poses(options)
         before = self._arrays.copy() if poses else None
@@ -357,11 +391,11 @@ class Batch:
                 self._check_overlap(chosen)
                 if "target_pose" in poses:
                     self._check_room_to_turn(chosen)
-            except ValueError:
+                observations = self._start(chosen, START_FROM_POSES)
+            except BaseException:
                 if before is not None:
                     self._arrays.write(before)
                 raise
-            observations = self._start(chosen, START_FROM_POSES)
         self.seed, self._started = new_seed, True
         return observations
 
@@ -372,9 +406,9 @@ class Batch:
         """
         for key in options:
             if key not in _OPTIONS:
-                raise ValueError(f"unknown option {key!r}; options are: {', '.join(_OPTIONS)}")
+                raise ValueError(f"unknown option {shown(key)}; options are: {', '.join(_OPTIONS)}")
         if seed is not None:
-            _check_seed(seed)
+            check_seed(seed)
         chosen = self._check_mask(options.get("reset_mask"))
         if not self._started and not chosen.all():
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
@@ -456,10 +490,13 @@ class Batch:
         kernel = self._kernel
         return lambda: kernel(*arguments)
 
+    def _check_started(self, what: str) -> None:
+        if not self._started:
+            raise ResetNeeded(f"{what} before reset: call reset() first")
+
     def _check_running(self) -> None:
         """Raise if a step is not possible now."""
-        if not self._started:
-            raise ResetNeeded("step before reset: call reset() first")
+        self._check_started("step")
         if self.autoreset == "disabled" and first_over(self._arrays.world) >= 0:
             over = np.flatnonzero(self._arrays.world["over"])
             raise ResetNeeded(
@@ -490,11 +527,9 @@ class Batch:
 
     def cast_actions(self, actions: npt.ArrayLike) -> FloatArray:
         """Return the actions as contiguous float32, or raise if their type or shape is wrong."""
-        array = np.asarray(actions)
+        array = actions if type(actions) is np.ndarray else as_array("actions", actions)
         if array.dtype != np.float32:
-            if array.dtype.kind not in "fiu":
-                raise ValueError(f"actions must be real numbers, got an array of {array.dtype}")
-            array = array.astype(np.float32)
+            array = to_float32(real_numbers("actions", array))
         if array.shape != self.action_shape:
             raise ValueError(
                 f"actions have shape {array.shape}, wanted {self.action_shape}: "
@@ -541,7 +576,7 @@ class Batch:
     def _check_mask(self, mask: npt.ArrayLike | None) -> BoolArray:
         if mask is None:
             return np.ones(self.num_worlds, np.bool_)
-        array = np.asarray(mask)
+        array = as_array("reset_mask", mask)
         if array.dtype != np.bool_ or array.shape != (self.num_worlds,):
             raise ValueError(
                 f"reset_mask must be a bool array of shape ({self.num_worlds},), got "
@@ -558,7 +593,7 @@ class Batch:
             if options.get(name) is None:
                 continue
             full = (self.num_worlds, *shape)
-            array = np.asarray(options[name], dtype=np.float64)
+            array = real_numbers(name, options[name]).astype(np.float64)
             if array.shape not in (shape, full):
                 raise ValueError(
                     f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each"
@@ -590,7 +625,7 @@ class Batch:
                 f"{names[i]} and {names[j]} would start {apart.min():.3g} m apart, discs of "
                 f"robot_radius={s.robot_radius:g} overlap: move one"
             )
-        if math.isfinite(s.arena):
+        if math.isfinite(s.arena) and chosen.any():
             room = s.arena / 2 - s.robot_radius - np.abs(robots).max(axis=(0, 2))
             if room.min() <= 0:
                 raise ValueError(f"{names[int(room.argmin())]} would start in a wall: move it")
@@ -604,7 +639,12 @@ class Batch:
     def _check_room_to_turn(self, chosen: BoolArray) -> None:
         """Raise if neither turning circle of a scripted target is free."""
         s, world, obstacle = self.scenario, self._arrays.world[chosen], self._arrays.obstacle
-        if math.isinf(s.arena) or s.target_motion == "agent" or s.target_speed == 0:
+        if (
+            math.isinf(s.arena)
+            or s.target_motion == "agent"
+            or s.target_speed == 0
+            or not len(world)
+        ):
             return
         radius = s.target_speed / s.target_turn_rate
         needed = radius + s.robot_radius + SAFE_MARGIN
@@ -654,14 +694,3 @@ def _check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
             f"{array.dtype} of shape {array.shape} with strides {array.strides}"
             + ("" if array.flags.writeable else ", not writable")
         )
-
-
-def _check_count(name: str, value: object, least: int) -> None:
-    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < least:
-        raise ScenarioError(f"{name}={value!r} must be a whole number, at least {least}")
-
-
-def _check_seed(seed: object) -> int:
-    if not isinstance(seed, (int, np.integer)) or isinstance(seed, bool) or not 0 <= seed < 2**63:
-        raise ScenarioError(f"seed={seed!r} must be a whole number in [0, 2**63)")
-    return int(seed)

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.engine.arguments import options_of
 from posse.engine.batch import Batch, Snapshot, action_error
 from posse.engine.kernels import (
     LOOK,
@@ -275,7 +276,12 @@ class CudaBatch(Batch):
         return episode_metrics(self.scenario, self.worlds)
 
     def save(self) -> Snapshot:
-        """Return the worlds as they stand, on the host, for :meth:`restore`, here or on a CPU."""
+        """Return the worlds as they stand, on the host, for :meth:`restore`, here or on a CPU.
+
+        Raises:
+            ResetNeeded: Before the first :meth:`reset`.
+        """
+        self._check_started("save")
         return Snapshot(self.scenario, self.arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> DeviceArray:
@@ -298,7 +304,7 @@ class CudaBatch(Batch):
         ``options["reset_mask"]`` may lie on the device. Start poses go by way of the host: the
         whole state is copied there and back.
         """
-        options = dict(options or {})
+        options = options_of(options)
         mask = _as_device_array(options.get("reset_mask"))
         if mask is not None:
             # On the device it is not looked into: that would wait for it.

@@ -16,6 +16,7 @@ from posse.scenarios.limits import (
     START_CLEARANCE,
 )
 from posse.scenarios.setting import ScenarioError, fail, is_number
+from posse.scenarios.shown import shown
 
 if TYPE_CHECKING:
     from posse.scenarios.scenario import Scenario
@@ -246,10 +247,10 @@ def _check_rewards(s: Scenario) -> None:
         if name not in REWARD_TERMS:
             raise ScenarioError(f"in reward_weights: {REWARD_TERMS.unknown(name)}")
         if not is_number(weight) or not math.isfinite(weight):
-            fail(f"reward_weights[{name!r}]", weight, "a weight must be a finite number")
+            fail(f"reward_weights[{shown(name)}]", weight, "a weight must be a finite number")
         if abs(weight) > MOST_WEIGHT:
             fail(
-                f"reward_weights[{name!r}]", weight,
+                f"reward_weights[{shown(name)}]", weight,
                 f"a weight must lie in [-{MOST_WEIGHT:g}, {MOST_WEIGHT:g}]: scale all of them",
             )  # fmt: skip
 

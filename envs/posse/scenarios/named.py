@@ -7,7 +7,8 @@ import functools
 from typing import Any
 
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import ScenarioError
+from posse.scenarios.setting import ScenarioError, is_one_of
+from posse.scenarios.shown import shown
 
 
 @functools.cache  # not before all that scenarios may name has been declared
@@ -116,12 +117,12 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         found = scenario
-    elif scenario in _named():
+    elif is_one_of(_named(), scenario):
         found = _named()[scenario]
     else:
-        near = difflib.get_close_matches(str(scenario), _named(), n=3)
+        near = difflib.get_close_matches(shown(scenario), _named(), n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
         raise ScenarioError(
-            f"unknown scenario {scenario!r}{hint}; scenarios are: {', '.join(_named())}"
+            f"unknown scenario {shown(scenario)}{hint}; scenarios are: {', '.join(_named())}"
         )
     return found.replace(**overrides) if overrides else found

@@ -41,6 +41,7 @@ from posse.scenarios.setting import (
     text,
     whole,
 )
+from posse.scenarios.shown import shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,7 +236,8 @@ class Scenario:
     def __post_init__(self) -> None:
         object.__setattr__(self, "extra_fields", _names("extra_fields", self.extra_fields))
         object.__setattr__(self, "reward_weights", _weights(self.reward_weights))
-        object.__setattr__(self, "metrics", _names("metrics", self.metrics))
+        further = tuple(dict.fromkeys(_names("metrics", self.metrics)))
+        object.__setattr__(self, "metrics", further)
         for name, setting in self.settings().items():
             if setting.per_tracker and isinstance(getattr(self, name), list):
                 object.__setattr__(self, name, tuple(getattr(self, name)))
@@ -343,7 +345,7 @@ class Scenario:
         for key in overrides:
             if key not in names:
                 raise ScenarioError(
-                    f"unknown setting {key!r} of a scenario{near(key, names)}; "
+                    f"unknown setting {shown(key)} of a scenario{near(key, names)}; "
                     f"settings are: {', '.join(names)}"
                 )
         return dataclasses.replace(self, **overrides)
@@ -356,11 +358,11 @@ class Scenario:
 
 
 def _names(setting: str, given: object) -> tuple[str, ...]:
-    """Return names in a tuple, each once; a name alone is one of them."""
+    """Return names in a tuple, whatever they were given in; a name alone is one of them."""
     names = tuple(given) if isinstance(given, (list, tuple)) else (given,)
     if not all(isinstance(name, str) for name in names):
         fail(setting, given, "it must be a tuple of names")
-    return tuple(dict.fromkeys(names))
+    return names
 
 
 def _weights(given: object) -> tuple[tuple[str, float], ...]:
@@ -370,5 +372,5 @@ def _weights(given: object) -> tuple[tuple[str, float], ...]:
         return tuple(sorted(weights.items()))
     except (TypeError, ValueError):
         raise ScenarioError(
-            f"reward_weights={given!r} is not possible: it must map names of terms to numbers"
+            f"reward_weights={shown(given)} is not possible: it must map names of terms to numbers"
         ) from None

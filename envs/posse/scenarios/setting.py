@@ -9,9 +9,11 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from typing import Any, Final, NoReturn
+
+from posse.scenarios.shown import LONGEST, shown
 
 GREATEST_WHOLE: Final = 2**62
 
@@ -176,8 +178,13 @@ def _check_text(name: str, value: object, setting: Setting) -> None:
     choices = None if setting.choices is None else tuple(setting.choices())
     if choices is not None and value not in choices:
         raise ScenarioError(
-            f"unknown {name}={value!r}{near(value, choices)}; known: {', '.join(choices)}"
+            f"unknown {name}={shown(value)}{near(value, choices)}; known: {', '.join(choices)}"
         )
+
+
+def is_one_of(names: Container[str], value: object) -> bool:
+    """Say whether a value is a string among names; an array, say, is none."""
+    return isinstance(value, str) and value in names
 
 
 def is_number(value: object) -> bool:
@@ -189,10 +196,10 @@ def is_number(value: object) -> bool:
 
 def near(name: str, names: Iterable[str]) -> str:
     """Return a hint at the names that resemble one that is unknown, or nothing."""
-    found = difflib.get_close_matches(name, tuple(names), n=3)
+    found = difflib.get_close_matches(name[:LONGEST], tuple(names), n=3)
     return f" (did you mean {' or '.join(map(repr, found))}?)" if found else ""
 
 
 def fail(name: str, value: object, allowed: str) -> NoReturn:
     """Raise that a value is not possible, and what is."""
-    raise ScenarioError(f"{name}={value!r} is not possible: {allowed}")
+    raise ScenarioError(f"{name}={shown(value)} is not possible: {allowed}")

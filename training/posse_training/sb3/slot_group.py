@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch
+from posse import Batch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.advice import MOTION, Advice, Adviser, advised
@@ -149,4 +149,4 @@ class SlotGroup:
 
     def resume(self) -> None:
         """Have the batch take its arrays, which were written to, as running episodes."""
-        self.batch.restore(self.batch.save())
+        self.batch.restore(Snapshot(self.batch.scenario, self.batch.arrays.copy()))

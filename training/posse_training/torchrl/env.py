@@ -25,6 +25,7 @@ from torchrl.envs import EnvBase
 
 import posse
 from posse.adapters.actions import agent_names
+from posse.engine.arguments import check_seed, options_of
 
 TRACKERS: Final = "agents"
 """Group of the trackers, named as in TorchRL's multi-agent examples."""
@@ -116,7 +117,7 @@ class PosseEnv(EnvBase):
 
     def _set_seed(self, seed: int | None) -> None:
         """Make the next reset of all worlds restart from episode 0 of a seed."""
-        self._seed = seed
+        self._seed = None if seed is None else check_seed(seed)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
@@ -124,15 +125,17 @@ class PosseEnv(EnvBase):
         ``seed`` and ``options`` (start poses) of :meth:`reset` are those of
         :meth:`posse.Batch.reset`.
         """
-        options = dict(kwargs.get("options") or {})
+        options = options_of(kwargs.get("options"))
+        all_worlds = False
         marks = None if tensordict is None else tensordict.get("_reset", None)
         if marks is not None and not bool(marks.all()):
             options["reset_mask"] = self._array(marks.reshape(self.batch.num_worlds))
             seed = kwargs.get("seed")
         else:
-            seed = kwargs.get("seed", self._seed)
-            self._seed = None
+            seed, all_worlds = kwargs.get("seed", self._seed), True
         observations = self.batch.reset(seed=seed, options=options)
+        if all_worlds:
+            self._seed = None
         return self._pack(observations)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:

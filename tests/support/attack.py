@@ -1,0 +1,163 @@
+"""Every kind of environment behind one face: what is wrong to pass to it, and what it holds."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import VectorEnv
+from tests.support.adapters import same
+
+import posse
+
+SHORT: dict[str, Any] = {"num_trackers": 2, "horizon": 4, "settle_time": 0.1}
+LONG_NAME = "x" * 5000
+
+
+def _vector(name: str) -> VectorEnv[Any, Any, Any]:
+    return gymnasium.make_vec(name, 2, **{**SHORT, "num_trackers": 1 + (name == TEAM)})
+
+
+def _torchrl() -> Any:
+    from posse_training.torchrl.env import PosseEnv
+
+    return PosseEnv("constant", 2, **SHORT)
+
+
+TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
+MAKERS: dict[str, Callable[[], Any]] = {
+    "batch": lambda: posse.batch("constant", 2, **SHORT),
+    "parallel": lambda: posse.parallel_env(**SHORT),
+    "turns": lambda: posse.env(**SHORT),
+    "team": lambda: gymnasium.make(TEAM, disable_env_checker=True, **SHORT).unwrapped,
+    "solo": lambda: (
+        gymnasium.make(SOLO, disable_env_checker=True, **{**SHORT, "num_trackers": 1}).unwrapped
+    ),
+    "team vector": lambda: _vector(TEAM),
+    "solo vector": lambda: _vector(SOLO),
+    "torchrl": _torchrl,
+}
+
+
+class Subject:
+    """An environment of one kind.
+
+    Attributes:
+        env: The environment.
+        batch: The batch that it stands on.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self.env = MAKERS[kind]()
+        inner = self.env.unwrapped if kind == "turns" else self.env
+        self.batch: posse.Batch = {
+            "batch": lambda: inner,
+            "parallel": lambda: inner._world.batch,
+            "turns": lambda: inner._world.batch,
+            "team": lambda: inner._world.batch,
+            "solo": lambda: inner._world.batch,
+        }.get(kind, lambda: inner.batch)()
+
+    def reset(self, **arguments: Any) -> Any:
+        return self.env.reset(**arguments)
+
+    def step(self, action: Any) -> Any:
+        """Step with what the kind's ``step`` takes; where agents take turns, one turn."""
+        return self.env.step(action)
+
+    def good_action(self, rng: np.random.Generator) -> Any:
+        """Return an action that is taken now."""
+        scenario = self.batch.scenario
+        drawn = rng.uniform(-1, 1, (self.batch.num_worlds, scenario.num_trackers, 2))
+        actions = drawn.astype(np.float32)
+        if self.kind == "parallel":
+            return {f"tracker_{i}": row for i, row in enumerate(actions[0])}
+        if self.kind == "turns":
+            env = self.env
+            over = env.terminations[env.agent_selection] or env.truncations[env.agent_selection]
+            return None if over else actions[0, 0]
+        if self.kind == "torchrl":
+            import torch
+
+            carried = self.env.fake_tensordict().exclude("next")
+            return carried.set(("agents", "action"), torch.from_numpy(actions))
+        shape: dict[str, Any] = {"team": actions[0], "solo": actions[0, 0]}
+        return shape.get(self.kind, actions[:, 0] if self.kind == "solo vector" else actions)
+
+    def bad_actions(self) -> Iterator[Any]:
+        """Yield what no step takes, at any time."""
+        if self.kind == "torchrl":
+            import torch
+
+            for value in (np.nan, np.inf, 2.0):
+                bad = self.good_action(np.random.default_rng(0))
+                bad[("agents", "action")][1, 1, 1] = value
+                yield bad
+            bad = self.good_action(np.random.default_rng(0))
+            yield bad.set(("agents", "action"), torch.full((2, 2, 2), 1j))
+            return
+        yield from (
+            "x", LONG_NAME, "\0", object(), 5, 10**5000, 1j, [[1], [2, 3]], [10**400, 0], {"a": 1},
+            {5: 2}, {LONG_NAME: [0, 0]}, {10**5000: 1}, np.full((3, 3), object()), np.array(None),
+            [np.nan, 0.0], [1e300, 0.0], b"ab", b"\0", np.zeros(2, "M8[s]"), slice(3), print,
+        )  # fmt: skip
+        if self.kind == "parallel":
+            good = self.good_action(np.random.default_rng(0))
+            for bad in (LONG_NAME, 10**5000, [10**400, 0], [[1], [2, 3]], object(), [0.0, 2.0]):
+                yield {**good, "tracker_1": bad}
+                yield {**good, LONG_NAME: bad}
+
+    def held(self) -> list[Any]:
+        """Return copies of all that the environment holds, to compare by :func:`same`."""
+        batch, env = self.batch, self.env
+        kept: list[Any] = [
+            {name: array.copy() for name, array in batch.state.items()},
+            [batch.seed, batch._started],
+        ]
+        if self.kind in ("parallel", "turns", "team", "solo"):
+            world = env.unwrapped._world
+            kept.append([world.running, world._started, world._seeded, world.observations.copy()])
+        if self.kind in ("team vector", "solo vector"):
+            kept.append([env._seeded, repr(env.np_random.bit_generator.state)])
+        if self.kind in ("team", "solo"):
+            kept.append(repr(env.np_random.bit_generator.state))
+        if self.kind == "parallel":
+            kept.append(list(env.agents))
+        if self.kind == "torchrl":
+            kept.append(env._seed)
+        if self.kind == "turns":
+            inner = env.env
+            names = ("agents", "agent_selection", "rewards", "terminations", "truncations", "infos",
+                     "_cumulative_rewards", "_actions", "_observations")  # fmt: skip
+            kept.append(
+                [env._has_reset, {n: copy.deepcopy(getattr(inner, n, None)) for n in names}]
+            )
+        return kept
+
+
+BAD_SEEDS: tuple[Any, ...] = (
+    -1, 2**63, 10**5000, -(10**5000), 1.0, True, "1", "\0", LONG_NAME, [1], 1j, np.float64(1),
+    np.array([1, 2]), object(), b"1",
+)  # fmt: skip
+BAD_OPTIONS: tuple[Any, ...] = (
+    5, "abc", [1], True, object(), {LONG_NAME: 1}, {5: 1}, {"\0": 1}, {10**5000: 1},
+    *(
+        {name: pose}
+        for name in ("tracker_pose", "target_pose")
+        for pose in (
+            "x", LONG_NAME, 5, 1j, object(), {"a": 1}, {}, [], [[1, 2], [3]], [object()] * 3,
+            [1j] * 3, ["1", "2", "3"], [None] * 3, [10**5000, 0, 0], [True] * 3, [np.nan, 0, 0],
+            [1e300, 0, 0], np.zeros((0, 3)), np.zeros(3, "M8[s]"), np.zeros((2, 3), complex),
+            b"abc",
+        )
+    ),
+)  # fmt: skip
+
+
+def unchanged(before: list[Any], after: list[Any]) -> bool:
+    """Say whether nothing that is held has changed."""
+    return same(before, after)
