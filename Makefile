@@ -15,7 +15,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format docs bench bench-costs bench-training bench-peers results reproduce clean
+.PHONY: help demo test fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,6 +26,9 @@ demo: $(BASE) ## Watch teams at work; installs the base packages only, no torch
 test: lint ## Everything that must pass: lint, types, tests, docs
 	$(BIN)/python -m pytest -n auto --dist worksteal
 	$(BIN)/mkdocs build --strict --quiet
+
+fuzz: $(FULL) ## Look for faults at random, each campaign for MINUTES=1
+	$(BIN)/python -m tests.fuzz --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0)
 
 lint: $(FULL) ## Style and types
 	$(BIN)/ruff check

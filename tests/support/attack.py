@@ -78,6 +78,8 @@ class Subject:
             return {f"tracker_{i}": row for i, row in enumerate(actions[0])}
         if self.kind == "turns":
             env = self.env
+            if not env.agents:
+                return None
             over = env.terminations[env.agent_selection] or env.truncations[env.agent_selection]
             return None if over else actions[0, 0]
         if self.kind == "torchrl":
@@ -93,9 +95,9 @@ class Subject:
         if self.kind == "torchrl":
             import torch
 
-            for value in (np.nan, np.inf, 2.0):
+            for number in (np.nan, np.inf, 2.0):
                 bad = self.good_action(np.random.default_rng(0))
-                bad[("agents", "action")][1, 1, 1] = value
+                bad[("agents", "action")][1, 1, 1] = number
                 yield bad
             bad = self.good_action(np.random.default_rng(0))
             yield bad.set(("agents", "action"), torch.full((2, 2, 2), 1j))
@@ -107,9 +109,9 @@ class Subject:
         )  # fmt: skip
         if self.kind == "parallel":
             good = self.good_action(np.random.default_rng(0))
-            for bad in (LONG_NAME, 10**5000, [10**400, 0], [[1], [2, 3]], object(), [0.0, 2.0]):
-                yield {**good, "tracker_1": bad}
-                yield {**good, LONG_NAME: bad}
+            for value in (LONG_NAME, 10**5000, [10**400, 0], [[1], [2, 3]], object(), [0.0, 2.0]):
+                yield {**good, "tracker_1": value}
+                yield {**good, LONG_NAME: value}
 
     def held(self) -> list[Any]:
         """Return copies of all that the environment holds, to compare by :func:`same`."""
@@ -120,7 +122,7 @@ class Subject:
         ]
         if self.kind in ("parallel", "turns", "team", "solo"):
             world = env.unwrapped._world
-            kept.append([world.running, world._started, world._seeded, world.observations.copy()])
+            kept.append([world.running, world._started, world._seeded])
         if self.kind in ("team vector", "solo vector"):
             kept.append([env._seeded, repr(env.np_random.bit_generator.state)])
         if self.kind in ("team", "solo"):

@@ -1,0 +1,113 @@
+"""Scenarios drawn over every setting, with teams that chase and crowd, judged in float64.
+
+Run it for as long as you like::
+
+    python -m tests.fuzz.worlds --minutes 30 --seed 1
+
+A case is a scenario and a team. After each step no disc is inside another or a wall, no robot has
+moved faster than it can, every observation lies within its bounds and every number is finite. A
+scenario that is not possible is refused by a ScenarioError.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+import numpy as np
+from tests.fuzz.campaign import main
+from tests.support.crowding import TOLERANCE, Team, depth, points
+
+import posse
+from posse.scenarios import Setting
+
+WORLDS, STEPS, DRAWS = 24, 60, 50
+ROUNDING = 1e-3
+"""m that a robot may seem to have moved too far: float32 at up to 2,000 m."""
+BROADEN = 2.0
+"""Numbers are drawn up to so many powers of two from their default."""
+
+
+def drawn(rng: random.Random, setting: Setting, default: Any) -> Any:
+    """Return a value of a setting, mostly one that is possible."""
+    if setting.choices is not None:
+        return rng.choice(tuple(setting.choices()))
+    if setting.kind == "flag":
+        return rng.random() < 0.5
+    if setting.kind == "whole":
+        most = int(min(setting.high, max(12, 2 * (default or 0))))
+        return rng.randint(int(setting.low), most)
+    if setting.kind == "pair":
+        scale = 2 ** rng.uniform(-BROADEN, BROADEN)
+        return tuple(sorted(min(setting.high, end * scale) for end in default))
+    if setting.kind == "number":
+        if setting.may_be_infinite and rng.random() < 0.2:
+            return math.inf
+        if setting.low == 0 and setting.low_is_allowed and rng.random() < 0.2:
+            return 0.0
+        about = default if isinstance(default, float) and 0 < default < math.inf else 1.0
+        high = min(setting.high, about * 2**BROADEN)
+        return min(max(about * 2 ** rng.uniform(-BROADEN, BROADEN), setting.low), high)
+    return default
+
+
+def scenario(rng: random.Random) -> posse.Scenario | None:
+    """Return a named scenario with some settings drawn anew, or None if none was possible."""
+    for _ in range(DRAWS):
+        base = posse.get_scenario(rng.choice(posse.scenario_names()))
+        share = rng.choice((0.1, 0.3))
+        changes = {
+            name: drawn(rng, setting, getattr(base, name))
+            for name, setting in base.settings().items()
+            if name not in ("name", "version") and rng.random() < share
+        }
+        try:
+            return base.replace(**changes)
+        except posse.ScenarioError:
+            continue
+    return None
+
+
+def case(seed: int, number: int) -> None:
+    """Play one scenario with one team."""
+    rng = random.Random(f"{seed} {number}")
+    s = scenario(rng)
+    if s is None:
+        return
+    batch = posse.Batch(s, WORLDS, seed=rng.randrange(2**63), num_threads=1)
+    low, high = (bound.astype(np.float64) for bound in batch.layout.bounds())
+    _judge_observations(batch.reset(), low, high)
+    team = Team(
+        batch, number, crowds=rng.random() < 0.5, stays=rng.choice((4.0, 10.0)),
+        leaves=rng.choice((0.0, 4.0)),
+    )  # fmt: skip
+    reach = np.array([*s.tracker_speeds, s.target_speed]) * s.control_step
+    for _ in range(STEPS):
+        before = _robots(batch)
+        observations, rewards = team.play()
+        _judge_observations(observations, low, high)
+        assert np.isfinite(rewards).all()
+        assert ((batch.score >= 0) & (batch.score <= 1)).all()
+        assert depth(batch).max() <= TOLERANCE, f"{depth(batch).max()} m inside: {s}"
+        on = batch.state["world_step"] > 0
+        moved = np.abs(_robots(batch) - before)[on]
+        assert (moved <= reach + ROUNDING).all(), f"{(moved - reach).max()} m too far: {s}"
+    for name, array in batch.state.items():
+        if array.dtype.kind == "f" and name.endswith(("_x", "_y")):
+            assert np.isfinite(array).all(), name
+
+
+def _robots(batch: posse.Batch) -> Any:
+    return np.concatenate([points(batch, "tracker"), points(batch, "world")[:, None]], axis=1)
+
+
+def _judge_observations(observations: Any, low: Any, high: Any) -> None:
+    wide = observations.astype(np.float64)
+    assert np.isfinite(wide).all()
+    bad = (wide < low) | (wide > high)
+    assert not bad.any(), f"out of bounds at {np.argwhere(bad)[0]}"
+
+
+if __name__ == "__main__":
+    main(__doc__, case)
