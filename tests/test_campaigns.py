@@ -11,7 +11,7 @@ from tests.fuzz.campaign import campaign
 
 @pytest.mark.parametrize(
     ("case", "cases"),
-    [(worlds.case, 6), (calls.case, 4), (processes.case, 12)],
+    [(worlds.case, 40), (calls.case, 4), (processes.case, 24)],
     ids=["worlds", "calls", "processes"],
 )
 def test_no_case_fails(case: Any, cases: int) -> None:
