@@ -1,4 +1,4 @@
-"""From the results of ``peers.py`` to the page of the manual."""
+"""Writes the manual's page on other simulators from the results of ``peers.py``."""
 
 from __future__ import annotations
 
@@ -12,90 +12,73 @@ Row = dict[str, Any]
 CONTENTS = {
     "posse": (
         "`smart`: 5 trackers with limits on speed and turn rate, an evasive target, swept "
-        "contacts, target sensor, sonar ring, what team-mates tell, score and every metric, "
-        "automatic resets; open plane and a perfect radio, so nothing to occlude and nothing lost"
+        "contacts, target sensor, sonar ring, messages of team-mates, score and every "
+        "metric, automatic resets; open plane, no occlusion, radio without loss"
     ),
     "posse, own kernel": (
-        "the same worlds, stepped by a kernel that is compiled for this scenario alone "
-        "(`own_kernel=True`), once, and kept on disk"
+        "the same worlds, stepped by a kernel compiled for this scenario (`own_kernel=True`) and "
+        "cached on disk"
     ),
     "posse, field": (
-        "as `posse`, and 6 obstacles that occlude, walls, short and noisy sensing, a radio with "
-        "range, delay and loss, faults and outages"
+        "as `posse`, with 6 occluding obstacles, walls, short and noisy sensing, a radio with range, "
+        "delay and loss, faults and outages"
     ),
     "posse, PettingZoo": "as `posse`, one world, through PettingZoo's parallel interface",
     "mpe2 simple_tag": (
-        "5 adversaries, 1 agent, 2 obstacles: forces, soft contacts, places of all others"
+        "5 adversaries, 1 agent, 2 obstacles: forces, soft contacts, positions of all others"
     ),
-    "PettingZoo pursuit": "5 pursuers, 1 evader on a grid; a picture of 7 x 7 x 3 each",
-    "Gymnasium CartPole": "one cart with a pole; a yardstick of what numpy reaches",
-    "VMAS simple_tag, 10 substeps": "as mpe2's, with VMAS's own 10 substeps; episodes never end",
-    "VMAS simple_tag, 1 substep": "the same with 1 substep, the like-for-like row",
+    "PettingZoo pursuit": "5 pursuers, 1 evader on a grid; an image of 7 x 7 x 3 each",
+    "Gymnasium CartPole": "one cart with a pole; a reference for what numpy reaches",
+    "VMAS simple_tag, 10 substeps": "as mpe2's, with VMAS's default of 10 substeps; episodes never end",
+    "VMAS simple_tag, 1 substep": "the same with 1 substep, the row comparable with mpe2",
     "JaxMARL simple_tag": "as mpe2's; jit, vmap, scan; automatic resets",
     "CAMAR": (
-        "5 robots with differential drive, goals, 3 obstacles and a border, made of discs; "
+        "5 differential-drive robots, goals, 3 obstacles and a border, made of discs; "
         "2 physics steps; jit, vmap, scan; episodes never end"
     ),
     "PufferLib Ocean target": (
-        "5 agents, 1 goal: motion and places of all others, in C, the loop over steps and worlds "
-        "too; no contacts"
+        "5 agents, 1 goal: motion and positions of all others; C, including the loop over steps "
+        "and worlds; no contacts"
     ),
 }
 
 WHAT_IS_TIMED = """\
-An agent-step is one step of one agent that is given an action; targets that the simulator moves
-itself are not counted. Actions are random and drawn before the clock starts, for all; observations
-and rewards are computed in every step, by all. The simulators in JAX and in C keep the latest
-observations alone; the others hand over those of every step. One thread means that the process is
-held to one core."""
+An agent-step is one step of one agent that receives an action; targets moved by the simulator are
+not counted. Actions are random and drawn before timing starts. Observations and rewards are
+computed in every step. The JAX and C simulators keep only the latest observations; the others
+return those of every step. With one thread, the process is pinned to one core.
+
+To run it again: `make bench-peers` (needs a C compiler). `python benchmarks/peers.py --page` writes
+this page from `benchmarks/results/peers.json`, which also holds every sample and the throughput per
+second of processor time."""
 
 SPEED = """\
-## Million agent-steps a second
+## Throughput
 
-The median of {samples} samples; beneath it their spread, greatest less least, as a share of it. A
-column is a number of worlds."""
-
-CORE_FOR_CORE = """\
-## Core for core
-
-Million agent-steps for each second of processor time, all threads counted; the median. Work that
-only took turns with a simulator leaves this alone."""
-
-TIMES_MPE2 = """\
-## Times mpe2
-
-Each sample over one of mpe2's made just before it; the median. mpe2 has one world and one thread
-throughout."""
-
-OURS_OVER_THEIRS = """\
-## Ours over theirs
-
-Our ratio to mpe2 over theirs, with the same number of threads."""
+Million agent-steps/s, median of {samples} samples, by number of worlds. Small figures: how many
+times the throughput of `posse, own kernel` is that of the simulator, with the same number of
+threads. Host load varies during a run, so this ratio is taken between ratios to mpe2, which is
+sampled immediately before each sample."""
 
 DISTURBED = """\
-!!! warning "Other work ran on the machine"
+!!! warning "Other processes ran during the measurement"
 
-    {spoilt} of the {taken} samples were taken while something else kept the machine busy, and
-    {dropped} more were dropped. Read the ratios rather than the speeds; cells with a star have such
-    samples."""
+    {spoilt} of the {taken} samples were taken while other processes used the cores, and {dropped}
+    more were dropped. The ratios are more reliable than the throughput; cells with a star contain
+    such samples."""
 
 
 def write_page(results: dict[str, Any], path: Path) -> None:
     """Write ``docs/peers.md``."""
     rows: list[Row] = results["rows"]
     parts = [
-        "# Beside other simulators",
+        "# Compared with other simulators",
         _machine(results["machine"]),
         WHAT_IS_TIMED,
         _disturbance(rows),
         SPEED.format(samples=results["samples"]),
-        _table(rows, _speed),
-        CORE_FOR_CORE,
-        _table(rows, lambda row: f"{statistics.median(row['per_core']) / 1e6:.3g}"),
-        TIMES_MPE2,
-        _table(rows, lambda row: _number(_ratio(row))),
-        *_ours_over_theirs(rows),
-        "## What each computes",
+        _speed_table(rows),
+        "## What each simulator computes",
         _contents(rows),
     ]
     if results["missing"]:
@@ -107,7 +90,7 @@ def write_page(results: dict[str, Any], path: Path) -> None:
 
 def _machine(machine: dict[str, Any]) -> str:
     return (
-        f"Made by `make bench-peers`, from one run on one machine: {machine['processor']}, "
+        f"One run of `make bench-peers` on one machine: {machine['processor']}, "
         f"{machine['cores']} cores, {machine['memory_gib']} GiB, {machine['system']}, "
         f"Python {machine['python']}, {machine['date']}, commit `{machine['commit']}`."
     )
@@ -118,21 +101,12 @@ def _disturbance(rows: list[Row]) -> str:
     taken = sum(len(row["samples"]) for row in rows)
     dropped = sum(row["dropped"] for row in rows)
     if not spoilt:
-        others = f"; {dropped} others were disturbed, and repeated" if dropped else ""
+        repeated = f"; {dropped} samples with other load were repeated" if dropped else ""
         return (
-            f"Nothing else that the machine knows of kept it busy during these samples{others}. "
-            "A virtual machine does not know what its host does: read the ratios rather than the "
-            "speeds."
+            f"Other processes used at most 0.15 cores during these samples{repeated}. A virtual machine "
+            "cannot see the load of its host: the ratios are more reliable than the throughput."
         )
     return DISTURBED.format(spoilt=spoilt, taken=taken, dropped=dropped)
-
-
-def _speed(row: Row) -> str:
-    samples = row["samples"]
-    middle = statistics.median(samples)
-    spread = (max(samples) - min(samples)) / middle
-    star = r"\*" if row["spoilt"] else ""
-    return f"{middle / 1e6:.3g}{star}<br><small>{spread:.0%}</small>"
 
 
 def _number(value: float) -> str:
@@ -162,21 +136,18 @@ def _table(rows: list[Row], cell: Callable[[Row], str]) -> str:
     )
 
 
-def _ours_over_theirs(rows: list[Row]) -> list[str]:
-    parts = [OURS_OVER_THEIRS]
-    theirs = [row for row in rows if not row["name"].startswith("posse")]
-    for name in ("posse", "posse, own kernel"):
-        ours = {(row["threads"], row["batch"]): _ratio(row) for row in rows if row["name"] == name}
+def _speed_table(rows: list[Row]) -> str:
+    own = {(r["threads"], r["batch"]): _ratio(r) for r in rows if r["name"] == "posse, own kernel"}
 
-        def cell(row: Row, ours: dict[tuple[int, int], float] = ours) -> str:
-            mine = ours.get((row["threads"], row["batch"]))
-            return "" if mine is None else _number(mine / _ratio(row))
+    def cell(row: Row) -> str:
+        star = r"\*" if row["spoilt"] else ""
+        speed = f"{statistics.median(row['samples']) / 1e6:.3g}{star}"
+        ours = own.get((row["threads"], row["batch"]))
+        if ours is None or row["name"].startswith("posse"):
+            return speed
+        return f"{speed}<br><small>{_number(ours / _ratio(row))}</small>"
 
-        parts += [f"`{name}`:", _table(theirs, cell)]
-    single = [_ratio(row) for row in rows if row["name"] == "posse, PettingZoo"]
-    if single:
-        parts += [f"Through PettingZoo's own interface: {_number(single[0])} times mpe2."]
-    return parts
+    return _table(rows, cell)
 
 
 def _contents(rows: list[Row]) -> str:
@@ -188,7 +159,7 @@ def _contents(rows: list[Row]) -> str:
         sizes = [str(row["agents"]), str(row["observation"])]
         body.append([name, CONTENTS[name], *sizes, versions])
     return _lines(
-        ["simulator", "a world", "agents", "numbers observed", "versions"],
+        ["simulator", "world", "agents", "observation size", "versions"],
         ["---", "---", "---:", "---:", "---"],
         body,
     )

@@ -91,7 +91,8 @@ def test_snapshots() -> None:
     for call in (batch.save, batch.observe, lambda: batch.copies(1)):
         assert "before reset: call reset() first" in refused(subject, call, ResetNeeded)
     batch.reset()
-    for bad in (None, 5, LONG_NAME, {}, batch.state):
+    others: tuple[Any, ...] = (None, 5, LONG_NAME, {}, batch.state)
+    for bad in others:
         assert "what save() returned" in refused(subject, lambda bad=bad: batch.restore(bad))
     for count in (0, 2**63, 10**5000, 1.0, None):
         refused(subject, lambda count=count: batch.copies(count))
