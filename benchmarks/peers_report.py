@@ -20,8 +20,8 @@ CONTENTS = {
         "cached on disk"
     ),
     "posse, field": (
-        "as `posse`, with 6 occluding obstacles, walls, short and noisy sensing, a radio with range, "
-        "delay and loss, faults and outages"
+        "as `posse`, with 6 occluding obstacles, walls, short and noisy sensing, a radio with "
+        "range, delay and loss, faults and outages"
     ),
     "posse, PettingZoo": "as `posse`, one world, through PettingZoo's parallel interface",
     "mpe2 simple_tag": (
@@ -29,7 +29,7 @@ CONTENTS = {
     ),
     "PettingZoo pursuit": "5 pursuers, 1 evader on a grid; an image of 7 x 7 x 3 each",
     "Gymnasium CartPole": "one cart with a pole; a reference for what numpy reaches",
-    "VMAS simple_tag, 10 substeps": "as mpe2's, with VMAS's default of 10 substeps; episodes never end",
+    "VMAS simple_tag, 10 substeps": "as mpe2's, with VMAS's 10 substeps; episodes never end",
     "VMAS simple_tag, 1 substep": "the same with 1 substep, the row comparable with mpe2",
     "JaxMARL simple_tag": "as mpe2's; jit, vmap, scan; automatic resets",
     "CAMAR": (
@@ -103,8 +103,8 @@ def _disturbance(rows: list[Row]) -> str:
     if not spoilt:
         repeated = f"; {dropped} samples with other load were repeated" if dropped else ""
         return (
-            f"Other processes used at most 0.15 cores during these samples{repeated}. A virtual machine "
-            "cannot see the load of its host: the ratios are more reliable than the throughput."
+            f"Other processes used at most 0.15 cores during these samples{repeated}. A virtual "
+            "machine cannot see the load of its host: the ratios are more reliable than the throughput."
         )
     return DISTURBED.format(spoilt=spoilt, taken=taken, dropped=dropped)
 
