@@ -1,4 +1,4 @@
-"""A scenario of your own, and what it leaves open between the best team and what is possible.
+"""Define a scenario, and compare the scores of policies on it with the bound.
 
 python docs/tutorials/add_scenario.py
 """
@@ -12,8 +12,8 @@ parser = argparse.ArgumentParser()
 parser.add_argument("--episodes", type=int, default=200)
 arguments = parser.parse_args()
 
-# A scenario is a value: start from one that has a name, and change fields. Impossible ones are
-# refused with a message that says what is possible.
+# A scenario is a value: start from a named one and change fields. Invalid values raise an error
+# that states the valid range.
 night = posse.get_scenario("obstacles").replace(
     name="night",
     version=1,
@@ -22,13 +22,13 @@ night = posse.get_scenario("obstacles").replace(
     num_trackers=4,
 )
 
-# Every environment takes it in the place of a name.
+# Every environment accepts it instead of a name.
 env = posse.parallel_env(night)
 observations, infos = env.reset(seed=1)
 print(f"{len(observations)} trackers, {len(observations['tracker_0'])} numbers each")
 
-# Is it worth playing? There should be room between the best scripted team and the bound, and the
-# planner, which reads the state, should do clearly better than those who do not.
+# A useful benchmark leaves a gap between the best scripted team and the bound, and the planner,
+# which reads the full state, should score clearly higher than the others.
 for policy in ("pursuit", "ddcs-distributed", "planner"):
     results = evaluate(
         policy, night, arguments.episodes, seed=0, split="validation", progress=False

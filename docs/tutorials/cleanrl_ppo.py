@@ -1,6 +1,6 @@
-"""PPO in one file, after the manner of CleanRL: torch and the PettingZoo environment, no more.
+"""PPO in one file, in the style of CleanRL, on torch and the PettingZoo environment alone.
 
-All trackers share one policy. Reads top to bottom: python docs/tutorials/cleanrl_ppo.py
+All trackers share one policy. Run it with: python docs/tutorials/cleanrl_ppo.py
 """
 
 import argparse
@@ -33,7 +33,7 @@ torch.manual_seed(args.seed)
 torch.set_num_threads(1)
 
 # --- the environments: each has N agents, so a rollout has envs x N columns -----------------------
-# Small rewards for being there, large ones for getting there: returns stay near 1.
+# A small reward for holding a slot and a larger one for approaching it keep returns near 1.
 weights = {"slot": 0.1, "progress": 0.5, "contact": -0.2}
 envs = [
     posse.parallel_env(args.scenario, first_world=k, reward_weights=weights)
@@ -63,7 +63,7 @@ class Agent(nn.Module):
         super().__init__()
         self.policy, self.critic = network(outputs, 0.01), network(1, 1.0)
         self.log_deviation = nn.Parameter(torch.full((outputs,), -0.5))
-        # Statistics of the observations: a part of the agent, saved with it.
+        # Statistics of the observations are part of the agent and saved with it.
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("square", torch.ones(inputs))
         self.register_buffer("count", torch.tensor(1e-4))
@@ -111,7 +111,7 @@ while done < args.steps:
             )
             mine = slice(k * len(agents), (k + 1) * len(agents))
             rewards[t, mine] = torch.tensor([reward[a] for a in agents])
-            # A truncated episode would have gone on: its last observation still has a value.
+            # A truncated episode is bootstrapped from its last observation.
             with torch.no_grad():
                 alive = 1.0 - float(terminated[agents[0]])
                 nexts[t, mine] = alive * agent.value(stacked([row]))
@@ -124,7 +124,7 @@ while done < args.steps:
         observation = stacked(rows)
         done += columns
 
-    # Generalized advantage estimation: nothing flows back over the end of an episode.
+    # Generalized advantage estimation, cut at the ends of episodes.
     advantages, advantage = torch.zeros(shape), torch.zeros(columns)
     for t in reversed(range(args.rollout)):
         error = rewards[t] + args.discount * nexts[t] - values[t]
@@ -145,11 +145,11 @@ while done < args.steps:
             value_loss = (agent.value(flat_seen[rows]) - returns[rows]).square().mean()
             optimizer.zero_grad()
             (policy_loss + 0.5 * value_loss).backward()
-            # Apart, or large errors of the critic would leave nothing to the policy.
+            # Clipped separately, or large gradients of the critic would scale down the policy's.
             nn.utils.clip_grad_norm_([*agent.policy.parameters(), agent.log_deviation], 0.5)
             nn.utils.clip_grad_norm_(agent.critic.parameters(), 0.5)
             optimizer.step()
-    agent.see(flat_seen)  # between rollouts: within one, the policy stays the same
+    agent.see(flat_seen)  # between rollouts, so that the policy is constant within one
 
     recent = f"{np.mean(scores[-20:]):.3f}" if scores else "-"
     rate = done / (time.time() - started)

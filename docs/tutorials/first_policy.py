@@ -1,4 +1,4 @@
-"""Train a first learned team, and see how it does on worlds that it has never seen.
+"""Train a first team, and evaluate it on the test split.
 
 Takes about 3 minutes on a laptop: python docs/tutorials/first_policy.py
 """
@@ -18,7 +18,7 @@ parser.add_argument("--folder", type=Path, default=Path("runs/tutorials/first"))
 parser.add_argument("--episodes", type=int, default=200)
 arguments = parser.parse_args()
 
-# What a training is a function of; `posse train --help` lists every setting.
+# `posse train --help` lists every setting.
 settings = replace(
     default_settings("smart", "ppo"),
     steps=arguments.steps,
@@ -28,11 +28,11 @@ settings = replace(
     evaluate_every=max(arguments.steps // 5, 1),
     tensorboard=False,
 )
-# The best policy on validation worlds, as one file; its card says how it was made.
+# The best policy on validation worlds, as one file; its card records how it was trained.
 file = train(settings)
 policy = load(file)
 
-# The test split: neither learning nor choosing has seen these worlds.
+# The test split: used neither for training nor for selection.
 for contender in (load("pursuit"), load("ddcs-distributed"), policy):
     results = evaluate(contender, "smart", episodes=arguments.episodes, progress=False)
     print(f"{contender.name:20s} {results.estimate('score')}")

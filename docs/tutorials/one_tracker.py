@@ -1,4 +1,4 @@
-"""One learner among scripted team-mates, with stable-baselines3 as it is.
+"""Train one learner among scripted team-mates, with unmodified stable-baselines3.
 
 python docs/tutorials/one_tracker.py
 """
@@ -23,14 +23,14 @@ assert "ddcs-distributed" in posse_baselines.policy_names()
 
 TEAM = {"scenario": "constant", "teammates": "ddcs-distributed", "number": 2}
 
-# Scripted team-mates talk to each other; a silent learner hears them, and has two actions.
+# Scripted team-mates exchange messages; the learner receives them but sends none: two actions.
 env = Monitor(gym.make("posse/Tracker-v0", **TEAM))
 model = PPO("MlpPolicy", env, n_steps=arguments.rollout, gamma=0.98, seed=1, device="cpu")
 model.learn(arguments.steps)
 arguments.file.parent.mkdir(parents=True, exist_ok=True)
 model.save(arguments.file)
 
-# How it does in worlds of the test split: the score is the team's, so one tracker is a fifth.
+# Evaluation on the test split. The score is the team's: one tracker contributes a fifth.
 test = gym.make("posse/Tracker-v0", **TEAM, split="test", seed=7)
 learned = PPO.load(arguments.file, device="cpu")
 scores = []

@@ -1,6 +1,6 @@
-"""A policy of your own: every tracker heads for the slot that bears its number.
+"""A custom policy: every tracker heads for the slot of its own number.
 
-Score it beside the others: python docs/tutorials/own_policy.py
+Compare it with others:     python docs/tutorials/own_policy.py
 Or in a comparison:         cd docs/tutorials && posse compare pursuit own_policy:OwnSlot
 """
 
@@ -16,13 +16,13 @@ from posse_training import evaluate
 
 
 class OwnSlot(BasePolicy):
-    """Goes to the slot of its own number, wherever the others are."""
+    """Every tracker goes to the slot of its own number and ignores the others."""
 
     name = "own-slot"
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the memory: what stays the same for a whole episode."""
-        super().begin(layout, num_worlds)  # checks that our messages would fit
+        super().begin(layout, num_worlds)  # checks the message size
         return layout, np.array(slot_offsets(layout.scenario))
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
@@ -30,21 +30,21 @@ class OwnSlot(BasePolicy):
         layout, slots = memory  # slots (N, 2): ahead and to the left of the target, m
         seen = layout.views(observations)  # every field by name, (E, N) or (E, N, size)
 
-        # In the robot's own frame: the target's last fix, and on it the frame that slots lie in.
+        # In the robot's frame: the target's last fix and the slot frame at that time.
         target = seen["target_range"][..., None] * seen["target_bearing"]
         cos, sin = seen["target_frame"][..., 0], seen["target_frame"][..., 1]
         ahead = target[..., 0] + slots[:, 0] * cos - slots[:, 1] * sin
         left = target[..., 1] + slots[:, 0] * sin + slots[:, 1] * cos
 
-        # Turn towards the slot, and drive as far as it lies in front.
+        # Turn towards the slot; the speed follows the component of the distance ahead.
         bearing, distance = np.arctan2(left, ahead), np.hypot(ahead, left)
         forward = np.clip(2 * distance, 0, 1) * np.maximum(np.cos(bearing), 0)
         turn = np.clip(2 * bearing, -1, 1) * np.minimum(4 * distance, 1)
 
-        # Until somebody has seen the target, go round in circles and look.
+        # Until the target is known, move in a circle to search for it.
         known = seen["target_known"] > 0
         actions = np.zeros((*known.shape, 2 + layout.scenario.message_size), np.float32)
-        actions[..., 0] = np.where(known, 2 * forward - 1, 0)  # -1 stands still, 1 is full speed
+        actions[..., 0] = np.where(known, 2 * forward - 1, 0)  # -1: at rest, 1: full speed
         actions[..., 1] = np.where(known, turn, 0.3)
         return actions, memory
 

@@ -1,6 +1,6 @@
-"""A new reward term at work: weighed by a scenario, and reported by its name.
+"""Use a new reward term: weighted in a scenario, and reported by name.
 
-Needs the term `steady` in envs/posse/reward.py: python docs/tutorials/reward_term.py
+Needs the term `steady` in envs/posse/signals/reward.py: python docs/tutorials/reward_term.py
 """
 
 import argparse
@@ -17,7 +17,7 @@ weights = {"slot": 1.0, "steady": 0.1}
 env = posse.parallel_env("constant", reward_weights=weights)
 env.reset(seed=1)
 for _ in range(arguments.steps):
-    # The first tracker drives straight on, the others in circles.
+    # The first tracker drives straight, the others in circles.
     rewards, infos = env.step(
         {
             agent: np.array([1.0, 0.0 if agent == "tracker_0" else 1.0], np.float32)
@@ -25,7 +25,7 @@ for _ in range(arguments.steps):
         }
     )[1::3]
 
-# Terms are reported unscaled, each by its name; the reward is their weighed sum.
+# Terms are reported unscaled, by name; the reward is their weighted sum.
 for agent, info in infos.items():
     terms = info["reward_terms"]
     expected = sum(weight * terms[name] for name, weight in weights.items())
