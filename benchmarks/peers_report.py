@@ -103,8 +103,9 @@ def _disturbance(rows: list[Row]) -> str:
     if not spoilt:
         repeated = f"; {dropped} samples with other load were repeated" if dropped else ""
         return (
-            f"Other processes used at most 0.15 cores during these samples{repeated}. A virtual "
-            "machine cannot see the load of its host: the ratios are more reliable than the throughput."
+            f"Other processes used at most 0.15 cores during these samples{repeated}. "
+            "A virtual machine cannot see the load of its host: the ratios are more reliable than "
+            "the throughput."
         )
     return DISTURBED.format(spoilt=spoilt, taken=taken, dropped=dropped)
 

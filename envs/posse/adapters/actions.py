@@ -1,7 +1,7 @@
-"""What an action may be, and how the adapters take one: checked, and said by name what is wrong.
+"""Action spaces, and checked conversion of user actions for the kernels.
 
-An action is a robot's (speed, turn rate), each in [-1, 1], and after them the message. Learners
-that choose among a few actions get a `Discrete` variant: three speeds times five turn rates.
+An action is (speed, turn rate), each in [-1, 1], followed by the message. The `Discrete` variant
+has three speeds by five turn rates.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.shown import shown
 
 SPEEDS: Final = (-1.0, 0.0, 1.0)
-"""Speeds to choose from: at rest, half, full."""
+"""Discrete speeds: at rest, half, full."""
 TURN_RATES: Final = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Turn rates to choose from: hard right to hard left."""
+"""Discrete turn rates: maximum right to maximum left."""
 MOTIONS: Final = np.array([(v, turn) for v in SPEEDS for turn in TURN_RATES], np.float32)
-"""What each discrete action stands for, (15, 2): number 5 i + j is speed i with turn rate j."""
+"""The discrete actions, (15, 2): number 5 i + j is speed i with turn rate j."""
 
 _PARTS: Final = ("speed", "turn rate")
 _FLOAT32: Final = np.dtype(np.float32)
@@ -37,7 +37,7 @@ def agent_names(scenario: Scenario) -> list[str]:
 
 
 def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]:
-    """Return what one robot's action may be.
+    """Return the action space of one robot.
 
     Raises:
         ScenarioError: ``discrete`` with messages, which are not discrete.
@@ -50,21 +50,21 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
         return spaces.Box(-1.0, 1.0, (2 + scenario.message_size,), np.float32)
     if scenario.message_size:
         raise ScenarioError(
-            f"discrete_actions=True leaves no way to say a message of message_size="
-            f"{scenario.message_size}: set one of them back"
+            f"discrete_actions=True cannot encode messages of message_size="
+            f"{scenario.message_size}: unset one of them"
         )
     return spaces.Discrete(len(MOTIONS))
 
 
 class ActionReader:
-    """Turns what users pass as actions into what the kernels take.
+    """Converts user actions to the kernels' array.
 
     Args:
-        scenario: The worlds that the actions are for.
+        scenario: Scenario of the worlds.
         discrete: Whether each action is the number of one of :data:`MOTIONS`.
 
     Attributes:
-        read: The actions that were read last, (1, rows, 2 + m) float32; always the same array.
+        read: The last actions, (1, rows, 2 + m) float32; always the same array.
     """
 
     def __init__(self, scenario: Scenario, discrete: bool) -> None:
@@ -81,7 +81,7 @@ class ActionReader:
         self._first_bad = self._first_bad_of_all
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Made anew, so that rows stay those of what is read.
+        # Rebuilt, so that the rows are views of the new array.
         return ActionReader, (self._scenario, self._discrete)
 
     def by_agent(self, actions: Mapping[str, Any]) -> None:
@@ -92,8 +92,8 @@ class ActionReader:
                 not finite, or outside the space; the message names agent and value.
         """
         if type(actions) is dict and len(actions) == len(self._rows) and not self._discrete:
-            # The usual case, an array of float32 for each agent. A memoryview takes nothing but
-            # what has its own type and shape, and says so in less time than it takes to ask.
+            # The usual case, a float32 array for each agent. Assignment to a memoryview checks type
+            # and shape faster than explicit tests.
             try:
                 for agent, row in self._rows:
                     row[:] = actions[agent]
@@ -139,13 +139,13 @@ class ActionReader:
         return checked
 
     def _first_bad_of_all(self, actions: FloatArray) -> int:
-        """Look through the actions, for the first time: from then on without this detour."""
+        """Check the actions; later calls use the resolved kernel directly."""
         position = bad_action(actions)
         self._first_bad = direct(bad_action)
         return position
 
     def _by_agent_slowly(self, actions: Mapping[str, Any]) -> None:
-        """Read the actions, or find out which of them is wrong in which way."""
+        """Read the actions with full checks, and report which one is invalid."""
         if not isinstance(actions, Mapping):
             raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
         known = f"agents are: {', '.join(self._agents)}"
@@ -172,7 +172,7 @@ class ActionReader:
         return array if self._discrete else to_float32(array)
 
     def _in_space(self, array: npt.NDArray[Any], agents: Sequence[str]) -> FloatArray:
-        """Return rows of the right type and shape as the kernels take them, if in the space."""
+        """Return rows of the right type and shape as kernel input, after a range check."""
         if self._discrete:
             outside = (array < 0) | (array >= len(MOTIONS))
             if outside.any():

@@ -1,4 +1,4 @@
-"""The worlds as Gymnasium environments: one agent drives the team, or is the only tracker."""
+"""Gymnasium environments: one agent controls the team, or a single tracker."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ from posse.signals.layout import ObservationLayout
 
 
 class TeamEnv(gymnasium.Env[Any, Any]):
-    """``posse/Team-v0``: one agent drives the whole team.
+    """``posse/Team-v0``: one agent controls the whole team.
 
-    **Observation**: ``Box`` (N, F) float32, what each tracker is given; its fields are
+    **Observation**: ``Box`` (N, F) float32, the observation of each tracker; its fields are
     ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
 
     **Action**: ``Box(-1, 1, (N, 2 + message_size))`` float32: for each tracker its speed (-1 is at
-    rest, 1 the greatest), turn rate (1 is the greatest to the left) and message. With
+    rest, 1 the maximum), turn rate (1 is the maximum to the left) and message. With
     ``discrete_actions=True`` ``MultiDiscrete([15] * N)``, rows of
     :data:`posse.adapters.actions.MOTIONS`.
 
     **Reward**: the mean over the trackers of the weighted sum of named terms.
 
     **Info** of every step: ``"score"`` in [0, 1]; ``"reward_terms"``, each term by name, unscaled,
-    (N,); ``"working"`` (N,), where the scenario has trackers break; at the end ``"metrics"``, each
+    (N,); ``"working"`` (N,), where trackers may break; at the end ``"metrics"``, each
     metric of the episode by name (``posse.METRICS``).
 
-    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the world that is
-    the first of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
+    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
+    world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
     ``options={"tracker_pose": (N, 3), "target_pose": (3,)}`` starts from these (x, y, θ).
 
     **End**: truncation after ``horizon`` steps; termination only with ``terminate_on_contact``.
 
     Args:
-        scenario: Name of a scenario, or one.
+        scenario: Name of a scenario, or a scenario.
         discrete_actions: Whether actions are discrete.
         render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
-        seed: Of every random draw; ``None``: an arbitrary one.
+        seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Which world of the seed.
+        first_world: Index of the world within the seed.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown scenario or setting, or an impossible one.
+        ScenarioError: An unknown scenario, or an unknown or invalid setting.
         ValueError: An unknown split or render mode, a negative seed.
     """
 
@@ -93,7 +93,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         """Return the scenario with its overrides, and its episodes cut to ``horizon`` steps.
 
         Raises:
-            ScenarioError: It is impossible, or does not fit an environment of one agent.
+            ScenarioError: It is invalid, or does not fit an environment of one agent.
         """
         return _with_scripted_target(scenario, horizon, overrides)
 
@@ -117,7 +117,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         return self._world.state_layout
 
     def state(self) -> FloatArray:
-        """Return everything there is to know of the world, (S,) float32.
+        """Return the full state of the world, (S,) float32.
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -168,7 +168,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
+        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array".
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -183,8 +183,8 @@ class TeamEnv(gymnasium.Env[Any, Any]):
 class SoloEnv(TeamEnv):
     """``posse/Solo-v0``: one tracker, one target.
 
-    As :class:`TeamEnv` with a team of one, and no axis for the team: **observation** ``Box`` (F,),
-    **action** ``Box(-1, 1, (2 + message_size,))`` or ``Discrete(15)``, reward terms plain numbers.
+    As :class:`TeamEnv` with a team of one, without the team axis: **observation** ``Box`` (F,),
+    **action** ``Box(-1, 1, (2 + message_size,))`` or ``Discrete(15)``, reward terms scalars.
     ``options["tracker_pose"]`` may be (3,).
 
     Raises:
@@ -198,7 +198,7 @@ class SoloEnv(TeamEnv):
         """Return the scenario with one tracker.
 
         Raises:
-            ScenarioError: It is impossible, or asks for more trackers.
+            ScenarioError: It is invalid, or has more than one tracker.
         """
         if not np.array_equal(overrides.get("num_trackers", 1), 1):
             raise ScenarioError(
@@ -264,6 +264,6 @@ def _with_scripted_target(
 
 
 _NO_PLACE = (
-    "{} has no place in an environment of one agent: use posse.parallel_env(..., target='agent'), "
-    "or a scripted target_motion"
+    "{} is not possible in an environment of one agent: use posse.parallel_env(..., "
+    "target='agent'), or a scripted target_motion"
 )

@@ -1,4 +1,4 @@
-"""The worlds as PettingZoo environments: trackers are agents, and the target, if asked for."""
+"""PettingZoo environments: trackers, and optionally the target, are agents."""
 
 from __future__ import annotations
 
@@ -29,44 +29,44 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
     """A team of unicycle robots finds, follows and holds formation on one mobile target.
 
     **Agents**: ``tracker_0`` ... ``tracker_{N-1}``, and ``target_0`` where the target is an agent.
-    All act at once; none leaves before the end.
+    All act simultaneously until the end of the episode.
 
-    **Observation**: ``Box`` (F,) float32, own sensors, odometry and radio; its fields, in order,
+    **Observation**: ``Box`` (F,) float32: own sensors, odometry and radio; its fields, in order,
     are ``posse.observation_fields(scenario)``, and ``env.layout.views(observation)`` names them.
-    A ``target_0`` observes in the same layout and knows where the trackers are.
+    ``target_0`` has the same layout and observes the trackers without error.
 
-    **Action**: ``Box(-1, 1, (2 + message_size,))`` float32: speed (-1 is at rest, 1 the greatest),
-    turn rate (1 is the greatest to the left), message. With ``discrete_actions=True``
+    **Action**: ``Box(-1, 1, (2 + message_size,))`` float32: speed (-1 is at rest, 1 the maximum),
+    turn rate (1 is the maximum to the left), message. With ``discrete_actions=True``
     ``Discrete(15)``, the rows of :data:`posse.adapters.actions.MOTIONS`.
 
     **Reward**: the weighted sum of named terms, ``scenario.reward_weights``; for ``target_0`` the
     negative of the team's score.
 
     **Info**, for each agent, of every step: ``"score"`` of the team in [0, 1]; ``"reward_terms"``,
-    each term by name, unscaled; ``"working"``, where the scenario has trackers break; at the end
+    each term by name, unscaled; ``"working"``, where trackers may break; at the end
     ``"metrics"``, each metric of the episode by name (``posse.METRICS``).
 
-    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the world that is
-    the first of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
+    **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
+    world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
     ``options={"tracker_pose": (N, 3), "target_pose": (3,)}`` starts from these (x, y, θ).
 
     **End**: truncation after ``horizon`` steps; termination only with ``terminate_on_contact``.
 
-    **State**: ``env.state()`` is everything as one float32 vector; ``env.state_layout`` names it.
+    **State**: ``env.state()`` is the full state, a float32 vector; ``env.state_layout`` names it.
 
     Args:
-        scenario: Name of a scenario, or one.
-        target: ``"agent"`` makes the target an agent: ``target_motion="agent"``, shorter.
+        scenario: Name of a scenario, or a scenario.
+        target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
         discrete_actions: Whether actions are ``Discrete``.
-        max_cycles: Length of an episode in steps: another name for ``horizon``.
+        max_cycles: Length of an episode in steps; alias of ``horizon``.
         render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
-        seed: Of every random draw; ``None``: an arbitrary one.
+        seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Which world of the seed.
+        first_world: Index of the world within the seed.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown scenario or setting, or an impossible one.
+        ScenarioError: An unknown scenario, or an unknown or invalid setting.
         ValueError: An unknown split or render mode, a negative seed.
     """
 
@@ -114,11 +114,11 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         self._state_space: spaces.Box | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
-        """Return what an agent may observe; the same object at each call."""
+        """Return the observation space of an agent; the same object at each call."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
-        """Return what an agent may do; the same object at each call."""
+        """Return the action space of an agent; the same object at each call."""
         return self.action_spaces[agent]
 
     @property
@@ -128,13 +128,13 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
 
     @property
     def state_space(self) -> spaces.Box:
-        """What :meth:`state` may return."""
+        """Space of :meth:`state`."""
         if self._state_space is None:
             self._state_space = box(self.state_layout.bounds())
         return self._state_space
 
     def state(self) -> FloatArray:
-        """Return everything there is to know of the world, (S,) float32.
+        """Return the full state of the world, (S,) float32.
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -186,11 +186,11 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         score, name_terms = world.score, world.name_terms
         infos: _Infos = {
             agent: {"score": score, "reward_terms": name_terms(*values)}
-            # zip's default is right: as many of each, and this is the hot path.
+            # No strict=True: equal lengths, in the hot path.
             for agent, values in zip(agents, world.terms.tolist())  # noqa: B905
         }
         if self._breakable:
-            self._tell_who_works(infos)
+            self._report_working(infos)
         terminated, truncated = self._nobody.copy(), self._nobody.copy()
         if over:
             was_terminated, metrics = world.end()
@@ -209,13 +209,13 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             infos,
         )
 
-    def _tell_who_works(self, infos: _Infos) -> None:
+    def _report_working(self, infos: _Infos) -> None:
         working = [*self._world.working().tolist(), True]  # a target never breaks
         for info, works in zip(infos.values(), working, strict=False):
             info["working"] = works
 
     def check_action(self, agent: str, action: npt.ArrayLike) -> None:
-        """Raise what is wrong with an agent's action.
+        """Raise if an agent's action is invalid.
 
         Raises:
             ValueError: Of a wrong type or shape, not finite, or out of its space.
@@ -223,7 +223,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         self._world.actions.one(agent, action)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
+        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array".
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -236,7 +236,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
 
 
 def target_overrides(target: str | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the overrides with ``target="agent"`` written out."""
+    """Return the overrides with ``target="agent"`` resolved."""
     if target is None:
         return dict(overrides)
     if target != "agent":
@@ -253,7 +253,7 @@ def target_overrides(target: str | None, overrides: Mapping[str, Any]) -> dict[s
 
 
 class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):
-    """The agents in turns. A bad action is refused in its agent's own turn, not in the last."""
+    """AEC wrapper that checks an action in its agent's turn, not in that of the last agent."""
 
     def step(self, action: Any) -> None:
         agent = self.agent_selection
@@ -268,14 +268,14 @@ class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):
 
 
 class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
-    """:class:`TeamParallelEnv` in turns: nothing moves before the last agent has acted."""
+    """:class:`TeamParallelEnv` as AEC: the world advances once the last agent has acted."""
 
     def __init__(self, env: TeamParallelEnv) -> None:
         self._has_reset = self._has_updated = False
         super().__init__(_InTurns(env))
 
     def __getattr__(self, name: str) -> Any:
-        if name == "env":  # asked for by copy and pickle, before there is anything to look into
+        if name == "env":  # copy and pickle look it up before initialisation
             raise AttributeError(name)
         return super().__getattr__(name)
 
@@ -308,10 +308,10 @@ class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:
-    """Return a PettingZoo environment whose agents act at once: :class:`TeamParallelEnv`."""
+    """Return a PettingZoo parallel environment: :class:`TeamParallelEnv`."""
     return TeamParallelEnv(scenario, **settings)
 
 
 def env(scenario: str | Scenario = "constant", **settings: Any) -> TeamAECEnv:
-    """Return a PettingZoo environment whose agents act in turns: :class:`TeamAECEnv`."""
+    """Return a PettingZoo AEC environment: :class:`TeamAECEnv`."""
     return TeamAECEnv(TeamParallelEnv(scenario, **settings))

@@ -1,4 +1,4 @@
-"""Makes the environments known to Gymnasium and PettingZoo by their ids."""
+"""Registers the environments with Gymnasium and PettingZoo."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PETTINGZOO = "posse/track-v0"
 
 
 def register() -> None:
-    """Register every id, once however often it is called."""
+    """Register every id; repeated calls have no effect."""
     for name, (entry_point, vector_entry_point) in _GYMNASIUM.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point=entry_point, vector_entry_point=vector_entry_point)

@@ -1,4 +1,4 @@
-"""One world, and what the environments of one world share: seeds, the end, state, pictures."""
+"""Shared base of the single-world environments: seeds, end of episode, state, rendering."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ _OPTIONS: Final = ("tracker_pose", "target_pose")
 
 
 class SingleWorld:
-    """A batch of one world, with what an environment of one world needs around it.
+    """A batch of one world, for an environment of one world.
 
     Args:
-        scenario: What the world is like.
+        scenario: Scenario of the world.
         discrete_actions: Whether actions are ``Discrete``.
-        seed: Of every random draw; ``None``: one from the system's entropy, at the first reset.
+        seed: Seed of all random draws; ``None``: from the system's entropy, at the first reset.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Which world of the seed.
+        first_world: Index of the world within the seed.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
 
     Attributes:
         running: Whether a step is possible: after a reset, and before the end.
-        actions: What reads the actions for :attr:`advance`.
-        advance: Makes a control step with the actions that were read; returns 1 where the episode
-            is over: then :meth:`end` is called.
+        actions: Reader of the actions for :attr:`advance`.
+        advance: Performs a control step with the last actions read; returns 1 at the end of the
+            episode, after which :meth:`end` must be called.
         observations: (rows, F) of the last step; the next one overwrites them.
         rewards: (rows,) of the last step, likewise.
         terms: (rows, K) reward terms of the last step, likewise.
@@ -68,7 +68,7 @@ class SingleWorld:
             seed=0 if seed is None else seed,
             split=split,
             first_world=first_world,
-            autoreset="next_step",  # never comes to it: the end is looked after here
+            autoreset="next_step",  # not used: the end is handled here
             num_threads=1,
         )
         self.render_mode = render_mode
@@ -81,7 +81,7 @@ class SingleWorld:
         self._prepare()
 
     def _prepare(self) -> None:
-        # Made once: making a view or an array takes longer than reading it.
+        # Created once: creating a view takes longer than reading it.
         self._score = self.batch.worlds["score"]
         self.name_terms = namer(self.batch.term_names)
         self.actions = ActionReader(self.scenario, self._discrete)
@@ -116,13 +116,13 @@ class SingleWorld:
 
     @property
     def score(self) -> float:
-        """The present step's score."""
+        """Score of the current step."""
         score: float = self._score.item()
         return score
 
     @property
     def state_layout(self) -> StateLayout:
-        """What :meth:`state` is made of."""
+        """Layout of :meth:`state`."""
         if self._state_layout is None:
             self._state_layout = StateLayout(self.scenario)
         return self._state_layout
@@ -150,7 +150,7 @@ class SingleWorld:
         return first
 
     def check_running(self) -> None:
-        """Raise if a step is not possible now.
+        """Raise if no step is possible.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end of the episode.
@@ -160,7 +160,7 @@ class SingleWorld:
             raise ResetNeeded(f"step {when}: call reset() first")
 
     def end(self) -> tuple[bool, dict[str, float]]:
-        """Take note that the episode is over.
+        """Mark the episode as over.
 
         Returns:
             Whether it was terminated, rather than truncated, and every metric by name.
@@ -175,7 +175,7 @@ class SingleWorld:
         return working
 
     def state(self) -> FloatArray:
-        """Return everything there is to know of the world, (S,) float32.
+        """Return the full state of the world, (S,) float32.
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -186,7 +186,7 @@ class SingleWorld:
         return state
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the world: the picture (H, W, 3) in the mode "rgb_array", a window in "human".
+        """Draw the world: an image (H, W, 3) in the mode "rgb_array", a window in "human".
 
         Raises:
             ResetNeeded: Before the first reset.
@@ -208,7 +208,7 @@ class SingleWorld:
 
 
 def new_renderer(scenario: Scenario, render_mode: str) -> Any:
-    """Return a renderer; what draws is loaded when something is to be drawn, and not before."""
+    """Return a renderer; imports pygame lazily."""
     return importlib.import_module("posse.rendering.renderer").Renderer(scenario, render_mode)
 
 
@@ -221,17 +221,17 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 def frames_per_second(scenario: Scenario) -> int:
-    """Return how many pictures a second show the world in real time."""
+    """Return the frame rate that shows the world in real time."""
     return max(1, round(1 / scenario.control_step))
 
 
 def shortened(
     scenario: str | Scenario, horizon: int | None, overrides: Mapping[str, Any]
 ) -> Scenario:
-    """Return a scenario with overrides, its episodes cut to ``horizon`` steps unless that is None.
+    """Return a scenario with overrides, and ``horizon`` steps per episode unless that is None.
 
-    That is what ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium) mean. Where an
-    episode becomes shorter than ``settle_time``, that is cut to the episode's length.
+    For ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium). ``settle_time`` is
+    reduced to the episode's length where necessary.
     """
     changed = dict(overrides)
     if horizon is None:

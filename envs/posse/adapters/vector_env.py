@@ -1,4 +1,4 @@
-"""The worlds as Gymnasium vector environments: thousands of them, stepped by one call."""
+"""Gymnasium vector environments: many worlds, stepped by one call."""
 
 from __future__ import annotations
 
@@ -36,35 +36,34 @@ _Rewards = npt.NDArray[np.float64]
 
 
 class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
-    """``posse/Team-v0`` as a vector environment: E worlds, one agent drives the team in each.
+    """``posse/Team-v0`` as a vector environment: E worlds, one agent controls the team in each.
 
-    What a step means is as in :class:`posse.adapters.gymnasium_env.TeamEnv`, with an axis E in
-    front.
+    As :class:`posse.adapters.gymnasium_env.TeamEnv`, with a leading axis E.
     World i is world ``first_world + i`` of the seed, so ``reset(seed=s)`` gives E different worlds.
-    Infos have the form that ``gymnasium.vector.SyncVectorEnv`` gives them: for each entry an
-    array over the worlds, and beside it under ``"_" + name`` a mask of the worlds it is about.
+    Infos have the form of ``gymnasium.vector.SyncVectorEnv``: for each entry an array over the
+    worlds, and under ``"_" + name`` a mask of the worlds that have it.
 
     Args:
-        scenario: Name of a scenario, or one.
+        scenario: Name of a scenario, or a scenario.
         num_envs: E, at least 1.
-        autoreset_mode: What happens when an episode ends, a ``gymnasium.vector.AutoresetMode`` or
-            its value. ``NEXT_STEP``: the next step starts another, its action is ignored;
-            ``SAME_STEP``: another starts at once, the last observation is ``info["final_obs"]``;
+        autoreset_mode: Behaviour at the end of an episode, a ``gymnasium.vector.AutoresetMode`` or
+            its value. ``NEXT_STEP``: the next step starts a new one and ignores its action;
+            ``SAME_STEP``: a new one starts at once, the last observation is ``info["final_obs"]``;
             ``DISABLED``: the caller resets, with ``options={"reset_mask": mask}``.
-        max_episode_steps: Length of an episode: another name for ``horizon``.
+        max_episode_steps: Length of an episode; alias of ``horizon``.
         discrete_actions: Whether actions are discrete.
         render_mode: ``"human"`` (a window with world 0), ``"rgb_array"`` or ``None``.
-        seed: Of every random draw; ``None``: an arbitrary one.
+        seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the first world.
         num_threads: Threads that step the worlds; never changes a result.
-        own_kernel: Whether to compile a kernel for this scenario alone, which is about a third
-            faster; never changes a result.
+        own_kernel: Whether to compile a kernel for this scenario, about a third faster; never
+            changes a result.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown scenario or setting, or an impossible one.
-        ValueError: Anything else that is not possible; the message says what is.
+        ScenarioError: An unknown scenario, or an unknown or invalid setting.
+        ValueError: Any other invalid argument; the message states the valid range.
     """
 
     single_env: ClassVar[type[TeamEnv]] = TeamEnv
@@ -132,7 +131,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         """Start episodes, and return the observations of all worlds.
 
         Args:
-            seed: One number: start over from episode 0 of this seed; ``None``: each world's next
+            seed: One number: restart from episode 0 of this seed; ``None``: each world's next
                 episode.
             options: ``"reset_mask"`` (E,) bool: only these worlds; ``"tracker_pose"`` and
                 ``"target_pose"``: start from these, as in :meth:`posse.Batch.reset`.
@@ -142,7 +141,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         """
         if isinstance(seed, (list, tuple)):
             raise ValueError(
-                "seed must be one number, from which every world gets draws of its own; got a "
+                "seed must be one number, from which the seeds of all worlds are derived; got a "
                 f"{type(seed).__name__} of {len(seed)}"
             )
         fresh = seed
@@ -205,7 +204,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         if self.scenario.breaks:
             entries["working"] = last[:, :, self._works_at] != 0
         if self.autoreset_mode != AutoresetMode.SAME_STEP or "final_obs" not in found:
-            # A world that has just been reset has nothing to tell.
+            # Worlds that have just been reset have no info.
             infos = _masked(entries, self.batch.worlds["step"] > 0)
             if "metrics" in found:
                 infos.update(_masked({"metrics": found["metrics"]}, ended))
@@ -219,7 +218,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         infos["final_info"], infos["_final_info"] = final, ended.copy()
         return infos
 
-    # What differs between a team and a single tracker.
+    # Overridden for a single tracker.
 
     def _options(self, options: dict[str, Any] | None) -> dict[str, Any] | None:
         return options

@@ -1,10 +1,10 @@
 """The engine on an NVIDIA GPU: the same functions as on the CPU, compiled by numba-cuda.
 
 One thread steps one world. State, actions, observations, rewards and flags stay on the device.
-Imported only when ``device="cuda"`` is asked for.
+Imported only for ``device="cuda"``.
 
-With ``NUMBA_ENABLE_CUDASIM=1 NUMBA_DISABLE_JIT=1`` numba simulates the device in plain Python, very
-slowly: enough to test with, on a machine that has none.
+With ``NUMBA_ENABLE_CUDASIM=1 NUMBA_DISABLE_JIT=1`` numba simulates the device in plain Python,
+slowly, for tests on machines without a GPU.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if not _CONFIG.ENABLE_CUDASIM and importlib.util.find_spec("numba_cuda") is None
         "pip install 'posse[cuda]'"
     )
 
-import numba.cuda  # noqa: E402 (only now: an older numba has one of its own)
+import numba.cuda  # noqa: E402 (after the check: older versions of numba include numba.cuda)
 
 cuda: Final[Any] = numba.cuda
 _SIMULATED: Final = bool(_CONFIG.ENABLE_CUDASIM)
@@ -58,10 +58,10 @@ DeviceArray = Any
 without a copy (``torch.as_tensor(array, device="cuda")``), and ``copy_to_host()``."""
 
 _THREADS: Final = 32
-"""A block. Nothing is shared in one, so the least there is spreads the worlds best."""
+"""Threads per block. Blocks share nothing, so the smallest size spreads worlds best."""
 
-# What the kernels report: the flat position of the first action that is not in [-1, 1], the first
-# world that is over and waits for a reset, and how many worlds' episodes are over.
+# Reported by the kernels: the flat position of the first action outside [-1, 1], the first world
+# that waits for a reset, and the number of worlds whose episode is over.
 _BAD_ACTION: Final = 0
 _WAITING: Final = 1
 _OVER: Final = 2
@@ -75,9 +75,9 @@ _ONE: Final = np.float32(1.0)
 def _check(
     world: Records, actions: FloatArray, clipped: FloatArray, report: DeviceArray, disabled: bool
 ) -> None:
-    """Clip actions, which rounding may have carried out of [-1, 1], and write them to ``clipped``.
+    """Clip actions outside [-1, 1] by rounding, and write them to ``clipped``.
 
-    Report those farther out and, with autoreset disabled, worlds that are over.
+    Report actions farther out and, with autoreset disabled, worlds that are over.
     """
     e = cuda.grid(1)
     if e == 0:
@@ -112,12 +112,12 @@ def _stepping(parts: Parts) -> Any:
         orders: npt.NDArray[np.uint8],
         report: DeviceArray,
     ) -> None:
-        """Do what each world is ordered to; nothing where there is something to complain of."""
+        """Execute the order of each world, unless an error was reported."""
         e = cuda.grid(1)
         if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
             scratch = cuda.local.array(1, SCRATCH_FOR_ONE)
             if _SIMULATED:
-                scratch[:] = 0  # numpy would warn of what lies in lanes that nobody looks at
+                scratch[:] = 0  # suppress warnings for unused lanes
             s = scratch[0]
             writers = Writers(own, mate, reward, empty, width, mate_width)
             rules = Rules(draw_motion, set_goal, sees, measure)
@@ -144,7 +144,7 @@ def _choose(
     split: int,
     first_world: int,
 ) -> None:
-    """Order worlds to start an episode: the first of a seed, or each its next."""
+    """Order worlds to start an episode: the first of a seed, or the next."""
     e = cuda.grid(1)
     if e < len(world):
         orders[e] = LOOK
@@ -161,7 +161,7 @@ def _choose(
 
 
 class _DeviceResults:
-    """What one pass over the worlds writes, on the device."""
+    """Output arrays of one pass, on the device."""
 
     def __init__(
         self, observation_shape: tuple[int, int, int], term_names: tuple[str, ...]
@@ -176,27 +176,27 @@ class _DeviceResults:
         self.reward_terms = {name: self.terms[:, :, k] for k, name in enumerate(term_names)}
 
     def arrays(self) -> Results:
-        """Return the arrays that the kernels of a CPU write, too."""
+        """Return the arrays that CPU kernels write, too."""
         return Results(self.observations, self.rewards, self.terms, self.flags)
 
 
 class CudaBatch(Batch):
     """A batch of E worlds on an NVIDIA GPU.
 
-    The same arguments as :class:`posse.Batch`, and the same worlds for the same seeds. Every random
-    draw is the same to the bit; what is computed in float32 differs by rounding, since a GPU
-    contracts ``a * b + c`` and has sines and cosines of its own.
+    Same arguments as :class:`posse.Batch`, and the same worlds for the same seeds. Random draws are
+    bit-identical; float32 results differ by rounding, since a GPU contracts ``a * b + c`` and
+    implements sine and cosine differently.
 
-    What :meth:`reset` and :meth:`step` return lies in device arrays of numba, which torch takes
-    without a copy: ``torch.as_tensor(observations, device="cuda")``. They are **overwritten by the
-    second call after**: there are two sets of them, used in turn. Copy what is kept for longer.
+    :meth:`reset` and :meth:`step` return numba device arrays, which torch reads without a copy:
+    ``torch.as_tensor(observations, device="cuda")``. There are two sets, used alternately: results
+    are **overwritten by the second call after**. Copy them to keep them longer.
 
-    Everything runs on the legacy default stream of the current CUDA device, as torch's work does
-    unless told otherwise. The first reset of a process compiles for about a minute.
+    Everything runs on the legacy default stream of the current CUDA device, which is torch's
+    default. The first reset of a process compiles for about a minute.
 
     Raises:
         ImportError: numba-cuda is not installed.
-        RuntimeError: There is no GPU that it can use.
+        RuntimeError: There is no usable GPU.
         ValueError: As :class:`posse.Batch`; ``num_threads`` or ``own_kernel`` given.
     """
 
@@ -210,7 +210,7 @@ class CudaBatch(Batch):
         super().__init__(scenario, num_worlds, **settings)
 
     def _prepare(self) -> None:
-        """Put the batch onto the device; the host's arrays are a mirror, up to date on demand."""
+        """Copy the batch to the device; the host arrays are updated on demand."""
         super()._prepare()
         self._advance = _stepping(parts_for(self.scenario))
         self._device_tables: Any = Tables(*map(cuda.to_device, self._tables))
@@ -241,38 +241,38 @@ class CudaBatch(Batch):
 
     @property
     def state(self) -> dict[str, npt.NDArray[Any]]:
-        """Every state array by name, as now, on the host; they do not follow the worlds."""
+        """Every state array by name: copies on the host."""
         return self.arrays.copy().by_name()
 
     @property
     def worlds(self) -> Records:
-        """The worlds' records, (E,) :func:`posse.rules.state.world_record`, as now, on the host."""
+        """The worlds' records, (E,) :func:`posse.rules.state.world_record`: copies on the host."""
         records: Records = self._device_arrays.world.copy_to_host()
         return records
 
     @property
     def arrays(self) -> WorldArrays:
-        """The arrays as they are now, on the host; the worlds do not follow them."""
+        """The state arrays: copies on the host."""
         self._download()
         return self._arrays
 
     @property
     def score(self) -> DeviceArray:
-        """(E,) the score of the present step, as the last step or reset left it."""
+        """(E,) the score of the current step."""
         return self._last.score
 
     @property
     def terminated(self) -> DeviceArray:
-        """(E,) whether the last step or reset left the world's episode terminated."""
+        """(E,) whether the episode is terminated."""
         return self._last.terminated
 
     @property
     def truncated(self) -> DeviceArray:
-        """(E,) whether the last step or reset left the world's episode truncated."""
+        """(E,) whether the episode is truncated."""
         return self._last.truncated
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Return every metric by name, (E,), of the episodes as they stand, on the host."""
+        """Return every metric of the current episodes by name, (E,), on the host."""
         return episode_metrics(self.scenario, self.worlds)
 
     def save(self) -> Snapshot:
@@ -285,13 +285,13 @@ class CudaBatch(Batch):
         return Snapshot(self.scenario, self.arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> DeviceArray:
-        """Go back to a snapshot and return its observations."""
+        """Restore a snapshot and return its observations."""
         super().restore(snapshot)
         self._upload()
         return self._pass(self._all_look).observations
 
     def observe(self) -> DeviceArray:
-        """Return the observations (E, rows, F) of the worlds as they stand."""
+        """Return the current observations (E, rows, F)."""
         if not self._started:
             raise ResetNeeded("observe before reset: call reset() first")
         return self._pass(self._all_look).observations
@@ -301,13 +301,13 @@ class CudaBatch(Batch):
     ) -> DeviceArray:
         """Start an episode in every world and return its observations, as :class:`posse.Batch`.
 
-        ``options["reset_mask"]`` may lie on the device. Start poses go by way of the host: the
-        whole state is copied there and back.
+        ``options["reset_mask"]`` may be on the device. With start poses the whole state is copied
+        to the host and back.
         """
         options = options_of(options)
         mask = _as_device_array(options.get("reset_mask"))
         if mask is not None:
-            # On the device it is not looked into: that would wait for it.
+            # Not checked on the device, which would synchronise.
             options["reset_mask"] = mask.copy_to_host() if not self._started else None
             if mask.dtype != np.bool_ or tuple(mask.shape) != (self.num_worlds,):
                 raise ValueError(
@@ -334,16 +334,16 @@ class CudaBatch(Batch):
         Args:
             actions: (E, rows, 2 + message_size) numbers in [-1, 1]. A contiguous float32 array on
                 the device (a torch tensor, or anything else with ``__cuda_array_interface__``) is
-                read where it is; anything else is copied there.
-            check: Whether to look for actions that are not in [-1, 1] and for episodes that ended,
-                which waits for the device. ``False``, in the mode "next_step": the step is only
-                queued, actions are taken as they are, and ``infos`` holds no metrics. The other
-                modes always wait.
+                read in place; anything else is copied.
+            check: Whether to check for actions outside [-1, 1] and for ended episodes, which
+                synchronises with the device. ``False``, in the mode "next_step": the step is only
+                queued, actions are not checked, and ``infos`` holds no metrics. The other modes
+                always synchronise.
 
         Returns:
-            What :meth:`posse.Batch.step` returns, on the device. ``infos["metrics"]`` and
-            ``infos["_metrics"]`` alone are numpy arrays; the worlds' records are copied to the host
-            for them in a step in which episodes end.
+            What :meth:`posse.Batch.step` returns, on the device. Only ``infos["metrics"]``
+            and ``infos["_metrics"]`` are numpy arrays; for them, the worlds' records are copied to
+            the host in steps in which episodes end.
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
@@ -373,7 +373,7 @@ class CudaBatch(Batch):
         return observations, done.rewards, done.terminated, done.truncated, infos
 
     def stepper(self, *arrays: FloatArray) -> Any:
-        """Not offered: it is for environments of one world, which a GPU would only slow down."""
+        """Not available: environments of one world run on the CPU."""
         raise NotImplementedError("a batch on the GPU has no stepper(): call step()")
 
     def _take(self, actions: Any) -> DeviceArray:
@@ -392,7 +392,7 @@ class CudaBatch(Batch):
         return array
 
     def _wait(self, actions: DeviceArray) -> int:
-        """Return how many worlds' episodes are over, or raise what kept the step from being."""
+        """Return how many episodes are over, or raise the error that prevented the step."""
         bad, waiting, over = (int(number) for number in self._report.copy_to_host())
         if bad == _NONE and waiting == _NONE:
             return over
@@ -414,12 +414,12 @@ class CudaBatch(Batch):
         return self._pass(self._chosen).observations
 
     def _pass(self, orders: DeviceArray) -> _DeviceResults:
-        """Do what each world is ordered to, which is no step, and return the results."""
+        """Execute orders other than a step, and return the results."""
         self._launch_advance(self._device_actions, orders)
         return self._turn()
 
     def _turn(self) -> _DeviceResults:
-        """Return what the last pass wrote; the next one writes elsewhere."""
+        """Return the results of the last pass; the next one writes to the other set."""
         self._last, self._next = self._next, next(self._results)
         return self._last
 
@@ -436,20 +436,20 @@ class CudaBatch(Batch):
         kernel[-(-self.num_worlds // _THREADS), _THREADS](*arguments)
 
     def _download(self) -> None:
-        """Bring the host's arrays up to date."""
+        """Update the host arrays."""
         for device, host in zip(self._device_arrays, self._arrays, strict=True):
             if host.size:
                 device.copy_to_host(host)
 
     def _upload(self) -> None:
-        """Bring the device's arrays up to date."""
+        """Update the device arrays."""
         for device, host in zip(self._device_arrays, self._arrays, strict=True):
             if host.size:
                 device.copy_to_device(host)
 
 
 def check_device() -> None:
-    """Raise what keeps worlds from being stepped on a GPU, with what to do about it."""
+    """Raise if the GPU cannot be used, with the reason and the fix."""
     if _CONFIG.ENABLE_CUDASIM:
         if not _CONFIG.DISABLE_JIT:
             raise RuntimeError(
@@ -471,9 +471,9 @@ def check_device() -> None:
 
 
 def _as_in_a_kernel(argument: Any) -> Any:
-    """Return an argument as the simulated kernel takes it: the simulator forgets arrays in tuples.
+    """Return an argument for the simulated kernel, since the simulator skips arrays in tuples.
 
-    There, an array's fields are attributes of its elements.
+    There, fields are attributes of an array's elements.
     """
     if not isinstance(argument, tuple):
         return argument
@@ -483,7 +483,7 @@ def _as_in_a_kernel(argument: Any) -> Any:
 
 
 def _as_device_array(array: Any) -> DeviceArray | None:
-    """Return an array that lies on the device as numba's, without a copy; None for any other."""
+    """Return a device array as numba's, without a copy; None for any other."""
     if getattr(array, "__cuda_ndarray__", False):  # numba's own; the simulator's too
         return array
     if hasattr(array, "__cuda_array_interface__"):

@@ -1,4 +1,4 @@
-"""One world, stepped: the order in which everything happens in a control step.
+"""A control step of one world, and the kernels that step all worlds.
 
 actions → faults → the target decides → physics (target first, then trackers by number) → the slot
 frame follows → contacts → sensing → radio → score → reward → end → observation.
@@ -54,7 +54,7 @@ _ONE: Final = np.float32(1.0)
 
 
 class Tables(NamedTuple):
-    """What is the same for all worlds of a batch."""
+    """Constants of all worlds of a batch."""
 
     config: Records
     """(1,) :data:`posse.rules.state.CONFIG`."""
@@ -67,7 +67,7 @@ class Tables(NamedTuple):
 
 
 class Results(NamedTuple):
-    """What a pass over the worlds writes."""
+    """Outputs of a pass over the worlds."""
 
     observations: FloatArray
     """(E, rows, F)."""
@@ -81,11 +81,11 @@ class Results(NamedTuple):
 
 @compiled
 def sense(c: Record, worlds: WorldArrays, e: int, rules: Rules, scratch: Record) -> None:
-    """Let every tracker of world e look for the target, then tell and hear."""
+    """Target sensors and radio of every tracker of world e."""
     w, trackers = worlds.world[e], worlds.tracker[e]
     seeing = look(c, w, trackers, rules.sees, rules.measure, scratch)
     if c.perfect_radio:
-        if seeing < c.num_trackers:  # else nobody has anything to hear
+        if seeing < c.num_trackers:  # else every tracker has a fix of this step
             share_fixes(c, trackers)
     else:
         broadcast, message = worlds.broadcast[e], worlds.message[e]
@@ -104,7 +104,7 @@ def begin(
     message: FloatArray,
     clear_sums: Any,
 ) -> None:
-    """Bring a world whose poses are set to the start of an episode, but for what is sensed."""
+    """Initialise an episode of a world whose poses are set, except for sensing."""
     rest(c, w, trackers)
     clear_sums(w)
     heard["step"][:] = -1
@@ -125,7 +125,7 @@ def reward(
 ) -> None:
     """Write the reward of every agent (rows,) and its terms (rows, K).
 
-    A target that is an agent gets the negative of the team's score.
+    A target agent gets the negative of the team's score.
     """
     for i in range(c.num_trackers):
         rewards[i] = writers.reward(c, w, trackers[i], weights, terms[i])
@@ -138,7 +138,7 @@ def reward(
 def act(
     c: Record, worlds: WorldArrays, e: int, actions: FloatArray, rules: Rules, scratch: Record
 ) -> None:
-    """Move everything in world e by a control step, and say what the actions say."""
+    """Move all robots of world e by a control step, and store the messages."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
     motion(c, w, trackers, worlds.obstacle[e], actions, rules.set_goal, scratch)
@@ -164,7 +164,7 @@ def end_step(c: Record, w: Record, trackers: Records, slots: Records, add_to_sum
 
 @compiled
 def fetch_all(array: npt.NDArray[Any]) -> None:
-    """Have the processor bring an array that is soon to be written to into its cache."""
+    """Prefetch an array that is written soon."""
     for offset in range(0, array.size * array.itemsize, LINE):
         fetch(array, offset)
 
@@ -175,9 +175,9 @@ START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
 LINE: Final = 64
-"""Bytes in a line of the cache."""
+"""Bytes of a cache line."""
 FETCHED: Final = MOST_IN_TEAM
-"""Up to this team size, what is fetched for a world has room in the first cache."""
+"""Greatest team size whose prefetched data fit in the first-level cache."""
 
 
 @compiled
@@ -194,7 +194,7 @@ def advance_worlds(
     writers: Writers,
     scratch: Record,
 ) -> int:
-    """Do what worlds are ordered to, ``count`` from ``first`` on; return how many are over.
+    """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
     STEP               a control step; or, where the episode is over, the start of the next one
@@ -211,7 +211,7 @@ def advance_worlds(
         observations, flags = results.observations[e], results.flags
         rewards, terms = results.rewards[e], results.terms[e]
         if count > 1 and trackers.shape[0] <= FETCHED:
-            fetch_all(observations)  # written below, and after the last of these worlds
+            fetch_all(observations)  # written below, after the last of these worlds
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
@@ -266,9 +266,9 @@ def tables_of(scenario: Scenario) -> Tables:
 
 
 def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario, or of the one whose tables these are.
+    """Return the kernel that steps worlds of any scenario, or of the one of these tables.
 
-    Its configuration, slots and beams become constants in the code.
+    The configuration, slots and beams of the latter become constants in the code.
     """
     own_fields, mate, terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
@@ -313,9 +313,9 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
 @functools.cache
 def kernel_of(parts: Parts) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario that these parts are enough for.
+    """Return the kernel that steps worlds of any scenario that consists of these parts.
 
-    It does what each world is ordered to, for the worlds of a thread: the one loop over a batch.
+    It executes the orders of a thread's worlds, the only loop over a batch.
     See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are
     over.
     """
@@ -326,8 +326,8 @@ def kernel_of(parts: Parts) -> Callable[..., int]:
 def own_kernel(scenario: Scenario) -> Callable[..., int]:
     """Return :data:`advance` for one scenario alone.
 
-    The scenario is part of the code: loops over trackers, slots and beams have known lengths, and
-    what it has none of is left out. Results are the same, bit by bit. Each scenario's kernel is
+    The scenario is constant in the code: loops over trackers, slots and beams have known lengths,
+    and unused parts are removed. Results are bit-identical. Each scenario's kernel is
     compiled by itself, and kept on disk as any other.
     """
     return _stepping(parts_for(scenario), tables_of(scenario))
@@ -343,20 +343,20 @@ def first_over(world: Records) -> int:
 
 
 MOST_ACTION: Final = np.float32(1 + 1e-6)
-"""Actions up to this are taken for the bound, 1: no more than rounding carried them past it."""
+"""Actions up to this are clipped to 1, since rounding may exceed it."""
 IN_BOX: Final = -1
 TO_CLIP: Final = -2
 
 
 @kernel
 def bad_action(actions: FloatArray) -> int:
-    """Return the flat position of the first action that is no number in [-1, 1], even to rounding.
+    """Return the flat position of the first action that is outside [-1, 1], beyond rounding.
 
     :data:`IN_BOX` if there is none; :data:`TO_CLIP` if some lie outside by rounding.
     """
     flat = actions.reshape(-1)
     outside = 0
-    for k in range(len(flat)):  # without a way out, so that many are looked at at once
+    for k in range(len(flat)):  # without early exit, so that the loop is vectorised
         outside += not ((flat[k] >= -_ONE) & (flat[k] <= _ONE))
     if outside == 0:
         return IN_BOX

@@ -1,1 +1,1 @@
-"""Pictures of a world: the window, and frames."""
+"""Rendering of a world: frames and a window."""

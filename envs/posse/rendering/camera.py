@@ -1,8 +1,8 @@
-"""Where the picture looks: world metres to pixels.
+"""The view of a frame: world metres to pixels.
 
-A walled arena is shown whole. On the open plane the camera follows the robots: it holds them all,
-keeps its scale while it can, and moves smoothly in *simulated* time, so that what it shows is a
-function of the states drawn and of nothing else.
+An arena is shown whole. On the open plane the view follows the robots: it contains all of them,
+changes its scale rarely, and moves smoothly in *simulated* time, so that it depends only on the
+states drawn.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 Points = npt.NDArray[np.float64]
 
-_MARGIN: Final = 0.7  # m, between the outermost robot and the picture's edge
-_LEAST_SPAN: Final = 8.0  # m, across the shorter side: a team in formation with room around it
-_LEVEL: Final = 1.25  # the scales it settles on lie this factor apart
+_MARGIN: Final = 0.7  # m, between the outermost robot and the edge
+_LEAST_SPAN: Final = 8.0  # m, along the shorter side: a team in formation, with margin
+_LEVEL: Final = 1.25  # ratio of successive scales
 _ZOOM_TIME: Final = 1.0  # s, time constant of a change of scale
-_FOLLOW_TIME: Final = 0.8  # s, time constant of a change of place
+_FOLLOW_TIME: Final = 0.8  # s, time constant of a change of position
 
 
 class Camera:
@@ -30,8 +30,8 @@ class Camera:
         arena: Side of the walled square, m; ``inf``: the open plane.
 
     Attributes:
-        centre: What is in the middle of the view, (2,) m.
-        scale: Pixels a metre.
+        centre: Centre of the view, (2,) m.
+        scale: Pixels per metre.
     """
 
     def __init__(self, viewport: tuple[int, int, int, int], arena: float) -> None:
@@ -40,7 +40,7 @@ class Camera:
         self.reset()
 
     def reset(self) -> None:
-        """Forget where it looked: the next :meth:`follow` jumps."""
+        """Reset the view: the next :meth:`follow` does not smooth."""
         self.centre: Points = np.zeros(2)
         self._level: int | None = None
         self.scale = 1.0
@@ -48,16 +48,16 @@ class Camera:
             self.scale = min(self.viewport[2:]) / (self._arena + 2 * _MARGIN)
 
     def follow(self, points: Points, time: float) -> None:
-        """Move on towards a view that holds every point (K, 2) m, ``time`` s after the last one."""
+        """Move towards a view that contains all points (K, 2) m, ``time`` s after the last call."""
         if math.isfinite(self._arena):
             return
         lowest, highest = points.min(axis=0), points.max(axis=0)
         middle = (lowest + highest) / 2
         pixels = np.array(self.viewport[2:], np.float64)
-        least = _LEAST_SPAN / min(pixels)  # m a pixel
+        least = _LEAST_SPAN / min(pixels)  # m per pixel
         needed = max(least, float(((highest - lowest + 2 * _MARGIN) / pixels).max()))
         level = math.ceil(math.log(needed / least, _LEVEL) - 1e-9)
-        # It widens at once when it has to, and narrows only when there is a level to spare.
+        # Zoom out at once when necessary; zoom in only by a full level.
         first = self._level is None
         if self._level is None or level > self._level or level < self._level - 1:
             self._level = level
@@ -79,6 +79,6 @@ class Camera:
         return np.stack([x, y], axis=-1)
 
     def bounds(self) -> tuple[Points, Points]:
-        """Return the lower left and the upper right corner of what is in view, (2,) m each."""
+        """Return the lower left and the upper right corner of the view, (2,) m each."""
         half = np.array(self.viewport[2:], np.float64) / (2 * self.scale)
         return self.centre - half, self.centre + half

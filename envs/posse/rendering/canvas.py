@@ -1,6 +1,6 @@
-"""A surface to draw on in pixels, anti-aliased: drawn larger than it is shown, then averaged down.
+"""An anti-aliased surface: drawn at a higher resolution, then averaged down.
 
-The only part of the drawing that knows pygame. It needs no display, so frames are drawn headless.
+The only module of the drawing that uses pygame. It needs no display.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ Point = Sequence[float] | npt.NDArray[np.float64]
 
 @cache
 def _font(size: int) -> pygame.font.Font:
-    """Return the typeface that pygame carries along, so that frames agree on every machine."""
+    """Return pygame's bundled font, so that frames are equal on every machine."""
     pygame.font.init()
     return pygame.font.Font(None, size)
 
 
 class Canvas:
-    """What a frame is drawn on. Coordinates and lengths are pixels of the finished frame.
+    """The surface of a frame. Coordinates and lengths are in pixels of the finished frame.
 
     Args:
         size: Width and height, px.
@@ -48,11 +48,11 @@ class Canvas:
         self._frame = pygame.Surface(size, 0, 32)
 
     def clip(self, box: tuple[int, int, int, int] | None) -> None:
-        """Draw only within (left, top, width, height) from now on; ``None``: everywhere."""
+        """Clip drawing to (left, top, width, height); ``None``: no clipping."""
         self._large.set_clip(None if box is None else tuple(v * _OVERSAMPLED for v in box))
 
     def fill(self, colour: Colour) -> None:
-        """Fill all that the clip leaves open."""
+        """Fill the clipped area."""
         self._large.fill(colour)
 
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
@@ -93,7 +93,7 @@ class Canvas:
             pygame.gfxdraw.filled_polygon(self._large, whole, (*colour, round(255 * opacity)))
 
     def dashes(self, start: Point, end: Point, width: float, dash: float, colour: Colour) -> None:
-        """Draw a broken line: strokes ``dash`` long, as far apart."""
+        """Draw a dashed line, strokes and gaps of length ``dash``."""
         (x0, y0), (x1, y1) = start, end
         length = math.hypot(x1 - x0, y1 - y0)
         for k in range(math.ceil(length / (2 * dash))):
@@ -108,7 +108,7 @@ class Canvas:
     def text(
         self, text: str, place: tuple[float, float], size: float, colour: Colour, anchor: float = 0
     ) -> float:
-        """Write a line; return its width, px.
+        """Write a line of text; return its width, px.
 
         ``place`` is the middle of its height at its left end (``anchor`` 0), its centre (0.5) or
         its right end (1).
@@ -120,7 +120,7 @@ class Canvas:
         return width / _OVERSAMPLED
 
     def finish(self) -> pygame.Surface:
-        """Return the frame; it holds until the next one is finished."""
+        """Return the frame; valid until the next call."""
         pygame.transform.smoothscale(self._large, self.size, self._frame)
         return self._frame
 
@@ -128,11 +128,11 @@ class Canvas:
         return float(point[0]) * _OVERSAMPLED, float(point[1]) * _OVERSAMPLED
 
     def _is_near(self, x: float, y: float) -> bool:
-        """Say whether a place is near enough to the canvas for pygame's 16-bit coordinates."""
+        """Return whether a point is within the range of pygame's 16-bit coordinates."""
         return abs(x) < _FARTHEST and abs(y) < _FARTHEST
 
     def _in_reach(self, place: tuple[float, float], radius: float) -> bool:
-        """Say whether any of a disc is on the canvas: far ones overflow pygame's integers."""
+        """Return whether a disc overlaps the canvas: far ones overflow pygame's integers."""
         reach = radius * _OVERSAMPLED + 1
         width, height = self._large.get_size()
         x, y = place

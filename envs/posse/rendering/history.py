@@ -1,4 +1,4 @@
-"""What a picture keeps of the moments before: trails, and contacts that began a moment ago."""
+"""History shown in a frame: trails and recent contacts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _FLASH_TIME: Final = 0.8  # s
 
 @dataclass(frozen=True)
 class Mark:
-    """Where the robots were."""
+    """Past positions of the robots."""
 
     position: Floats
     """(N + 1, 2) m, the target last."""
     freshness: float
-    """1: now; 0: so long ago that the trail ends."""
+    """1: now; 0: end of the trail."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Flash:
     position: Floats
     """(2,) of the tracker that touched something, m."""
     age: float
-    """0: now; 1: so long ago that it is no longer drawn."""
+    """0: now; 1: no longer drawn."""
 
 
 class History:
-    """The last seconds of an episode, as far as they were noted. Starts over with each episode."""
+    """The recorded last seconds of an episode. Cleared at the start of an episode."""
 
     def __init__(self) -> None:
         self._episode: tuple[int, ...] = ()
@@ -44,9 +44,9 @@ class History:
         self._step_time = 0.0
 
     def note(self, scene: Scene) -> float | None:
-        """Take note of a moment; return the time since the last one, s, or None in a new episode.
+        """Record a state; return the time since the last one, s, or None in a new episode.
 
-        A moment noted twice counts once; one before the last (a restored batch) starts over.
+        A state recorded twice counts once; an earlier one (a restored batch) clears the history.
         """
         self._step_time = scene.scenario.control_step
         marks, last = self._marks, self._marks[-1][0] if self._marks else -1
@@ -67,7 +67,7 @@ class History:
         return None if begun else (scene.step - last) * self._step_time
 
     def trail(self) -> list[Mark]:
-        """Return where the robots were, oldest first."""
+        """Return past positions, oldest first."""
         return [Mark(place, 1 - self._age(step) / _TRAIL_TIME) for step, place in self._marks]
 
     def flashes(self) -> list[Flash]:
@@ -78,7 +78,7 @@ class History:
         ]
 
     def _is_close(self, marks: list[tuple[int, Floats]]) -> bool:
-        """Say whether the last mark is too close to the one before to be worth keeping."""
+        """Return whether the last mark is too close to the one before to be kept."""
         if len(marks) < 2:
             return False
         return (marks[-1][0] - marks[-2][0]) * self._step_time < _MARK_TIME - 1e-9

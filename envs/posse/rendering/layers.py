@@ -1,4 +1,4 @@
-"""What a frame is made of, from the ground up: one function a layer, one list that orders them."""
+"""The layers of a frame: one function each, and a list in drawing order."""
 
 from __future__ import annotations
 
@@ -40,33 +40,33 @@ from posse.rendering.style import (
 if TYPE_CHECKING:
     from posse.rendering.canvas import Canvas
 
-_LEAST_ROBOT: Final = 5.0  # points; robots are drawn no smaller, however far away
-_VIEW_SHOWN: Final = 1.5  # m; how far a field of view of unlimited range is drawn
+_LEAST_ROBOT: Final = 5.0  # points; least radius of a drawn robot
+_VIEW_SHOWN: Final = 1.5  # m; drawn range of a field of view with unlimited range
 _GRID_STEP: Final = 2.0  # m
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """All that a layer may draw from, and what it draws on."""
+    """Input and canvas of a layer."""
 
     scene: Scene
     camera: Camera
     canvas: Canvas
     point: float
-    """Pixels in a point."""
+    """Pixels per point."""
     trail: Sequence[Mark]
-    """Where the robots were, oldest first."""
+    """Past positions, oldest first."""
     flashes: Sequence[Flash]
-    """Contacts that began a moment ago."""
+    """Recent contacts."""
 
     @property
     def radius(self) -> float:
-        """Of a robot's disc, px."""
+        """Radius of a robot's disc, px."""
         return max(self.scene.scenario.robot_radius * self.camera.scale, _LEAST_ROBOT * self.point)
 
 
 def _floor(d: Drawing) -> tuple[Floats, Floats]:
-    """Return two corners (2,) m of the floor: the arena, or as much of the plane as is in view."""
+    """Return two corners (2,) m of the floor: the arena, or the visible part of the plane."""
     arena = d.scene.scenario.arena
     if math.isfinite(arena):
         return np.full(2, -arena / 2), np.full(2, arena / 2)
@@ -81,9 +81,9 @@ def ground(d: Drawing) -> None:
 
 
 def grid(d: Drawing) -> None:
-    """Draw faint crosses two metres apart, by which the eye tells how far and how fast.
+    """Draw faint crosses two metres apart, as a reference for distance and speed.
 
-    Lines would change every row of a film whose view moves; crosses keep its file small.
+    Grid lines would change every row of a video with a moving view; crosses compress better.
     """
     low, high = _floor(d)
     arm = 4 * d.point
@@ -98,7 +98,7 @@ def grid(d: Drawing) -> None:
 
 
 def walls(d: Drawing) -> None:
-    """Draw the walls of an arena, outside of where robots can be."""
+    """Draw the walls of an arena, outside the reachable area."""
     arena = d.scene.scenario.arena
     if not math.isfinite(arena):
         return
@@ -115,7 +115,7 @@ def walls(d: Drawing) -> None:
 
 
 def sensing(d: Drawing) -> None:
-    """Tint what the target sensors cover, where their range or field of view is limited."""
+    """Tint the area covered by target sensors of limited range or field of view."""
     s = d.scene.scenario
     all_round = s.field_of_view >= 2 * math.pi - 1e-9
     if math.isinf(s.sensing_range) and all_round:
@@ -146,7 +146,7 @@ def _sector(centre: Floats, radius: float, heading: Floats, angle: float) -> Flo
 
 
 def obstacles(d: Drawing) -> None:
-    """Draw the discs that stand in the way."""
+    """Draw the obstacles."""
     for x, y, radius in d.scene.obstacles:
         place = d.camera.project(np.array([x, y]))
         d.canvas.disc(place, radius * d.camera.scale, OBSTACLE_RIM)
@@ -154,7 +154,7 @@ def obstacles(d: Drawing) -> None:
 
 
 def trails(d: Drawing) -> None:
-    """Draw where everyone has just been, fading with age."""
+    """Draw the trails, fading with age."""
     if len(d.trail) < 2:
         return
     places = d.camera.project(np.stack([mark.position for mark in d.trail]))
@@ -185,12 +185,12 @@ def slots(d: Drawing) -> None:
 
 
 def links(d: Drawing) -> None:
-    """Draw a line between trackers that hear each other, paler the longer ago the last word was."""
+    """Draw a line between trackers that hear each other, fading with the age of the message."""
     strength = np.triu(d.scene.links)
     heard = np.argwhere(strength > 0)
     if not len(heard):
         return
-    # A large team has hundreds of links: together they are to weigh no more than a small team's.
+    # A large team has hundreds of links: limit their total weight to that of a small team.
     weight = 0.5 * max(0.2, min(1.0, 12 / len(heard)))
     places = d.camera.project(d.scene.position)
     for i, j in heard.tolist():
@@ -198,9 +198,9 @@ def links(d: Drawing) -> None:
 
 
 def trackers(d: Drawing) -> None:
-    """Draw the trackers: grey wafers with a line for the heading, coloured by task if known.
+    """Draw the trackers: grey discs with a line for the heading, coloured by task if known.
 
-    One that does not have the target in its own sight is pale; one that is broken is crossed out.
+    Pale: does not see the target itself; crossed out: broken.
     """
     scene, canvas, point, radius = d.scene, d.canvas, d.point, d.radius
     places = d.camera.project(scene.position)
@@ -231,7 +231,7 @@ def _wafer(d: Drawing, place: Floats, heading: Floats, colour: Colour, rim: Colo
 
 
 def leader_mark(canvas: Canvas, tip: Floats, size: float) -> None:
-    """Draw the pointer that stands over a leader; ``tip`` is its lower end."""
+    """Draw the marker above a leader; ``tip`` is its lower end."""
     x, y = tip
     for grow, colour in ((1.2, PAPER), (0.0, INK)):
         side = size + grow
@@ -241,7 +241,7 @@ def leader_mark(canvas: Canvas, tip: Floats, size: float) -> None:
 
 
 def target(d: Drawing) -> None:
-    """Draw the target, set apart by colour and a white rim."""
+    """Draw the target, with its own colour and a white rim."""
     place, heading = d.camera.project(d.scene.target), d.scene.target_heading * (1, -1)
     radius, point = d.radius, d.point
     end = place + heading * (radius + 5 * point)
@@ -252,7 +252,7 @@ def target(d: Drawing) -> None:
 
 
 def flashes(d: Drawing) -> None:
-    """Draw a ring that widens and fades around each contact that has just begun."""
+    """Draw a growing, fading ring around each recent contact."""
     for flash in d.flashes:
         place = d.camera.project(flash.position)
         radius = d.radius + (3 + 9 * flash.age) * d.point

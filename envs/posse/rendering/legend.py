@@ -1,4 +1,4 @@
-"""The words of a picture: what it shows, when, how well it goes, and how long a metre is."""
+"""The text of a frame: title, time, score, scale bar and key."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def header(canvas: Canvas, scene: Scene, title: str | None, point: float) -> Non
     left += canvas.text(title or name, (left, middle), _TITLE * point, INK) + 10 * point
     if title:
         canvas.text(name, (left, middle), _TEXT * point, FAINT_INK)
-    # Columns of a fixed width: digits that change must not push the words about.
+    # Columns of fixed width, so that changing digits do not move the text.
     right = width - _EDGE * point
     columns = (
         (f"{scene.score:.2f}", 38, INK),
@@ -46,7 +46,7 @@ def header(canvas: Canvas, scene: Scene, title: str | None, point: float) -> Non
 
 
 def footer(canvas: Canvas, scene: Scene, scale: float, point: float) -> None:
-    """Draw the scale bar (``scale`` in pixels a metre), and a key to the colours of the tasks."""
+    """Draw the scale bar (``scale`` in pixels per metre), and a key to the colours of the tasks."""
     width, height = canvas.size
     middle = height - FOOTER * point / 2
     fitting = [v for v in _BAR_LENGTHS if v * scale <= _BAR_MOST * point]

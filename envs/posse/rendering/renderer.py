@@ -1,7 +1,7 @@
-"""Pictures of a world: frames as arrays, or a window that follows it.
+"""Renderer of a world: frames as arrays, or a window.
 
-The paper's own figures set the style: trackers are grey wafers with a line for the heading, the
-target is set apart. :mod:`posse.rendering.layers` lists what a frame is made of.
+The style follows the paper's figures: trackers are grey discs with a line for the heading, and the
+target has its own colour. :mod:`posse.rendering.layers` lists the layers of a frame.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ LEAST_SIZE: Final = 200
 class Renderer:
     """Draws one world of a batch, frame by frame.
 
-    A frame shows the present state, the trails that lead to it, and on the open plane a view that
-    follows the team; so it depends on the frames before it in the episode, and on nothing else: the
-    same states drawn in the same order give the same pixels.
+    A frame shows the current state and the trails; on the open plane the view follows the team. It
+    depends only on this and the earlier states drawn in the episode: the same sequence gives the
+    same pixels.
 
     Args:
-        scenario: Of the batches that are to be drawn.
+        scenario: Scenario of the batches to draw.
         mode: ``"rgb_array"``: frames are returned, no display is needed; ``"human"``: they appear
             in a window, in real time.
         size: Width and height of a frame, px.
-        title: Stands above the picture, beside the scenario's name; default: the name alone.
+        title: Shown above the frame, beside the scenario's name; default: the name alone.
 
     Raises:
         ValueError: An unknown mode, or a size below :data:`LEAST_SIZE`.
@@ -61,7 +61,7 @@ class Renderer:
             raise ValueError(
                 f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px"
             )
-        # pygame is loaded by those who draw, not by everyone who imports the package.
+        # Imported here, so that importing posse does not import pygame.
         from posse.rendering.canvas import Canvas
 
         self.scenario = scenario
@@ -83,9 +83,9 @@ class Renderer:
         return self._closed
 
     def follow(self, batch: Batch, world: int = 0) -> None:
-        """Take note of the present state without drawing it.
+        """Record the current state without drawing it.
 
-        For films that show every other step: trails and view become the same as if all were drawn.
+        For videos that skip steps: trails and view are the same as if all steps were drawn.
 
         Raises:
             ValueError: The batch is of another scenario, or has no such world.
@@ -99,18 +99,18 @@ class Renderer:
         world: int = 0,
         annotations: Mapping[str, npt.ArrayLike] | None = None,
     ) -> npt.NDArray[np.uint8] | None:
-        """Draw a world as it stands.
+        """Draw the current state of a world.
 
         Args:
             batch: A batch of the renderer's scenario.
-            world: Place of the world in the batch.
-            annotations: What a policy tells of itself, each (E, N) integers: ``"task"``, by its
-                number in :data:`posse.rendering.style.TASKS`, colours the trackers; ``"leader"``,
-                the one that each tracker takes for the leader, marks those that take themselves.
+            world: Index of the world in the batch.
+            annotations: Internal values of a policy, each (E, N) integers: ``"task"``, the number
+                in :data:`posse.rendering.style.TASKS`, colours the trackers; ``"leader"``, the
+                number of the leader of each tracker, marks those that lead themselves.
 
         Returns:
             A frame (H, W, 3) uint8 in the mode ``"rgb_array"``; ``None`` in the mode ``"human"``,
-            where nothing happens any more once the user has closed the window.
+            which draws nothing after the user has closed the window.
 
         Raises:
             ValueError: The batch is of another scenario, has no such world, or annotations do not
@@ -139,7 +139,7 @@ class Renderer:
         return None
 
     def project(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return where points (..., 2) m lie in the last frame, (..., 2) px: right, down."""
+        """Return the pixels (..., 2), right and down, of points (..., 2) m in the last frame."""
         return self._camera.project(np.asarray(points, np.float64))
 
     def close(self) -> None:
@@ -163,7 +163,7 @@ class Renderer:
         time = self._history.note(scene)
         if time is None:
             self._camera.reset()
-        # Broken trackers stay behind: a view that held them would grow without end.
+        # Broken trackers stay behind: a view that included them would grow without bound.
         working = scene.position[~scene.broken]
         points = np.vstack([working, scene.target, scene.target + scene.frame])
         self._camera.follow(points, time or 0.0)

@@ -1,4 +1,4 @@
-"""What one frame shows, read from a batch in one place; drawing knows nothing of records."""
+"""The contents of one frame, read from a batch; drawing does not access records."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 _LINK_FADES: Final = 6
-"""Control steps after which a link that nothing was heard over is no longer drawn."""
+"""Control steps after which a silent link is no longer drawn."""
 _ANNOTATIONS: Final = ("task", "leader")
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One world at one moment. N trackers, M obstacles; metres, seconds, radians."""
+    """One world at one time. N trackers, M obstacles; metres, seconds, radians."""
 
     scenario: Scenario
     episode: tuple[int, ...]
-    """Which episode of which world: equal in all frames of one episode."""
+    """Identifies world and episode."""
     step: int
     score: float
     """Mean over the steps so far."""
@@ -44,7 +44,7 @@ class Scene:
     broken: BoolArray
     """(N,)."""
     sees: BoolArray
-    """(N,) the target is in the tracker's own sight."""
+    """(N,) the tracker's own sensor sees the target."""
     senses: BoolArray
     """(N,) the target sensor works."""
     struck: BoolArray
@@ -56,18 +56,18 @@ class Scene:
     frame: Floats
     """(2,), cosine and sine of the slot frame's heading ψ."""
     slots: Floats
-    """(N, 2) places of the slots."""
+    """(N, 2) positions of the slots."""
     occupied: BoolArray
     """(N,) by slot."""
     obstacles: Floats
     """(M, 3): x, y, radius."""
     links: Floats
     """(N, N) symmetric, in [0, 1]: 1 where one was heard by the other in this step, fading with
-    the steps since; all 0 where the radio is perfect and a picture of it would say nothing."""
+    the steps since; all 0 where the radio is perfect."""
     task: Integers | None
     """(N,) number of each tracker's task in :data:`posse.rendering.style.TASKS`, -1: none."""
     leads: BoolArray | None
-    """(N,) the tracker holds itself to be the leader."""
+    """(N,) the tracker considers itself the leader."""
 
     @property
     def time(self) -> float:
@@ -89,14 +89,13 @@ class Scene:
 def read_scene(
     batch: Batch, world: int = 0, annotations: Mapping[str, npt.ArrayLike] | None = None
 ) -> Scene:
-    """Return what is to be drawn of one world of a batch.
+    """Return the scene of one world of a batch.
 
     Args:
         batch: A batch that has been reset.
-        world: Its place in the batch.
-        annotations: What a policy tells of itself, (E, N) integers each: ``"task"``, and
-            ``"leader"``, the number of the tracker that each one holds to be the leader (-1: none).
-            Other names are left alone.
+        world: Its index in the batch.
+        annotations: Internal values of a policy, (E, N) integers each: ``"task"``, and
+            ``"leader"``, the number of each tracker's leader (-1: none). Other names are ignored.
 
     Raises:
         ValueError: No such world, or annotations of a wrong shape.
@@ -152,7 +151,7 @@ def _pair(of: Mapping[str, npt.NDArray[Any]], array: str, first: str, second: st
 
 
 def _links(heard_at: npt.NDArray[Any], now: int, n: int) -> Floats:
-    """Return (N, N) strengths from the steps (N, N) at which what was last heard was sent."""
+    """Return link strengths (N, N) from the steps (N, N) at which the last messages were sent."""
     if heard_at.size == 0 or now < 0:
         return np.zeros((n, n))
     strength = np.where(heard_at >= 0, 1 - (now - heard_at.astype(np.float64)) / _LINK_FADES, 0.0)

@@ -1,9 +1,8 @@
-"""How the pictures look: colours, and lengths in points.
+"""The style of frames: colours, and lengths in points.
 
-The hues are Okabe and Ito's, told apart by readers of every colour vision; a test simulates
-deuteranopia, protanopia and tritanopia. Everything of the target
-is vermilion (the target, its slots, its frame), everything of the team grey or blue, so that a
-picture needs no key. A *point* is a pixel in a picture whose shorter side is :data:`DESIGN_SIZE`.
+The colour-blind safe hues are Okabe and Ito's; a test simulates deuteranopia, protanopia and
+tritanopia. The target, its slots and its frame are vermilion, the team grey or blue. A *point* is
+a pixel in a frame whose shorter side is :data:`DESIGN_SIZE`.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import Final
 Colour = tuple[int, int, int]
 
 DESIGN_SIZE: Final = 640
-"""Shorter side of a picture in which a point is a pixel, px."""
+"""Shorter side of a frame in which a point is a pixel, px."""
 
 PAPER: Final[Colour] = (255, 255, 255)
 GROUND: Final[Colour] = (248, 249, 251)
@@ -45,17 +44,17 @@ TASK_COLOURS: Final[tuple[Colour, ...]] = (
     (0, 158, 115),
     (240, 228, 66),
 )
-"""Not Okabe and Ito's pink for the last: seen with deuteranopia it is the grey of a tracker."""
+"""The last is not Okabe and Ito's pink, which deuteranopia maps to the grey of a tracker."""
 
 
 def mix(colour: Colour, ground: Colour, share: float) -> Colour:
-    """Return a colour laid over a ground, as opaque as ``share`` in [0, 1] says."""
+    """Return a colour blended over a background with opacity ``share`` in [0, 1]."""
     r, g, b = (round(q + (p - q) * share) for p, q in zip(colour, ground, strict=True))
     return r, g, b
 
 
 def pale(colour: Colour) -> Colour:
-    """Return the colour of a tracker that does not have the target in its own sight."""
+    """Return the colour of a tracker that does not see the target itself."""
     return mix(colour, PAPER, 0.45)
 
 
@@ -64,10 +63,10 @@ PALETTE: Final[tuple[Colour, ...]] = (
     TRACKER, TRACKER_RIM, BROKEN, LINK, SENSING, SENSING_RIM, CONTACT, pale(TRACKER),
     *TASK_COLOURS, *(pale(colour) for colour in TASK_COLOURS),
 )  # fmt: skip
-"""Every flat colour of a picture; all others are blends of these, at edges and in what fades."""
+"""Every flat colour of a frame; all others are blends of these."""
 
 PLAYERS: Final[tuple[Colour, ...]] = ((0, 114, 178), (213, 120, 0), (40, 165, 130), INK)
-"""Curves of the teams that are compared in one picture, left to right."""
+"""Colours of the teams compared in one video, left to right."""
 
 DARK: Final[dict[str, Colour]] = {
     "PAPER": (23, 26, 31), "GROUND": (29, 33, 39), "GRID": (58, 65, 75), "WALL": (132, 140, 151),
@@ -77,7 +76,7 @@ DARK: Final[dict[str, Colour]] = {
     "TRAIL": (140, 147, 157), "BROKEN": (72, 78, 87), "LINK": (86, 180, 233),
     "SENSING": (32, 47, 61), "SENSING_RIM": (58, 92, 122), "CONTACT": (255, 70, 100),
 }  # fmt: skip
-"""The colours of the same names on a dark screen."""
+"""The same colours for a dark background."""
 DARK_TASK_COLOURS: Final[tuple[Colour, ...]] = (
     (110, 195, 240),
     (40, 130, 200),

@@ -10,11 +10,11 @@ class Window:
 
     Args:
         size: Width and height, px.
-        caption: What stands in its title bar.
-        rate: Frames a second, at most.
+        caption: Text of the title bar.
+        rate: Maximum frames per second.
 
     Raises:
-        RuntimeError: There is no display to open it on.
+        RuntimeError: There is no display.
     """
 
     def __init__(self, size: tuple[int, int], caption: str, rate: float) -> None:
@@ -31,9 +31,9 @@ class Window:
         self._rate = rate
 
     def show(self, frame: pygame.Surface) -> bool:
-        """Show a frame when its time has come; return False once the user wants to leave.
+        """Show a frame at its time; return False once the user has closed the window.
 
-        That is by closing the window, or by the escape key.
+        The escape key closes it, too.
         """
         for event in pygame.event.get():
             escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE

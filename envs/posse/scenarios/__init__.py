@@ -1,4 +1,4 @@
-"""What can be set: the scenario, its formation, and the named ones."""
+"""The scenario: settings, validation, formation slots, named scenarios."""
 
 from posse.scenarios.named import get_scenario, scenario_names
 from posse.scenarios.scenario import Scenario

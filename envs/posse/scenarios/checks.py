@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def check_together(s: Scenario) -> None:
-    """Raise where settings that are valid by themselves do not go together.
+    """Raise where individually valid settings are inconsistent.
 
     Raises:
         ScenarioError: Names the settings, the limit and the fix.
@@ -54,7 +54,7 @@ def _check_motion(s: Scenario) -> None:
     if s.target_speed > 0.9999 * slowest:
         raise ScenarioError(
             f"target_speed={s.target_speed:g} must be below tracker_speed={slowest:g}, by "
-            "0.01 % at least: a team that is no faster never catches up (paper, assumption ii)"
+            "0.01 % at least: a slower team cannot catch up (paper, assumption ii)"
         )
     if s.target_speed == 0 and s.target_motion != "constant":
         fail("target_speed", s.target_speed, "only a target of constant motion may rest")
@@ -129,7 +129,7 @@ def _check_place(s: Scenario) -> None:
     if not math.isfinite(s.arena):
         if s.num_obstacles:
             raise ScenarioError(
-                f"num_obstacles={s.num_obstacles} needs a walled place: set arena to its side in m"
+                f"num_obstacles={s.num_obstacles} needs an arena: set arena to its side in m"
             )
         if excluded > ring:
             raise ScenarioError(
@@ -156,8 +156,8 @@ def _check_place(s: Scenario) -> None:
     blocked = s.num_obstacles * math.pi * (s.obstacle_radius[1] + circle) ** 2
     if s.target_motion != "agent" and blocked > 0.9 * (s.arena - 2 * circle) ** 2:
         raise ScenarioError(
-            f"num_obstacles={s.num_obstacles} leave no room to a target that needs {circle:.3g} m "
-            f"to turn round at target_turn_rate={s.target_turn_rate:g}: lower their number or "
+            f"num_obstacles={s.num_obstacles} leave no room for a target that needs {circle:.3g} m "
+            f"to turn at target_turn_rate={s.target_turn_rate:g}: lower their number or "
             "target_speed, or raise target_turn_rate or arena"
         )
     room = _room_to_start(s)
@@ -171,16 +171,16 @@ def _check_place(s: Scenario) -> None:
 
 
 def _room_to_start(s: Scenario) -> float:
-    """Return the area within the walls where trackers may start, for the worst place of the target.
+    """Return the area within the walls where trackers may start, for the worst target position, m².
 
-    By summing over a grid of distances and bearings, m².
+    Summed over a grid of distances and bearings.
     """
     least, most = s.start_distance
     inner = s.arena / 2 - s.robot_radius - START_CLEARANCE
     distances = [least + (most - least) * (k + 0.5) / 16 for k in range(16)]
     bearings = [2 * math.pi * (k + 0.5) / 64 for k in range(64)]
     areas = []
-    for at in (0.0, s.target_extent):  # the middle, and a corner
+    for at in (0.0, s.target_extent):  # centre and corner
         area = 0.0
         for d in distances:
             inside = sum(
@@ -193,7 +193,7 @@ def _room_to_start(s: Scenario) -> float:
 
 
 def _check_rounding(s: Scenario) -> None:
-    """Raise where the kernels' float32 would lose what the scenario asks for."""
+    """Raise where float32 in the kernels would be too coarse for the scenario."""
     fastest = max(s.tracker_speeds)
     move, longest = fastest * s.physics_step, math.sqrt(LONGEST_MOVE * s.robot_radius)
     if move > longest:
@@ -228,7 +228,7 @@ def _check_rounding(s: Scenario) -> None:
 
 
 def _spacing(value: float) -> float:
-    """Return how far the neighbouring float32 lie from a number."""
+    """Return the spacing of float32 at a number."""
     return math.ulp(value) * 2.0**29  # a double has 29 more bits
 
 

@@ -1,6 +1,6 @@
-"""Where the team should stand: slots on the target, and the frame that carries them.
+"""Formation slots around the target, and the slot frame.
 
-A slot is a polar offset (r, β) on the target in the slot frame ψ; behind the target is β = π. The
+A slot is a polar offset (r, β) from the target in the slot frame ψ; β = π is behind the target. The
 frame follows the target's heading at a limited rate, so that a robot that does not reverse can
 follow every slot (:attr:`posse.scenarios.scenario.Scenario.slot_turn_rate`).
 """
@@ -22,16 +22,16 @@ FORMATIONS: Final = ("wedge", "ring", "rows")
 _HALF: Final = np.float32(0.5)
 _THREE_HALVES: Final = np.float32(1.5)
 _ZERO: Final = np.float32(0.0)
-_DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge open by 45 degrees to each side
+_DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
 def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
-    """Return the (x, y) of each slot in the slot frame, m; x points where the target heads.
+    """Return the (x, y) of each slot in the slot frame, m; x points ahead.
 
     ========== ====================================================================================
-    wedge      the first slot straight behind the target, the others by turns on two wings that
-               open backwards at 45 degrees, ``formation_spacing`` apart
-    ring       evenly round the target, the first slot behind it; the radius grows with the team so
+    wedge      the first slot straight behind the target, the others alternating on two wings that
+               extend backwards at 45 degrees, ``formation_spacing`` apart
+    ring       evenly around the target, the first slot behind it; the radius grows with the team so
                that neighbours are ``formation_spacing`` apart, and is at least
                ``formation_distance``
     rows       a block behind the target, as wide as deep, ``formation_spacing`` apart
@@ -71,7 +71,7 @@ def follow_heading(
 ) -> tuple[np.float32, np.float32]:
     """Return (cos ψ, sin ψ) after one control step towards the heading.
 
-    ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the farthest the frame may turn.
+    ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the maximum turn.
     """
     along = psi_c * heading_c + psi_s * heading_s
     if along >= most_c:

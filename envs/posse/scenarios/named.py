@@ -1,4 +1,4 @@
-"""The named scenarios: what the benchmark consists of."""
+"""The named scenarios of the benchmark."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from posse.scenarios.setting import ScenarioError, is_one_of
 from posse.scenarios.shown import shown
 
 
-@functools.cache  # not before all that scenarios may name has been declared
+@functools.cache  # lazily, after all declarations that scenarios may name
 def _named() -> dict[str, Scenario]:
-    # Why each setting is what it is, and what it costs a team, stands in docs/scenarios.md.
+    # The reasons for these settings are in docs/scenarios.md.
     paper = Scenario(
         name="paper",
         horizon=80,
@@ -109,10 +109,10 @@ def scenario_names() -> tuple[str, ...]:
 
 
 def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
-    """Return a scenario by name, or the one given, with any field overridden.
+    """Return a scenario by name, or the given one, with fields overridden.
 
     Raises:
-        ScenarioError: An unknown name (the message has near ones), an unknown or impossible
+        ScenarioError: An unknown name (the message suggests similar ones), an unknown or invalid
             setting.
     """
     if isinstance(scenario, Scenario):

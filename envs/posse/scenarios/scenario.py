@@ -1,8 +1,7 @@
 """The settings of a world: one frozen, validated dataclass.
 
-A scenario is everything that makes one benchmark different from another. It is a value: two
-scenarios with equal fields are the same benchmark. Named ones are in :mod:`posse.scenarios.named`,
-checks of one field against others in :mod:`posse.scenarios.checks`.
+Scenarios with equal fields define the same benchmark. Named ones are in
+:mod:`posse.scenarios.named`, checks across fields in :mod:`posse.scenarios.checks`.
 """
 
 from __future__ import annotations
@@ -46,19 +45,19 @@ from posse.scenarios.shown import shown
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """One benchmark: a team, a target, and what surrounds them.
+    """One benchmark: team, target, environment, sensing, radio, faults and reward.
 
     Lengths are in metres, times in seconds, speeds in m/s, angles in radians, turn rates in rad/s.
     Every field can be overridden by keyword: ``posse.parallel_env("smart", num_trackers=8)``.
     :meth:`settings` lists the fields with unit, range, meaning and source.
 
     Raises:
-        ScenarioError: A field, or a combination of fields, that no world can have.
+        ScenarioError: An invalid field or combination of fields.
     """
 
-    name: str = text(dataclasses.MISSING, "what results and policy cards call it")
+    name: str = text(dataclasses.MISSING, "name in results and policy cards")
     version: int = whole(
-        1, 1, math.inf, "raised when the behaviour of the named scenario changes, and only then"
+        1, 1, math.inf, "incremented when the behaviour of the named scenario changes"
     )
 
     # The team
@@ -87,7 +86,7 @@ class Scenario:
 
     # The target
     target_motion: str = text(
-        "constant", "how the target moves; agent: a policy steers it",
+        "constant", "how the target moves; agent: a policy controls it",
         lambda: TARGET_MOTIONS, source="section 2",
     )  # fmt: skip
     target_speed: float = number(0.6, "m/s", 0, 1000, "speed of the target; an agent's greatest")
@@ -106,11 +105,11 @@ class Scenario:
         1.2, "m", 0, WIDE, "between neighbouring slots; more than twice the tolerance", above=True
     )
     tolerance: float = number(
-        0.3, "m", SMALL, WIDE, "a slot is occupied when a tracker is this near to it"
+        0.3, "m", SMALL, WIDE, "a slot is occupied when a tracker is within this distance"
     )
     settle_time: float = number(
         3.0, "s", 0, math.inf,
-        "the team has settled when every slot has been held for this long on end", above=True,
+        "the team has settled when every slot has been held continuously for this long", above=True,
     )  # fmt: skip
 
     # Time
@@ -123,18 +122,18 @@ class Scenario:
         False, "whether the episode ends when any tracker touches anything"
     )
 
-    # The place
+    # The arena
     arena: float = number(
         math.inf, "m", 0, 2 * FARTHEST, "side of the walled square; inf: the open plane",
         above=True, infinite=True,
     )  # fmt: skip
-    num_obstacles: int = whole(0, 0, MAX_OBSTACLES, "discs in the arena; they need an arena")
+    num_obstacles: int = whole(0, 0, MAX_OBSTACLES, "discs in the arena; require an arena")
     obstacle_radius: tuple[float, float] = pair(
         (0.4, 0.8), "m", WIDE, "least and greatest radius of an obstacle"
     )
     obstacle_gap: float = number(
         1.2, "m", 0, WIDE,
-        "least free width between two obstacles, and between an obstacle and a wall",
+        "least clearance between two obstacles, and between an obstacle and a wall",
     )  # fmt: skip
     start_distance: tuple[float, float] = pair(
         (4.0, 10.0), "m", FARTHEST,
@@ -142,9 +141,7 @@ class Scenario:
     )  # fmt: skip
 
     # Sensing
-    sensor: str = text(
-        "range-bearing", "what the target sensor has of a target in sight", lambda: SENSORS
-    )
+    sensor: str = text("range-bearing", "kind of the target sensor", lambda: SENSORS)
     sensing_range: float = number(
         math.inf, "m", 0, FAR, "a tracker sees the target up to this distance; inf: at any",
         above=True, infinite=True,
@@ -155,10 +152,10 @@ class Scenario:
     )  # fmt: skip
     range_noise: float = number(
         0.0, "1", 0, 0.3,
-        "standard deviation of a measured range, as a share of the range; cut at three",
+        "standard deviation of a measured range, as a share of the range; truncated at three",
     )  # fmt: skip
     bearing_noise: float = number(
-        0.0, "rad", 0, 0.5, "standard deviation of a measured bearing; cut at three"
+        0.0, "rad", 0, 0.5, "standard deviation of a measured bearing; truncated at three"
     )
     velocity_smoothing: float = number(
         0.0, "s", 0, WIDE,
@@ -173,15 +170,15 @@ class Scenario:
         above=True, infinite=True,
     )  # fmt: skip
     radio_delay: int = whole(
-        0, 0, 100, "between sending and hearing; 0: in the observation that follows the step",
+        0, 0, 100, "delay of messages; 0: received in the observation after the step",
         unit="steps",
     )  # fmt: skip
     radio_loss: float = number(
         0.0, "1", 0, 0.999, "probability that a message is lost, for each pair and step"
     )
-    message_size: int = whole(0, 0, 64, "numbers that a policy may add to each broadcast")
+    message_size: int = whole(0, 0, 64, "numbers that a policy can add to each broadcast")
     forget_after: float = number(
-        5.0, "s", 0, WIDE, "a team-mate not heard for this long is dropped from the observation",
+        5.0, "s", 0, WIDE, "time after which a silent team-mate is dropped from the observation",
         above=True,
     )  # fmt: skip
     num_neighbours: int | None = whole(
@@ -191,29 +188,29 @@ class Scenario:
 
     # Faults
     breaks: int = whole(
-        0, 0, MAX_TRACKERS - 1, "trackers that break for good during an episode, below num_trackers"
+        0, 0, MAX_TRACKERS - 1, "trackers that break during an episode, below num_trackers"
     )
     break_choice: str = text(
         "nearest",
-        "which one breaks: the nearest to the target at that moment (where a leader is), one drawn,"
-        " or the one given by number",
+        "which one breaks: the nearest to the target at that time (usually the leader), a random"
+        " one, or the one given by number",
         lambda: BREAK_CHOICES,
     )
     break_number: int = whole(
-        0, 0, MAX_TRACKERS - 1, "number of the tracker that breaks where it is given"
+        0, 0, MAX_TRACKERS - 1, "number of the tracker that breaks with break_choice given"
     )
     break_window: tuple[float, float] = pair(
-        (0.4, 0.6), "1", 1.0, "when one breaks, as shares of the horizon: drawn between the two"
+        (0.4, 0.6), "1", 1.0, "interval of the time of a break, as shares of the horizon"
     )
     sensor_outages: float = number(
         0.0, "1", 0, 1,
-        "probability that a tracker's target sensor goes dead for outage_time, once",
+        "probability that a tracker's target sensor fails once for outage_time",
     )  # fmt: skip
     radio_outages: float = number(
-        0.0, "1", 0, 1, "probability that a tracker's radio goes dead for outage_time, once"
+        0.0, "1", 0, 1, "probability that a tracker's radio fails once for outage_time"
     )
     outage_time: float = number(
-        5.0, "s", 0, WIDE, "length of an outage; it starts at a time drawn over the episode",
+        5.0, "s", 0, WIDE, "length of an outage; its start is drawn over the episode",
         above=True,
     )  # fmt: skip
 
@@ -228,9 +225,7 @@ class Scenario:
     # Reward
     reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
         (("slot", 1.0), ("progress", 0.5), ("contact", -0.2)),
-        Setting(
-            "other", "1", "weight of each reward term by name (posse.REWARD_TERMS); others weigh 0"
-        ),
+        Setting("other", "1", "weight of each reward term by name (posse.REWARD_TERMS); others: 0"),
     )
 
     def __post_init__(self) -> None:
@@ -276,7 +271,7 @@ class Scenario:
 
     @property
     def whole_arcs(self) -> bool:
-        """Whether a robot far from anything moves on one arc for the whole control step."""
+        """Whether a robot with nothing near moves on one arc for the whole control step."""
         turn = max(*self.tracker_turn_rates, self.target_turn_rate) * self.control_step
         limits = (self.tracker_acceleration, self.tracker_turn_acceleration)
         return turn <= 1.0 and all(math.isinf(limit) for limit in limits)
@@ -293,7 +288,7 @@ class Scenario:
 
     @property
     def target_clearance(self) -> float:
-        """How far from every wall the target starts, m: room to turn away either way."""
+        """Distance from every wall at which the target starts, m: room to turn either way."""
         return 2 * self.target_speed / self.target_turn_rate + self.robot_radius + SAFE_MARGIN
 
     @property
@@ -321,15 +316,15 @@ class Scenario:
 
     @property
     def range_bound(self) -> float:
-        """Greatest distance between any two places that robots can reach, m."""
+        """Greatest distance between any two reachable positions, m."""
         return 2 * math.sqrt(2) * self.position_bound
 
     @property
     def slot_turn_rate(self) -> float:
-        """Greatest turn rate of the slot frame, rad/s: what a robot in the outermost slot follows.
+        """Greatest turn rate of the slot frame, rad/s.
 
-        ω_s = min(0.8 (V - v_t), v_t) / ρ_max with V of the slowest tracker, so that no slot ever
-        has to move backwards nor faster than a tracker can.
+        ω_s = min(0.8 (V - v_t), v_t) / ρ_max with V of the slowest tracker, so that no slot moves
+        backwards or faster than a tracker.
         """
         rho = max(math.hypot(x, y) for x, y in slot_offsets(self))
         slowest = min(self.tracker_speeds)
@@ -339,7 +334,7 @@ class Scenario:
         """Return a copy with some fields changed.
 
         Raises:
-            ScenarioError: An unknown field (the message names near ones) or an impossible value.
+            ScenarioError: An unknown field (the message suggests similar ones) or an invalid value.
         """
         names = [field.name for field in dataclasses.fields(self)]
         for key in overrides:
@@ -366,7 +361,7 @@ def _names(setting: str, given: object) -> tuple[str, ...]:
 
 
 def _weights(given: object) -> tuple[tuple[str, float], ...]:
-    """Return reward weights in the one order that makes equal scenarios compare equal."""
+    """Return reward weights sorted by name, so that equal scenarios compare equal."""
     try:
         weights = dict(given)  # type: ignore[call-overload]
         return tuple(sorted(weights.items()))

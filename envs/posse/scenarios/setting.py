@@ -1,7 +1,7 @@
-"""What a setting of a scenario may be: its unit, range, meaning and source, beside its default.
+"""Declaration of a scenario's settings: unit, range, meaning and source.
 
 A field of :class:`~posse.scenarios.scenario.Scenario` is declared by one of the functions below.
-Its :class:`Setting` lies in the field's metadata; checks, tables and error messages follow from it.
+Its :class:`Setting` is in the field's metadata; checks, tables and messages are derived from it.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True)
 class Setting:
-    """How one field of a scenario is declared.
+    """Declaration of one field of a scenario.
 
     Attributes:
         kind: ``"number"``, ``"whole"``, ``"pair"``, ``"flag"``, ``"text"`` or ``"other"``.
         unit: SI unit; ``"1"`` for shares and counts, ``""`` for texts.
-        meaning: What it sets, in a sentence.
+        meaning: Its meaning, in one sentence.
         low: Least value.
         high: Greatest value.
         low_is_allowed: Whether the range includes ``low``.
         may_be_infinite: Whether ``math.inf`` is allowed beyond ``high``: no limit.
         may_be_none: Whether ``None`` is allowed.
         per_tracker: Whether it may be a tuple, one value for each tracker.
-        choices: Returns the names that a text may be.
-        source: Where the paper speaks of it.
+        choices: Returns the valid values of a text.
+        source: Section of the paper.
     """
 
     kind: str
@@ -54,7 +54,7 @@ class Setting:
 
     @property
     def range(self) -> str:
-        """The valid values, in words and brackets."""
+        """The valid values, as text."""
         if self.choices is not None:
             return ", ".join(f'"{choice}"' for choice in self.choices())
         if self.kind == "flag":
@@ -78,7 +78,7 @@ def number(
     default: float, unit: str, low: float, high: float, meaning: str, *,
     above: bool = False, infinite: bool = False, per_tracker: bool = False, source: str = "",
 ) -> Any:  # fmt: skip
-    """Declare a real number in [low, high], or (low, high] where it must lie ``above`` low."""
+    """Declare a real number in [low, high], or in (low, high] with ``above``."""
     setting = Setting(
         "number", unit, meaning, low, high, not above, infinite, per_tracker=per_tracker,
         source=source,
@@ -102,7 +102,7 @@ def pair(default: tuple[float, float], unit: str, high: float, meaning: str) -> 
 
 
 def flag(default: bool, meaning: str) -> Any:
-    """Declare a truth value."""
+    """Declare a boolean."""
     return declare(default, Setting("flag", "", meaning))
 
 
@@ -121,7 +121,7 @@ def setting_of(field: dataclasses.Field[Any]) -> Setting:
 
 
 def check(name: str, value: object, setting: Setting) -> None:
-    """Raise where a value is not what its setting may be.
+    """Raise if a value is invalid for its setting.
 
     Raises:
         ScenarioError: A wrong type, or out of range; names the setting and its range.
@@ -188,7 +188,7 @@ def is_one_of(names: Container[str], value: object) -> bool:
 
 
 def is_number(value: object) -> bool:
-    """Say whether a value is a real number that a float can hold, and no truth value."""
+    """Return whether a value is a real number that a float can hold, and not a boolean."""
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         return False
     return not isinstance(value, int) or abs(value) <= GREATEST_WHOLE

@@ -117,7 +117,7 @@ BAD_ACTIONS: list[tuple[Any, str]] = [
     (["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
     (np.array([1j, 0]), r"tracker_3 must be real numbers"),
     (None, r"tracker_3 must be real numbers, got None"),
-    ([[0], [0, 1]], r"tracker_3 is no array"),
+    ([[0], [0, 1]], r"tracker_3 is not an array"),
 ]
 
 
@@ -177,7 +177,7 @@ def test_a_bad_discrete_action_names_its_agent(action: Any, message: str) -> Non
         (np.eye(5, 2) * 1.5, r"tracker_0: speed = 1\.5"),
         (np.zeros((5, 2), np.complex64), r"tracker_0 must be real numbers"),
         ("rest", r"shape \(\), wanted"),
-        ([[0, 0]] * 4 + [[0]], r"action is no array"),
+        ([[0, 0]] * 4 + [[0]], r"action is not an array"),
     ],
 )
 def test_a_bad_action_of_a_team(action: Any, message: str) -> None:
