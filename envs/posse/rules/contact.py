@@ -1,8 +1,8 @@
-"""Contact: a disc never passes into or through another, however fast it moves.
+"""Contact: no disc enters or passes through another, at any speed.
 
-Robots move one after the other, target first. Each move is swept along the chord of its arc and
-stops where the disc would meet another disc or a wall; a robot so blocked stands still until it
-heads elsewhere. A contact is counted once, when it begins, and by kind.
+Robots move sequentially, target first. Each move is swept along the chord of its arc and stops
+before contact with another disc or a wall; a blocked robot stays in place until its heading is
+free. A contact is counted once, when it begins, and by kind.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ def free_share(
     other_y: Lanes,
     reach: Lanes,
 ) -> Lanes:
-    """Return which share of a straight move, 0 to 1, a point makes before it is ``reach`` away.
+    """Return the share of a straight move, 0 to 1, until a point is within ``reach`` of another.
 
-    From one other point, or from eight.
+    The other is one point, or a block of eight.
     """
     rx, ry = x - other_x, y - other_y
     closing = rx * dx + ry * dy
@@ -67,7 +67,7 @@ def free_share(
 
 @compiled
 def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.float32:
-    """Return which share of a move along one axis stays within ±bound."""
+    """Return the share of a move along one axis that stays within ±bound."""
     if dx > _ZERO and x + dx > bound:
         return max(_ZERO, (bound - x) / dx)
     if dx < _ZERO and x + dx < -bound:
@@ -88,8 +88,7 @@ def free_of_robots(
 ) -> np.float32:
     """Return the share of a robot's move that no other robot blocks.
 
-    The places of ``count`` robots are in ``xs`` and ``ys``. The robot may be one of them: it does
-    not close in on itself.
+    The positions of ``count`` robots are in ``xs`` and ``ys``; the robot itself may be among them.
     """
     reach = c.radius + c.radius + BLOCKING_GAP
     within = (reach + abs(dx) + abs(dy)) * _A_LITTLE_MORE
@@ -119,7 +118,7 @@ def free_of_surroundings(
 
 @compiled
 def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
-    """Say whether a robot touches an obstacle or a wall."""
+    """Return whether a robot touches an obstacle or a wall."""
     inner = c.half_arena - c.radius - TOUCHING_GAP
     if c.walled and max(abs(robot.x), abs(robot.y)) >= inner:
         return True
@@ -133,10 +132,10 @@ def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
 
 @compiled
 def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
-    """Work out who touches whom, count the contacts that begin, and flag who is near to anything.
+    """Find contacts, count those that begin, and mark robots with something near.
 
     ``near`` marks robots that could touch something within the next control step; the others move
-    without a sweep. How near the discs are stands in ``s`` (:func:`posse.rules.discs.find_gaps`).
+    without a sweep. Gaps are read from ``s`` (:func:`posse.rules.discs.find_gaps`).
     """
     inner = c.half_arena - c.radius
     smallest = w.least_gap
@@ -169,7 +168,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
 
 @compiled(seldom=True)
 def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
-    """Work out what a tracker that is near to something touches; say whether it is the target."""
+    """Find the contacts of a tracker with something near; return whether it touches the target."""
     touches_target = meet_target(c, w, t, i)
     meet_trackers(c, w, t, i, s)
     meet_surroundings(c, w, t, obstacles)
@@ -179,7 +178,7 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
 
 @compiled
 def near_target(c: Record, w: Record, t: Record) -> bool:
-    """Say whether a tracker and the target could touch within the next control step."""
+    """Return whether a tracker and the target could touch within the next control step."""
     reach = c.radius + c.radius + TOUCHING_GAP + (t.max_speed + c.target_speed) * c.dt
     dx, dy = w.x - t.x, w.y - t.y
     return bool(dx * dx + dy * dy <= reach * reach)
@@ -187,12 +186,12 @@ def near_target(c: Record, w: Record, t: Record) -> bool:
 
 @compiled
 def target_near_surroundings(c: Record, w: Record, s: Record) -> bool:
-    """Say whether the target could touch an obstacle or a wall within the next control step.
+    """Return whether the target could touch an obstacle or a wall within the next control step.
 
-    Where the obstacles are stands in scratch memory (:func:`posse.rules.discs.lay_out`).
+    Positions of obstacles are read from scratch memory (:func:`posse.rules.discs.lay_out`).
     """
-    # A scripted target seldom comes so near: only where trackers held it (walls.way_out),
-    # or where it is so fast that a control step takes it across the free width that it keeps.
+    # A scripted target rarely comes so near: after trackers blocked it (walls.way_out), or if it
+    # crosses its clearance within a control step.
     way = TOUCHING_GAP + c.target_speed * c.dt
     if c.half_arena - c.radius - max(abs(w.x), abs(w.y)) <= way:
         return True
@@ -208,7 +207,7 @@ def target_near_surroundings(c: Record, w: Record, s: Record) -> bool:
 
 @compiled
 def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
-    """Say whether tracker i touches the target, and count the contact if it begins."""
+    """Return whether tracker i touches the target, and count the contact if it begins."""
     touch = c.radius + c.radius + TOUCHING_GAP
     dx, dy = w.x - t.x, w.y - t.y
     if dx * dx + dy * dy > touch * touch:

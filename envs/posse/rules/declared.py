@@ -1,4 +1,4 @@
-"""The declared rules of a world, as the functions that a kernel is made of."""
+"""The declared rules of a world, as functions for kernels."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from posse.rules.targets.declaring import drawing, setting_goals
 
 
 class Rules(NamedTuple):
-    """Functions for compiled code, which do what the world's scenario asks for."""
+    """Functions for compiled code that dispatch on the scenario."""
 
     draw_motion: Any
-    """(c, w): draws what the target's motion depends on in an episode."""
+    """(c, w): draws the parameters of the target's motion for an episode."""
     set_goal: Any
     """(c, w, trackers, obstacles, s): sets a scripted target's goal heading."""
     sees: Any
-    """(c, w, t, dx, dy, s) -> whether a tracker's sensor has the target."""
+    """(c, w, t, dx, dy, s) -> whether the target is in sight of a tracker."""
     measure: Any
-    """(c, w, number, dx, dy) -> where it has the target."""
+    """(c, w, number, dx, dy) -> the measured position."""
 
 
 @functools.cache

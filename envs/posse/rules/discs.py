@@ -1,8 +1,8 @@
-"""Where every disc of a world is, laid out so that the processor works on eight of them at once.
+"""Positions of all discs of a world, laid out for processing in blocks of eight.
 
-Discs (trackers, the target, obstacles) lie side by side in rows of a thread's scratch memory.
-Contact, score, target sensor and sonar all start from these rows, and go over them by blocks of
-eight (:mod:`posse.numeric.simd.lanes`); what fills the last block is too far away to count.
+Discs (trackers, the target, obstacles) are stored in rows of a thread's scratch memory. Contact,
+score, target sensor and sonar read these rows in blocks of eight
+(:mod:`posse.numeric.simd.lanes`); the padding of the last block is far away.
 """
 
 from __future__ import annotations
@@ -47,26 +47,22 @@ _NO_BITS: Final = np.uint64(0)
 
 @compiled
 def natural(count: int) -> int:
-    """Return a count as it is, and let the compiler know that it is not negative.
-
-    A negative index counts from the end, and numba has every index looked at for that unless it
-    can be seen not to be negative.
-    """
+    """Assert ``count >= 0``, so that numba drops its negative-index check."""
     return count & 0x7FFFFFFF
 
 
 @compiled
 def blocks(count: int) -> int:
-    """Return how many blocks hold ``count`` discs or beams."""
+    """Return the number of blocks for ``count`` discs or beams."""
     return (natural(count) + (BLOCK - 1)) >> 3
 
 
 @compiled
 def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
-    """Write what is the same for all worlds.
+    """Write the constants of all worlds.
 
-    The directions of the sonar's beams (2, S), of which those that fill a block point nowhere, what
-    counts the places of a row, and the robots' radius.
+    The directions of the sonar's beams (2, S), zero in the padding of a block, the indices of a
+    row, and the robots' radius.
     """
     for k in range(ROBOTS):
         s.index[k] = np.float32(k)
@@ -81,17 +77,17 @@ def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
 
 @compiled
 def heard_within2(c: Record, radius: np.float32) -> np.float32:
-    """Return a squared distance of the centres within which every disc is that the sonar has."""
+    """Return the squared distance of centres within which the sonar may detect a disc."""
     within = (c.sonar_range + c.radius + radius) * _A_LITTLE_MORE
     return np.float32(within * within)
 
 
 @compiled
 def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lanes, ...]:
-    """Return eight fields that follow on each other, of eight of ``count`` records, field by field.
+    """Return eight consecutive fields of eight of ``count`` records, field by field.
 
-    From record ``first`` on, beginning ``offset`` bytes into each; the last record stands in for
-    those that there are not.
+    From record ``first`` on, starting ``offset`` bytes into each; beyond the end, the last record
+    is repeated.
     """
     last = count - 1
     return transpose(
@@ -119,13 +115,13 @@ def store_rows(
     row: FloatArray,
     at: int,
 ) -> None:
-    """Write what :func:`columns` gives back as it stands in records, eight numbers each."""
+    """Inverse of :func:`columns`: write eight numbers per record."""
     store_each(transpose(a, b, c, d, e, f, g, h), row, at)
 
 
 @compiled
 def store_each(lanes: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
-    """Write eight lanes, one after the other."""
+    """Write eight lanes consecutively."""
     a, b, c, d, e, f, g, h = lanes
     store(row, at, a)
     store(row, at + WIDTH, b)
@@ -139,7 +135,7 @@ def store_each(lanes: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
 
 @compiled
 def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
-    """Write where every disc is: trackers, then the target, then obstacles."""
+    """Write the positions of all discs: trackers, then the target, then obstacles."""
     n = natural(c.num_trackers)
     for block in range(blocks(n + 1)):
         j = BLOCK * block
@@ -161,21 +157,21 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
 
 @compiled
 def num_discs(c: Record) -> int:
-    """Return how many discs a world has: trackers, the target, obstacles."""
+    """Return the number of discs of a world: trackers, the target, obstacles."""
     return natural(c.num_trackers) + 1 + natural(c.num_obstacles)
 
 
 @compiled
 def within_one(value: Lanes) -> Lanes:
-    """Return a cosine or sine that rounding may have carried past 1, brought back."""
+    """Return a cosine or sine, clipped to [-1, 1] against rounding."""
     return lesser(greater(value, _MINUS_ONE), _ONE)
 
 
 @compiled
 def find_gaps(c: Record, s: Record) -> None:
-    """Write each tracker's free width to the nearest disc, and whether one is near (EXCESS ≤ 0).
+    """Write each tracker's gap to the nearest disc, and whether one is near (``excess`` ≤ 0).
 
-    Near is what could be touched within the next control step.
+    Near discs could be touched within the next control step.
     """
     n = natural(c.num_trackers)
     robots = c.radius + c.radius
@@ -185,11 +181,11 @@ def find_gaps(c: Record, s: Record) -> None:
     for block in range(blocks(n)):
         i = BLOCK * block
         x, y, number = load(s.x, i), load(s.y, i), load(s.index, i)
-        # Robots are all of one size: what is nearest is so without a square root for each.
+        # All robots have one radius, so the nearest is found without a square root for each.
         nearest2 = eight(FAR)
         for j in range(n):
             dx, dy = x - s.x[j], y - s.y[j]
-            # That is j: to read it is faster than to convert it.
+            # s.index[j] is j; reading it is faster than converting j.
             d2 = choose(number == s.index[j], FAR, dx * dx + dy * dy)
             nearest2 = lesser(nearest2, d2)
         dx, dy = x - s.x[n], y - s.y[n]
@@ -208,9 +204,9 @@ def find_gaps(c: Record, s: Record) -> None:
 def find_slots(
     c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: Record
 ) -> None:
-    """Write, of eight trackers from ``first`` on, the nearest slot that is not in ``taken``.
+    """Write the nearest slot that is not in ``taken`` of eight trackers from ``first`` on.
 
-    That is a set, a bit each; -1: all are.
+    ``taken`` is a bit set; the result is -1 if all slots are taken.
     """
     dx, dy = load(s.x, first) - w.x, load(s.y, first) - w.y
     ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin

@@ -1,4 +1,4 @@
-"""What goes wrong in an episode: trackers break for good, sensors and radios fail for a while."""
+"""Faults: trackers break permanently; sensors and radios fail temporarily."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from posse.rules.randomness import FAULTS, bits, uniform
 from posse.rules.state import NEVER
 
 _PER_TRACKER: Final = 4  # draws for each tracker
-_BREAKS: Final = 1000  # where the draws of the breaks begin
+_BREAKS: Final = 1000  # first index of the draws for breaks
 _ONE: Final = np.float32(1.0)
 
 
 @compiled
 def _drawn_step(c: Record, w: Record, earliest: int, index: int) -> int:
-    """Return a control step drawn from what is left of the window in which trackers break."""
+    """Return a control step drawn from the rest of the window in which trackers break."""
     width = max(0, c.break_until - earliest)
     return int(earliest + np.int32(np.float32(width) * uniform(w.key, 0, FAULTS, index)))
 
 
 @compiled
 def _drawn_outage(c: Record, w: Record, chance: np.float32, looked: int, index: int) -> np.int32:
-    """Return when an outage begins, given that none has at the first ``looked`` steps, or NEVER."""
+    """Return the start of an outage, given none in the first ``looked`` steps, or NEVER."""
     left = np.float32(c.horizon - looked)
     share = left / np.float32(c.horizon)
     if uniform(w.key, 0, FAULTS, index) >= chance * share / (_ONE - chance * (_ONE - share)):
@@ -45,10 +45,10 @@ def draw_faults(c: Record, w: Record, trackers: Records) -> None:
 
 @compiled
 def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, moved: int) -> None:
-    """Draw the faults that are yet to come, given those that have been.
+    """Draw future faults, given the past ones.
 
-    Sensors have looked ``looked`` times in this episode, and robots moved at ``moved`` steps: both
-    0 where it begins. Faults that have begun by then stay as they are.
+    Sensors have been read ``looked`` times in this episode, and robots moved in ``moved`` steps;
+    both are 0 at its start. Faults that have begun are unchanged.
     """
     n = c.num_trackers
     for i in range(n):
@@ -77,19 +77,19 @@ def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, mov
 
 @compiled
 def break_tracker(w: Record, t: Record) -> None:
-    """Break one tracker for good."""
+    """Break one tracker permanently."""
     t.broken_at = w.step
     t.speed, t.turn_rate = np.float32(0.0), np.float32(0.0)
     w.working -= 1
     if w.lost_at < 0:
         w.lost_at = w.step
-    # Whoever is left has to settle anew before the loss counts as recovered from.
+    # The rest of the team has to settle again to recover.
     w.held = 0
 
 
 @compiled
 def apply_faults(c: Record, w: Record, trackers: Records) -> None:
-    """Break the trackers whose time has come."""
+    """Break the trackers that are due."""
     if w.breaks_left == 0:
         return
     if c.break_nearest:
@@ -105,7 +105,7 @@ def apply_faults(c: Record, w: Record, trackers: Records) -> None:
         if nearest >= 0:
             break_tracker(w, trackers[nearest])
         w.breaks_left -= 1
-        # Several break one after the other, each when it is nearest.
+        # Several break in sequence, each when it is nearest.
         w.break_step = _drawn_step(c, w, w.step + 1, _BREAKS + w.breaks_left)
         return
     for i in range(c.num_trackers):

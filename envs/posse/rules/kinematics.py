@@ -1,8 +1,8 @@
 """Unicycle motion, equations (2-1) to (2-3) of the paper, integrated exactly.
 
-A robot that holds (V, ω) for a time dt moves on a circular arc. Headings are carried as
-(cos θ, sin θ), so that a step needs no call of a trigonometric function: the turn in one step is
-at most 1 rad (checked with the scenario), where a short polynomial is exact to float32's rounding.
+With constant (V, ω) a robot moves on a circular arc. Headings are stored as (cos θ, sin θ), so a
+step needs no trigonometric function: the turn in one step is at most 1 rad (checked with the
+scenario), for which a short polynomial is exact to float32 rounding.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _C42: Final = np.float32(1 / 42)
 _C12: Final = np.float32(1 / 12)
 _C30: Final = np.float32(1 / 30)
 _C56: Final = np.float32(1 / 56)
-_SMALL: Final = np.float32(5e-7)  # tangents up to this are their angles, and what rounding leaves
+_SMALL: Final = np.float32(5e-7)  # up to this, tan(x) = x within rounding
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
@@ -78,12 +78,12 @@ def turn_towards(
 ) -> np.float32:
     """Return the turn rate, at most ``most``, that brings a heading to a wanted one in ``time``.
 
-    The short way round; from a heading exactly opposite, either.
+    By the shorter turn; from exactly the opposite heading, either.
     """
     along = cosine * wanted_c + sine * wanted_s
     across = cosine * wanted_s - sine * wanted_c
-    # Nearly always it is too far to reach, or reached: neither needs an inverse tangent. The
-    # tangent of the farthest turn is at most limit / near_one.
+    # Usually the heading is out of reach or reached, and no inverse tangent is needed. The tangent
+    # of the greatest turn is at most limit / near_one.
     limit = most * time
     near_one = _ONE - _HALF * limit * limit
     if near_one > _ZERO and abs(across) * near_one > _A_LITTLE_MORE * limit * along:

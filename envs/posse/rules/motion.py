@@ -1,7 +1,7 @@
-"""How actions become motion, for one world and one control step.
+"""Motion of the robots of one world in one control step.
 
-Robots that nothing can touch within the step move each for itself, eight trackers at a time. The
-others move by physics steps, target first, then trackers by number, each move swept.
+Robots with nothing near move independently, eight trackers at a time. The others move in physics
+steps, target first, then trackers by number, with swept collision checks.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _HALF: Final = np.float32(0.5)
 
 @compiled
 def move(robot: Record, time: np.float32) -> None:
-    """Move a robot that nothing is near to on its arc."""
+    """Move a robot with nothing near on its arc."""
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, time
     )
@@ -48,10 +48,10 @@ def move(robot: Record, time: np.float32) -> None:
 def move_swept(
     c: Record, robot: Record, place: int, count: int, obstacles: Records, s: Record
 ) -> None:
-    """Move a robot that something is near to by a physics step, as far as nothing blocks.
+    """Move a robot with something near by a physics step, until it is blocked.
 
-    Where the ``count`` robots are that may be in the way, itself in ``place``, stands in scratch
-    memory, and is kept up to date there.
+    The positions of the ``count`` robots that may block it, itself at ``place``, are in scratch
+    memory and updated there.
     """
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
         robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
@@ -78,9 +78,9 @@ def move_in_parts(
     actions: FloatArray,
     s: Record,
 ) -> None:
-    """Move those that something is near to, by physics steps, the target first.
+    """Move the robots with something near in physics steps, the target first.
 
-    Whom nothing is near to is in nobody's way.
+    The other robots cannot block them.
     """
     near = 0
     for i in range(natural(c.num_trackers)):
@@ -114,7 +114,7 @@ def command(
     wanted_speed: Lanes,
     wanted_turn: Lanes,
 ) -> tuple[Lanes, Lanes]:
-    """Return speed and turn rate, brought towards what an action asks for within the limits."""
+    """Return speed and turn rate after an action, within the limits."""
     return (
         approach(speed, _HALF * (wanted_speed + _ONE) * max_speed, c.speed_change),
         approach(turn_rate, wanted_turn * max_turn_rate, c.turn_change),
@@ -123,14 +123,14 @@ def command(
 
 @compiled
 def lay_out_actions(c: Record, actions: FloatArray, s: Record) -> None:
-    """Write which speeds and turn rates actions (rows, 2 + m) ask for to rows of scratch memory."""
+    """Write commanded speeds and turn rates of actions (rows, 2 + m) to scratch memory."""
     for i in range(natural(c.num_trackers)):
         s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
 
 
 @compiled
 def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
-    """Move the trackers that nothing is near to on their arcs; say whether there are others."""
+    """Move the trackers with nothing near on their arcs; return whether there are others."""
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
         i = BLOCK * block
@@ -188,11 +188,10 @@ def motion(
     set_goal: Any,
     scratch: Record,
 ) -> None:
-    """Turn actions (rows, 2 + m) into motion for one control step; -1 is V = 0, 0 is ω = 0.
+    """Move the robots by actions (rows, 2 + m) for one control step; -1 is V = 0, 0 is ω = 0.
 
-    A robot that nothing can touch within the step moves on one arc, or on one for each physics step
-    where its speed changes only little by little; one that something is near to moves by physics
-    steps, each of them swept.
+    A robot with nothing near moves on one arc, or with limited acceleration on one per physics
+    step; a robot with something near moves in swept physics steps.
     """
     lay_out_actions(c, actions, scratch)
     command_target(c, w, trackers, obstacles, actions, set_goal, scratch)

@@ -1,8 +1,8 @@
 """Counter-based random numbers: a draw is a pure function of (key, step, stream, index).
 
-No generator is carried along, so nothing depends on the order in which worlds are stepped: world
-17 of 4,096 replays alone, bit for bit, and the number of threads changes nothing. The mixing
-function is the finalizer of SplitMix64 (Steele, Lea & Flood 2014), applied once a coordinate.
+There is no generator state, so results do not depend on the order in which worlds are stepped or on
+the number of threads, and a world of a batch replays alone bit for bit. The mixing function is the
+finalizer of SplitMix64 (Steele, Lea & Flood 2014), applied once per coordinate.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from posse.numeric import compiled
 
-# One stream for each use, so that two uses at one step never share a draw.
+# One stream per use, so that no two uses share a draw.
 START: Final = np.uint64(1)
 OBSTACLES: Final = np.uint64(2)
 TARGET: Final = np.uint64(3)
@@ -47,7 +47,7 @@ def mix(key: np.uint64, value: np.uint64) -> np.uint64:
 
 @compiled
 def episode_key(seed: int, split: int, world: int, episode: int) -> np.uint64:
-    """Return the key of one episode of one world; every draw of the episode hangs on it."""
+    """Return the key of one episode of one world, from which all its draws are derived."""
     key = mix(np.uint64(0), np.uint64(seed))
     key = mix(key, np.uint64(split))
     key = mix(key, np.uint64(world))
@@ -80,7 +80,7 @@ def normal_pair(
 ) -> tuple[np.float32, np.float32]:
     """Return two normal float32, standard deviation 1, drawn inside a circle of radius 3.
 
-    Box-Muller with the radius cut at 3, so that neither number ever exceeds 3 in absolute value.
+    Box-Muller with the radius truncated at 3, so that neither number exceeds 3 in absolute value.
     """
     u = uniform(key, step, stream, 2 * index)
     angle = _TWO_PI * uniform(key, step, stream, 2 * index + 1)

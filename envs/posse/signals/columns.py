@@ -47,7 +47,7 @@ class Rows(NamedTuple):
 
 
 def width_of(declarations: Declarations) -> int:
-    """Return how many numbers fields are together."""
+    """Return the total size of fields."""
     return sum(d.size for d in declarations)
 
 

@@ -1,15 +1,15 @@
-"""What an observation field is, and how a function is declared as one.
+"""Declaration of observation fields.
 
-A field is declared on its formula. The parameters of the function say what it is about:
+A field is declared on its formula. The parameters of the function determine its subject:
 
 ========== =====================================================================================
-(c)        a setting of the scenario: the same number for everybody, always
-(c, v)     what a robot observes of itself and of the target (:class:`posse.signals.views.View`)
-(c, v, m)  what it observes of a team-mate (:class:`posse.signals.views.Mate`), once for each
+(c)        a setting of the scenario, a constant
+(c, v)     an observation of the robot itself or the target (:class:`posse.signals.views.View`)
+(c, v, m)  an observation of a team-mate (:class:`posse.signals.views.Mate`), for each of them
 ========== =====================================================================================
 
 ``c`` is the scenario as kernels read it (:data:`posse.rules.state.CONFIG`). ``v`` and ``m`` hold
-eight observers side by side, so a formula is written for eight numbers as for one
+eight observers, so a formula is written for a block of eight numbers like for one
 (:mod:`posse.numeric`). A function returns a number, or a tuple of ``size`` of them.
 """
 
@@ -28,7 +28,7 @@ from posse.scenarios import Scenario
 Bound = float | Callable[[Scenario], float]
 
 SLACK: Final = 1.001
-"""By how much a bound is widened, so that it is true for numbers rounded to float32, too."""
+"""Factor by which bounds are widened to allow for float32 rounding."""
 
 _SUBJECTS: Final = {1: "setting", 2: "self", 3: "mate"}
 
@@ -44,18 +44,18 @@ class Field:
     high: float
     meaning: str
     unknown: float | None = None
-    """The value that stands for "not known", or ``None`` where it is always known."""
+    """The value for "unknown", or ``None`` if it is always known."""
     of_neighbour: bool = False
     """Whether it is repeated for each place of a team-mate."""
 
 
 @dataclass(frozen=True)
 class FieldDeclaration:
-    """A field of any scenario, and the function that works it out."""
+    """A field of any scenario, and the function that computes it."""
 
     name: str
     subject: str
-    """What it is about: ``"setting"``, ``"self"`` or ``"mate"``."""
+    """Its subject: ``"setting"``, ``"self"`` or ``"mate"``."""
     size: int
     unit: str
     low: Bound
@@ -65,10 +65,10 @@ class FieldDeclaration:
     function: Function
 
     def of(self, scenario: Scenario) -> Field:
-        """Return what the field is in a scenario.
+        """Return the field in a scenario.
 
         Raises:
-            DeclarationError: Its bounds are no finite numbers, or the wrong way round.
+            DeclarationError: Its bounds are not finite, or low is above high.
         """
         low, high = (self._bound(name, scenario) for name in ("low", "high"))
         if not low <= high:
@@ -108,12 +108,11 @@ def field(
     """Declare a function as an observation field of its name; its docstring is the meaning.
 
     Args:
-        unit: What it is measured in; ``"1"`` for a bare number.
+        unit: Its unit; ``"1"`` for a plain number.
         low: The least value, or a function (scenario) -> least value.
         high: The greatest, likewise.
-        unknown: What the function returns for "not known"; a team-mate's place that is empty holds
-            it, too, or 0.
-        size: How many numbers the function returns; a tuple where there are more than one.
+        unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
+        size: Number of values that the function returns, as a tuple if more than one.
 
     Raises:
         DeclarationError: The name is taken, the docstring is missing, or the parameters are not
@@ -140,7 +139,7 @@ def field(
 
 
 def setting(unit: str, value: Callable[[Scenario], float]) -> Callable[[Function], Function]:
-    """Declare a function (c) as a field that holds a setting; -1 stands for a boundless one."""
+    """Declare a function (c) as a field that holds a setting; -1 stands for an unlimited one."""
 
     def low(s: Scenario) -> float:
         return -1.0 if math.isinf(value(s)) else value(s) / SLACK

@@ -1,10 +1,10 @@
-"""Everything there is to know of a world, as one flat float32 vector: for critics that see it all.
+"""The full state of a world as one flat float32 vector, for centralized critics.
 
-It holds what decides how the world goes on, chance apart: poses, speeds, the slot frame ψ, where
-the target is bound for and what its motion remembers, obstacles, faults past and to come, every
-tracker's fix, and the radio: what was heard last, and what is in flight. What follows from these
-(sonar, contacts, occupied slots, whether the episode is over) is left out, and so are the sums
-behind the metrics. To add an entry, add its line to the function of its part below.
+It determines the future of the world, apart from random draws: poses, speeds, the slot frame ψ, the
+target's goal heading and its motion's memory, obstacles, past and future faults, every tracker's
+fix, and the radio's last received and pending messages. Derived values (sonar, contacts, occupied
+slots, end of the episode) and the sums of metrics are not included. To add an entry, add its line
+to the function of its part below.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class StateEntry:
 
 
 class StateLayout:
-    """What the state vector of a scenario is made of, entry by entry.
+    """The entries of a scenario's state vector.
 
     Attributes:
         entries: Every :class:`StateEntry`, in order.
@@ -118,7 +118,7 @@ def _when(array: str, field: str, step: float) -> Callable[[WorldArrays], _Value
 
 
 def _in_order_of_age(arrays: WorldArrays, ring: _Values) -> _Values:
-    """Return what is kept by step modulo its length, (E, D + 1, ...), newest first."""
+    """Return a ring buffer (E, D + 1, ...) in order, newest first."""
     length = ring.shape[1]
     if length == 0:
         return ring
@@ -127,7 +127,7 @@ def _in_order_of_age(arrays: WorldArrays, ring: _Values) -> _Values:
     return ordered
 
 
-# What was never heard or sent reads as zeros: what an earlier episode left there is no state.
+# Entries never heard or sent are zero, whatever an earlier episode left there.
 
 
 def _of_heard(field: str) -> Callable[[WorldArrays], _Values]:
@@ -158,7 +158,7 @@ _FIX: Final = ("fix_x", "fix_y", "fix_cos", "fix_sin", "fix_frame_cos", "fix_fra
 def _limits(s: Scenario) -> dict[str, tuple[str, float, float]]:
     """Unit, least and greatest value of what robots and fixes have in common."""
     place = s.position_bound * _SLACK
-    # A measured place is off by the noise, cut at three standard deviations, times the range.
+    # The error of a measured position is at most three standard deviations times the range.
     fix = (s.position_bound + 3 * (s.range_noise + s.bearing_noise) * s.range_bound) * _SLACK
     if SENSORS[s.sensor].fix == "bearing":
         fix = max(fix, _SLACK)  # a unit vector

@@ -1,10 +1,9 @@
-"""What robots observe of team-mates, the nearest first: eight robots at once, a lane each.
+"""Observations of team-mates, nearest first, for eight robots at once, one per lane.
 
-Where the radio is perfect, team-mates are seen where they are. Of a small team that is observed as
-a whole, each is worked out once and written to its place. Where there are fewer places than
-team-mates, or the team is large, the nearest are listed first (:mod:`posse.signals.nearest`), and
-then the nearest of all eight are written together, after them the second nearest, and so on. So are
-they, too, where they are known from what was heard of them, and to a target that is an agent.
+With a perfect radio the current state of team-mates is observed. In a small team observed as a
+whole, each mate is computed once and written to its place. With fewer places than team-mates or a
+large team, the nearest are listed first (:mod:`posse.signals.nearest`) and then written place by
+place. The same applies to received messages, and to the observations of a target agent.
 """
 
 from __future__ import annotations
@@ -54,8 +53,7 @@ def observe_mates(
 ) -> None:
     """Write the nearest team-mates of trackers from k on.
 
-    Where the radio is perfect, the team stands in its rows
-    (:func:`posse.signals.team.lay_out_team`).
+    With a perfect radio, requires the team's rows (:func:`posse.signals.team.lay_out_team`).
     """
     mates, places = natural(c.num_trackers - 1), natural(c.neighbours)
     if places == 0:
@@ -85,7 +83,7 @@ def _observe_whole_team(
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write every team-mate: each has a place."""
+    """Write every team-mate."""
     n, size = natural(c.num_trackers), np.float32(writers.mate_width + c.message_size)
     _, i, _, across = observers
     rows = Rows(observers, observations, k, s.start, True)
@@ -105,9 +103,9 @@ def _observe_whole_team(
 
 @compiled
 def _find_places(n: int, i: int, across: int, s: Record) -> None:
-    """Write how many team-mates are nearer to its observers than each, m + 1 places behind them.
+    """Write the rank by distance of each team-mate, m + 1 places behind its observers.
 
-    Or as near, and of a lower number.
+    Ties are broken by number.
     """
     for m in range(n - 1):
         ahead, left = seen_at(i, m, across, s)
@@ -135,7 +133,7 @@ def _observe_listed(
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write ``most`` team-mates of each list: as they are now, or as they were heard of."""
+    """Write ``most`` team-mates of each list: current or as received."""
     size = natural(writers.mate_width + c.message_size)
     for place in range(natural(most)):
         x, y, cosine, sine, speed, turn_rate, step, _ = transpose(
@@ -169,9 +167,9 @@ def _pose(
     observers: Observers,
     s: Record,
 ) -> Lanes:
-    """Return the pose of whom a lane's list names, and what follows on it.
+    """Return the pose, and the fields after it, of a lane's listed mate.
 
-    The last of ``count`` lanes stands in for those that there are not.
+    Lanes beyond ``count`` repeat the last one.
     """
     there = min(lane, observers.number - 1)
     number = natural(int(s.listed[WIDTH * place + there]))
@@ -192,7 +190,7 @@ def _observe_heard(
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest team-mates from what trackers last heard of each, and what they said."""
+    """Write the nearest team-mates and their messages, as last received."""
     most = 0
     for lane in range(observers.number):
         to, who = world_of(observers, lane), robot_of(observers, lane)
@@ -209,7 +207,7 @@ def _observe_heard(
 
 @compiled
 def _list_heard(c: Record, worlds: WorldArrays, e: int, i: int, lane: int, s: Record) -> int:
-    """List whom tracker i of world e has heard of, the nearest first; return how many they are."""
+    """List the team-mates heard by tracker i of world e, nearest first; return their number."""
     t, step, filled = worlds.tracker[e, i], worlds.world[e].step, 0
     for j in range(natural(c.num_trackers)):
         h = worlds.heard[e, i, j]
@@ -232,7 +230,7 @@ def observe_trackers(
     observations: FloatArray,
     k: int,
 ) -> None:
-    """Write the nearest trackers of a target that is an agent, from k on; it hears nothing."""
+    """Write the nearest trackers of a target agent, without messages, from k on."""
     w, n, filled = worlds.world[e], natural(c.num_trackers), 0
     for j in range(n):
         t = worlds.tracker[e, j]
@@ -261,13 +259,13 @@ def observe_trackers(
 def _write_the_rest(
     c: Record, filled: int, said: FloatArray, writers: Writers, o: FloatArray, k: int
 ) -> None:
-    """Write what the first ``filled`` team-mates said, of (N, m), and the places that are empty."""
+    """Write the messages (N, m) of the first ``filled`` team-mates, and the empty places."""
     size = natural(writers.mate_width + c.message_size)
     for place in range(natural(c.neighbours)):
         start = natural(k + place * size)
         message = start + writers.mate_width
         if place < filled:
-            number = natural(int(o[start]))  # what a team-mate's fields begin with
+            number = natural(int(o[start]))  # the first field of a team-mate
             for q in range(c.message_size):
                 o[message + q] = said[number, q]
         else:

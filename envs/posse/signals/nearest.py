@@ -1,9 +1,9 @@
-"""Which team-mates are nearest to eight trackers, a lane each.
+"""Nearest team-mates of eight trackers, one per lane.
 
-Up to eight of the nearest are found for all lanes at once: squared distances to eight team-mates
-are sorted and merged with the nearest so far, without a branch. That keeps a distance to five
-digits and six bits of whose it is; where two distances are nearer to each other than that can tell,
-the lane's list is made again, one by one and exactly. Longer lists are always made so.
+Up to eight nearest are found for all lanes at once: squared distances to eight team-mates are
+sorted by a sorting network and merged with the nearest so far. A tag of six bits with the mate's
+index replaces the last bits of a distance; where two distances are too close to be distinguished,
+the lane's list is computed again by an exact insertion sort, as longer lists always are.
 """
 
 from __future__ import annotations
@@ -42,9 +42,8 @@ _Eight = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 def list_nearest(n: int, places: int, i: int, count: int, across: int, s: Record) -> None:
     """List the nearest of a team of n to ``count`` trackers, the first of them i.
 
-    They are at most eight; what other lanes hold is of no use.
-    There are no more places than team-mates, and the team stands in its rows
-    (:func:`posse.signals.team.lay_out_team`).
+    At most eight; other lanes are undefined. Requires no more places than team-mates, and the
+    team's rows (:func:`posse.signals.team.lay_out_team`).
     """
     together = places <= WIDTH
     if together:
@@ -56,7 +55,7 @@ def list_nearest(n: int, places: int, i: int, count: int, across: int, s: Record
 
 @compiled
 def rank_eight(n: int, i: int, across: int, s: Record) -> None:
-    """List the eight nearest team-mates of eight trackers, and say which lists are certain."""
+    """List the eight nearest team-mates of eight trackers, and mark the lists that are certain."""
     last = WIDTH * (blocks(n - 1) - 1)
     a, b, c, d, e, f, g, h = sort(eight_apart(n, i, last, False, across, s))
     ninth = eight(_ABSENT)
@@ -79,21 +78,21 @@ def rank_eight(n: int, i: int, across: int, s: Record) -> None:
 
 @compiled
 def as_near(one: Lanes, next_one: Lanes) -> Mask:
-    """Say whether somebody is so near to the next in order that tags cannot tell them apart."""
+    """Return whether a distance is too close to the next one to be distinguished with tags."""
     return (next_one * _CLOSER <= one) & (one < _ABSENT)
 
 
 @compiled
 def whose(n: int, behind: Lanes, distance: Lanes) -> Lanes:
-    """Return the numbers of those whose distances these are; ``behind``, of those next behind."""
+    """Return the numbers of the mates of tagged distances; ``behind``: of the next mates."""
     return round_again(n, behind + tag(distance))
 
 
 @compiled
 def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: Record) -> _Eight:
-    """Return how far the eight team-mates from m + 1 places behind eight trackers are, tagged.
+    """Return tagged distances of the eight team-mates from m + 1 places behind eight trackers.
 
-    Who is not there is too far to count.
+    Absent ones are far away.
     """
     return (
         apart(n, i, m, all_there, across, s), apart(n, i, m + 1, all_there, across, s),
@@ -107,11 +106,11 @@ def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: Record)
 def apart(n: int, i: int, m: int, is_there: bool, across: int, s: Record) -> Lanes:
     """Return the squared distances to the team-mates m + 1 places behind, tagged with m.
 
-    Of who is not there anything is read, and may be no number.
+    Values read for an absent mate are undefined, possibly NaN.
     """
     dx, dy = way_behind(i, m, across, s)
     least = choose(is_there or m < n - 1, _ZERO, _ABSENT)
-    # Last, what makes them numbers again to LLVM: it would not sort bits as fast.
+    # Last, an operation on floats: LLVM sorts bit patterns more slowly.
     return greater(least, tagged(dx * dx + dy * dy, m))
 
 
@@ -123,7 +122,7 @@ def in_order(value: Lanes, other: Lanes) -> tuple[Lanes, Lanes]:
 
 @compiled
 def sort(eight_of: _Eight) -> _Eight:
-    """Return eight in order, the least first, lane by lane (19 comparisons)."""
+    """Return eight values sorted in ascending order, lane by lane (19 comparisons)."""
     a, b, c, d, e, f, g, h = eight_of
     (a, c), (b, d) = in_order(a, c), in_order(b, d)
     (e, g), (f, h) = in_order(e, g), in_order(f, h)
@@ -140,14 +139,14 @@ def sort(eight_of: _Eight) -> _Eight:
 
 @compiled
 def merge(one: _Eight, other: _Eight) -> tuple[Lanes, ...]:
-    """Return the eight least of two eights in order, in order, and the least of the rest."""
+    """Merge two sorted eights: return the eight least, sorted, and the least of the rest."""
     a, b, c, d, e, f, g, h = one
     i, j, k, l, m, n, o, p = other  # noqa: E741
     least = lesser(
         lesser(lesser(greater(a, p), greater(b, o)), lesser(greater(c, n), greater(d, m))),
         lesser(lesser(greater(e, l), greater(f, k)), lesser(greater(g, j), greater(h, i))),
     )
-    # First up, then down: three rounds of comparisons put that in order.
+    # A bitonic sequence: three rounds of comparisons sort it.
     a, b, c, d = lesser(a, p), lesser(b, o), lesser(c, n), lesser(d, m)
     e, f, g, h = lesser(e, l), lesser(f, k), lesser(g, j), lesser(h, i)
     (a, e), (b, f) = in_order(a, e), in_order(b, f)
@@ -183,7 +182,7 @@ def list_exactly(n: int, places: int, i: int, lane: int, across: int, s: Record)
 def keep_nearest(places: int, filled: int, number: int, distance: np.float32, s: Record) -> int:
     """Insert a team-mate into the list of the nearest, of which ``filled`` are known so far.
 
-    Of those as near, who came first stays first. Who they are stands in ``who``.
+    Stable for equal distances. Numbers are in ``who``.
     """
     if filled == places:
         if distance >= s.so_far[places - 1]:

@@ -1,8 +1,8 @@
-"""Who observes what, and when.
+"""Writes the observations.
 
-Trackers observe eight at once, a lane each (:mod:`posse.signals.views`): one tracker of eight
-worlds (``across`` is 1) or, where there are fewer worlds or the team is large, the trackers of one
-(0). The sonar, and a target that is an agent, are looked after world by world.
+Eight trackers at once, one per lane (:mod:`posse.signals.views`): one tracker of eight worlds
+(``across`` is 1) or, with fewer worlds or a large team, eight trackers of one world (0). The sonar
+and the target agent are processed world by world.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from posse.signals.team import lay_out_team
 from posse.signals.views import view_of_target, view_of_trackers
 
 TOGETHER: Final = WIDTH
-"""Worlds that are observed together."""
+"""Worlds processed together."""
 
 _ZERO: Final = np.float32(0.0)
 
@@ -58,7 +58,7 @@ def observe_together(
     s: Record,
     observations: FloatArray,
 ) -> None:
-    """Write what trackers of ``count`` worlds, at most eight, observe, the sonar apart."""
+    """Write the observations of ``count`` worlds, at most eight, without the sonar."""
     n = natural(c.num_trackers)
     observes_team = c.perfect_radio != 0 and c.neighbours > 0
     if count == TOGETHER and n <= MOST_IN_TEAM:
@@ -80,7 +80,7 @@ def observe_sonar(
 ) -> None:
     """Write the sonar of every tracker of a world to (rows, F), from ``first`` on.
 
-    Where every disc is stands in ``s`` (:func:`posse.rules.discs.lay_out`).
+    Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     for i in range(natural(c.num_trackers)):
         t = trackers[i]
@@ -92,7 +92,7 @@ def observe_sonar(
 def observe_target(
     c: Record, worlds: WorldArrays, e: int, writers: Writers, s: Record, observations: FloatArray
 ) -> None:
-    """Write what a target that is an agent observes; it knows where trackers are."""
+    """Write the observation of a target agent, which observes the trackers without error."""
     w, n = worlds.world[e], natural(c.num_trackers)
     view = view_of_target(c, w, worlds.obstacle[e])
     writers.own(c, view, s, Rows(Observers(e, n, 1, 0), observations, 0, s.start, False))

@@ -1,8 +1,8 @@
-"""Eight observers at once, a lane each: their team laid out in rows, and what is written to all.
+"""Eight observers at once, one per lane: rows of their team.
 
-The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or
-teams are large, the trackers of one (0). A row holds the team twice, one after the other, so that a
-team-mate lies as many places behind its observer, whoever that is.
+The eight are one tracker of eight worlds (``across`` is 1) or, with fewer worlds or large teams,
+eight trackers of one world (0). A row holds the team twice, so that the offset of a team-mate from
+its observer does not wrap around.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from posse.rules.state import POSE
 
 @compiled
 def stride_of(across: int) -> int:
-    """Return how far one tracker lies from the next in a row of the team."""
+    """Return the stride between trackers in a row of the team."""
     return WIDTH if across else 1
 
 
@@ -53,11 +53,11 @@ def team_columns(tracker: Records, e: int, i: int, across: int, offset: int) -> 
 def lay_out_team(tracker: Records, e: int, across: int, s: Record) -> None:
     """Write the rows of the team of world e, or of eight worlds.
 
-    What is read beyond their end, from the last block, is of nobody, and must not count.
+    Values read beyond the end of the last block are undefined.
     """
     n, stride = natural(tracker.shape[1]), stride_of(across)
     each = WIDTH // stride
-    # From the last block on: what fills it is overwritten by the others' second place.
+    # Backwards: the padding of the last block is overwritten by the second copy.
     for block in range((n + each - 1) // each - 1, -1, -1):
         i = natural(each * block)
         x, y, cosine, sine, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
@@ -78,7 +78,7 @@ def own_numbers(i: int, across: int, s: Record) -> Lanes:
 
 @compiled
 def round_again(n: int, number: Lanes) -> Lanes:
-    """Return numbers that were counted on past the last of a team of n as they are in it."""
+    """Return numbers modulo the team size n."""
     return choose(number >= np.float32(n), number - np.float32(n), number)
 
 
@@ -90,7 +90,7 @@ def number_behind(n: int, i: int, m: int, across: int, s: Record) -> Lanes:
 
 @compiled
 def way_behind(i: int, m: int, across: int, s: Record) -> tuple[Lanes, Lanes]:
-    """Return how far the team-mates m + 1 places behind are away, in x and in y, m."""
+    """Return the vectors to the team-mates m + 1 places behind, common frame, m."""
     own = natural(stride_of(across) * i)
     at = own + natural(stride_of(across) * (m + 1))
     return load(s.team_x, at) - load(s.team_x, own), load(s.team_y, at) - load(s.team_y, own)
@@ -98,7 +98,7 @@ def way_behind(i: int, m: int, across: int, s: Record) -> tuple[Lanes, Lanes]:
 
 @compiled
 def seen_at(i: int, m: int, across: int, s: Record) -> tuple[Lanes, Lanes]:
-    """Return where the team-mates m + 1 places behind their observers are: ahead and left, m."""
+    """Return the vectors to the team-mates m + 1 places behind, ahead and to the left, m."""
     own = natural(stride_of(across) * i)
     dx, dy = way_behind(i, m, across, s)
     hc, hs = load(s.team_cos, own), load(s.team_sin, own)

@@ -1,8 +1,8 @@
-"""What observation fields are worked out from: eight observers, a lane each.
+"""Inputs of observation fields: views of eight observers, one per lane.
 
-The eight are one tracker of eight worlds (``across`` is 1) or, where there are fewer worlds or
-teams are large, the trackers of one (0). A target that is an agent sees by itself, in the first
-lane. Only what a field uses costs time: the rest is left out when it is compiled.
+The eight are one tracker of eight worlds (``across`` is 1) or, with fewer worlds or large teams,
+eight trackers of one world (0). A target agent uses the first lane. Unused parts of a view are
+removed by the compiler.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _NOBODY: Final = np.uint64(0)
 
 
 class View(NamedTuple):
-    """Eight observers, and what they know of the target.
+    """Eight observers, and their knowledge of the target.
 
-    Places and directions are in the common frame.
+    Positions and directions are in the common frame.
     """
 
     number: Lanes
-    """Which tracker it is; -1: the target."""
+    """Number of the tracker; -1: the target."""
     x: Lanes
     """m."""
     y: Lanes
@@ -68,17 +68,17 @@ class View(NamedTuple):
     turn_acceleration_time: Lanes
     """From no turn to the greatest turn rate, s; 0: at once."""
     target_known: Mask
-    """Whether it has a fix of the target, which the following is about."""
+    """Whether it has a fix of the target, described by the following."""
     target_seen: Lanes
-    """1 while its own sensor has the target, else 0."""
+    """1 while its own sensor sees the target, else 0."""
     target_step: Lanes
     """Control step of the fix."""
     target_dx: Lanes
-    """Where the target was, from here, m; of a bearing alone: its direction, a unit vector."""
+    """Vector to the target at the fix, m; for a bearing: a unit vector."""
     target_dy: Lanes
     target_distance: Lanes
     target_cos: Lanes
-    """How it headed."""
+    """Heading of the target at the fix."""
     target_sin: Lanes
     target_frame_cos: Lanes
     """The slot frame ψ."""
@@ -90,23 +90,23 @@ class View(NamedTuple):
 
 @compiled
 def ego(v: View, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
-    """Return a vector of the common frame as robots have it: ahead, and to the left."""
+    """Return a vector of the common frame in the robot's frame: ahead, and to the left."""
     return x * v.heading_cos + y * v.heading_sin, y * v.heading_cos - x * v.heading_sin
 
 
 class Mate(NamedTuple):
-    """A team-mate of each of eight observers: as it is now, or as it was heard of last."""
+    """A team-mate of each of eight observers: current or as last received."""
 
     number: Lanes
     age: Lanes
-    """Of what is known of it, s."""
+    """Age of the data, s."""
     dx: Lanes
-    """Where it was, from here, common frame, m."""
+    """Vector to it, common frame, m."""
     dy: Lanes
     distance: Lanes
     """m."""
     ahead: Lanes
-    """The direction of where it was, ego; rounding may carry it past 1."""
+    """Its direction in the robot's frame; may exceed 1 by rounding."""
     left: Lanes
     heading_cos: Lanes
     heading_sin: Lanes
@@ -149,9 +149,9 @@ def mate_heard(
     speed: Lanes,
     turn_rate: Lanes,
 ) -> Mate:
-    """Return a team-mate as it was heard of last.
+    """Return a team-mate as last received.
 
-    In another order of rounding than :func:`mate_now`: to change either would change results.
+    Its rounding differs from :func:`mate_now`; changing either would change results.
     """
     distance = root(dx * dx + dy * dy)
     apart = distance > _ZERO
@@ -194,7 +194,7 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
 
 @compiled
 def view_of_target(c: Record, w: Record, obstacles: Records) -> View:
-    """Return the view of a target that is an agent, whose limits act at once."""
+    """Return the view of a target agent, which has no acceleration limits."""
     touching = w.touching != _NOBODY or touches_surroundings(c, w, obstacles)
     zero, never = eight(_ZERO), eight(_MINUS_ONE)
     return View(

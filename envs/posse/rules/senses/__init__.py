@@ -1,4 +1,4 @@
-"""What trackers sense and hear: target sensor, sonar, radio.
+"""Target sensors, sonar and radio.
 
 Kinds of target sensors are declared by name (:mod:`posse.rules.senses.declaring`).
 """

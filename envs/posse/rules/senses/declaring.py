@@ -1,12 +1,12 @@
-"""How a kind of target sensor is declared, and how the declared ones become part of a kernel.
+"""Declaration of target sensors, and their dispatch in a kernel.
 
-A sensor says whether it has the target, and where. What that makes is a *fix*
-(:data:`posse.rules.state.FIX_FIELDS`), of one of these kinds:
+A sensor determines whether the target is in sight, and its measured position. The result is a
+*fix* (:data:`posse.rules.state.FIX_FIELDS`), of one of these kinds:
 
 ============ ======================================================================================
-``position`` where the target is, how it heads, the slot frame; a velocity from successive fixes
-``bearing``  in which direction it is; range, heading, frame and velocity stay unknown. A fix of
-             this kind is not sent by radio: from elsewhere the direction would be another
+``position`` position and heading of the target, slot frame; velocity from successive fixes
+``bearing``  direction of the target; range, heading, frame and velocity stay unknown. Not sent by
+             radio, since the direction depends on the observer
 ============ ======================================================================================
 """
 
@@ -34,15 +34,15 @@ class Sensor:
     name: str
     meaning: str
     sight: Function
-    """(c, w, t, dx, dy, s) -> whether tracker t has the target, which is (dx, dy) from it."""
+    """(c, w, t, dx, dy, s) -> whether the target, (dx, dy) from tracker t, is in sight."""
     measure: Function | None
-    """(c, w, number, dx, dy) -> where it has the target; None: where it is, and the scenario's
+    """(c, w, number, dx, dy) -> the measured (dx, dy); None: the true one with the scenario's
     noise."""
     fix: str
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions that it consists of, and what each returns."""
+        """Its functions, and their kinds of return value."""
         measure = () if self.measure is None else ((self.measure, "pair"),)
         return (self.sight, "truth"), *measure
 
@@ -52,15 +52,15 @@ def sensor(
 ) -> Callable[[Function], Function]:
     """Declare a function as the sight of a kind of sensor; its docstring is the meaning.
 
-    The function takes the scenario, the world, the tracker, what is from it to the target in the
-    common frame, and scratch memory, which says where the obstacles are, and returns whether the
-    sensor has the target. :func:`posse.rules.senses.in_sight` is what the built-in one returns.
+    The function takes the scenario, the world, the tracker, the vector (dx, dy) to the target in
+    the common frame, and scratch memory with the obstacles' positions, and returns whether the
+    target is in sight. The built-in one is :func:`posse.rules.senses.in_sight`.
 
     Args:
         name: What ``sensor`` of a scenario calls it.
-        measure: A function of the scenario, the world, the tracker's number and what is from it to
-            the target, which returns what the sensor takes that for. By default it is the truth,
-            and the scenario's ``range_noise`` and ``bearing_noise``.
+        measure: A function of the scenario, the world, the tracker's number and the vector to the
+            target, which returns the measured vector. Default: the true one with the scenario's
+            ``range_noise`` and ``bearing_noise``.
         fix: The kind of a fix, ``"position"`` or ``"bearing"``.
 
     Raises:

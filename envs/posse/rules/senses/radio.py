@@ -1,7 +1,7 @@
-"""The radio: what each tracker sends every control step, and what reaches the others.
+"""The radio: broadcasts of the trackers in every control step, and their reception.
 
 Each working tracker broadcasts its pose, speed, turn rate, its best fix of the target with the
-fix's time, and the policy's message. Range, delay and loss act on all of it alike.
+fix's time, and the policy's message. Range, delay and loss apply to the whole broadcast.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _NO_BITS: Final = np.uint64(0)
 
 @compiled
 def radio_works(c: Record, w: Record, t: Record) -> bool:
-    """Say whether a tracker can send and hear now."""
+    """Return whether a tracker can send and receive now."""
     if t.broken_at != NEVER:
         return False
     return bool(w.step < t.radio_dead_from or w.step >= t.radio_dead_from + c.outage_steps)
@@ -30,7 +30,7 @@ def radio_works(c: Record, w: Record, t: Record) -> bool:
 
 @compiled
 def share_fixes(c: Record, trackers: Records) -> None:
-    """A radio without limits, where nobody breaks: everyone takes the newest fix there is."""
+    """Perfect radio without faults: every tracker takes the newest fix."""
     if c.fix_bearing != 0:
         return
     best = 0
@@ -49,7 +49,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
 
 @compiled(seldom=True)
 def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
-    """Put what every tracker says now into the (D + 1, N) ring."""
+    """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
         t, b = trackers[i], broadcast[slot, i]
@@ -71,7 +71,7 @@ def hear(
     heard_message: FloatArray,
     message: FloatArray,
 ) -> None:
-    """Let every tracker hear what was sent ``radio_delay`` steps ago and reaches it."""
+    """Deliver the broadcasts sent ``radio_delay`` steps ago to the trackers in range."""
     sent_at = w.step - c.radio_delay
     if sent_at < 0:
         return
@@ -107,9 +107,9 @@ def hear(
 
 @compiled(seldom=True)
 def connected(c: Record, w: Record, trackers: Records) -> bool:
-    """Say whether the working trackers are one radio graph, over any number of hops.
+    """Return whether the radio graph of the working trackers is connected.
 
-    Not for a perfect radio, which always makes them one.
+    Not for a perfect radio, where it always is.
     """
     n = c.num_trackers
     reach2 = c.radio_range * c.radio_range

@@ -1,4 +1,4 @@
-"""What a tracker senses of the target by itself, if it is in sight, and the fix that this makes."""
+"""The built-in target sensor, and fixes of the target."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from posse.rules.state import FIX, NEVER
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _TINY: Final = np.float32(1e-9)
-_VELOCITY_MEMORY: Final = np.float32(1.0)  # s; an older fix tells nothing of the velocity
+_VELOCITY_MEMORY: Final = np.float32(1.0)  # s; older fixes give no velocity
 
 
 @sensor("range-bearing")
 def in_sight(c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> bool:
-    """Range and bearing of a target that is in sight.
+    """Range and bearing of a target in sight.
 
-    Which is in range, in the field of view, with no obstacle across the line of sight, while the
-    sensor works. Returns whether a tracker has the target, which lies (dx, dy) from it.
+    In sight: in range and in the field of view, not occluded, while the sensor works. Returns
+    whether this holds for the target at (dx, dy) from a tracker.
     """
     d2 = dx * dx + dy * dy
     if d2 > c.sensing_range * c.sensing_range:
@@ -53,9 +53,9 @@ def in_sight(c: Record, w: Record, t: Record, dx: np.float32, dy: np.float32, s:
 
 @compiled
 def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> bool:
-    """Say whether an obstacle lies across the line from a tracker to what is (dx, dy) from it.
+    """Return whether an obstacle occludes the point (dx, dy) from a tracker.
 
-    Eight at a time: which of them is across cannot be predicted.
+    In blocks of eight, since single branches would be mispredicted.
     """
     d2 = dx * dx + dy * dy
     first = natural(c.num_trackers) + 1
@@ -78,15 +78,15 @@ def fix_velocity(
     old_vx: Lanes,
     old_vy: Lanes,
 ) -> tuple[Lanes, Lanes]:
-    """Return the target's velocity from a fix that lies (dx, dy) from the one before.
+    """Return the target's velocity from a fix at (dx, dy) from the previous one.
 
-    ``since`` counts the control steps between them, ``old_vx`` and ``old_vy`` are the velocity that
-    was known. All are plain numbers, or lanes.
+    ``since`` counts the control steps between them; ``old_vx`` and ``old_vy`` are the previous
+    velocity. All are numbers or lanes.
     """
     rate = _ONE / (since * c.dt)
     vx, vy, keep = dx * rate, dy * rate, lesser(_ONE, c.smoothing * since)
     vx, vy = old_vx + keep * (vx - old_vx), old_vy + keep * (vy - old_vy)
-    # No target is faster than a tracker (assumption ii), so noise that says so is cut.
+    # No target is faster than a tracker (assumption ii): limit the effect of noise.
     speed2 = vx * vx + vy * vy
     too_fast = speed2 > c.fastest * c.fastest
     cut = choose(too_fast, c.fastest / root(greater(speed2, _TINY)), _ONE)
@@ -105,7 +105,7 @@ def take_fix(
     frame_cos: np.float32,
     frame_sin: np.float32,
 ) -> None:
-    """Give a tracker a newer fix of the target, and a velocity from this and the one before."""
+    """Store a newer fix of a tracker, with the velocity from this and the previous one."""
     since = np.float32(step - t.fix_step)
     if t.fix_step >= 0 and since * c.dt <= _VELOCITY_MEMORY:
         t.fix_vx, t.fix_vy = fix_velocity(c, since, x - t.fix_x, y - t.fix_y, t.fix_vx, t.fix_vy)
@@ -119,9 +119,9 @@ def take_fix(
 
 @compiled
 def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Record) -> int:
-    """Let every tracker look for the target, and note the fix if it has it; return how many do.
+    """Read the target sensors and store fixes; return the number of trackers with one.
 
-    Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
+    Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     n = natural(c.num_trackers)
     measured = c.measured != 0
@@ -167,7 +167,7 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
 
 @compiled(seldom=True)
 def note_bearings(c: Record, w: Record, trackers: Records, s: Record) -> None:
-    """Note the bearings of those that have the target: fixes of no place."""
+    """Store bearing fixes of the trackers that see the target."""
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.sees:
@@ -184,7 +184,7 @@ def note_bearings(c: Record, w: Record, trackers: Records, s: Record) -> None:
 def add_noise(
     c: Record, w: Record, number: int, dx: np.float32, dy: np.float32
 ) -> tuple[np.float32, np.float32]:
-    """Return what is (dx, dy) from a tracker as its sensor has it, with the scenario's noise."""
+    """Return the vector (dx, dy) from a tracker with the scenario's noise."""
     first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
     scale = _ONE + c.range_noise * first
     turn = c.bearing_noise * second

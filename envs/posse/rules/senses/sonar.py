@@ -1,4 +1,4 @@
-"""The sonar ring: how far the nearest thing is in each direction, for a tracker by itself."""
+"""The sonar ring: distance to the nearest disc or wall in each direction."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from posse.numeric import (
 )
 from posse.rules.discs import BLOCK, FAR, blocks, natural, num_discs
 
-_WORD: Final = 8  # blocks of eight discs, a bit each, that fill a number of 64 bits
+_WORD: Final = 8  # blocks of eight discs in a bit set of 64
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -31,18 +31,18 @@ _TINY: Final = np.float32(1e-9)
 _A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
 
 Pose = tuple[np.float32, np.float32, np.float32, np.float32]
-"""Where a robot is and how it heads, x, y, cosine, sine: of a tracker, or of the target."""
+"""x, y, cosine and sine of the heading, of a tracker or the target."""
 _Echo = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 
 
 @compiled
 def echo(c: Record, robot: Pose, j: int, s: Record) -> _Echo:
-    """Return what the sonar has of disc j.
+    """Return the echo of disc j.
 
-    Where its centre lies, ahead and to the left; how far its nearest point is; how far along a
-    beam's axis the centre lies at least, if that point is in the beam's width; and the square of
-    its radius, or -1 where it looks narrower than a beam is wide, as it nearly always does: then no
-    axis meets it but that of the beam in whose width it lies. What is out of reach is far.
+    The position of its centre, ahead and to the left; the distance of its nearest point; the least
+    distance of the centre along a beam's axis for which that point is within the beam; and the
+    squared radius, or -1 if the disc appears narrower than a beam (the usual case), so that only
+    the axis of the beam that contains it can meet it. Distances out of range are ``FAR``.
     """
     at = natural(j)
     x, y, hc, hs = robot
@@ -61,7 +61,7 @@ def echo(c: Record, robot: Pose, j: int, s: Record) -> _Echo:
 
 @compiled
 def listen(c: Record, one: _Echo, two: _Echo, three: _Echo, four: _Echo, s: Record) -> None:
-    """Shorten the sonar readings by four discs."""
+    """Update the sonar readings with four discs."""
     wide = max(max(one[4], two[4]), max(three[4], four[4])) >= _ZERO
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
@@ -81,14 +81,14 @@ def listen(c: Record, one: _Echo, two: _Echo, three: _Echo, four: _Echo, s: Reco
 
 @compiled
 def in_width(disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
-    """Return how far a disc's nearest point is, for beams in whose width that lies."""
+    """Return the distance of a disc's nearest point for the beams that contain it."""
     ahead, left, nearest, least, _ = disc
     return choose(ahead * cosine + left * sine >= least, nearest, FAR)
 
 
 @compiled
 def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
-    """Return where the axes of beams meet a disc; its nearest point counts for some of them."""
+    """Return the distance at which the axes of beams meet a disc, unless its nearest point does."""
     ahead, left, _, least, radius2 = disc
     along, across = ahead * cosine + left * sine, left * cosine - ahead * sine
     under_root = radius2 - across * across
@@ -99,7 +99,7 @@ def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
 
 @compiled(seldom=True)
 def listen_to_walls(c: Record, robot: Pose, s: Record) -> None:
-    """Shorten the sonar readings by the walls of the arena."""
+    """Update the sonar readings with the walls of the arena."""
     half, (x, y, _, _) = c.half_arena, robot
     listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
     listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
@@ -116,7 +116,7 @@ def listen_to_wall(
     distance: np.float32,
     s: Record,
 ) -> None:
-    """Shorten the sonar readings by a wall at a distance along its outward normal."""
+    """Update the sonar readings with a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
         return
     nearest = max(distance - c.radius, _ZERO)
@@ -132,17 +132,17 @@ def listen_to_wall(
 
 @compiled
 def _next(near: int, otherwise: int) -> int:
-    """Return the place of the lowest bit; of no bits, another that is heard again, for nothing."""
+    """Return the index of the lowest bit, or ``otherwise`` if there is none."""
     return lowest_bit(near) if near != 0 else otherwise
 
 
 @compiled
 def listen_to_discs(c: Record, robot: Pose, number: int, s: Record) -> None:
-    """Shorten the sonar readings by all discs that are near."""
+    """Update the sonar readings with all discs in range."""
     x, y, _, _ = robot
     discs = blocks(num_discs(c))
     for first_block in range(0, discs, _WORD):
-        near = 0  # a bit for each disc that may be, looked at without a square root
+        near = 0  # candidate discs as bits, found without a square root
         for block in range(min(_WORD, discs - first_block)):
             j = BLOCK * (first_block + block)
             dx, dy = load(s.x, j) - x, load(s.y, j) - y
@@ -151,7 +151,7 @@ def listen_to_discs(c: Record, robot: Pose, number: int, s: Record) -> None:
         if 0 <= own < BLOCK * _WORD:
             near &= ~(1 << own)
         while near != 0:
-            # Four at a time: mostly there are no more, so that the loop's end can be predicted.
+            # Four at a time: usually enough, so that the end of the loop is predictable.
             at = natural(BLOCK * first_block)
             one = lowest_bit(near)
             near &= near - 1
@@ -179,8 +179,8 @@ def ping(
 ) -> None:
     """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
 
-    The robot is disc ``number`` of those whose places stand in ``s``
-    (:func:`posse.rules.discs.lay_out`). No other is nearer than ``gap``, m between the rims.
+    The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`); the gap to
+    the nearest other disc is at least ``gap``, m.
     """
     for block in range(blocks(c.sonar_beams)):
         store(s.reading, BLOCK * block, eight(c.sonar_range))

@@ -1,4 +1,4 @@
-"""How the target moves: one file a motion, and what keeps the target clear of walls.
+"""Target motions, one file each, and avoidance of walls and obstacles.
 
 The built-in motions are declared in the order of these imports.
 """

@@ -40,7 +40,7 @@ def draw(c: Record, w: Record) -> None:
 
 @target_motion("accelerating", draw=draw, memory=_MEMORY)
 def accelerating(c: Record, w: Record) -> None:
-    """Turns to and fro by a sine of drawn amplitude, rate and phase (paper, section 2)."""
+    """Turn rate is a sine of random amplitude, rate and phase (paper, section 2)."""
     time = np.float32(w.step) * c.dt
     turn = w.weave_amplitude * np.float32(math.sin(w.weave_rate * time + w.weave_phase))
     for _ in range(c.physics_steps):  # an arc turns by 1 rad at most

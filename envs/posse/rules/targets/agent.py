@@ -1,4 +1,4 @@
-"""The target that a policy drives."""
+"""The target controlled by a policy."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ from posse.rules.targets.declaring import target_motion
 
 @target_motion("agent", agent=True)
 def agent(c: Record, w: Record) -> None:
-    """A policy drives it, as it drives the trackers."""
+    """A policy controls the target."""

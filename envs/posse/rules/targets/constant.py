@@ -1,4 +1,4 @@
-"""The constant motion: straight on."""
+"""The constant motion: straight ahead."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ from posse.rules.targets.declaring import target_motion
 
 @target_motion("constant")
 def constant(c: Record, w: Record) -> None:
-    """Straight on at the heading of the start (paper, section 2)."""
+    """Straight ahead at the initial heading (paper, section 2)."""

@@ -1,7 +1,7 @@
-"""How a motion of the target is declared, and how the declared ones become part of a kernel.
+"""Declaration of target motions, and their dispatch in a kernel.
 
-A motion sets the heading that the target is to take, ``w.goal_cos`` and ``w.goal_sin``, in every
-control step. One steering law turns the target there (:mod:`posse.rules.targets.steering`).
+A motion sets the goal heading, ``w.goal_cos`` and ``w.goal_sin``, in every control step. One
+steering law turns the target to it (:mod:`posse.rules.targets.steering`).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ _ZERO: Final = np.float32(0.0)
 Bound = float | Callable[[Scenario], float]
 
 GOAL_PARAMETERS: Final = ("c", "w", "trackers", "obstacles", "s")
-"""The scenario, the world, its trackers and obstacles, scratch memory; the first two or more."""
+"""Scenario, world, trackers, obstacles, scratch memory; a motion takes the first two or more."""
 
 
 class Memory(NamedTuple):
-    """A number that a motion remembers: a float32 of the world's record, 0 at the start.
+    """A state variable of a motion: a float32 of the world's record, 0 at the start.
 
-    The global state holds it, so its bounds must be true; a function of the scenario may be one.
+    It is part of the global state, within its bounds: numbers, or functions of the scenario.
     """
 
     name: str
@@ -53,16 +53,16 @@ class TargetMotion:
     goal: Function
     """Sets the goal heading; takes the first of :data:`GOAL_PARAMETERS`."""
     draw: Function | None
-    """(c, w): draws what an episode depends on, from the stream TARGET."""
+    """(c, w): draws the parameters of an episode, from the stream TARGET."""
     memory: tuple[Memory, ...]
     mirrored: bool
     """Whether the goal heading is mirrored near walls."""
     agent: bool
-    """Whether a policy drives the target instead."""
+    """Whether a policy controls the target instead."""
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions that it consists of, and what each returns."""
+        """Its functions, and their kinds of return value."""
         draw = () if self.draw is None else ((self.draw, "nothing"),)
         return (self.goal, "nothing"), *draw
 
@@ -84,14 +84,14 @@ def target_motion(
 
     Args:
         name: What ``target_motion`` of a scenario calls it.
-        draw: A function ``(c, w)`` that draws what an episode depends on.
-        memory: What it remembers, fields of ``w``.
-        mirrored: Whether the goal is mirrored near walls. One that looks ahead goes without.
-        agent: Whether a policy drives the target: the function is not called.
+        draw: A function ``(c, w)`` that draws the parameters of an episode.
+        memory: Its state variables, fields of ``w``.
+        mirrored: Whether the goal is mirrored near walls; not needed by a motion that avoids them.
+        agent: Whether a policy controls the target: the function is not called.
 
     Raises:
         DeclarationError: The name, or that of a memory, is taken, the docstring is missing, or the
-            parameters are others.
+            parameters are wrong.
     """
 
     def declare(function: Function) -> Function:
@@ -126,7 +126,7 @@ def _check_memory(function: Function, memory: Sequence[Memory]) -> None:
 
 
 def drawing(motions: Sequence[TargetMotion]) -> Any:
-    """Return (c, w): clears what motions remember, and draws what the one of ``c`` needs."""
+    """Return (c, w): clears the memories, and draws the parameters of the motion of ``c``."""
     lines = [f"w.{each.name} = ZERO" for motion in motions for each in motion.memory]
     functions: dict[str, Any] = {"ZERO": _ZERO}
     for k, motion in enumerate(motions):

@@ -1,7 +1,7 @@
-"""The smart motion: it knows where everybody is, and gets away.
+"""The smart motion: evasion with full knowledge of the state.
 
-It makes ground through the widest gap, until the team keeps station on it or a tracker comes too
-near. Then it darts: it takes the turn that tears the formation apart, and holds it.
+The target escapes through the widest gap until the team keeps station or a tracker comes too near.
+Then it darts: it takes the turn that disrupts the formation most, and holds it.
 """
 
 from __future__ import annotations
@@ -16,39 +16,39 @@ from posse.rules.targets.declaring import Memory, target_motion
 from posse.rules.targets.smart_plans import DART_TURN, plan_dart, plan_escape
 
 SMART_REPLAN: Final = 5
-"""It decides every so many control steps."""
+"""Control steps between decisions."""
 PATIENCE: Final = np.float32(3.0)
-"""Of station keeping that provoke a dart, s."""
+"""Time of station keeping by the whole team that triggers a dart, s."""
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _TWO: Final = np.float32(2.0)
 _NO_BITS: Final = np.uint64(0)
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
-_STATION_MARGIN: Final = np.float32(1.0)  # m beyond the farthest slot that count as near
+_STATION_MARGIN: Final = np.float32(1.0)  # m; beyond the outermost slot, counts as near
 _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
-_DANGER: Final = np.float32(0.6)  # a tracker this near provokes a dart, x formation_distance
+_DANGER: Final = np.float32(0.6)  # times formation_distance; a nearer tracker triggers a dart
 _ALARM: Final = np.float32(1e3)
 
 _PRESSED: Final = Memory(
     "pressed", "s", lambda s: -float(DART_TURN) / s.target_turn_rate * _SLACK, float(PATIENCE),
-    "of a smart target: how long the team has kept station; < 0: it darts",
+    "of a smart target: time that the team has kept station; < 0: dart",
 )  # fmt: skip
 
 
 @target_motion("smart", memory=(_PRESSED,), mirrored=False)
 def smart(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
-    """Makes for the widest gap, and darts when the team keeps station (paper, section 2)."""
+    """Escapes through the widest gap, and darts when the team keeps station (paper, section 2)."""
     if w.step % SMART_REPLAN == 0:
         evade(c, w, trackers, obstacles, s)
 
 
 @compiled
 def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
-    """Set the goal heading, for as long as it takes to decide anew."""
+    """Set the goal heading until the next decision."""
     past = np.float32(SMART_REPLAN) * c.dt
     if w.touching != _NO_BITS:
-        # Held fast: the way out is where nobody stands.
+        # Blocked by contact: leave in a free direction.
         w.pressed = _ZERO
         plan_escape(c, w, trackers, obstacles, s)
         return
@@ -66,10 +66,10 @@ def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record
 
 @compiled
 def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
-    """Return how committed the team is: from -1, no tracker keeps station, to 1, all of them do.
+    """Return the commitment of the team: -1, no tracker keeps station, to 1, all do.
 
-    A tracker keeps station when it is about as near as a slot is and moves as the target does. One
-    that comes nearer than any slot is a danger, which takes more than all patience at once.
+    A tracker keeps station if it is about as near as a slot and moves as the target does. A tracker
+    much nearer than any slot triggers a dart at once.
     """
     near = c.slots_reach + _STATION_MARGIN
     danger = max(_DANGER * c.formation_distance, c.radius + c.radius)

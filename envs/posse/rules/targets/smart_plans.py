@@ -1,4 +1,4 @@
-"""What a smart target weighs: every direction it could take, against where the trackers are."""
+"""Plans of a smart target: evaluation of candidate directions."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from posse.rules.state import NEVER
 from posse.scenarios.formation import follow_heading
 
 DART_TURN: Final = np.float32(1.3 * math.pi)
-"""A dart lasts as long as turning so far, rad."""
+"""A dart lasts as long as a turn by this angle, rad."""
 SMART_DIRECTIONS: Final = 2 * WIDTH
-"""That it weighs."""
+"""Number of candidate directions."""
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -34,16 +34,16 @@ _HALF: Final = np.float32(0.5)
 _NO_BITS: Final = np.uint64(0)
 _TINY: Final = np.float32(1e-12)
 _HALF_ROUND: Final = WIDTH
-_FORESIGHT: Final = np.float32(0.5)  # s; trackers are taken to be where they will be then
-_LOYALTY: Final = np.float32(0.5)  # s; going back on its choice has to be worth twice that
-_LOOKOUT: Final = np.float32(4.0)  # s; an obstacle or wall that is farther ahead does not matter
-_DART_MOMENTS: Final = 6  # at which a dart is looked at beforehand
+_FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by this time
+_LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
+_LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
+_DART_MOMENTS: Final = 6  # time samples of a simulated dart
 _DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
 _DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
-_DART_STRIDE: Final = 2  # every second direction is played through
+_DART_STRIDE: Final = 2  # every second direction is simulated
 _CLEARANCE: Final = np.float32(0.3)  # m between the rims of the target and a tracker
-_FAR: Final = np.float32(1e3)  # for a direction that nobody bars
-_BLOCKED: Final = np.float32(100.0)  # m; what running into a tracker takes off a dart's worth
+_FAR: Final = np.float32(1e3)  # for an unblocked direction
+_BLOCKED: Final = np.float32(100.0)  # m; penalty of a dart for a collision
 
 _ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
 _DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
@@ -54,24 +54,23 @@ _DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Set the goal heading through the widest gap that the team leaves.
 
-    For every direction u, the soonest that any tracker, straight on at full speed, could be where
-    the target then is: the least root t of |p - u v t| = V t. The target takes the direction where
-    that is latest, seen from where the trackers will be shortly, and does not go back on a choice
-    for little: among trackers that surround it, it would dither.
+    For every direction u, the earliest interception by any tracker moving straight at full speed is
+    the least root t of |p - u v t| = V t, with predicted positions of the trackers. The target
+    takes the direction with the latest interception, with hysteresis against oscillation.
     """
     v, most = c.target_speed, c.fastest
     a = most * most - v * v
     per_a = _ONE / a
     clear = c.radius + c.radius + _CLEARANCE
-    # What it heads for at the start was not its choice, and one that ended in contact was bad.
+    # No hysteresis for the initial heading, nor for a choice that ended in contact.
     loyalty = _LOYALTY if w.step > 0 and w.touching == _NO_BITS else _ZERO
-    # Half the directions and, astern, their opposites, which have the square root in common.
+    # Half the directions; the opposite ones share the square root.
     ux, uy = load(_DIRECTION_COS, 0), load(_DIRECTION_SIN, 0)
     ahead, astern = eight(_FAR), eight(_FAR)
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.broken_at != NEVER:
-            # It goes nowhere, and is met only by running into it.
+            # A broken tracker is only an obstacle.
             px, py = t.x - w.x, t.y - w.y
             along, across = px * ux + py * uy, px * uy - py * ux
             met = (across < clear) & (across > -clear)
@@ -123,11 +122,10 @@ def free_time(
 
 @compiled(seldom=True)
 def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
-    """Set the goal heading whose turn tears the formation apart.
+    """Set the goal heading whose turn disrupts the formation most.
 
-    Every direction is played through, the trackers holding the speed and turn rate that they have:
-    the best one moves them farthest from where they stand around the target, and does not lead
-    into one of them.
+    Candidate directions are simulated with the trackers holding speed and turn rate: the best one
+    displaces them farthest from their places around the target, without a collision.
     """
     moment = DART_TURN / (c.target_turn_rate * np.float32(_DART_MOMENTS))
     clear = c.radius + c.radius + _CLEARANCE
@@ -138,7 +136,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
         for i in range(c.num_trackers):
             t = trackers[i]
             hc, hs, tc, ts = w.heading_cos, w.heading_sin, t.heading_cos, t.heading_sin
-            moved_x, moved_y = _ZERO, _ZERO  # by how much, seen from the target
+            moved_x, moved_y = _ZERO, _ZERO  # displacement relative to the target
             for _ in range(_DART_MOMENTS):
                 old_c, old_s = hc, hs
                 hc, hs = follow_heading(hc, hs, ux, uy, _DART_TURN_COS, _DART_TURN_SIN)

@@ -1,6 +1,6 @@
-"""How a scripted target steers: it turns to its goal heading, within its turn limit.
+"""Steering of a scripted target: turns to its goal heading within its turn limit.
 
-In an arena it takes no turn that leads it into a wall or an obstacle
+In an arena, turns that lead into a wall or an obstacle are avoided
 (:mod:`posse.rules.targets.walls`).
 """
 
@@ -19,7 +19,7 @@ from posse.rules.targets.walls import mirror_at_walls, safe_turn
 def target_turn_rate(
     c: Record, w: Record, trackers: Records, obstacles: Records, set_goal: Any, s: Record
 ) -> np.float32:
-    """Return the turn rate that a scripted target takes for the next control step, rad/s."""
+    """Return the turn rate of a scripted target for the next control step, rad/s."""
     set_goal(c, w, trackers, obstacles, s)
     if c.mirrored:
         mirror_at_walls(c, w)

@@ -1,9 +1,9 @@
-"""How a target keeps clear of walls and obstacles.
+"""Avoidance of walls and obstacles by a scripted target.
 
-In an arena the goal is mirrored near walls, and the target only takes a turn that leaves one of its
-two turning circles free, so that it can always go on turning for ever without touching anything.
-Trackers that block it, so that it turns on the spot, can leave it without a free circle: then it
-turns to the wider side until one is free, and is stopped by contact (:mod:`posse.rules.contact`).
+In an arena the goal is mirrored near walls, and only turns that leave one of the two turning
+circles free are taken, so that the target can always keep turning without contact. If trackers block the
+target, which then turns on the spot, both circles may be occupied: then it turns to the wider side
+until one is free, and contacts stop it (:mod:`posse.rules.contact`).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from posse.rules.kinematics import arc
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _HALF: Final = np.float32(0.5)
-_ROUNDING: Final = np.float32(1e-3)  # m, far more than an episode of rounding adds up to
-_SOFT_WALL: Final = np.float32(2.0)  # a goal heading is mirrored this far before a wall, m
+_ROUNDING: Final = np.float32(1e-3)  # m, far more than the accumulated rounding of an episode
+_SOFT_WALL: Final = np.float32(2.0)  # m; distance to a wall at which goals are mirrored
 
 
 @compiled(seldom=True)
@@ -37,15 +37,14 @@ def mirror_at_walls(c: Record, w: Record) -> None:
 def circle_is_free(
     c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32
 ) -> bool:
-    """Say whether a disc of the target's turning circle, rim included, is clear of everything."""
+    """Return whether the disc of the target's turning circle is clear of walls and obstacles."""
     room = radius + c.safe_distance
     if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:
         return False
     for k in range(c.num_obstacles):
         o = obstacles[k]
         reach = room + o.radius
-        # The disc may also surround the obstacle, but then the path along its rim is not safe
-        # for every obstacle inside; a circle that holds one is not free.
+        # A circle that contains an obstacle is not free, either.
         if (o.x - x) * (o.x - x) + (o.y - y) * (o.y - y) < reach * reach:
             return False
     return True
@@ -62,7 +61,7 @@ def has_free_circle(
     side: np.float32,
     allowance: np.float32 = _ZERO,
 ) -> bool:
-    """Say whether the turning circle to one side (+1 left, -1 right) is free, to an allowance."""
+    """Return whether the turning circle on a side (+1 left, -1 right) is free, to an allowance."""
     radius = c.target_speed / c.target_turn_rate
     x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
     return circle_is_free(c, obstacles, x, y, radius - allowance)
@@ -72,7 +71,7 @@ def has_free_circle(
 def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
     """Return ``turn`` if a free turning circle remains after it, else the turn along a free one.
 
-    Where there is none, the turn that leads to one.
+    If there is none, the turn that leads to one.
     """
     dx, dy, hc, hs = w.heading_cos, w.heading_sin, w.heading_cos, w.heading_sin
     x, y = w.x, w.y
@@ -83,7 +82,7 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
         return turn
     if has_free_circle(c, obstacles, x, y, hc, hs, -_ONE):
         return turn
-    # The circle it follows stays free but for rounding, which must not make it change sides.
+    # Allow for rounding, so that the target does not change sides on a free circle.
     x, y, hc, hs = w.x, w.y, w.heading_cos, w.heading_sin
     left = has_free_circle(c, obstacles, x, y, hc, hs, _ONE, _ROUNDING)
     right = has_free_circle(c, obstacles, x, y, hc, hs, -_ONE, _ROUNDING)
@@ -98,10 +97,10 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
 
 @compiled(seldom=True)
 def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
-    """Return to which side (+1 left, -1 right) to turn where neither turning circle is free."""
+    """Return the side (+1 left, -1 right) to turn to if neither turning circle is free."""
     if w.speed == _ZERO:
-        # Blocked in the last step. To and fro it could stay so for ever; turning on the same way,
-        # it comes to every heading there is.
+        # Blocked in the last step: keep turning the same way, which reaches every heading, whereas
+        # alternating could last forever.
         return _ONE if w.turn_rate >= _ZERO else -_ONE
     radius = c.target_speed / c.target_turn_rate
     aside_x, aside_y = -radius * w.heading_sin, radius * w.heading_cos
@@ -112,7 +111,7 @@ def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
 
 @compiled
 def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) -> np.float32:
-    """Return how far the nearest obstacle or wall is from a place, m."""
+    """Return the distance from a point to the nearest obstacle or wall, m."""
     width = c.half_arena - max(abs(x), abs(y))
     for k in range(c.num_obstacles):
         o = obstacles[k]
