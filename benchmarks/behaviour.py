@@ -1,4 +1,4 @@
-"""What teams do once they have arrived: the figures of that section in docs/comparison.md."""
+"""Behaviour of teams after their arrival, for that section of docs/comparison.md."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from posse_baselines import begin, load
 
 @dataclass(frozen=True)
 class Settings:
-    """Whom to look at, and where."""
+    """Policies and scenario."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional] = (
         "ddcs-distributed", "planner", "learned-smart",
@@ -27,7 +27,7 @@ class Settings:
     seed: int = 3
     split: str = "validation"
     after: float = 20.0
-    """Time that the team is given to arrive, s."""
+    """Time before the measurement starts, s."""
 
 
 def look(name: str, s: Settings) -> dict[str, float]:
@@ -69,7 +69,7 @@ def look(name: str, s: Settings) -> dict[str, float]:
 
 
 def main() -> None:
-    """Play, and print a column for each policy."""
+    """Run, and print a column for each policy."""
     settings = tyro.cli(Settings)
     columns = {name: look(name, settings) for name in settings.policies}
     table = Table(

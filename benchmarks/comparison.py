@@ -1,7 +1,7 @@
-"""Part of ``make results``: the shipped learned teams beside the scripted ones, on every scenario.
+"""Part of ``make results``: compares the shipped learned teams with the scripted ones.
 
-Fills docs/comparison.md below its mark, and draws the figures into docs/media. With nothing
-shipped it leaves the page alone.
+Fills docs/comparison.md below its mark, and draws the figures into docs/media. Without
+shipped policies the page is not changed.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ FIGURES = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What the comparison takes."""
+    """Command-line arguments."""
 
     groups: tuple[str, ...] = ()
     """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals over seeds, too."""
     scenarios: tuple[str, ...] = SCENARIOS
-    """What to play."""
+    """Scenarios."""
     episodes: int = 500
     """Worlds for each policy and scenario."""
     planner_episodes: int = 500
@@ -74,7 +74,7 @@ ANOTHER_TRAINING: Final = (
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Play everything, fill the page and put the figures beside it."""
+    """Run all evaluations, write the page and its figures."""
     settings = tyro.cli(Settings, args=arguments)
     learned = tuple(shipped())
     if not learned:
@@ -159,7 +159,7 @@ def better_ddcs(found: Comparison, scenario: str) -> Plays:
 
 
 def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Return how every training seed did on validation worlds, from the cards."""
+    """Return the validation score of every training seed, from the cards."""
     lines = [
         "## Training seeds",
         "",

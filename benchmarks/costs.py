@@ -1,7 +1,6 @@
-"""``make bench-costs``: what a step costs, part by part, and how that grows with the worlds.
+"""``make bench-costs``: time of each phase of a step, and how it grows with size.
 
-One thread throughout, so that figures of different sizes compare; each is the best of many runs,
-since other work on the machine only ever adds to it.
+One thread throughout; each figure is the minimum of many runs, since other load only adds to it.
 """
 
 from __future__ import annotations
@@ -38,12 +37,12 @@ PARTS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``make bench-costs`` takes."""
+    """Command-line arguments."""
 
     seconds: float = 0.5
-    """Spent on each figure."""
+    """Time per figure."""
     scenarios: tuple[str, ...] = ("smart", "field")
-    """Whose steps are taken apart."""
+    """Scenarios to profile."""
     team_sizes: tuple[int, ...] = (2, 3, 5, 8, 16, 32, 64)
     obstacles: tuple[int, ...] = (0, 2, 4, 8, 16, 32)
     worlds: tuple[int, ...] = (1, 8, 64, 512, 4096, 16_384, 65_536)
@@ -69,7 +68,7 @@ def one_part(  # type: ignore[no-untyped-def]
         if part == 0:
             motion.motion(c, w, t, o, actions[e], RULES.set_goal, scratch)
             continue
-        survey.lay_out(c, w, t, o, scratch)  # what the other parts start from
+        survey.lay_out(c, w, t, o, scratch)  # input of the other parts
         survey.find_gaps(c, scratch)
         if part == 2:
             contact.meet(c, w, t, o, scratch)
@@ -115,7 +114,7 @@ def moving(scenario: str, count: int, **overrides: Any) -> tuple[posse.Batch, An
 
 
 def parts(scenario: str, seconds: float) -> dict[str, float]:
-    """Return what each part of a step costs for a tracker, ns; ``"step"`` is the whole."""
+    """Return the time of each part of a step per tracker, ns; ``"step"`` is the whole."""
     batch, actions = moving(scenario, 256)
     agents = batch.num_worlds * batch.scenario.num_trackers
     observations = np.empty(batch.observation_shape, np.float32)
@@ -138,7 +137,7 @@ def parts(scenario: str, seconds: float) -> dict[str, float]:
 
 
 def whole(scenario: str, count: int, seconds: float, **overrides: Any) -> float:
-    """Return what a step costs for a tracker, ns."""
+    """Return the time of a step per tracker, ns."""
     batch, actions = moving(scenario, count, **overrides)
     agents = count * batch.scenario.num_trackers
     return best(lambda: batch.step(actions), seconds) / agents * 1e9

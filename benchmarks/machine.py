@@ -1,4 +1,4 @@
-"""The machine that figures were taken on, and whether it had other things to do meanwhile."""
+"""Description of the machine, and detection of other load."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from posse_training.runs.provenance import commit
 
 STAT = Path("/proc/stat")
 IDLE, IO_WAIT = 3, 4
-"""Places of the times without work in the first line of STAT."""
+"""Indices of the idle times in the first line of STAT."""
 
 
 def describe() -> dict[str, Any]:
-    """Return what a reader needs to compare figures: the machine, the date, the commit."""
+    """Return machine, date and commit."""
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -44,11 +44,10 @@ def _memory() -> int:
 
 
 class OtherWork:
-    """Measures how much of the machine something else took, between its making and a later call.
+    """Measures the processor time used by other processes since its creation.
 
-    Taken from the system's own account of processor time, stolen time (another guest's of the same
-    host) included. Where there is no such account the answer is 0 and the load average, which
-    :func:`describe` reports, has to do.
+    From the system's accounting of processor time, including stolen time of a virtual machine.
+    Where that is not available the result is 0; :func:`describe` also reports the load average.
     """
 
     def __init__(self) -> None:
@@ -56,7 +55,7 @@ class OtherWork:
         self._busy = _busy_seconds()
 
     def cores(self, own_seconds: float) -> float:
-        """Return how many cores others kept busy, given the processor time taken by ourselves."""
+        """Return the number of cores used by others, given our own processor time."""
         elapsed = time.perf_counter() - self._began
         return max(0.0, (_busy_seconds() - self._busy - own_seconds) / elapsed)
 

@@ -1,13 +1,13 @@
-"""Ours beside what a researcher would pick instead: one run, one machine, one table.
+"""Throughput of posse compared with other simulators, on one machine.
 
     make bench-peers                               everything: installs, measures, writes the page
     python benchmarks/peers.py --only posse vmas   some of them, printed and not written
 
 Each simulator runs in a virtual environment of its own, under ``.venv-peers/``, with the exact
-versions of ``peers/requirements-*.txt``. What is timed, for all alike: steps of a batch, actions
-drawn beforehand, observations and rewards computed. Samples of a simulator take turns with samples
-of mpe2, so that each has a ratio to something that met the same machine at the same time. A sample
-during which others kept the machine busy is dropped and repeated, as long as patience lasts.
+versions of ``peers/requirements-*.txt``. Timed are steps of a batch with actions drawn beforehand,
+including observations and rewards. Samples of a simulator alternate with samples of mpe2, so that
+each has a ratio measured under the same load. A sample with other load on the machine is dropped
+and repeated within a time limit.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ PAGE = ROOT / "docs" / "peers.md"
 BATCHES = (1, 32, 1024, 16_384)
 SAMPLES = 5
 UNDISTURBED = 0.15
-"""Cores that others may keep busy during a sample that counts."""
+"""Cores that others may use during a valid sample."""
 PUFFERLIB = "3.0.0"
 
 
@@ -51,7 +51,7 @@ class Peer:
     runner: str
     """Script in ``peers/``, without its ending."""
     environment: str | None
-    """Whose requirements it runs with; ``None``: this project's own environment."""
+    """Name of its requirements; ``None``: this project's environment."""
     variant: str = ""
     batches: tuple[int, ...] = BATCHES
     threaded: bool = True
@@ -77,7 +77,7 @@ YARDSTICK = next(peer for peer in PEERS if peer.environment == "mpe2")
 
 @dataclass
 class Row:
-    """What was measured of one simulator, on so many threads, at one batch size."""
+    """Measurements of one simulator, number of threads and batch size."""
 
     name: str
     threads: int
@@ -87,13 +87,13 @@ class Row:
     warm_up_seconds: float
     versions: dict[str, str]
     samples: list[float] = field(default_factory=list)
-    """Agent-steps a second."""
+    """Agent-steps per second."""
     yardstick: list[float] = field(default_factory=list)
-    """mpe2's agent-steps a second, just before each of the samples."""
+    """mpe2's agent-steps per second, just before each sample."""
     per_core: list[float] = field(default_factory=list)
-    """Agent-steps for each second of processor time taken, all threads counted."""
+    """Agent-steps per second of processor time, all threads counted."""
     spoilt: int = 0
-    """How many of the samples kept were taken while others worked."""
+    """Number of kept samples with other load."""
     dropped: int = 0
 
 
@@ -102,15 +102,15 @@ class Sample:
     """Some steps of a batch, timed."""
 
     rate: float
-    """Steps a second."""
+    """Steps per second."""
     core_rate: float
-    """Steps for each second of processor time."""
+    """Steps per second of processor time."""
     spoilt: bool
-    """Whether others kept the machine busy meanwhile."""
+    """Whether there was other load."""
 
 
 class Patience:
-    """Time that may be spent on repeating spoilt samples, for the whole run, in seconds."""
+    """Time limit for repeating samples with other load, for the whole run, s."""
 
     def __init__(self, seconds: float) -> None:
         self.left = seconds
@@ -127,7 +127,7 @@ class Runner:
             command.append(str(ENVIRONMENTS / "ocean"))
         environment = {**os.environ, "OMP_NUM_THREADS": str(threads)}
         self._errors = tempfile.TemporaryFile(mode="w+")  # noqa: SIM115 (closed in __exit__)
-        # One thread means one core, for every simulator alike: JAX heeds nothing less.
+        # One thread means one core for every simulator; JAX ignores other settings.
         self._process = subprocess.Popen(
             ["taskset", "-c", ",".join(map(str, cores)), *command],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
@@ -163,11 +163,11 @@ class Runner:
         return answer
 
     def build(self, batch: int) -> dict[str, Any]:
-        """Have a batch built and warmed up."""
+        """Build and warm up a batch."""
         return self.ask(build=batch, variant=self._peer.variant)
 
     def sample(self) -> Sample:
-        """Have a sample taken."""
+        """Take a sample."""
         watch = OtherWork()
         answer = self.ask(sample=True)
         busy = answer["processor_seconds"]
@@ -315,7 +315,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", metavar="WORD", help="peers whose name has a word")
     parser.add_argument(
         "--patience", type=float, default=120.0, metavar="S",
-        help="seconds to spend on repeating samples that other work spoilt (default 120)",
+        help="time limit for repeating samples with other load, s (default 120)",
     )  # fmt: skip
     parser.add_argument("--page", action="store_true", help="write the page from the last results")
     arguments = parser.parse_args()

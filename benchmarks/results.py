@@ -1,6 +1,6 @@
 """Part of ``make results``: the scripted teams on every scenario, 1,000 test worlds each.
 
-Writes docs/results.md, with seed and commit, and the rows behind it. Nothing was tuned on them.
+Writes docs/results.md, with seed and commit, and its data. Nothing was tuned on these worlds.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SMART_COST = (
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``make results`` takes."""
+    """Command-line arguments."""
 
     episodes: int = 1000
     seed: int = 2026
@@ -48,7 +48,7 @@ class Settings:
 
 
 def main() -> None:
-    """Play everything and write the page."""
+    """Run all evaluations and write the page."""
     settings = tyro.cli(Settings)
     plays = [(scenario, policy) for scenario in SCENARIOS for policy in POLICIES]
     plays += list(ABLATIONS)

@@ -1,9 +1,8 @@
-"""``make bench``: how fast the worlds run on this machine.
+"""``make bench``: throughput on this machine.
 
-Agent-steps a second of batches, the same observations written by a plain copy, environment steps
-of one world through the interfaces, alone and beside busy processes, and what the first step of a
-fresh process costs. With ``--device cuda``, batches on the GPU instead, and what share of its
-memory's bandwidth they take.
+Agent-steps/s of batches, compared with a plain copy of the observations; steps/s of single-world
+environments, alone and beside busy processes; time of the first step of a fresh process. With
+``--device cuda``: batches on the GPU, and their share of its memory bandwidth.
 """
 
 from __future__ import annotations
@@ -37,33 +36,33 @@ FIRST_STEP = (
     "env = gymnasium.make('posse/Team-v0', scenario='smart'); "
     "env.reset(seed=0); env.step(env.action_space.sample())"
 )
-# For as long as whoever started it is there: left alone, it would spoil whatever is measured next.
+# Ends with its parent process, so that it does not disturb later measurements.
 BUSY = "import os; parent = os.getppid()\nwhile os.getppid() == parent: sum(range(1000))"
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``make bench`` takes."""
+    """Command-line arguments."""
 
     scenario: str = "smart"
     overrides: dict[str, int] = field(default_factory=dict)
-    """Whole numbers that the worlds of the batches have instead of the scenario's."""
+    """Integer settings that override those of the scenario."""
     device: Literal["cpu", "cuda"] = "cpu"
     worlds: tuple[int, ...] | None = None
     """Default: 1 to 16,384 on the CPU, 1,024 to 4 million on a GPU."""
     seconds: float = 1.0
-    """Each figure is the median of five runs that together take so long."""
+    """Total time of the five runs of each figure, s."""
     cold: bool = True
-    """Also time the first step of a fresh process, without and with kernels kept on disk."""
+    """Also time the first step of a fresh process, without and with cached kernels."""
     out: Path = Path("runs/bench/speed.json")
 
 
 def per_second(step: Callable[[], object], seconds: float) -> list[float]:
-    """Return calls a second, the median, least and greatest of five runs."""
+    """Return calls per second: median, least and greatest of five runs."""
     step()
     started = time.perf_counter()
     step()
-    # To look at the clock takes a while, too: once a millisecond will do.
+    # Reading the clock takes time, too: once per millisecond suffices.
     together = 1 + int(1e-3 / max(time.perf_counter() - started, 1e-6))
     rates = []
     for _ in range(5):
@@ -79,7 +78,7 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
 def batches(settings: Settings) -> list[dict[str, Any]]:
     """Measure batches with one thread and with all, and a plain copy of their observations.
 
-    By the kernel for all scenarios, then by one compiled for this scenario alone.
+    With the general kernel, then with one compiled for this scenario.
     """
     rows = []
     kinds = itertools.product(
@@ -115,21 +114,21 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
 
 
 def finished(step: Callable[[], object], times: int) -> None:
-    """Call a function of the GPU some times, and wait until it is done."""
+    """Call a GPU function several times and synchronise."""
     for _ in range(times):
         step()
     numba.cuda.synchronize()  # type: ignore[no-untyped-call]
 
 
 def bandwidth(seconds: float) -> float:
-    """Return bytes a second, read and written, of a plain copy in the GPU's memory."""
+    """Return bytes per second, read and written, of a plain copy in GPU memory."""
     source, target = (numba.cuda.device_array(1 << 28, np.float32) for _ in range(2))
     copies = per_second(lambda: finished(lambda: target.copy_to_device(source), 10), seconds)
     return float(copies[0] * 10 * 2 * source.nbytes)
 
 
 def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
-    """Measure batches on the GPU, beside a plain copy from its memory to its memory."""
+    """Measure batches on the GPU, compared with a plain copy in its memory."""
     limit = bandwidth(settings.seconds)
     rows = []
     for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
@@ -194,7 +193,7 @@ def report_gpu(settings: Settings) -> None:
 
 
 def interfaces(settings: Settings) -> dict[str, list[float]]:
-    """Measure environment steps a second of one world, dictionaries and checks included."""
+    """Measure steps per second of single-world environments, including dictionaries and checks."""
     parallel = posse.parallel_env(settings.scenario, horizon=1_000_000)
     parallel.reset(seed=0)
     rng = np.random.default_rng(0)
@@ -215,7 +214,7 @@ def interfaces(settings: Settings) -> dict[str, list[float]]:
 
 
 def team_step(scenario: str, action: Any) -> Callable[[], None]:
-    """Return what makes a step of one world through Gymnasium, again and again."""
+    """Return a function that steps one world through Gymnasium."""
     env: Any = gym.make("posse/Team-v0", scenario=scenario, horizon=1_000_000).unwrapped
     env.reset(seed=0)
 
@@ -229,15 +228,15 @@ def team_step(scenario: str, action: Any) -> Callable[[], None]:
 
 @dataclass
 class Pace:
-    """How often something was done, and what that took."""
+    """Count and time of a repeated function."""
 
     calls: int = 0
     seconds: float = 0.0
     processor: float = 0.0
-    """Seconds in which the thread had a processor."""
+    """Processor time of the thread, s."""
 
     def work(self, step: Callable[[], object], seconds: float) -> None:
-        """Do it for so long."""
+        """Repeat for a time."""
         started, had = time.perf_counter(), time.thread_time()
         while time.perf_counter() - started < seconds:
             for _ in range(10):
@@ -247,7 +246,7 @@ class Pace:
         self.processor += time.thread_time() - had
 
     def beside(self, alone: Pace) -> dict[str, float]:
-        """Return its speed as a share of that alone, by the clock and by the processor's."""
+        """Return its speed relative to running alone, by wall time and by processor time."""
         return {
             "share": self.calls / self.seconds / (alone.calls / alone.seconds),
             "of_the_processor": self.calls / self.processor / (alone.calls / alone.processor),
@@ -255,10 +254,10 @@ class Pace:
 
 
 def beside_others(settings: Settings) -> dict[str, dict[str, dict[str, float]]]:
-    """Return how fast a single world is beside busy processes, as a share of its speed alone.
+    """Return the speed of a single world beside busy processes, relative to running alone.
 
-    And a plain loop, by turns of a hundredth of a second, since a processor that is busy may be a
-    slower one, and who gets how much of it is up to the system.
+    Alternating every 10 ms with a plain loop as a reference, since clock rate and scheduling
+    depend on the load.
     """
     still = np.zeros((posse.get_scenario(settings.scenario).num_trackers, 2), np.float32)
     work: dict[str, Callable[[], object]] = {
@@ -297,7 +296,7 @@ def beside_others(settings: Settings) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def first_steps() -> dict[str, float]:
-    """Return seconds from a fresh process to its first step, cold and with kernels on disk."""
+    """Return seconds from the start of a process to its first step, without and with cache."""
     seconds = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in ("cold", "warm"):

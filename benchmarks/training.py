@@ -1,4 +1,4 @@
-"""``make bench-training``: how fast PPO learns on ``smart``, and whose the time is."""
+"""``make bench-training``: throughput of PPO training on ``smart``, and its time shares."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from posse_training.sb3.vec_env import TeamVecEnv
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``make bench-training`` takes."""
+    """Command-line arguments."""
 
     steps: int = 1_000_000
     """Agent-steps to train for."""
     threads: int = 1
-    """Threads for torch; 1 is what ``posse train`` takes unless told otherwise."""
+    """Threads of torch; the default of ``posse train`` is 1."""
 
 
 PARTS: dict[str, tuple[type, str]] = {
@@ -43,7 +43,7 @@ PARTS: dict[str, tuple[type, str]] = {
 
 @contextmanager
 def timed(seconds: dict[str, float]) -> Iterator[None]:
-    """Add up, meanwhile, the time that each part takes."""
+    """Accumulate the time of each part."""
 
     def wrap(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
@@ -67,7 +67,7 @@ def timed(seconds: dict[str, float]) -> Iterator[None]:
 
 
 def main() -> None:
-    """Train, and print the speed and each part's share."""
+    """Train, and print throughput and time shares."""
     s = tyro.cli(Settings)
     others, own = machine.OtherWork(), time.process_time()
     seconds: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""One tracker's step through the three layers, and the loop over all trackers of all worlds."""
+"""The control step of one tracker, and the loop over all trackers of all worlds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _UNLIMITED = 1e4  # m/s² or rad/s²: what stands for no limit
 
 @compiled
 def feel_body(f: Record, o: FloatArray, body: Record) -> None:
-    """Read from an observation (F,) how the robot moves, and what it can do."""
+    """Read the robot's motion and limits from an observation (F,)."""
     body.heading_cos, body.heading_sin = o[f.heading], o[f.heading + 1]
     body.speed, body.omega = o[f.speed], o[f.turn_rate]
     body.max_speed, body.max_omega = o[f.max_speed], o[f.max_turn_rate]

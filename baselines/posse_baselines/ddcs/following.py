@@ -27,7 +27,7 @@ L_L: Final = 1
 def motion_of(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, float, float]:
     """Return speed (m/s), heading (rad, now) and turn rate (rad/s) of a team-mate.
 
-    One that is silent too long has stopped. In the first step nobody has moved yet: the mate is
+    A mate that has been silent for too long counts as stopped. In the first step, the mate is
     expected to move as the target does.
     """
     theta = math.atan2(float(mate.heading_sin), float(mate.heading_cos))
@@ -44,7 +44,7 @@ def motion_of(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, flo
 def place_and_frame(
     f: Record, s: Record, d: Record, mate: Record, own: Record, theirs: Record
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Return a place in the formation by a team-mate that is in its own.
+    """Return a place in the formation relative to a team-mate in its place.
 
     The mate's place (x, y) now, the wanted place (x, y), the mate's speed (m/s) and heading (rad),
     heading (rad) and turn rate (rad/s) of the frame that the formation is kept in: the mate's own
@@ -85,7 +85,7 @@ def demand_on(
     y: float,
     body: Record,
 ) -> tuple[float, float, float, float, float]:
-    """Return what l-φ on a team-mate wants of the control point c_j, and where that is.
+    """Return the demand of l-φ on a team-mate for the control point c_j, and its position.
 
     (l, A, B, direction now, wanted direction): the directions of l in the common frame. c_j is
     wanted where it lies when the robot is in its place, and heads as one does there.
@@ -147,9 +147,9 @@ def on_leader(
     y: float,
     body: Record,
 ) -> tuple[float, float, float, float]:
-    """Return (vx, vy, V, ω): what a follower in the flock wants of c_j, and the command.
+    """Return (vx, vy, V, ω) of a follower in the flock: velocity of c_j, and command.
 
-    By l-φ on the leader; by l-l on the leader and one more, where that is the law and there is one.
+    By l-φ on the leader, or by l-l on the leader and another robot where there is one.
     """
     leader, place = mates[d.leader], slots[d.slot]
     l_i, a, b, angle, wanted = demand_on(f, s, d, leader, place, slots[0], x, y, body)

@@ -1,18 +1,18 @@
-"""Who leads the centralized model: selection and exchange by section 3.5, without a referee.
+"""Distributed leader selection and exchange of the centralized model (section 3.5).
 
 A claim is a pair (term, leader). Every tracker broadcasts the claim that it holds and adopts a
-better one that it hears: the higher term; of equal terms, the leader of the lower number. Only two
-events make a higher term: the leader finds another clearly nearer to the target and hands over (the
-nearest-neighbour rule, every time lag), or a tracker has not heard of the leader for too long and
-appoints the nearest one that it knows of. So a connected radio graph comes to hold one claim, and
+better one that it receives: the higher term; for equal terms, the lower leader number. Two events
+create a higher term: the leader finds another tracker clearly nearer to the target and hands over
+(the nearest-neighbour rule, every time lag), or a tracker has not heard of the leader for too long
+and appoints the nearest one that it knows. A connected radio graph thus converges to one claim, and
 two parts that meet again agree on the higher one.
 
-There is a leader from the first step on. While nobody knows the target, it is the tracker in the
-middle of those that hear each other. A tracker that hears nobody leads itself (rule ii), under a
-lower term, so that it yields as soon as it meets a group.
+There is a leader from the first step on. While the target is unknown, it is the most central
+tracker of those that hear each other. A tracker that hears no other leads itself (rule ii) under a
+lower term, so that it yields when it meets a group.
 
-The leader counts its steps in its message, and the others pass the highest count on: a tracker
-several hops away thus knows that the leader is alive.
+The leader counts its steps in its message, and the others relay the highest count, so that trackers
+several hops away know that the leader is alive.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from posse_baselines.laws.geometry import length
 
 @compiled
 def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool:
-    """Say whether a claim (term, leader) wins over another; -1 is no leader."""
+    """Return whether a claim (term, leader) wins over another; -1 is no leader."""
     if leader < 0:
         return False
     if old_leader < 0 or is_newer(term, old_term):
@@ -37,7 +37,7 @@ def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool
 
 @compiled
 def appoint(d: Record, leader: int, term: int, pulse: int) -> None:
-    """Hold a claim from now on."""
+    """Adopt a claim."""
     if d.leader >= 0 and leader != d.leader:
         d.exchanges += 1
     if leader != d.leader:
@@ -49,9 +49,9 @@ def appoint(d: Record, leader: int, term: int, pulse: int) -> None:
 def nearest_tracker(
     f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int
 ) -> tuple[int, float, float]:
-    """Return who is nearest to the target, how near, and the own distance (m).
+    """Return the tracker nearest to the target, its distance, and the own distance (m).
 
-    Of all that count as working, ``barred`` excepted (-1: nobody).
+    Among all that count as working, except ``barred`` (-1: none).
     """
     own_distance = length(d.now_x - x, d.now_y - y)
     best, least = own, own_distance
@@ -68,7 +68,7 @@ def nearest_tracker(
 def place_of(
     f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, j: int
 ) -> tuple[float, float]:
-    """Return where tracker j is now, m; (x, y) is the own place."""
+    """Return the current position of tracker j, m; (x, y) is the own one."""
     return (x, y) if j == own else mate_now(f, s, d, mates[j])
 
 
@@ -76,7 +76,7 @@ def place_of(
 def central_tracker(
     f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float
 ) -> tuple[int, int]:
-    """Return who has the least sum of distances to all others that are heard, and their number."""
+    """Return the tracker with the least sum of distances to all heard, and their number."""
     n, others = len(mates), 0
     best, least = own, 1e30
     for i in range(n):
@@ -90,7 +90,7 @@ def central_tracker(
             if j != i and (j == own or is_there(f, s, d, mates[j], n)):
                 x_j, y_j = place_of(f, s, d, mates, own, x, y, j)
                 total += length(x_i - x_j, y_i - y_j)
-        # Sums that are equal but for rounding go to the lower number.
+        # Ties within rounding go to the lower number.
         if total < least - 1e-3:
             best, least = i, total
     return best, others
@@ -100,7 +100,7 @@ def central_tracker(
 def select_leader(
     f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int
 ) -> None:
-    """Appoint somebody else than ``barred`` (-1: anybody) under a new term."""
+    """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
     if d.known:
         best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, barred)
         appoint(d, best, (d.term + 1) % COUNT, 0)
@@ -116,7 +116,7 @@ def select_leader(
 def settle_lead(
     f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float
 ) -> None:
-    """Hear the others' claims, hand over or appoint if it is time to; (x, y) is the own place."""
+    """Process received claims; hand over or appoint if due; (x, y) is the own position."""
     for j in range(len(mates)):
         mate = mates[j]
         if mate.fresh == 0 or mate.leader < 0:
@@ -132,7 +132,7 @@ def settle_lead(
     if d.leader < 0:
         select_leader(f, s, d, mates, own, x, y, -1)
         return
-    # In the search, where nobody follows anybody, the lead passes without a task of its own.
+    # In the search there are no followers, and leadership changes without the exchange task.
     if d.task != SEARCHING and not may_change(s, d.task, EXCHANGING):
         return
     if d.leader == own:

@@ -1,4 +1,4 @@
-"""What trackers remember from step to step, as structured arrays with leading axes (E, N)."""
+"""Memory of the trackers, as structured arrays with leading axes (E, N)."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ MIND: Final = _record(
     ("lost_step", _I),  # when the target was lost; -1: never seen yet
     ("area_x", _F), ("area_y", _F),  # middle of the area that is searched
 )  # fmt: skip
-"""What one tracker has in mind."""
+"""Memory of one tracker."""
 
 MATE: Final = _record(
     ("step", _I),  # own step at which it sent what follows; -1: never heard
@@ -67,7 +67,7 @@ MATE: Final = _record(
     ("fresh", _I),  # 1: heard in this step
     ("task", _I), ("leader", _I), ("term", _I), ("pulse", _I), ("slot", _I),  # -1: not said
 )  # fmt: skip
-"""What one tracker knows of a team-mate: (E, N, N), the second N by the mate's number."""
+"""Knowledge of a tracker about a team-mate: (E, N, N), the second N by the mate's number."""
 
 GRID: Final = 16
-"""Cells of a tracker's map of where has been looked, along each axis."""
+"""Cells of a tracker's map of covered areas, along each axis."""

@@ -1,4 +1,4 @@
-"""What trackers tell each other, beside what the radio carries anyway: five small whole numbers."""
+"""The message of a tracker: five small whole numbers."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ def encode(value: int) -> float:
 
 @compiled
 def decode(number: float) -> int:
-    """Return the whole number that :func:`encode` made a number of; any number is one."""
+    """Inverse of :func:`encode`, defined for any number."""
     return round(number / _STEP) - 1
 
 
 @compiled
 def is_newer(value: int, old: int) -> bool:
-    """Say whether a count modulo ``COUNT`` is ahead of another, the short way round."""
+    """Return whether a count modulo ``COUNT`` is ahead of another, by the shorter way."""
     ahead = (value - old) % COUNT
     return 0 < ahead < COUNT // 2
 
 
 @compiled
 def write_message(d: Record, action: FloatArray) -> None:
-    """Write what a mind has to say behind the motion, in an action (2 + m,)."""
+    """Write the message of a tracker into an action (2 + m,)."""
     action[2] = encode(d.task)
     action[3] = encode(d.leader)
     action[4] = encode(d.term)

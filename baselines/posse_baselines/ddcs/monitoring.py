@@ -1,7 +1,8 @@
 """The monitoring layer: one estimate of the target, and a table of the team-mates.
 
-Fixes come late, and from others; each is carried on to the present. Position is noisy, heading and
-slot frame are not, so speed is worked out along the heading, averaged over seconds.
+Fixes may be delayed and come from team-mates; each is extrapolated to the present. Position is
+noisy, heading and slot frame are not, so speed is estimated along the heading, averaged over
+seconds.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from posse_baselines.laws.geometry import clip, length, wrap
 def carry_on(
     s: Record, x: float, y: float, theta: float, speed: float, turn: float, time: float
 ) -> tuple[float, float, float]:
-    """Return the most likely (x, y, θ) after a time (s), with a turn rate that fades away.
+    """Return the most likely (x, y, θ) after a time (s), with a decaying turn rate.
 
-    After a second the way fades, too: its direction is ever less certain, and the mean of all
-    places where the target may be lags behind a target that keeps its heading.
+    After a second the speed decays, too: the direction gets uncertain, and the mean of the possible
+    positions lags behind a target that keeps its heading.
     """
     if time <= 0.0:
         return x, y, theta
@@ -43,7 +44,7 @@ def frame_limit(speed: float, max_speed: float, outermost: float) -> float:
 
 @compiled
 def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: float) -> None:
-    """Bring the estimate of the target up to date with an observation (F,)."""
+    """Update the estimate of the target with an observation (F,)."""
     dt = float(f.dt)
     d.sees = 1 if o[f.target_seen] > 0.0 else 0
     if o[f.target_known] > 0.0 and (s.radio or d.sees):
@@ -55,7 +56,7 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
         return
     d.age = (d.step - d.fix_step) * dt
     if d.age <= s.late_fix:
-        # How late fixes usually are, so that more than that can be told from the usual.
+        # The usual age of fixes, to detect unusual delays.
         d.usual_age += (dt / s.gap_memory) * (d.age - d.usual_age)
     if d.age <= s.target_lost_after:
         d.known = 1
@@ -65,7 +66,7 @@ def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: floa
     psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
     turn = s.turn_share * d.turn * math.exp(-d.age / s.turn_memory)
     d.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
-    # What the rest of the step would otherwise work out again for every slot and every disc.
+    # Computed once for all slots and discs of this step.
     d.speed_x, d.speed_y = d.speed * math.cos(theta), d.speed * math.sin(theta)
     d.frame_cos, d.frame_sin = math.cos(psi), math.sin(psi)
 
@@ -114,7 +115,7 @@ def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: 
 
 @compiled
 def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -> None:
-    """Bring the table of team-mates (N,) up to date with an observation (F,)."""
+    """Update the table of team-mates (N,) with an observation (F,)."""
     for j in range(len(mates)):
         mates[j].fresh = 0
     d.usual_gap -= d.usual_gap * min(1.0, f.dt / s.gap_memory)
@@ -127,7 +128,7 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
         number = int(o[f.neighbour_number + k])
         if number < 0:
             continue
-        # Nearest first: whoever is not in the list is farther away than its last, or not heard.
+        # Nearest first: others are farther away than the last of the list, or not heard.
         if o[f.neighbour_age + k] < s.lost_after:
             d.horizon = float(o[f.neighbour_range + k])
         mate = mates[number]
@@ -156,13 +157,13 @@ def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -
 
 @compiled
 def patience(s: Record, d: Record) -> float:
-    """Return how long (s) a silence has to be to mean something: over twice the usual."""
+    """Return the timeout (s) of a silence: over twice the usual."""
     return float(min(s.lost_after, s.least_patience + 2.0 * d.usual_gap))
 
 
 @compiled
 def is_there(f: Record, s: Record, d: Record, mate: Record, size: int) -> bool:
-    """Say whether a team-mate counts as working and in reach."""
+    """Return whether a team-mate counts as working and in range."""
     if mate.step < 0:
         return False
     time = patience(s, d) if f.neighbours >= size - 1 else s.unseen_memory
@@ -171,7 +172,7 @@ def is_there(f: Record, s: Record, d: Record, mate: Record, size: int) -> bool:
 
 @compiled
 def mate_now(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, float]:
-    """Return where a team-mate is taken to be now; one that is silent too long has stopped."""
+    """Return the predicted position of a team-mate; after a long silence it counts as stopped."""
     age = (d.step - mate.step) * f.dt
     if age > patience(s, d):
         return mate.x, mate.y

@@ -48,15 +48,15 @@ class _Minds(OwnArrays):
     mates: Records
     """(E, N, N) :data:`~posse_baselines.ddcs.memory.MATE`."""
     seen: npt.NDArray[np.uint16]
-    """(E, N, GRID²): own step + 1 at which a place was looked at last; (E, N, 0) without need."""
+    """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
 
 
 class DDCS(OwnArrays, BasePolicy):
     """Three layers, four tasks, from observations and messages alone.
 
     Args:
-        settings: How the team plays.
-        name: What results call it; default: by the model.
+        settings: Settings of the team.
+        name: Name in results; default: by the model.
     """
 
     message_size = MESSAGE_SIZE
@@ -67,7 +67,7 @@ class DDCS(OwnArrays, BasePolicy):
         self._record = settings_record(self.settings)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the minds of ``num_worlds`` teams at the start of an episode.
+        """Return the memory of ``num_worlds`` teams at the start of an episode.
 
         Raises:
             PolicyError: The scenario's messages are too small.
@@ -85,7 +85,7 @@ class DDCS(OwnArrays, BasePolicy):
         return self.restart(memory, np.ones(num_worlds, np.bool_))
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Empty the minds of the worlds of a mask (E,)."""
+        """Reset the memory of the worlds of a mask (E,)."""
         m: _Minds = memory
         for records in (m.minds, m.mates):
             records[mask] = np.zeros((), records.dtype)
@@ -120,10 +120,10 @@ class DDCS(OwnArrays, BasePolicy):
         return actions, m
 
     def annotations(self, memory: Memory) -> Annotations:
-        """Return what each tracker has in mind, (E, N) each; ``estimate`` is (E, N, 3).
+        """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).
 
-        ``task`` (its place among ``TASKS``), ``leader`` (-1: none), ``term``, ``slot`` (-1: none),
-        ``exchanges`` (times that the lead passed on), ``estimate`` (x, y, θ of the target, common
+        ``task`` (its index in ``TASKS``), ``leader`` (-1: none), ``term``, ``slot`` (-1: none),
+        ``exchanges`` (number of leader changes), ``estimate`` (x, y, θ of the target, common
         frame), ``estimate_age`` (s; -1: there is no estimate).
         """
         minds = memory.minds
@@ -138,12 +138,12 @@ class DDCS(OwnArrays, BasePolicy):
         return notes
 
     def leaders(self, memory: Memory) -> npt.NDArray[Any]:
-        """Return whom each tracker follows, (E, N), -1 for nobody, as a view."""
+        """Return the leader of each tracker, (E, N), -1 for none, as a view."""
         leaders: npt.NDArray[Any] = memory.minds["leader"]
         return leaders
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the minds of the trackers, field by field, as arrays that share their memory."""
+        """Return the trackers' memory, field by field, as views."""
         m: _Minds = memory
         arrays: dict[str, npt.NDArray[Any]] = {"seen": m.seen}
         for name, records in (("minds", m.minds), ("mates", m.mates)):

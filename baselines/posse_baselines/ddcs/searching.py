@@ -1,4 +1,4 @@
-"""Searching: a wander that spreads the team over the area, towards where nobody has looked yet."""
+"""Searching: exploration that spreads the team over areas not yet covered."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from posse_baselines.laws.geometry import length
 def mark_seen(
     f: Record, d: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
 ) -> None:
-    """Note in a map (GRID²,) that a tracker at (x, y) looks around."""
-    # In cells from the map's corner; the middle of cell i is at i + 0.5.
+    """Mark the cells of a map (GRID²,) covered by a tracker at (x, y)."""
+    # In cells from the map's corner; the centre of cell i is at i + 0.5.
     scale = GRID / (2.0 * f.area)
     x, y, reach = (x - d.area_x + f.area) * scale, (y - d.area_y + f.area) * scale, f.sight * scale
     for i in range(max(0, math.floor(x - reach)), min(GRID, math.floor(x + reach) + 1)):
-        # The cells whose middle is in reach are one run of each row.
+        # The cells with centres in range are contiguous in each row.
         square = reach * reach - (i + 0.5 - x) ** 2
         if square <= 0.0:
             continue
@@ -35,7 +35,7 @@ def mark_seen(
 
 @compiled(seldom=True)
 def begin_search(f: Record, d: Record, seen: npt.NDArray[np.uint16]) -> None:
-    """Note that the target is lost; on the open plane, search about where it should be."""
+    """Mark the target as lost; on the open plane, search around its predicted position."""
     d.lost_step, d.goal_step = d.step, -1
     if f.walled == 0 and d.fix_step >= 0:
         d.area_x, d.area_y = d.now_x, d.now_y
@@ -53,7 +53,7 @@ def look_around(
     x: float,
     y: float,
 ) -> None:
-    """Keep the map of where this tracker and those it hears have looked."""
+    """Update the map of areas covered by this tracker and those it hears."""
     if len(seen) == 0 or d.step % max(1, round(s.look_time / f.dt)) != 0:
         return
     mark_seen(f, d, seen, x, y, d.step)
@@ -103,7 +103,7 @@ def choose_goal(
     heading_c: float,
     heading_s: float,
 ) -> None:
-    """Set the goal: near, long not looked at, and nearer to this tracker than to any other."""
+    """Set the goal: near, long not covered, and nearer to this tracker than to any other."""
     cell = 2.0 * f.area / GRID
     inner = f.area - min(1.5, 0.5 * f.area)
     best = -1e9
@@ -122,24 +122,24 @@ def choose_goal(
             age = (d.step - looked) * f.dt if looked >= 0 else s.stale_after
             bonus = 0.0
             if d.fix_step >= 0:
-                # It was there, and cannot be far.
+                # Near the last known position.
                 away = length(cx - d.now_x, cy - d.now_y)
                 if away < reach:
                     bonus = s.lost_worth
                     if looked < d.lost_step:
                         age = s.stale_after
                     bonus -= s.lost_slope * away
-            # Who hears few of the others may find in the middle those who have found the target.
+            # A tracker that hears few others stays near the middle, where a report is likely heard.
             bonus -= s.middle_weight * deaf * length(cx - d.area_x, cy - d.area_y)
             way = length(cx - x, cy - y)
             turn = 1.0 - ((cx - x) * heading_c + (cy - y) * heading_s) / max(way, 1e-6)
             value = s.age_weight * min(age, s.stale_after) + bonus - way - s.turn_weight * turn
             if value <= best:
-                continue  # team-mates can only make it less
+                continue  # team-mates can only reduce it
             for m in range(len(mates)):
                 if m != own and is_there(f, s, d, mates[m], len(mates)):
                     mx, my = mate_now(f, s, d, mates[m])
-                    # Where it heads counts more than where it is.
+                    # A team-mate's goal counts more than its position.
                     other = length(
                         cx - mx - 2.0 * mates[m].speed_x, cy - my - 2.0 * mates[m].speed_y
                     )

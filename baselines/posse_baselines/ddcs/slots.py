@@ -1,8 +1,8 @@
-"""Who goes to which slot: everyone works out the assignment of all it knows, and takes its part.
+"""Distributed slot assignment: each tracker assigns all known trackers and takes its own slot.
 
-Those who know the same come to the same result. Where they do not, as when messages are lost, the
-slots that trackers say they hold count for them (``loyalty``), and two that hold the same one are
-told apart by who is sooner there.
+Trackers with equal knowledge get equal results. Otherwise, for example after lost messages, slots
+claimed in messages are respected (``loyalty``), and of two trackers that claim one slot the nearer
+one keeps it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from posse_baselines.laws.steering import intercept_time
 _HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
-_RESERVED = 1e4  # s; what a slot costs that belongs to another
+_RESERVED = 1e4  # s; cost of a slot claimed by another
 
 
 @compiled
 def slot_place(d: Record, slot: Record) -> tuple[float, float, float, float]:
-    """Return a slot's place now (x, y) and its arm from the target (x, y), common frame, m."""
+    """Return a slot's position (x, y) and its offset from the target (x, y), common frame, m."""
     arm_x, arm_y = rotate(slot.x, slot.y, d.frame_cos, d.frame_sin)
     return d.now_x + arm_x, d.now_y + arm_y, arm_x, arm_y
 
@@ -48,10 +48,10 @@ def choose_slot(
     cost: FloatArray,
     work: FloatArray,
 ) -> None:
-    """Set the slot of a mind: its part of the assignment that has all arrive soonest in total."""
+    """Set the own slot by the assignment of least total arrival time."""
     n = len(slots)
     if s.radio == 0:
-        d.slot = own  # nobody to ask
+        d.slot = own  # no team-mates
         return
     rows, mine = 0, 0
     vx, vy = d.speed_x, d.speed_y
@@ -65,7 +65,7 @@ def choose_slot(
             ahead_x, ahead_y = float(mates[j].heading_cos), float(mates[j].heading_sin)
             at_x, at_y = mate_now(f, s, d, mates[j])
         elif f.neighbours < n - 1 and mates[j].slot >= 0:
-            # No place for it in the observation, but it said which slot is its own. Were it there
+            # No place for it in the observation, but it claimed a slot. Were it there
             # still, and near, it would have a place.
             slot_x, slot_y, _, _ = slot_place(d, slots[mates[j].slot])
             if length(slot_x - x, slot_y - y) < d.horizon - s.in_place:
@@ -91,10 +91,10 @@ def choose_slot(
                 time -= s.loyalty
             if j == own and d.taken & (_BIT << np.uint64(k)) != _NO_BITS:
                 time += s.taken_cost
-            # Where there are more slots than trackers, those that see the target are filled first.
+            # With more slots than trackers, those that see the target are filled first.
             if slot.x * slot.x + slot.y * slot.y < (s.in_sight * f.sight) ** 2:
                 time -= s.sight_worth
-            # The centralized model's leader has the first slot to itself.
+            # The leader of the centralized model takes the first slot.
             if s.model == 1 and d.leader >= 0 and (k == 0) != (j == d.leader):
                 time += _RESERVED
             cost[rows, k] = time + 1e-4 * j
@@ -118,10 +118,10 @@ def loses_slot(
     x: float,
     y: float,
 ) -> bool:
-    """Say whether a team-mate that says it holds a slot has the better right to it.
+    """Return whether a team-mate that claims a slot has precedence.
 
-    The nearer one; of two that are equally near, the one of the lower number. Both come to the same
-    answer, though each may know of others that the other does not.
+    The nearer one has; for equal distances the lower number. Both trackers get the same result,
+    whatever else they know.
     """
     slot_x, slot_y, _, _ = slot_place(d, slots[slot])
     mine = length(slot_x - x, slot_y - y)

@@ -1,4 +1,4 @@
-"""What is near a tracker, as discs: those it knows, and those that only the sonar tells of."""
+"""Nearby discs of a tracker: known ones, and unexplained echoes of the sonar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from posse_baselines.laws.safeguard import put_disc, put_wall
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
 _SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
-_NEAR = 3.0  # m; farther things are no danger yet
+_NEAR = 3.0  # m; objects farther away are ignored
 _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
 
 
@@ -23,7 +23,7 @@ _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other exp
 def wall_explains(
     f: Record, x: float, y: float, beam_x: float, beam_y: float, reading: float
 ) -> bool:
-    """Say whether a wall gives a sonar reading (m) as short as this one."""
+    """Return whether a wall explains a sonar reading (m)."""
     for k in range(4):
         nx, ny = wall_normal(k)
         away = f.extent - nx * x - ny * y
@@ -48,7 +48,7 @@ def is_explained(
     beam_y: float,
     reading: float,
 ) -> bool:
-    """Say whether something that is known of gives a sonar reading (m) as short as this one.
+    """Return whether a known object explains a sonar reading (m).
 
     One of the ``robots`` that head the list, or a wall. (beam_x, beam_y) is the beam's direction.
     """
@@ -59,7 +59,7 @@ def is_explained(
         square = dx * dx + dy * dy
         if square > reach * reach:
             continue
-        # A little wider than the beam and the disc, since the place is not known exactly.
+        # A little wider than beam and disc, since the position is not exact.
         along, across = dx * beam_x + dy * beam_y, dy * beam_x - dx * beam_y
         if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(across) < radius + 0.1):
             return True
@@ -88,8 +88,8 @@ def slot_in_beam(
 ) -> int:
     """Return the slot whose occupant would give this echo, or -1.
 
-    Where not all team-mates have a place in the observation, an echo from a slot is taken for one
-    of them, who moves with the formation.
+    Where not all team-mates have a place in the observation, an echo from a slot is attributed to
+    one of them, moving with the formation.
     """
     for k in range(len(slots)):
         place_x, place_y, _, _ = slot_place(d, slots[k])
@@ -117,12 +117,12 @@ def surround(
     beams: FloatArray,
     discs: Records,
 ) -> int:
-    """List what is near the tracker; return how many things."""
+    """List the nearby discs; return their number."""
     count, two, radius = 0, 2.0 * f.radius, float(f.radius)
     if d.known:
         dx, dy = d.now_x - x, d.now_y - y
         if dx * dx + dy * dy < _NEAR * _NEAR:
-            # In a chase the target only explains its echo: the law ends the chase in time.
+            # In a chase the target is not avoided: the law ends the chase in time.
             reach, margin = (0.0, 0.0) if d.closing else (two, float(s.target_margin))
             count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, reach, margin)
     few = f.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
@@ -168,7 +168,7 @@ def surround(
                 vx, vy = d.speed_x - d.psi_rate * arm_y, d.speed_y + d.psi_rate * arm_x
                 count = put_disc(discs, count, place_x - x, place_y - y, vx, vy, two, s.margin)
                 continue
-        # It may lie anywhere in the beam's width: a disc that fills most of it.
+        # Its position within the beam is unknown: a disc that fills most of the beam.
         wide = min(0.5, 0.4 * (reading + radius))
         away = reading + radius + wide
         count = put_disc(

@@ -1,7 +1,7 @@
-"""The four tasks of section 3.1, and what changes one into another (figure 1).
+"""The four tasks of section 3.1, and their transitions (figure 1).
 
 ===================  =========================================================================
-searching            nobody knows where the target is: wander
+searching            the target is unknown: explore
 converging           chase stage: at full speed to the own place
 flocking             maintenance stage: the formation law, in the own place
 leader exchange      another leader was appointed and has not been heard yet: hold the flock's
@@ -17,17 +17,17 @@ from posse_baselines.ddcs.memory import CONVERGING, EXCHANGING, FLOCKING, SEARCH
 
 @compiled
 def may_change(s: Record, task: int, wanted: int) -> bool:
-    """Say whether a change of the task is not forbidden (an ablation)."""
+    """Return whether a transition is allowed (ablations forbid some)."""
     return (int(s.forbidden) >> (4 * task + wanted)) & 1 == 0
 
 
 @compiled
 def next_task(s: Record, d: Record) -> int:
-    """Return the task that follows from what the mind knows.
+    """Return the next task.
 
     Converging and flocking change with hysteresis: flocking begins within ``near`` of the place
-    and ends beyond ``far`` of it. For who pursues under PNGL the excess of the range counts, with
-    limits of its own: chase and maintenance.
+    and ends beyond ``far`` of it. Under PNGL the excess of the
+    range counts, with separate limits: chase and maintenance.
     """
     task = int(d.task)
     if d.known == 0:

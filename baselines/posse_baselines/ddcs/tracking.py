@@ -1,7 +1,7 @@
-"""The tracking layer: the law of the present task.
+"""The tracking layer: the law of the current task.
 
-A law returns what it wants as (vx, vy, V, ω): the velocity (m/s, common frame) by which the
-safeguard judges it, and the command that goes to the wheels where the safeguard agrees.
+A law returns (vx, vy, V, ω): the velocity (m/s, common frame) for the safeguard, and the command
+to execute if the safeguard accepts it.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ PNGL: Final = 1
 NO_DEVIATION: Final = 0
 OF_OCCUPANT: Final = 2
 
-_FULL_SPEED: Final = 1e6  # 1/s; a gain that asks for the greatest speed at any distance
-_FAR_SIGHT: Final = 8.0  # m; a sensor that reaches farther finds the target without being moved
+_FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
+_FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed
 _MOST_DEVIATION: Final = 0.7  # rad; beyond, a chase hardly closes in
 
 Motion = tuple[float, float, float, float]
@@ -46,9 +46,9 @@ def take_up(body: Record, vx: float, vy: float, rate: float) -> Motion:
 
 @compiled
 def hunt(s: Record, d: Record, n: int, x: float, y: float, body: Record) -> Motion:
-    """Return the motion of a tracker that helps to see a target again.
+    """Return the motion to see a lost target again.
 
-    The team spreads on a ring about where the target should be, slot by slot on either side of its
+    The team spreads on a ring around its predicted position, slot by slot on either side of its
     heading; the ring grows with the time that it was not seen.
     """
     side = 1.0 if d.slot % 2 else -1.0
@@ -66,7 +66,7 @@ def hunt(s: Record, d: Record, n: int, x: float, y: float, body: Record) -> Moti
 def to_slot(s: Record, d: Record, slots: Records, x: float, y: float, body: Record) -> Motion:
     """Return the motion that takes up the slot on the target (converging) or keeps it (flocking).
 
-    Converging, the slot is met at full speed, round the target; flocking is the slot law.
+    Converging: intercept at full speed, around the target; flocking: the slot law.
     """
     _, _, arm_x, arm_y = slot_place(d, slots[d.slot])
     arm_x, arm_y = arm_x + s.aim_ahead * d.frame_cos, arm_y + s.aim_ahead * d.frame_sin
@@ -104,7 +104,7 @@ def pursue(
         # Feedback on the bearing, c = ... + G wrap(σ - σ_d), acts as a greater K does.
         constant += s.bearing_gain
     if s.deviation == OF_OCCUPANT and d.task == FLOCKING:
-        # Who heads away from the target, in front of it, turns the bearing the other way.
+        # In front of the target, heading away from it, the bearing turns the other way.
         constant *= clip(math.cos(wanted_theta - wanted_sigma) / MIN_COSINE, -1.0, 1.0)
     theta = lawful_heading(sigma, constant, wanted_sigma, wanted_theta)
     delta = deviation(theta, sigma)
@@ -137,11 +137,11 @@ def own_constant(s: Record, own: int, n: int) -> float:
 
 @compiled
 def follows(f: Record, s: Record, d: Record, mates: Records, own: int) -> bool:
-    """Say whether a tracker keeps its place on the leader, and not on the target."""
+    """Return whether a tracker follows the leader, not the target."""
     if s.model != CENTRALIZED or d.leader < 0 or d.leader == own:
         return False
     leader = mates[d.leader]
-    # A leader that is silent, and that nobody may replace, is followed where it was heard last.
+    # A silent leader that cannot be replaced is followed at its last known position.
     tied = (int(s.forbidden) >> (4 * FLOCKING + EXCHANGING)) & 1 != 0 and leader.step >= 0
     return is_there(f, s, d, leader, len(mates)) or tied
 
@@ -150,7 +150,7 @@ def follows(f: Record, s: Record, d: Record, mates: Records, own: int) -> bool:
 def note_error(
     f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, x: float, y: float
 ) -> None:
-    """Note how far a tracker that knows the target is from its place, m."""
+    """Store the distance of a tracker from its place, m."""
     d.pursues = 0
     if follows(f, s, d, mates, own):
         place_x, place_y, _, _ = place_on_leader(f, s, d, mates[d.leader], slots[d.slot], slots[0])

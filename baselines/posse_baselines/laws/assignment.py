@@ -1,4 +1,4 @@
-"""Who takes which slot: the assignment of least total cost, by shortest augmenting paths."""
+"""The assignment of least total cost, by shortest augmenting paths."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 from posse.numeric import FloatArray, compiled
 
 WORK_ROWS: Final = 7
-"""Rows of the array that :func:`assign` works in, beside the costs."""
+"""Rows of the work array of :func:`assign`."""
 
 _LARGE: Final = 1e30
 

@@ -37,14 +37,14 @@ def length(x: float, y: float) -> float:
     """Return the length of a vector.
 
     ``math.hypot`` also handles lengths whose square overflows, and rounds the last bit correctly;
-    it takes several times as long, and no robot needs either.
+    it is several times slower, and neither is needed here.
     """
     return math.sqrt(x * x + y * y)
 
 
 @compiled
 def clip(value: float, low: float, high: float) -> float:
-    """Return ``value``, or the end of [low, high] that it lies beyond."""
+    """Return ``value`` clipped to [low, high]."""
     return max(low, min(value, high))
 
 

@@ -1,8 +1,8 @@
 """The proportional navigation guidance law and its special cases (sections 3.2 and 3.3).
 
 One law, ``θ = K σ + c``, with a tracker's own navigation constant K (0.9 to 1.1; M = K - 1),
-deviation c and range r_d. Written through the pair (σ_d, θ_d) that it contains, c = θ_d - K σ_d, it
-has no jump where σ passes ±π::
+deviation c and range r_d. With the pair (σ_d, θ_d), c = θ_d - K σ_d, it is continuous where
+σ passes ±π::
 
     θ = θ_d + K wrap(σ - σ_d)
 

@@ -1,7 +1,7 @@
-"""Heading regulation: how a robot takes up a wanted velocity within its limits (section 3.3).
+"""Heading regulation: tracking a wanted velocity within a robot's limits (section 3.3).
 
-The intact law has to hold for every sign of θ - σ and in every quadrant: a heading that does not
-obey it yet is turned the short way round, at the limit, and from then on turns with the law.
+The intact law holds for every sign of θ - σ and in every quadrant: a heading that does not obey it
+yet is turned by the shorter turn, at the limit, and then turns with the law.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ def turn_command(body: Record, error: float, time: float) -> float:
 
 @compiled
 def regulate(body: Record, speed_x: float, speed_y: float, rate: float) -> tuple[float, float]:
-    """Return the command (V, ω) of a robot that takes up a velocity (m/s) within its limits.
+    """Return the command (V, ω) of a robot that tracks a velocity (m/s) within its limits.
 
     V is the part of the velocity that lies ahead, and 0 while it points backwards: the robot turns
     on the spot instead of reversing. The wanted velocity itself turns at ``rate`` (rad/s)::
 
         ω = clip(rate + wrap(θ_wanted - θ) / dt, -ω_max, ω_max)
 
-    A velocity of nearly nothing keeps the heading.
+    A velocity near zero keeps the heading.
     """
     if length(speed_x, speed_y) < _STANDSTILL:
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Where kernels find each field of an observation."""
+"""Offsets of observation fields for kernels."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ OFFSETS: Final[np.dtype[Any]] = np.dtype(
         ),
     )
 )
-"""Of a layout: where each field begins, and what a robot knows of its own make and its place.
+"""Of a layout: offsets of the fields, and constants of robot and arena.
 
 A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
 """

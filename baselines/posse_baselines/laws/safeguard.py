@@ -1,9 +1,9 @@
-"""The safeguard: the velocity nearest to the wanted one that runs into nothing.
+"""The safeguard: the collision-free velocity nearest to the wanted one.
 
-What surrounds a tracker is a list of discs, each with a velocity: team-mates, the target,
-obstacles, walls. A velocity is judged by playing out how the robot takes it up within its limits,
-since a unicycle moves on for a while as it does now: how long it would spend too near to anything,
-whether and when it would touch, and how far it ends from where the wanted velocity leads.
+The surroundings of a tracker are a list of discs with velocities: team-mates, the target,
+obstacles, walls. A velocity is evaluated by simulating how the robot tracks it within its limits:
+the time spent within the margins, whether and when it would touch, and the distance of its final
+position from that of the wanted velocity.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from posse_baselines.laws.geometry import clip, length, wrap
 from posse_baselines.laws.heading import heading_error, turn_command
 
 LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
-"""Steps in which a velocity is played out, s."""
+"""Time steps of a simulated velocity, s."""
 
 _STEPS: Final = np.array(LOOK_AHEAD)
 _HORIZON: Final = sum(LOOK_AHEAD)
 _SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed
-# From straight on outwards, left and right in turn; every direction at every speed is a play.
+# From straight ahead outwards, alternating left and right; all directions at all speeds.
 _DIRECTIONS: Final = 16
 _TURNS: Final = np.array(
     [
@@ -34,11 +34,11 @@ _TURNS: Final = np.array(
 _TURN_COS: Final = np.cos(_TURNS)
 _TURN_SIN: Final = np.sin(_TURNS)
 _PLAYS: Final = _DIRECTIONS * len(_SPEED_LEVELS)
-_KEEP_RIGHT: Final = 0.02  # by how much passing on the right is preferred
+_KEEP_RIGHT: Final = 0.02  # preference for passing on the right
 _LIKELY: Final = 0.6  # share of a velocity's difference by which the robot ends elsewhere, at least
 _SAME_SPEED: Final = 0.3  # m/s
 _SAME_HEADING: Final = math.cos(0.35)  # cosine of the angle between two headings
-_GLANCE: Final = 0.15  # m; what a robot may be off the straight way meanwhile
+_GLANCE: Final = 0.15  # m; allowed deviation from the straight path
 _STANDSTILL: Final = 1e-6  # m/s
 _CONTACT: Final = 0.015  # m; a narrower gap counts as a contact
 _CONTACT_COST: Final = 4.0
@@ -54,13 +54,13 @@ DISC: Final[np.dtype[Any]] = np.dtype(
                 ("speed_x", np.float64),  # m/s
                 ("speed_y", np.float64),
                 ("reach", np.float64),  # distance between the centres at contact, m
-                ("margin", np.float64),  # free width to keep, m
+                ("margin", np.float64),  # clearance, m
             ],
             align=True,
         ),
     )
 )
-"""Something that must not be touched, in axes that have the tracker at the origin."""
+"""An object to avoid, relative to the tracker."""
 
 _BY_DIRECTION: Final = (
     "error", "omega", "cos", "sin", "middle_cos", "middle_sin", "goal_cos", "goal_sin", "ahead",
@@ -78,7 +78,7 @@ PLAYS: Final[np.dtype[Any]] = np.dtype(
         ),
     )
 )
-"""What :func:`play_all` works in: every direction at the greatest speed, then at the next share."""
+"""Work record of :func:`play_all`: all directions at the greatest speed, then the next one."""
 
 _PLANET: Final = 1000.0  # radius of the disc that stands for a wall, m
 
@@ -94,7 +94,7 @@ def put_disc(
     reach: float,
     margin: float,
 ) -> int:
-    """Add a disc to a list of ``count``; return the new count. A full list stays as it is."""
+    """Add a disc to a list of ``count``, unless it is full; return the new count."""
     if count >= len(discs):
         return count
     d = discs[count]
@@ -112,7 +112,7 @@ def put_wall(
     radius: float,
     margin: float,
 ) -> int:
-    """Add a wall, ``distance`` (m) away along its outward normal: a disc as large as a planet."""
+    """Add a wall at ``distance`` (m) along its outward normal, as a very large disc."""
     away = distance - radius + _PLANET
     return put_disc(discs, count, normal_x * away, normal_y * away, 0.0, 0.0, _PLANET, margin)
 
@@ -128,8 +128,7 @@ def turned(body: Record, error: float) -> tuple[float, float]:
 def half_turn(turn: float) -> tuple[float, float]:
     """Return cosine and sine of half an angle (rad), by short polynomials.
 
-    Half a turn in a step is at most a quarter of a radian or so, and nobody needs more than a rough
-    picture here.
+    Half a turn in a step is at most about a quarter of a radian, and low accuracy suffices.
     """
     half = 0.5 * turn
     square = half * half
@@ -147,7 +146,7 @@ def cost_of(
     wanted_y: float,
     enough: float,
 ) -> tuple[float, float]:
-    """Return (cost, danger) of taking up a velocity; stops above ``enough``.
+    """Return (cost, danger) of a velocity; stops above ``enough``.
 
     The velocity is a speed (m/s) and the angle to its heading from the present one (rad).
 
@@ -193,7 +192,7 @@ def cost_of(
 
 @compiled
 def begin_plays(body: Record, error: float, p: Record) -> None:
-    """Set out a :data:`PLAYS` from where a body is; straight on is a turn of ``error`` (rad)."""
+    """Initialise a :data:`PLAYS` at a body's pose; straight ahead is a turn of ``error`` (rad)."""
     goal_c, goal_s = turned(body, error)
     for k in range(_DIRECTIONS):
         p.error[k], p.omega[k] = wrap(error + _TURNS[k]), body.omega
@@ -206,10 +205,9 @@ def begin_plays(body: Record, error: float, p: Record) -> None:
 
 @compiled
 def play_all(body: Record, discs: Records, count: int, p: Record) -> None:
-    """Play out all of a :data:`PLAYS` as :func:`cost_of` does one, up to the end.
+    """Simulate all velocities of a :data:`PLAYS` as :func:`cost_of` does one.
 
-    That is 32 plays in the time of a few: the loops over them have no branches, and become vector
-    instructions.
+    The loops over the 32 velocities have no branches and are vectorised.
     """
     time = 0.0
     for n in range(len(_STEPS)):
@@ -268,13 +266,13 @@ def is_clear(
     speed_x: float,
     speed_y: float,
 ) -> bool:
-    """Say whether a velocity is safe at a glance: nearly the present one, and nothing in its way.
+    """Return whether a velocity is trivially safe: near the current one, and nothing ahead.
 
-    Spares playing it out, which a team in formation would do at every step for nothing.
+    Avoids the simulation, which a team in formation rarely needs.
     """
     if abs(speed - body.speed) > _SAME_SPEED:
         return False
-    # A velocity of nothing has no heading of its own.
+    # A zero velocity has no heading.
     ahead = speed_x * body.heading_cos + speed_y * body.heading_sin
     if speed > _STANDSTILL and ahead < _SAME_HEADING * speed:
         return False
@@ -294,9 +292,9 @@ def is_clear(
 def safe_velocity(
     body: Record, discs: Records, count: int, wanted_x: float, wanted_y: float, plays: Record
 ) -> tuple[float, float, bool]:
-    """Return the velocity (m/s) to take instead of a wanted one, and whether it is another one.
+    """Return a safe velocity (m/s), and whether it differs from the wanted one.
 
-    ``plays`` is a :data:`PLAYS` to work in.
+    ``plays`` is a work record, :data:`PLAYS`.
     """
     if count == 0:
         return wanted_x, wanted_y, False
@@ -313,7 +311,7 @@ def safe_velocity(
         least, best_x, best_y = cost, 0.0, 0.0
     begin_plays(body, error, plays)
     play_all(body, discs, count, plays)
-    # As shares of the greatest speed, and of how far it leads.
+    # As shares of the greatest speed and distance.
     top, farthest = body.max_speed, body.max_speed * _HORIZON
     wish_x, wish_y = wanted_x / top, wanted_y / top
     for k in range(_DIRECTIONS):
@@ -321,7 +319,7 @@ def safe_velocity(
             m = level * _DIRECTIONS + k
             share = _SPEED_LEVELS[level]
             x, y = share * plays.goal_cos[k], share * plays.goal_sin[k]
-            # However the robot gets there, it ends elsewhere than it should.
+            # A lower limit of the distance from the wanted final position.
             if _LIKELY * length(x - wish_x, y - wish_y) >= least:
                 continue
             cost = plays.danger[m] + (_KEEP_RIGHT if k % 2 == 1 else 0.0)

@@ -1,7 +1,7 @@
-"""Slots: where a place in a formation lies, how it moves, and the Cartesian law that keeps it.
+"""Slots: position, velocity, and the Cartesian law that holds a slot.
 
 A slot is an arm (x, y) from a leader or the target, m, in a frame that turns with it: the slot
-frame ψ, or the leader's own heading. A slot of a turning frame moves on a circle of its own.
+frame ψ, or the leader's own heading. In a turning frame each slot moves on its own circle.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def slot_law(
 
     The slot's velocity plus ``gain`` (1/s, below 1 / control step) times the slot's offset from
     the tracker (m). Where that is more than ``max_speed``, the part along the offset is shortened
-    until it is not: the tracker goes at full speed, on the course that meets a slot of constant
-    velocity on a straight line. A slot that outruns the tracker is followed in its own direction.
+    until it is not: the tracker moves at full speed on the straight intercept course of a slot of
+    constant velocity. A slot faster than the tracker is followed in its own direction.
     """
     distance = length(offset_x, offset_y)
     approach = gain * distance

@@ -1,4 +1,4 @@
-"""When a point can be met, and with what velocity to approach it."""
+"""Interception of moving points, and approach velocities."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from posse_baselines.laws.geometry import clip, length
 from posse_baselines.laws.slots import slot_law, slot_velocity
 
 NEVER: Final = 1e6
-"""s. What stands for a meeting that does not happen."""
+"""s. Value for no interception."""
 
-_FARTHEST: Final = 20.0  # s; a later meeting is planned as this one
-_SOON: Final = 0.1  # s; before that the present velocity alone counts
+_FARTHEST: Final = 20.0  # s; later interceptions are planned with this time
+_SOON: Final = 0.1  # s; before that only the current velocity counts
 _LEAST_TURN: Final = 0.6
-"""rad. How far round at least a tracker heads that is on the circle, or inside it."""
+"""rad. Least angle ahead on the circle for a tracker on or inside it."""
 _SPEED_LEFT: Final = 0.8
 """Share of the greatest deceleration that a planned approach uses."""
 
 
 @compiled
 def intercept_time(x: float, y: float, speed_x: float, speed_y: float, max_speed: float) -> float:
-    """Return the earliest time (s) at which a point can be met, straight on at ``max_speed``.
+    """Return the earliest interception time (s) of a point, straight at ``max_speed``.
 
     The point is (x, y) away (m) and moves at a constant velocity (m/s): the least root t >= 0 of
-    ``|p + s t| = V t``. ``NEVER`` for a point that gets away.
+    ``|p + s t| = V t``. ``NEVER`` if there is none.
     """
     surplus = max_speed**2 - speed_x**2 - speed_y**2
     opening = x * speed_x + y * speed_y
@@ -46,7 +46,7 @@ def approach_velocity(
     max_speed: float,
     deceleration: float,
 ) -> tuple[float, float]:
-    """Return the wanted velocity (x, y) in m/s towards a moving slot, with room to brake.
+    """Return the wanted velocity (x, y) in m/s towards a moving slot, limited by braking distance.
 
     :func:`~posse_baselines.laws.slots.slot_law` with the gain lowered where the tracker, whose
     speed changes by at most ``deceleration`` (m/s²), could not brake in time.
@@ -61,11 +61,11 @@ def approach_velocity(
 def way_round(
     from_x: float, from_y: float, to_x: float, to_y: float, clearance: float
 ) -> tuple[float, float]:
-    """Return where to head for, on the way from one place to another round the origin (m).
+    """Return the next waypoint from one position to another around the origin (m).
 
-    The place itself where the straight way keeps ``clearance`` from the origin; else the point at
-    which the tangent of that circle touches it, on the side of the shorter way. Who is on the
-    circle already heads for a point a little round it, and comes no nearer than 0.82 of it.
+    The goal itself if the straight path keeps ``clearance`` from the origin; else the tangent point
+    on that circle, on the shorter side. A tracker on the circle heads for a point a little further
+    along it, and comes no nearer than 0.82 of the clearance.
     """
     way_x, way_y = to_x - from_x, to_y - from_y
     square = way_x * way_x + way_y * way_y
@@ -102,11 +102,11 @@ def meeting_velocity(
     max_speed: float,
     deceleration: float,
 ) -> tuple[float, float]:
-    """Return the velocity (x, y) in m/s on a course that meets a slot, round the target.
+    """Return the velocity (x, y) in m/s of an intercept course to a slot, around the target.
 
-    Tracker (``from``) and slot (``arm``) are given from the target, m. A slot far away is met where
-    the target's mean velocity (``mean``) takes it, a near one where its present velocity does: that
-    one counts for about ``weave_time`` (s). ``frame_rate`` (rad/s) is that of the slot frame.
+    Tracker (``from``) and slot (``arm``) are relative to the target, m. Far slots are predicted
+    with the target's mean velocity (``mean``), near ones with its current one, which is used for
+    about ``weave_time`` (s). ``frame_rate`` (rad/s) is that of the slot frame.
     """
     round_x, round_y = way_round(from_x, from_y, arm_x, arm_y, clearance)
     dx, dy = round_x - from_x, round_y - from_y
@@ -124,6 +124,6 @@ def meeting_velocity(
 def write_motion(
     action: FloatArray, speed: float, omega: float, max_speed: float, max_omega: float
 ) -> None:
-    """Write the first two numbers of an action (2 + m,), brought into [-1, 1]."""
+    """Write the first two numbers of an action (2 + m,), clipped to [-1, 1]."""
     action[0] = clip(2.0 * speed / max_speed - 1.0, -1.0, 1.0)
     action[1] = clip(omega / max_omega, -1.0, 1.0)

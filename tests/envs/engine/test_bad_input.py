@@ -83,7 +83,7 @@ def test_impossible_settings_of_pettingzoo(
 @pytest.mark.parametrize("kind", ["team", "solo", "team vector", "solo vector"])
 def test_a_target_that_is_an_agent_needs_pettingzoo(kind: str) -> None:
     for settings in ({"target": "agent"}, {"target_motion": "agent"}):
-        with pytest.raises(posse.ScenarioError, match=r"'agent' has no place.*parallel_env"):
+        with pytest.raises(posse.ScenarioError, match=r"'agent' is not possible.*parallel_env"):
             MAKERS[kind](**settings)
 
 

@@ -1,9 +1,9 @@
 """Avoidance of walls and obstacles by a scripted target.
 
 In an arena the goal is mirrored near walls, and only turns that leave one of the two turning
-circles free are taken, so that the target can always keep turning without contact. If trackers block the
-target, which then turns on the spot, both circles may be occupied: then it turns to the wider side
-until one is free, and contacts stop it (:mod:`posse.rules.contact`).
+circles free are taken, so that the target can always keep turning without contact. If trackers
+block the target, which then turns on the spot, both circles may be occupied: then it turns to the
+wider side until one is free, and contacts stop it (:mod:`posse.rules.contact`).
 """
 
 from __future__ import annotations
