@@ -1,4 +1,4 @@
-"""Policies by name, and what is said when there is none."""
+"""Policies by name, and errors for unknown names."""
 
 from __future__ import annotations
 

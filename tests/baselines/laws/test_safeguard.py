@@ -1,4 +1,4 @@
-"""The safeguard: a robot that wants to go through things goes round them, within its limits."""
+"""The safeguard: robots avoid collisions within their limits."""
 
 from __future__ import annotations
 

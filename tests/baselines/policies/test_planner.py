@@ -1,4 +1,4 @@
-"""The planner: above the teams that play by the rules, and blind for what is yet to be drawn."""
+"""The planner: scores above other teams, without access to future random draws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What users pass as actions is read for what it is, whatever form it comes in."""
+"""Actions in any supported form are read correctly."""
 
 from __future__ import annotations
 

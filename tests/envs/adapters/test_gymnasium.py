@@ -1,4 +1,4 @@
-"""`posse/Team-v0` and `posse/Solo-v0`: other people's checkers, and what they do not look at."""
+"""`posse/Team-v0` and `posse/Solo-v0`: the checkers of Gymnasium and SB3, and further checks."""
 
 from __future__ import annotations
 

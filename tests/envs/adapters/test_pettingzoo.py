@@ -1,4 +1,4 @@
-"""The PettingZoo environments: PettingZoo's own tests, and what they do not look at."""
+"""The PettingZoo environments: PettingZoo's API tests, and further checks."""
 
 from __future__ import annotations
 

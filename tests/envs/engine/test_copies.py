@@ -1,4 +1,4 @@
-"""Copies of worlds: the present of their originals, and a future of their own."""
+"""Copies of worlds: the same state as their originals, and independent random draws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lanes: each is what a plain number would be, whatever stands beside it."""
+"""Lanes: each equals the scalar result, independent of the other lanes."""
 
 from __future__ import annotations
 

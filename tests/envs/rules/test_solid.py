@@ -1,4 +1,4 @@
-"""Discs are solid: whatever a team does, none is ever inside another or a wall.
+"""Discs never overlap each other or walls, whatever the team does.
 
 Nor is a scripted target that trackers held until it had no room to turn; and it gets away again.
 """

@@ -1,4 +1,4 @@
-"""How episodes start: what is drawn, and that nothing stands in anything."""
+"""Starts of episodes: random draws, and no overlaps."""
 
 from __future__ import annotations
 

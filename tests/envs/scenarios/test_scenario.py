@@ -1,4 +1,4 @@
-"""Scenarios: values, overrides, and that every impossible one is refused with a word on why."""
+"""Scenarios: values, overrides, and errors for invalid settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state vector: equal vectors and equal draws go on alike, whatever the arrays hold beside."""
+"""The state vector: worlds with equal vectors and equal draws evolve equally."""
 
 from __future__ import annotations
 

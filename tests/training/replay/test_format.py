@@ -1,4 +1,4 @@
-"""What is encoded is decoded, and what is no replay is refused."""
+"""Encoding and decoding are inverse, and invalid files raise errors."""
 
 from __future__ import annotations
 

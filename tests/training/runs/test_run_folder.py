@@ -1,4 +1,4 @@
-"""What is wrong with a run folder is named, and nothing is lost."""
+"""Errors of a run folder are named, and no data are lost."""
 
 from __future__ import annotations
 

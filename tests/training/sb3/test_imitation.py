@@ -1,4 +1,4 @@
-"""A warm start copies its expert."""
+"""Imitation copies its expert."""
 
 from __future__ import annotations
 
