@@ -41,7 +41,7 @@ MIND: Final = _record(
     # tracking
     ("task", _I),
     ("slot", _I),  # -1: none
-    ("taken", np.uint64),  # slots in which the sonar found somebody not heard, a bit each
+    ("taken", np.uint64),  # bit set of slots in which the sonar detected a robot not heard
     ("error", _F),  # distance from its place (PNGL: excess of the range), m; -1: it has none
     ("pursues", _I),  # 1: under PNGL
     ("closing", _I),  # 1: the law itself, not the safeguard, keeps the range to the target

@@ -28,17 +28,17 @@ NO_EXCHANGE: Final = ("converging>exchange", "flocking>exchange")
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How a team plays. Units, ranges, and what tuning may change: each field's metadata.
+    """Settings of a team. Units, ranges and use in tuning are in each field's metadata.
 
     Raises:
         ValueError: An unknown model, law or transition, or a number out of its range.
     """
 
     model: str = choice("distributed", MODELS)
-    """``"distributed"``: every tracker is tied to the target by ``guidance``; ``"centralized"``:
-    the leader is, the others keep their places on the leader by ``follower_law``."""
+    """``"distributed"``: every tracker is guided by the target (``guidance``); ``"centralized"``:
+    only the leader is, the others follow it by ``follower_law``."""
     guidance: str = choice("slot", GUIDANCE_LAWS)
-    """Law of whoever is tied to the target: ``"slot"`` (Cartesian: the slot's velocity and a gain
+    """Law of trackers guided by the target: ``"slot"`` (Cartesian: the slot's velocity and a gain
     on its offset) or ``"pngl"`` (θ = K σ + c, and (13) with a correction of the range)."""
     deviation: str = choice("slot", DEVIATIONS)
     """c of PNGL: ``"none"`` (0, as in (5)), ``"slot"`` (ψ - K σ_d) or ``"occupant"`` (the heading
@@ -51,26 +51,27 @@ class Settings:
     """``"l-phi"`` (distance and direction from the leader) or ``"l-l"`` (from the third robot on,
     the distances from the leader and from a follower before it in the order of the slots)."""
     follower_frame: str = choice("leader", FOLLOWER_FRAMES)
-    """What a follower's φ_d is constant in: the leader's heading (figure 6), or the slot frame."""
+    """Frame in which a follower's φ_d is constant: the leader's heading (figure 6) or the slot
+    frame."""
     radio: bool = True
-    """Whether anything that was heard is used; without, each tracker is alone."""
+    """Whether received messages are used."""
     forbidden: tuple[str, ...] = ()
-    """Changes of the task that do not happen (``TRANSITIONS``): for ablations."""
+    """Forbidden transitions of the task (``TRANSITIONS``), for ablations."""
 
     # monitoring
     speed_memory: float = tuned(3.0, "s", 0.1, 10.0)
     """Time constant of the target's estimated speed."""
     mean_memory: float = tuned(6.0, "s", 0.5, 20.0)
-    """Time constant of the target's mean velocity, by which far slots are met."""
+    """Time constant of the target's mean velocity, used to intercept far slots."""
     weave_time: float = tuned(1.5, "s", 0.2, 10.0)
-    """How long the target is taken to keep its present velocity, before its mean one counts."""
+    """Time for which the target's current velocity is extrapolated, before its mean one is used."""
     turn_memory: float = tuned(1.0, "s", 0.1, 5.0)
-    """Time constant with which a measured turn rate of the target fades."""
+    """Decay time constant of a measured turn rate of the target."""
     turn_share: float = tuned(0.0, "", 0.0, 1.0)
     """Share of that turn rate in the slot frame's rate once the frame has caught up with it: 1 is
     exact for a target on a circle, 0 scores better against one that weaves."""
     way_memory: float = tuned(3.0, "s", 0.5, 10.0)
-    """Time constant with which the target's speed fades in an estimate older than 1 s."""
+    """Decay time constant of the target's speed in an estimate older than 1 s."""
     fix_trust: float = tuned(0.6, "", 0.05, 1.0)
     """Share of a new fix in the estimate of the position."""
     fix_jump: float = number(1.0, "m", 0.1, 10.0)
@@ -78,25 +79,25 @@ class Settings:
     unknown_speed: float = number(0.6, "", 0.0, 1.0)
     """Speed of the target until it has been measured, as a share of the own greatest."""
     gap_memory: float = number(10.0, "s", 1.0, 100.0)
-    """How long a silence in what is heard is remembered."""
+    """Time constant of the memory of silences."""
     least_patience: float = tuned(0.3, "s", 0.1, 3.0)
-    """A silence shorter than this, plus twice the usual one, means nothing."""
+    """A silence shorter than this plus twice the usual one is ignored."""
     late_fix: float = number(1.0, "s", 0.1, 10.0)
-    """A fix of up to this age is late, an older one is a loss."""
+    """A fix of up to this age is delayed, an older one is lost."""
     lost_after: float = tuned(1.5, "s", 0.3, 5.0)
-    """A team-mate, or the leader's pulse, not heard for this long is gone."""
+    """Timeout of a team-mate, and of the leader's pulse."""
     unseen_memory: float = tuned(2.5, "s", 0.3, 10.0)
-    """The same, for team-mates who may just have had no place in the observation."""
+    """The same for team-mates that may have had no place in the observation."""
     target_lost_after: float = tuned(10.0, "s", 1.0, 30.0)
     """A fix older than this is no longer followed: the target is lost."""
 
     # the tasks
     time_lag: float = tuned(1.0, "s", 0.1, 10.0)
-    """Between two looks at who should lead."""
+    """Time between two checks of the leadership."""
     lead_hysteresis: float = tuned(0.6, "m", 0.0, 3.0)
-    """How much nearer to the target another has to be to take the lead."""
+    """Difference of the distances to the target required for a handover."""
     lead_patience: float = tuned(0.2, "s", 0.0, 2.0)
-    """How much longer than a team-mate the leader may be silent before another is appointed."""
+    """Additional timeout of the leader compared with a team-mate."""
     near: float = tuned(1.0, "m", 0.02, 1.5)
     """Distance from its place at which converging ends and flocking begins."""
     far: float = tuned(1.2, "m", 0.1, 4.0)
@@ -108,62 +109,61 @@ class Settings:
 
     # searching
     look_time: float = number(0.5, "s", 0.1, 5.0)
-    """Between two entries into the map of where has been looked, and at least between two goals."""
+    """Time between two updates of the map of covered areas; least time between two goals."""
     goal_time: float = tuned(4.0, "s", 0.5, 20.0)
     """A goal is reconsidered at least this often."""
     stale_after: float = tuned(30.0, "s", 5.0, 60.0)
-    """A place not looked at for this long counts as never looked at."""
+    """A cell not covered for this long counts as never covered."""
     age_weight: float = tuned(0.35, "m/s", 0.0, 2.0)
-    """Way that a second since the last look is worth."""
+    """Distance equivalent to a second since a cell was last covered."""
     turn_weight: float = tuned(0.8, "m", 0.0, 5.0)
-    """Way that a turn by a right angle costs."""
+    """Distance equivalent to a turn by a right angle."""
     lost_drift: float = tuned(0.35, "m/s", 0.0, 1.0)
-    """How fast the area grows in which a lost target is looked for first."""
+    """Growth rate of the area in which a lost target is searched first."""
     lost_worth: float = tuned(6.0, "m", 0.0, 20.0)
-    """Way that a place in that area is worth."""
+    """Distance equivalent to a cell in that area."""
     lost_slope: float = tuned(0.3, "", 0.0, 2.0)
-    """By how much less for each metre from where the target should be."""
+    """Its decrease per metre from the predicted position of the target."""
     middle_weight: float = tuned(0.5, "", 0.0, 3.0)
-    """Way that a metre farther from the middle costs a searcher who hears nobody."""
+    """Distance equivalent to a metre farther from the middle for a tracker that hears no other."""
 
     # slots
     replan_time: float = tuned(0.5, "s", 0.1, 3.0)
-    """Between two assignments."""
+    """Time between two assignments."""
     loyalty: float = tuned(0.6, "s", 0.0, 5.0)
-    """How much sooner all would have to arrive with other slots for a tracker to change."""
+    """Least gain in total arrival time for a change of slots."""
     taken_cost: float = tuned(8.0, "s", 0.0, 30.0)
-    """How much later a tracker may arrive elsewhere than in a slot where its sonar finds somebody
-    who is not heard."""
+    """Cost of a slot in which the sonar detects a robot that is not heard, as arrival time."""
     taken_memory: float = number(3.0, "s", 0.1, 20.0)
-    """The longest that a slot counts as taken after an echo from it."""
+    """Longest time for which a slot counts as taken after an echo from it."""
     sight_worth: float = tuned(10.0, "s", 0.0, 30.0)
-    """How much later a tracker may arrive in a slot from which the target is in sight."""
+    """Bonus of a slot from which the target is in sight, as arrival time."""
     in_sight: float = tuned(0.95, "", 0.1, 1.0)
-    """Share of the sensor's reach at which a slot counts as one that sees the target."""
+    """Share of the sensing range within which a slot counts as seeing the target."""
     in_place: float = number(0.4, "m", 0.05, 2.0)
     """Nearer to a slot than this, a tracker is in it."""
     equally_near: float = number(0.1, "m", 0.0, 1.0)
-    """Difference of two distances below which the lower number has the better right to a slot."""
+    """Difference of two distances below which the lower number has precedence for a slot."""
     close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
-    """With a fix older than this, beyond the usual age, the team closes in on where the target may
-    be, from all sides, to see it again."""
+    """With a fix older than this, beyond the usual age, the team moves to a ring around the
+    predicted position of the target, to see it again."""
     hunt_growth: float = tuned(0.3, "m/s", 0.0, 1.0)
-    """How fast the ring grows on which it does so."""
+    """Growth rate of that ring."""
 
     # laws
     gain: float = tuned(1.5, "1/s", 0.2, 6.0)
-    """Of the slot law."""
+    """Gain of the slot law."""
     feed_forward: float = tuned(0.0, "", 0.0, 1.0)
     """Share of the slot frame's turn rate that the slot law adds to the turn command. 0 scores best
     on every scenario by hand: a weaving target's rate has changed before the robot has turned."""
     aim_ahead: float = tuned(0.0, "m", -0.2, 0.3)
-    """How far ahead of a slot's middle, along the slot frame, the slot law aims."""
+    """Offset ahead of a slot's centre, along the slot frame, at which the slot law aims."""
     clearance: float = tuned(0.75, "m", 0.3, 2.0)
-    """Distance at which the way to a slot leads round the target."""
+    """Distance at which the path to a slot leads around the target."""
     bearing_gain: float = tuned(0.0, "", 0.0, 4.0)
     """G of a deviation c = ... + G wrap(σ - σ_d): feedback on the bearing. 0 is the paper's law."""
     range_gain: float = tuned(1.0, "1/s", 0.1, 6.0)
-    """Of the correction of the range in (13)."""
+    """Gain of the range correction in (13)."""
     alpha_1: float = tuned(2.0, "1/s", 0.2, 6.0)
     """α_1 of the l-φ law."""
     alpha_2: float = tuned(2.0, "1/s", 0.2, 6.0)
@@ -177,18 +177,17 @@ class Settings:
 
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)
-    """Free width that is kept to robots and walls."""
+    """Clearance to robots and walls."""
     target_margin: float = tuned(0.2, "m", 0.0, 0.6)
-    """Free width that is kept to the target."""
+    """Clearance to the target."""
     age_margin: float = tuned(0.15, "m/s", 0.0, 1.0)
-    """By how much more the margin of a team-mate is widened, for each second of its message's
-    age."""
+    """Increase of the margin of a team-mate per second of its message's age."""
     most_age: float = number(0.7, "s", 0.0, 5.0)
-    """Age from which on it is widened no more."""
+    """Age up to which it increases."""
     echo_margin: float = tuned(0.25, "m", 0.0, 0.6)
-    """Free width that is kept to what the sonar finds and nothing known explains."""
+    """Clearance to unexplained echoes of the sonar."""
     forgotten: float = number(30.0, "s", 1.0, 100.0)
-    """A team-mate silent for this long is no longer taken to stand where it was."""
+    """Silence after which a team-mate is no longer assumed at its last position."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
