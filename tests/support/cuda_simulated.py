@@ -14,7 +14,8 @@ from gymnasium.error import ResetNeeded
 from tests.support.cuda_cases import CASES, WORLDS, actions_for, make, on_host, play
 
 import posse
-from posse.engine.cuda import CudaBatch, cuda
+from posse.engine.cuda import CudaBatch
+from posse.engine.cuda_kernels import cuda
 
 
 @pytest.mark.parametrize("case", CASES)

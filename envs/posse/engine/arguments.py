@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray
+from posse.numeric import BoolArray, FloatArray
+from posse.rules.state import SPLITS
 from posse.scenarios import ScenarioError
+from posse.scenarios.setting import is_one_of
 from posse.scenarios.shown import shown
 
+AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 MOST = 2**63
 """Seeds and numbers of worlds lie below."""
 
@@ -90,3 +93,65 @@ def to_float32(array: npt.NDArray[Any]) -> FloatArray:
     """Return real numbers as float32; those that are too large for it become infinite."""
     with np.errstate(over="ignore"):
         return array.astype(np.float32)
+
+
+def check_mask(mask: npt.ArrayLike | None, num_worlds: int) -> BoolArray:
+    """Return which worlds a mask chooses, (E,): all without a mask."""
+    if mask is None:
+        return np.ones(num_worlds, np.bool_)
+    array = as_array("reset_mask", mask)
+    if array.dtype != np.bool_ or array.shape != (num_worlds,):
+        raise ValueError(
+            f"reset_mask must be a bool array of shape ({num_worlds},), got "
+            f"{array.dtype} of shape {array.shape}"
+        )
+    return array
+
+
+def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
+    """Return what is raised for actions[index]."""
+    e, i, k = index
+    return ValueError(
+        f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or "
+        "clip the policy's output first"
+    )
+
+
+def check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
+    """Raise if an array is not what compiled code takes it for without looking."""
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"{name} must be a numpy array, got {type(array).__name__}")
+    if array.dtype != np.float32 or array.shape != shape or not array.flags.carray:
+        raise ValueError(
+            f"{name} must be a contiguous, writable float32 array of shape {shape}, got "
+            f"{array.dtype} of shape {array.shape} with strides {array.strides}"
+            + ("" if array.flags.writeable else ", not writable")
+        )
+
+
+def check_settings(
+    num_worlds: int,
+    first_world: int,
+    split: str,
+    autoreset: str,
+    num_threads: int | None,
+    own_kernel: bool,
+) -> None:
+    """Raise ScenarioError if a batch cannot have these settings."""
+    num_worlds = check_count("num_worlds", num_worlds, 1)
+    first_world = check_count("first_world", first_world, 0)
+    if first_world + num_worlds > MOST:
+        raise ScenarioError(
+            f"first_world={first_world} and num_worlds={num_worlds} go beyond world 2**63 - 1: "
+            "lower first_world"
+        )
+    if num_threads is not None:
+        check_count("num_threads", num_threads, 1)
+    if not isinstance(own_kernel, bool):
+        raise ScenarioError(f"own_kernel={shown(own_kernel)} is not possible: it is True or False")
+    if not is_one_of(SPLITS, split):
+        raise ScenarioError(f"unknown split {shown(split)}; splits are: {', '.join(SPLITS)}")
+    if not is_one_of(AUTORESET_MODES, autoreset):
+        raise ScenarioError(
+            f"unknown autoreset mode {shown(autoreset)}; modes are: " + ", ".join(AUTORESET_MODES)
+        )

@@ -5,9 +5,7 @@ Everything else (PettingZoo, Gymnasium, training, evaluation) stands on :class:`
 
 from __future__ import annotations
 
-import math
 import os
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -17,60 +15,37 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.engine.arguments import (
-    MOST,
-    as_array,
+    check_array,
     check_count,
+    check_mask,
     check_seed,
+    check_settings,
     options_of,
-    real_numbers,
-    to_float32,
 )
-from posse.engine.copies import write_copies
+from posse.engine.copies import check_fit, write_copies
 from posse.engine.kernels import (
     LOOK,
     START,
     START_FROM_POSES,
-    STEP,
-    TO_CLIP,
     Results,
-    bad_action,
     first_over,
-    kernel_of,
-    own_kernel,
-    tables_of,
 )
-from posse.engine.scratch import SCRATCH
-from posse.engine.user_parts import check_fields, explain
+from posse.engine.start_poses import check_overlap, check_room_to_turn, poses_of, write_poses
+from posse.engine.stepping import Stepping
 from posse.numeric import (
-    Blocks,
     BoolArray,
     FloatArray,
-    Records,
-    direct,
     divide,
-    run_threads,
-    threads_for,
 )
-from posse.rules.scratch import new_scratch
 from posse.rules.state import (
     SPLITS,
     WorldArrays,
 )
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.limits import SAFE_MARGIN
-from posse.scenarios.setting import is_one_of
 from posse.scenarios.shown import shown
 from posse.signals.layout import ObservationLayout
-from posse.signals.metrics import episode_metrics
-from posse.signals.parts import parts_for
 from posse.signals.reward import TermsByName
 
-AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
-_RECYCLED_FROM: Final = 1 << 16
-"""Bytes from which an array's memory is worth keeping for the next step."""
-_ROUNDING: Final = 1e-3
-"""By how much a turning circle may be too wide for its room, m: float32 has rounded the pose."""
-_FLOAT32: Final = np.dtype(np.float32)
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
 
@@ -82,33 +57,7 @@ class Snapshot:
     arrays: WorldArrays
 
 
-class _Recycler:
-    """Gives out arrays of one shape; takes the memory back once nobody else refers to it.
-
-    What was returned is never overwritten while anyone holds it (a view, a tensor made from it):
-    each of these is a reference to the array that owns the memory. Fresh memory for every step
-    would cost as much as the step: the system hands it out page by page.
-    """
-
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._shape = shape
-        self._recycle = math.prod(shape) * 4 >= _RECYCLED_FROM
-        self._arrays: list[FloatArray] = []
-
-    def take(self) -> FloatArray:
-        if not self._recycle:
-            return np.empty(self._shape, _FLOAT32)
-        for k in range(len(self._arrays)):
-            # Two references: this list's, and the argument's of the call itself.
-            if sys.getrefcount(self._arrays[k]) == 2:
-                return self._arrays[k]
-        array = np.empty(self._shape, np.float32)
-        if len(self._arrays) < 4:
-            self._arrays.append(array)
-        return array
-
-
-class Batch:
+class Batch(Stepping):
     """A batch of E worlds of one scenario, N trackers each.
 
     Args:
@@ -153,31 +102,12 @@ class Batch:
         num_threads: int | None = None,
         own_kernel: bool = False,
     ) -> None:
-        num_worlds = check_count("num_worlds", num_worlds, 1)
-        first_world = check_count("first_world", first_world, 0)
-        if first_world + num_worlds > MOST:
-            raise ScenarioError(
-                f"first_world={first_world} and num_worlds={num_worlds} go beyond world 2**63 - 1: "
-                "lower first_world"
-            )
-        if num_threads is not None:
-            check_count("num_threads", num_threads, 1)
-        if not isinstance(own_kernel, bool):
-            raise ScenarioError(
-                f"own_kernel={shown(own_kernel)} is not possible: it is True or False"
-            )
-        if not is_one_of(SPLITS, split):
-            raise ScenarioError(f"unknown split {shown(split)}; splits are: {', '.join(SPLITS)}")
-        if not is_one_of(AUTORESET_MODES, autoreset):
-            raise ScenarioError(
-                f"unknown autoreset mode {shown(autoreset)}; modes are: "
-                + ", ".join(AUTORESET_MODES)
-            )
+        check_settings(num_worlds, first_world, split, autoreset, num_threads, own_kernel)
         self.scenario = scenario
-        self.num_worlds = num_worlds
+        self.num_worlds = int(num_worlds)
         self.seed = check_seed(seed)
         self.split = split
-        self.first_world = first_world
+        self.first_world = int(first_world)
         self.autoreset = autoreset
         self.num_threads = num_threads or os.cpu_count() or 1
         self.own_kernel = own_kernel
@@ -195,82 +125,6 @@ class Batch:
             ) from None
         self._started = False
         self._prepare()
-
-    def _prepare(self) -> None:
-        """Set what follows from the rest, and is not pickled."""
-        scenario, (num_worlds, rows, size) = self.scenario, self.observation_shape
-        parts = parts_for(scenario)
-        check_fields(parts, self._arrays)
-        self._tables = tables_of(scenario)
-        self._observations = _Recycler((num_worlds, rows, size))
-        self._rewards = _Recycler((num_worlds, rows))
-        self.term_names = parts.term_names
-        self._terms = _Recycler((num_worlds, rows, len(self.term_names)))
-        self._untyped: Callable[..., int] = (
-            own_kernel(scenario) if self.own_kernel else kernel_of(parts)
-        )
-        self._kernel: Callable[..., int] = direct(self._untyped)
-        self._score: FloatArray = self._arrays.world["score"]  # a view, made once
-        self._orders = np.full(num_worlds, STEP, np.uint8)
-        threads = threads_for(num_worlds, rows, self.num_threads)
-        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
-
-    def __getstate__(self) -> dict[str, Any]:
-        derived = (
-            "_tables", "_observations", "_rewards", "_terms", "_score",
-            "_scratch", "_orders", "_kernel", "_untyped",
-        )  # fmt: skip
-        return {k: v for k, v in self.__dict__.items() if k not in derived}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._prepare()
-
-    @property
-    def state(self) -> dict[str, npt.NDArray[Any]]:
-        """Every state array by name, as read-only views that follow the worlds.
-
-        Names are ``<array>_<field>``, e.g. ``"tracker_x"`` (E, N) or ``"world_step"`` (E,);
-        :mod:`posse.rules.state` documents every field.
-        """
-        names = self._arrays.by_name()
-        for view in names.values():
-            view.flags.writeable = False
-        return names
-
-    @property
-    def worlds(self) -> Records:
-        """The worlds' records, (E,) :func:`posse.rules.state.world_record`."""
-        return self._arrays.world
-
-    @property
-    def score(self) -> FloatArray:
-        """(E,) the score of the present step; 0 at the start."""
-        return self._score.copy()
-
-    @property
-    def terminated(self) -> BoolArray:
-        """(E,) whether the last step or reset left the world's episode terminated."""
-        return np.asarray(self._arrays.world["terminated"] != 0)
-
-    @property
-    def truncated(self) -> BoolArray:
-        """(E,) whether the last step or reset left the world's episode truncated."""
-        return np.asarray(self._arrays.world["over"] != 0) & ~self.terminated
-
-    @property
-    def arrays(self) -> WorldArrays:
-        """The arrays themselves; whoever writes to them changes the worlds."""
-        return self._arrays
-
-    @property
-    def bytes_per_world(self) -> int:
-        """Memory that the state of one world takes, in bytes."""
-        return self._arrays.bytes_per_world
-
-    def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Return every metric by name, (E,), of the episodes as they stand."""
-        return episode_metrics(self.scenario, self._arrays.world)
 
     def save(self) -> Snapshot:
         """Return the worlds as they stand, for :meth:`restore`.
@@ -334,20 +188,15 @@ class Batch:
         check_count("count", count, 1)
         seed = check_seed(seed)
         self._check_started("copies")
-        wanted = self.num_worlds * count
         if into is None:
             into = Batch(
-                self.scenario, wanted, seed=self.seed, split=self.split,
+                self.scenario, self.num_worlds * count, seed=self.seed, split=self.split,
                 num_threads=self.num_threads,
             )  # fmt: skip
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch on the CPU, got {shown(into)}")
-        elif into.scenario != self.scenario or into.num_worlds != wanted:
-            raise ValueError(
-                f"{count} copies of {self.num_worlds} worlds of {self.scenario.name!r} do not fit "
-                f"{into.num_worlds} worlds of {into.scenario.name!r}: scenario and number of "
-                "worlds must be equal"
-            )
+        else:
+            check_fit(self.scenario, self.num_worlds, count, into.scenario, into.num_worlds)
         write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
         into._started = True
         return into
@@ -370,7 +219,7 @@ class Batch:
         """
         options = options_of(options)
         chosen = self.check_reset(seed, options)
-        poses = self._check_poses(options)
+        poses = poses_of(options, self.scenario, self.num_worlds)
         before = self._arrays.copy() if poses else None
         world = self._arrays.world
         new_seed = self.seed if seed is None else int(seed)
@@ -384,13 +233,11 @@ class Batch:
         observations = self._start(chosen, START)
         if poses:
             for name, pose in poses.items():
-                _write_poses(
-                    self._arrays.tracker if name == "tracker_pose" else world, pose, chosen
-                )
+                write_poses(self._arrays.tracker if name == "tracker_pose" else world, pose, chosen)
             try:
-                self._check_overlap(chosen)
+                check_overlap(self.scenario, self._arrays, chosen)
                 if "target_pose" in poses:
-                    self._check_room_to_turn(chosen)
+                    check_room_to_turn(self.scenario, self._arrays, chosen)
                 observations = self._start(chosen, START_FROM_POSES)
             except BaseException:
                 if before is not None:
@@ -409,7 +256,7 @@ class Batch:
                 raise ValueError(f"unknown option {shown(key)}; options are: {', '.join(_OPTIONS)}")
         if seed is not None:
             check_seed(seed)
-        chosen = self._check_mask(options.get("reset_mask"))
+        chosen = check_mask(options.get("reset_mask"), self.num_worlds)
         if not self._started and not chosen.all():
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         return chosen
@@ -481,7 +328,7 @@ class Batch:
             ("rewards", rewards, rows),
             ("terms", terms, (*rows, len(self.term_names))),
         ):
-            _check_array(name, array, shape)
+            check_array(name, array, shape)
         arguments = (
             self._tables, self._arrays, actions,
             Results(observations, rewards, terms, self._new_flags()), self._orders,
@@ -515,182 +362,3 @@ class Batch:
         infos["_final_info"] = ended
         self._arrays.world["episode"][ended] += 1
         return self._start(ended, START)
-
-    def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
-        """Return the actions as the kernels take them, or raise what is wrong with them."""
-        array = self.cast_actions(actions)
-        position = bad_action(array)
-        if position >= 0:
-            e, i, k = np.unravel_index(position, array.shape)
-            raise action_error((int(e), int(i), int(k)), array[e, i, k])
-        return np.clip(array, -1, 1) if position == TO_CLIP else array
-
-    def cast_actions(self, actions: npt.ArrayLike) -> FloatArray:
-        """Return the actions as contiguous float32, or raise if their type or shape is wrong."""
-        array = actions if type(actions) is np.ndarray else as_array("actions", actions)
-        if array.dtype != np.float32:
-            array = to_float32(real_numbers("actions", array))
-        if array.shape != self.action_shape:
-            raise ValueError(
-                f"actions have shape {array.shape}, wanted {self.action_shape}: "
-                "(worlds, agents, 2 + message_size)"
-            )
-        return np.ascontiguousarray(array)
-
-    def _run(self, orders: npt.NDArray[np.uint8], actions: FloatArray, results: Results) -> int:
-        """Have the kernel do what each world is ordered to, spread over the threads.
-
-        Returns how many worlds' episodes are over.
-        """
-        kernel, scratch = self._kernel, self._scratch
-        arguments = (self._tables, self._arrays, actions, results, orders)
-
-        def work(thread: int, blocks: Blocks) -> int:
-            return kernel(*arguments, scratch[thread], thread, blocks)
-
-        return sum(run_threads(work, self.num_worlds, len(scratch)))
-
-    def _new_results(self) -> Results:
-        """Return room for what a pass over the worlds writes."""
-        return Results(
-            self._observations.take(), self._rewards.take(), self._terms.take(), self._new_flags()
-        )
-
-    def _new_flags(self) -> BoolArray:
-        """Return room for what a step says of episodes' ends: terminated, truncated, (2, E)."""
-        return np.empty((2, self.num_worlds), np.bool_)
-
-    def _start(self, chosen: BoolArray, order: int) -> FloatArray:
-        """Start an episode in the chosen worlds; return every world's observations."""
-        results = self._new_results()
-        orders = np.where(chosen, order, LOOK).astype(np.uint8)
-        actions = np.empty(self.action_shape, np.float32)  # not read
-        try:
-            self._run(orders, actions, results)
-        except Exception:
-            explain(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])
-            raise
-        self._kernel = direct(self._untyped)  # by now there is one
-        return results.observations
-
-    def _check_mask(self, mask: npt.ArrayLike | None) -> BoolArray:
-        if mask is None:
-            return np.ones(self.num_worlds, np.bool_)
-        array = as_array("reset_mask", mask)
-        if array.dtype != np.bool_ or array.shape != (self.num_worlds,):
-            raise ValueError(
-                f"reset_mask must be a bool array of shape ({self.num_worlds},), got "
-                f"{array.dtype} of shape {array.shape}"
-            )
-        return array
-
-    def _check_poses(self, options: Mapping[str, Any]) -> dict[str, npt.NDArray[np.float64]]:
-        poses = {}
-        for name, shape in (
-            ("tracker_pose", (self.scenario.num_trackers, 3)),
-            ("target_pose", (3,)),
-        ):
-            if options.get(name) is None:
-                continue
-            full = (self.num_worlds, *shape)
-            array = real_numbers(name, options[name]).astype(np.float64)
-            if array.shape not in (shape, full):
-                raise ValueError(
-                    f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each"
-                )
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
-            most = self.scenario.start_extent
-            if np.abs(array[..., :2]).max(initial=0) > most:
-                raise ValueError(
-                    f"{name} lies up to {np.abs(array[..., :2]).max():.4g} m from the origin, "
-                    f"starts of {self.scenario.name!r} lie within ±{most:g} m along each axis"
-                )
-            poses[name] = np.broadcast_to(array, full)
-        return poses
-
-    def _check_overlap(self, chosen: BoolArray) -> None:
-        """Raise if robots stand inside each other, an obstacle or a wall."""
-        s, world, tracker = self.scenario, self._arrays.world, self._arrays.tracker
-        robots = np.stack(
-            [np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen] for k in ("x", "y")],
-            axis=-1,
-        ).astype(np.float64)
-        names = [*(f"tracker_{i}" for i in range(s.num_trackers)), "the target"]
-        apart = np.linalg.norm(robots[:, :, None] - robots[:, None], axis=-1)
-        apart[:, np.arange(len(names)), np.arange(len(names))] = np.inf
-        if apart.size and apart.min() <= 2 * s.robot_radius:
-            _, i, j = np.unravel_index(apart.argmin(), apart.shape)
-            raise ValueError(
-                f"{names[i]} and {names[j]} would start {apart.min():.3g} m apart, discs of "
-                f"robot_radius={s.robot_radius:g} overlap: move one"
-            )
-        if math.isfinite(s.arena) and chosen.any():
-            room = s.arena / 2 - s.robot_radius - np.abs(robots).max(axis=(0, 2))
-            if room.min() <= 0:
-                raise ValueError(f"{names[int(room.argmin())]} would start in a wall: move it")
-        obstacle = self._arrays.obstacle[chosen]
-        for i, name in enumerate(names):
-            dx = obstacle["x"] - robots[:, i, :1]
-            dy = obstacle["y"] - robots[:, i, 1:]
-            if (np.hypot(dx, dy) <= obstacle["radius"] + s.robot_radius).any():
-                raise ValueError(f"{name} would start in an obstacle: move it")
-
-    def _check_room_to_turn(self, chosen: BoolArray) -> None:
-        """Raise if neither turning circle of a scripted target is free."""
-        s, world, obstacle = self.scenario, self._arrays.world[chosen], self._arrays.obstacle
-        if (
-            math.isinf(s.arena)
-            or s.target_motion == "agent"
-            or s.target_speed == 0
-            or not len(world)
-        ):
-            return
-        radius = s.target_speed / s.target_turn_rate
-        needed = radius + s.robot_radius + SAFE_MARGIN
-        x, y = world["x"].astype(np.float64), world["y"].astype(np.float64)
-        room = np.full(len(world), -np.inf)
-        for side in (radius, -radius):
-            centre_x, centre_y = x - side * world["heading_sin"], y + side * world["heading_cos"]
-            free = s.arena / 2 - np.maximum(np.abs(centre_x), np.abs(centre_y))
-            for o in obstacle[chosen].T:
-                away = np.hypot(o["x"] - centre_x, o["y"] - centre_y) - o["radius"]
-                free = np.minimum(free, away)
-            room = np.maximum(room, free)
-        if (room < needed - _ROUNDING).any():
-            e = int(room.argmin())
-            heading = math.atan2(world["heading_sin"][e], world["heading_cos"][e])
-            raise ValueError(
-                f"target_pose ({x[e]:.4g}, {y[e]:.4g}, {heading:.4g}) leaves the target no room to "
-                f"turn: a disc of {needed:.3g} m about the centre of its left or right turning "
-                f"circle must be clear of obstacles and walls, {max(0.0, room[e]):.3g} m are: move "
-                "it or turn it"
-            )
-
-
-def _write_poses(records: Records, poses: npt.NDArray[np.float64], chosen: BoolArray) -> None:
-    records["x"][chosen] = poses[chosen][..., 0]
-    records["y"][chosen] = poses[chosen][..., 1]
-    records["heading_cos"][chosen] = np.cos(poses[chosen][..., 2])
-    records["heading_sin"][chosen] = np.sin(poses[chosen][..., 2])
-
-
-def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
-    """Return what is raised for actions[index]."""
-    e, i, k = index
-    return ValueError(
-        f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or "
-        "clip the policy's output first"
-    )
-
-
-def _check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
-    """Raise if an array is not what compiled code takes it for without looking."""
-    if not isinstance(array, np.ndarray):
-        raise ValueError(f"{name} must be a numpy array, got {type(array).__name__}")
-    if array.dtype != np.float32 or array.shape != shape or not array.flags.carray:
-        raise ValueError(
-            f"{name} must be a contiguous, writable float32 array of shape {shape}, got "
-            f"{array.dtype} of shape {array.shape} with strides {array.strides}"
-            + ("" if array.flags.writeable else ", not writable")
-        )

@@ -9,155 +9,34 @@ slowly, for tests on machines without a GPU.
 
 from __future__ import annotations
 
-import functools
-import importlib.util
 import itertools
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.engine.arguments import options_of
-from posse.engine.batch import Batch, Snapshot, action_error
-from posse.engine.kernels import (
-    LOOK,
-    MOST_ACTION,
-    START,
-    STEP,
-    Results,
-    Tables,
-    advance_worlds,
-    prepare,
+from posse.engine.arguments import action_error, options_of
+from posse.engine.batch import Batch, Snapshot
+from posse.engine.cuda_kernels import (
+    CONFIG,
+    NONE,
+    NOTHING,
+    SIMULATED,
+    THREADS,
+    DeviceArray,
+    check_actions,
+    choose_worlds,
+    cuda,
+    stepping,
 )
-from posse.engine.scratch import SCRATCH_FOR_ONE
-from posse.numeric import BoolArray, FloatArray, Records
-from posse.rules.declared import Rules
+from posse.engine.kernels import LOOK, STEP, Results, Tables
+from posse.numeric import FloatArray, Records
 from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario
 from posse.signals.metrics import episode_metrics
-from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
-
-_CONFIG: Final[Any] = numba.config
-
-if not _CONFIG.ENABLE_CUDASIM and importlib.util.find_spec("numba_cuda") is None:
-    raise ImportError(
-        "device='cuda' needs the package numba-cuda, which is not installed: "
-        "pip install 'posse[cuda]'"
-    )
-
-import numba.cuda  # noqa: E402 (after the check: older versions of numba include numba.cuda)
-
-cuda: Final[Any] = numba.cuda
-_SIMULATED: Final = bool(_CONFIG.ENABLE_CUDASIM)
-
-DeviceArray = Any
-"""numba's device array. It has ``__cuda_array_interface__``, so that torch, CuPy and JAX take it
-without a copy (``torch.as_tensor(array, device="cuda")``), and ``copy_to_host()``."""
-
-_THREADS: Final = 32
-"""Threads per block. Blocks share nothing, so the smallest size spreads worlds best."""
-
-# Reported by the kernels: the flat position of the first action outside [-1, 1], the first world
-# that waits for a reset, and the number of worlds whose episode is over.
-_BAD_ACTION: Final = 0
-_WAITING: Final = 1
-_OVER: Final = 2
-_NONE: Final = 2**62
-_NOTHING: Final = np.array([_NONE, _NONE, 0], np.int64)
-
-_ONE: Final = np.float32(1.0)
-
-
-@cuda.jit  # type: ignore[untyped-decorator]
-def _check(
-    world: Records, actions: FloatArray, clipped: FloatArray, report: DeviceArray, disabled: bool
-) -> None:
-    """Clip actions outside [-1, 1] by rounding, and write them to ``clipped``.
-
-    Report actions farther out and, with autoreset disabled, worlds that are over.
-    """
-    e = cuda.grid(1)
-    if e == 0:
-        report[_OVER] = 0
-    if e < len(world):
-        if disabled and world[e].over != 0:
-            cuda.atomic.min(report, _WAITING, e)
-        rows, width = actions.shape[1], actions.shape[2]
-        for i in range(rows):
-            for k in range(width):
-                action = actions[e, i, k]
-                if action >= -MOST_ACTION and action <= MOST_ACTION:
-                    clipped[e, i, k] = min(max(action, -_ONE), _ONE)
-                else:
-                    cuda.atomic.min(report, _BAD_ACTION, (e * rows + i) * width + k)
-
-
-@functools.cache
-def _stepping(parts: Parts) -> Any:
-    """Return the kernel that steps worlds."""
-    own, mate, reward, empty, width, mate_width = writers_for(parts)
-    draw_motion, set_goal, sees, measure = rules_for(parts)
-    clear_sums, add_to_sums = sums_for(parts)
-
-    @cuda.jit  # type: ignore[untyped-decorator]
-    def advance(
-        tables: Tables,
-        worlds: WorldArrays,
-        actions: FloatArray,
-        results: Results,
-        score: FloatArray,
-        orders: npt.NDArray[np.uint8],
-        report: DeviceArray,
-    ) -> None:
-        """Execute the order of each world, unless an error was reported."""
-        e = cuda.grid(1)
-        if e < len(worlds.world) and report[_BAD_ACTION] == _NONE and report[_WAITING] == _NONE:
-            scratch = cuda.local.array(1, SCRATCH_FOR_ONE)
-            if _SIMULATED:
-                scratch[:] = 0  # suppress warnings for unused lanes
-            s = scratch[0]
-            writers = Writers(own, mate, reward, empty, width, mate_width)
-            rules = Rules(draw_motion, set_goal, sees, measure)
-            sums = Sums(clear_sums, add_to_sums)
-            prepare(tables, s)
-            over = advance_worlds(
-                e, 1, tables, worlds, actions, results, orders, rules, sums, writers, s
-            )
-            results.flags[2, e] = over
-            score[e] = worlds.world[e].score
-            if over:
-                cuda.atomic.add(report, _OVER, 1)
-
-    return advance
-
-
-@cuda.jit  # type: ignore[untyped-decorator]
-def _choose(
-    world: Records,
-    mask: BoolArray,
-    orders: npt.NDArray[np.uint8],
-    anew: bool,
-    seed: np.uint64,
-    split: int,
-    first_world: int,
-) -> None:
-    """Order worlds to start an episode: the first of a seed, or the next."""
-    e = cuda.grid(1)
-    if e < len(world):
-        orders[e] = LOOK
-        if mask[e]:
-            orders[e] = START
-            w = world[e]
-            if anew:
-                w.seed = seed
-                w.split = split
-                w.index = first_world + e
-                w.episode = 0
-            else:
-                w.episode += 1
+from posse.signals.parts import parts_for
 
 
 class _DeviceResults:
@@ -212,14 +91,14 @@ class CudaBatch(Batch):
     def _prepare(self) -> None:
         """Copy the batch to the device; the host arrays are updated on demand."""
         super()._prepare()
-        self._advance = _stepping(parts_for(self.scenario))
+        self._advance = stepping(parts_for(self.scenario))
         self._device_tables: Any = Tables(*map(cuda.to_device, self._tables))
         self._device_arrays: Any = WorldArrays(*map(cuda.to_device, self._arrays))
         self._device_actions = cuda.device_array(self.action_shape, np.float32)
         self._all_step = cuda.to_device(np.full(self.num_worlds, STEP, np.uint8))
         self._all_look = cuda.to_device(np.full(self.num_worlds, LOOK, np.uint8))
         self._chosen = cuda.device_array(self.num_worlds, np.uint8)
-        self._report = cuda.to_device(_NOTHING)
+        self._report = cuda.to_device(NOTHING)
         # In the mode "same_step" a step may take two sets.
         count = 4 if self.autoreset == "same_step" else 2
         self._results = itertools.cycle(
@@ -357,7 +236,8 @@ class CudaBatch(Batch):
         if waits:
             disabled = self.autoreset == "disabled"
             array = self._device_actions
-            self._launch(_check, self._device_arrays.world, given, array, self._report, disabled)
+            world = self._device_arrays.world
+            self._launch(check_actions, world, given, array, self._report, disabled)
         self._launch_advance(array, self._all_step)
         over = self._wait(given) if waits else 0
         done = self._turn()
@@ -394,10 +274,10 @@ class CudaBatch(Batch):
     def _wait(self, actions: DeviceArray) -> int:
         """Return how many episodes are over, or raise the error that prevented the step."""
         bad, waiting, over = (int(number) for number in self._report.copy_to_host())
-        if bad == _NONE and waiting == _NONE:
+        if bad == NONE and waiting == NONE:
             return over
-        self._report.copy_to_device(_NOTHING)
-        if waiting != _NONE:
+        self._report.copy_to_device(NOTHING)
+        if waiting != NONE:
             raise ResetNeeded(
                 f"step after the end of world {waiting}, and perhaps more: "
                 'call reset(options={"reset_mask": mask}) first'
@@ -408,7 +288,7 @@ class CudaBatch(Batch):
     def _begin(self, mask: DeviceArray, anew: bool) -> DeviceArray:
         """Start an episode in the worlds of a mask; return every world's observations."""
         self._launch(
-            _choose, self._device_arrays.world, mask, self._chosen, anew,
+            choose_worlds, self._device_arrays.world, mask, self._chosen, anew,
             np.uint64(self.seed), SPLITS.index(self.split), self.first_world,
         )  # fmt: skip
         return self._pass(self._chosen).observations
@@ -431,9 +311,9 @@ class CudaBatch(Batch):
         )  # fmt: skip
 
     def _launch(self, kernel: Any, *arguments: Any) -> None:
-        if _SIMULATED:
+        if SIMULATED:
             arguments = tuple(map(_as_in_a_kernel, arguments))
-        kernel[-(-self.num_worlds // _THREADS), _THREADS](*arguments)
+        kernel[-(-self.num_worlds // THREADS), THREADS](*arguments)
 
     def _download(self) -> None:
         """Update the host arrays."""
@@ -450,14 +330,14 @@ class CudaBatch(Batch):
 
 def check_device() -> None:
     """Raise if the GPU cannot be used, with the reason and the fix."""
-    if _CONFIG.ENABLE_CUDASIM:
-        if not _CONFIG.DISABLE_JIT:
+    if CONFIG.ENABLE_CUDASIM:
+        if not CONFIG.DISABLE_JIT:
             raise RuntimeError(
                 "NUMBA_ENABLE_CUDASIM=1 simulates the GPU in plain Python: set NUMBA_DISABLE_JIT=1 "
                 "too"
             )
         return
-    if _CONFIG.DISABLE_JIT:
+    if CONFIG.DISABLE_JIT:
         raise RuntimeError(
             "device='cuda' compiles the worlds for the GPU, which NUMBA_DISABLE_JIT=1 forbids: "
             "unset it, or set NUMBA_ENABLE_CUDASIM=1 too, to simulate"

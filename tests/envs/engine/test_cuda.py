@@ -75,7 +75,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
     """To the assembly of an H100; a function that a GPU lacks, or a call left over, would show."""
     import numba.cuda.dispatcher  # only now: it looks for a driver
 
-    from posse.engine import cuda
+    from posse.engine import cuda_kernels
     from posse.engine.kernels import Results
     from posse.signals.parts import built_in_parts
 
@@ -89,17 +89,17 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
     orders, report = np.zeros(WORLDS, np.uint8), np.zeros(3, np.int64)
     actions = np.zeros(batch.action_shape, np.float32)
     kernels = {
-        cuda._stepping(built_in_parts()): (
+        cuda_kernels.stepping(built_in_parts()): (
             batch._tables, batch.arrays, actions, Results(observations, rewards, terms, flags),
             infos["score"], orders, report,
         ),
-        cuda._check: (batch.worlds, actions, actions.copy(), report, True),
-        cuda._choose: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
+        cuda_kernels.check_actions: (batch.worlds, actions, actions.copy(), report, True),
+        cuda_kernels.choose_worlds: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
     }  # fmt: skip
     for kernel, arguments in kernels.items():
         types = (numba.typeof(argument) for argument in arguments)  # type: ignore[no-untyped-call]
         signature = numba.types.void(*types)
-        assembly, _ = cuda.cuda.compile(
+        assembly, _ = cuda_kernels.cuda.compile(
             kernel.py_func, signature, device=False, abi="numba", cc=(9, 0)
         )
         assert ".entry" in assembly
