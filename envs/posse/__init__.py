@@ -11,7 +11,7 @@ from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
-from posse.scenarios.shown import shown
+from posse.shown import shown
 from posse.signals.fields import Field, field
 from posse.signals.layout import ObservationLayout
 from posse.signals.measuring import Metric, metric

@@ -13,6 +13,8 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final, Generic, TypeVar
 
+from posse.shown import shown
+
 T = TypeVar("T")
 Function = Callable[..., Any]
 
@@ -48,7 +50,7 @@ class Registry(Mapping[str, T], Generic[T]):
             DeclarationError: The name is taken, or the function has no docstring.
         """
         if not name.replace("-", "_").isidentifier():
-            raise self.error(function, f"{name!r} is no name: use letters, digits, _ and -")
+            raise self.error(function, f"{shown(name)} is no name: use letters, digits, _ and -")
         taken = self._functions.get(name)
         if taken is not None:
             raise self.error(function, f"the name {name!r} is taken by {place_of(taken)}")
@@ -98,11 +100,11 @@ class Registry(Mapping[str, T], Generic[T]):
 
     def unknown(self, name: object) -> str:
         """Return the message that nothing of this name has been declared."""
-        near = difflib.get_close_matches(str(name), self._things, n=3)
+        near = difflib.get_close_matches(shown(name), self._things, n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
         known = ", ".join(self._things) or "none"
         return (
-            f"unknown {self.kind} {name!r}{hint}; known: {known}. "
+            f"unknown {self.kind} {shown(name)}{hint}; known: {known}. "
             "One of your own is known once its module has been imported"
         )
 

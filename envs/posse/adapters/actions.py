@@ -17,7 +17,7 @@ from posse.engine.arguments import to_float32
 from posse.engine.kernels import TO_CLIP, bad_action
 from posse.numeric import FloatArray, direct
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.shown import shown
+from posse.shown import shown
 
 SPEEDS: Final = (-1.0, 0.0, 1.0)
 """Discrete speeds: at rest, half, full."""

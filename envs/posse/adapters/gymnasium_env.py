@@ -15,7 +15,7 @@ from posse.adapters.spaces import box
 from posse.engine.arguments import options_of, real_numbers
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.shown import shown
+from posse.shown import shown
 from posse.signals.layout import ObservationLayout
 
 

@@ -18,7 +18,7 @@ from posse.numeric import FloatArray
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario, get_scenario
 from posse.scenarios.setting import is_number, is_one_of
-from posse.scenarios.shown import shown
+from posse.shown import shown
 from posse.signals.global_state import StateLayout
 from posse.signals.reward import namer
 

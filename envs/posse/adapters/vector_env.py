@@ -23,7 +23,7 @@ from posse.engine.arguments import as_array
 from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
-from posse.scenarios.shown import shown
+from posse.shown import shown
 from posse.signals.layout import ObservationLayout
 
 _MODES: Final = {

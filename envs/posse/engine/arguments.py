@@ -12,7 +12,7 @@ from posse.numeric import BoolArray, FloatArray
 from posse.rules.state import SPLITS
 from posse.scenarios import ScenarioError
 from posse.scenarios.setting import is_one_of
-from posse.scenarios.shown import shown
+from posse.shown import shown
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 MOST = 2**63

@@ -42,7 +42,7 @@ from posse.rules.state import (
     WorldArrays,
 )
 from posse.scenarios import Scenario, ScenarioError
-from posse.scenarios.shown import shown
+from posse.shown import shown
 from posse.signals.layout import ObservationLayout
 from posse.signals.reward import TermsByName
 

@@ -16,7 +16,7 @@ from posse.scenarios.limits import (
     START_CLEARANCE,
 )
 from posse.scenarios.setting import ScenarioError, fail, is_number
-from posse.scenarios.shown import shown
+from posse.shown import shown
 
 if TYPE_CHECKING:
     from posse.scenarios.scenario import Scenario
@@ -258,4 +258,4 @@ def _check_rewards(s: Scenario) -> None:
 def _check_metrics(s: Scenario) -> None:
     for name in s.metrics:
         if name not in METRICS:
-            raise ScenarioError(f"metrics={s.metrics!r}: {METRICS.unknown(name)}")
+            raise ScenarioError(f"metrics={shown(s.metrics)}: {METRICS.unknown(name)}")

@@ -8,7 +8,7 @@ from typing import Any
 
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError, is_one_of
-from posse.scenarios.shown import shown
+from posse.shown import shown
 
 
 @functools.cache  # lazily, after all declarations that scenarios may name

@@ -40,7 +40,7 @@ from posse.scenarios.setting import (
     text,
     whole,
 )
-from posse.scenarios.shown import shown
+from posse.shown import shown
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from typing import Any, Final, NoReturn
 
-from posse.scenarios.shown import LONGEST, shown
+from posse.shown import LONGEST, shown
 
 GREATEST_WHOLE: Final = 2**62
 
