@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.fuzz import calls, kernel_cache, processes, worlds
+from tests.fuzz import calls, interrupts, kernel_cache, processes, worlds
 from tests.fuzz.campaign import campaign
 
 Outcome = tuple[int, list[str]]
@@ -25,7 +25,13 @@ def _kernel_cache(seed: int, seconds: float) -> Outcome:
     return sum(counts.values()), failures
 
 
+def _interrupts(seed: int, seconds: float) -> Outcome:
+    counts, failures = interrupts.campaign(seed, seconds=seconds)
+    return sum(counts.values()), failures
+
+
 CAMPAIGNS: dict[str, Callable[[int, float], Outcome]] = {
+    "interrupts": _interrupts,  # first: it counts the threads of the process
     "worlds": lambda seed, seconds: campaign(worlds.case, seed, seconds=seconds),
     "calls": lambda seed, seconds: campaign(calls.case, seed, seconds=seconds),
     "processes": lambda seed, seconds: campaign(processes.case, seed, seconds=seconds),
