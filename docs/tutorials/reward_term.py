@@ -1,13 +1,17 @@
-"""Use a new reward term: weighted in a scenario, and reported by name.
-
-Needs the term `steady` in envs/posse/signals/reward.py: python docs/tutorials/reward_term.py
-"""
+"""A new reward term at work: weighed by a scenario, and reported by its name."""
 
 import argparse
 
 import numpy as np
 
 import posse
+
+
+@posse.reward_term("1")
+def steady(c, w, t):
+    """1 while the tracker turns at less than a tenth of its greatest turn rate, else 0."""
+    return abs(t.turn_rate) < 0.1 * t.max_turn_rate
+
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=100)

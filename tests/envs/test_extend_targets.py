@@ -3,39 +3,18 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.support.user_modules import examples, lines_of, run
 
-CHAPTER = Path(__file__).parents[2] / "docs" / "extend_targets.md"
+CHAPTER = "extend_targets.md"
 MOST_LINES = {"spiral": 15, "bearing": 25, "distance": 8}
-
-
-def examples() -> dict[str, str]:
-    """Return the chapter's modules by name."""
-    text = CHAPTER.read_text(encoding="utf-8")
-    return dict(re.findall(r'```python title="(\w+)\.py"\n(.*?)```', text, re.DOTALL))
-
-
-def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
-    """Run code beside modules of a user's own, in an interpreter of their own."""
-    for name, source in {**modules, "main": code}.items():
-        (folder / f"{name}.py").write_text(source, encoding="utf-8")
-    return subprocess.run(
-        [sys.executable, "main.py"], cwd=folder, capture_output=True, text=True, check=False
-    )
-
-
-def lines_of(source: str) -> int:
-    """Return how many lines hold code or a docstring."""
-    return sum(bool(line.strip()) for line in source.splitlines())
 
 
 @pytest.mark.parametrize("name", MOST_LINES)
 def test_an_example_is_short(name: str) -> None:
-    assert lines_of(examples()[name]) <= MOST_LINES[name]
+    assert lines_of(examples(CHAPTER)[name]) <= MOST_LINES[name]
 
 
 PLAY = """
@@ -115,7 +94,7 @@ print(sum(batch._untyped.stats.cache_hits.values()))
 
 def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
     """And kept on disk, until their source changes."""
-    modules = examples()
+    modules = examples(CHAPTER)
     for loss in ("0.0", "0.1"):
         done = run(tmp_path, PLAY.replace("RADIO_LOSS", loss), **modules)
         assert done.returncode == 0, done.stderr
@@ -172,7 +151,7 @@ def test_a_mistake_names_the_function_and_the_line(mistake: str, tmp_path: Path)
 
 def test_a_motion_that_is_not_declared_is_named_with_near_ones(tmp_path: Path) -> None:
     code = 'import posse, spiral\nposse.batch("constant", 1, target_motion="spirall")'
-    done = run(tmp_path, code, **examples())
+    done = run(tmp_path, code, **examples(CHAPTER))
     assert "unknown target_motion='spirall' (did you mean 'spiral'?)" in done.stderr
 
 

@@ -1,0 +1,252 @@
+"""Observation fields and reward terms from a user's own module: the chapter's examples, at work."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from tests.support.user_modules import examples, lines_of, run, snippets
+
+CHAPTER = "extend.md"
+MOST_LINES = {"walls": 8, "closing": 10, "steady": 6}
+
+
+@pytest.mark.parametrize("name", MOST_LINES)
+def test_an_example_is_short(name: str) -> None:
+    assert lines_of(examples(CHAPTER)[name]) <= MOST_LINES[name]
+
+
+TWICE = """
+import posse
+from posse.numeric import choose
+
+
+@posse.field("1", low=-1, high=lambda s: s.num_trackers, unknown=-1, size=2)
+def twice(c, v):
+    \"\"\"Whether it moves, and the team's size.\"\"\"
+    return choose(v.speed > 0.0, 1.0, -1.0), c.num_trackers
+"""
+PLAY = """
+import pickle
+
+import gymnasium
+import numpy as np
+import posse
+import closing
+import steady
+import twice
+import walls
+
+settings = dict(
+    extra_fields=("closing_speed", "wall_distance", "twice"), target_motion="agent",
+    reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
+    breaks=BREAKS, num_trackers=4,
+)
+
+batch = posse.batch("obstacles", 11, own_kernel=OWN, **settings)
+alone = [posse.batch("obstacles", 1, first_world=e, **settings) for e in (0, 9)]
+s, layout = batch.scenario, batch.layout
+plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": ()})
+names = [field.name for field in layout.fields]
+assert [name for name in names if name not in {f.name for f in plain.layout.fields}] == [
+    "wall_distance", "twice", "closing_speed"
+]
+assert names.index("twice") + 1 == names.index("sonar")
+assert names.index("closing_speed") + 1 == names.index("neighbour_message")
+low, high = layout.bounds()
+rng = np.random.default_rng(0)
+observed, expected = batch.reset(seed=1), plain.reset(seed=1)
+singles = [single.reset(seed=1) for single in alone]
+for step in range(60):
+    o, other = layout.views(observed), plain.layout.views(expected)
+    for name, view in other.items():
+        np.testing.assert_array_equal(o[name], view, err_msg=name)
+    for single, e in zip(singles, (0, 9)):
+        np.testing.assert_array_equal(single[0], observed[e])
+    assert ((observed >= low) & (observed <= high)).all()
+    state = batch.state
+    x, y, heading, speed = (
+        np.concatenate([state[f"tracker_{k}"], state[f"world_{k}"][:, None]], axis=1)
+        for k in ("x", "y", "heading_cos", "speed")
+    )
+    rim = s.arena / 2 - s.robot_radius
+    np.testing.assert_allclose(
+        o["wall_distance"], rim - np.maximum(abs(x), abs(y)), atol=1e-5
+    )
+    np.testing.assert_array_equal(o["twice"][..., 0], np.where(speed > 0, 1, -1))
+    np.testing.assert_array_equal(o["twice"][..., 1], 4)
+    if not s.breaks:
+        velocity = speed * (heading + 1j * np.concatenate(
+            [state["tracker_heading_sin"], state["world_heading_sin"][:, None]], axis=1
+        ))
+        for i in range(5):
+            number = o["neighbour_number"][:, i].astype(int)
+            apart = np.take_along_axis(x + 1j * y, number, 1) - (x + 1j * y)[:, i : i + 1]
+            moving = np.take_along_axis(velocity, number, 1) - velocity[:, i : i + 1]
+            closing_speed = -(apart.conj() * moving).real / abs(apart)
+            there = number >= 0
+            np.testing.assert_allclose(
+                o["closing_speed"][:, i][there], closing_speed[there], atol=2e-3
+            )
+            assert (o["closing_speed"][:, i][~there] == 0).all()
+    actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
+    observed, rewards, *_, infos = batch.step(actions)
+    expected = plain.step(actions)[0]
+    singles = [single.step(actions[e : e + 1])[0] for single, e in zip(alone, (0, 9))]
+    terms = infos["reward_terms"]
+    turn = abs(batch.state["tracker_turn_rate"]) / s.tracker_turn_rate
+    np.testing.assert_allclose(terms["steady"][:, :4], 1 - turn, atol=1e-5)
+    np.testing.assert_allclose(
+        rewards[:, :4], (terms["slot"] + 0.5 * terms["steady"])[:, :4], atol=1e-5
+    )
+copy = pickle.loads(pickle.dumps(batch))
+np.testing.assert_array_equal(copy.step(actions)[0], batch.step(actions)[0])
+assert "steady" not in plain.__class__(posse.get_scenario("smart"), 1).term_names
+
+team = gymnasium.make("posse/Team-v0", extra_fields=("twice",), reward_weights={"steady": 1})
+parallel = posse.parallel_env(extra_fields=("twice",), reward_weights={"steady": 1})
+team.reset(seed=0)
+parallel.reset(seed=0)
+info = team.step(team.action_space.sample())[4]
+assert info["reward_terms"]["steady"].shape == (5,)
+rewards, infos = parallel.step({agent: [0.0, 0.5] for agent in parallel.agents})[1::3]
+for agent, info in infos.items():
+    assert abs(info["reward_terms"]["steady"] - 0.5) < 1e-6
+    assert abs(rewards[agent] - 0.5) < 1e-6
+print("hits", sum(batch._untyped.stats.cache_hits.values()))
+"""
+
+
+def play(folder: Path, own_kernel: bool, breaks: int, **changed: str) -> tuple[str, str]:
+    """Return what a game with the examples says, and its errors."""
+    code = PLAY.replace("OWN", str(own_kernel)).replace("BREAKS", str(breaks))
+    done = run(folder, code, **{**examples(CHAPTER), "twice": TWICE, **changed})
+    return done.stdout, done.stderr
+
+
+def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
+    """And kept on disk, until their source changes."""
+    for hits, breaks in ((0, 0), (1, 1)):
+        said, errors = play(tmp_path, False, breaks)
+        assert said == f"hits {hits}\n", errors
+    steady = examples(CHAPTER)["steady"].replace("return 1 -", "return 2 -")
+    _, errors = play(tmp_path, False, 0, steady=steady)
+    assert "Not equal to tolerance" in errors, "an edited term is compiled anew"
+
+
+def test_the_examples_in_a_kernel_of_one_scenario(tmp_path: Path) -> None:
+    said, errors = play(tmp_path, True, 0)
+    assert said.startswith("hits"), errors
+
+
+def test_the_other_pieces_of_code_run(tmp_path: Path) -> None:
+    for code in snippets(CHAPTER):
+        done = run(tmp_path, code, **examples(CHAPTER))
+        assert done.returncode == 0, done.stderr
+
+
+FIELD = """
+import numpy as np
+import posse
+
+@posse.field({declaration})
+def own({parameters}):
+    {docstring}
+    {line}
+
+posse.batch("constant", 1, extra_fields=("own",)).reset()
+"""
+TERM = """
+import posse
+
+@posse.reward_term("1")
+def {name}({parameters}):
+    {docstring}
+    {line}
+
+posse.batch("constant", 1, reward_weights={{"own": 1.0}}).reset()
+"""
+FIELD_MISTAKES = {
+    "no docstring": ({"docstring": ""}, r"own \(main.py:5\): its docstring.* is missing"),
+    "other parameters": ({"parameters": "c, w"}, r"own \(main.py:5\): its parameters are \(c, w\)"),
+    "a bound that is not finite": (
+        {"declaration": '"1", 0, lambda s: s.arena'}, r"own \(main.py:5\): high=inf .*not a finite",
+    ),
+    "bounds the wrong way round": (
+        {"declaration": '"1", 1, 0'}, r"own \(main.py:5\): low=1 is above high=0",
+    ),
+    "a bound that fails": (
+        {"declaration": '"1", 0, lambda s: s.sped'},
+        r"own \(main.py:5\): high .*no attribute 'sped'",
+    ),
+    "no number": ({"declaration": '"1", 0, 1, size=0'}, r"own \(main.py:5\): size=0"),
+    "an unknown field": (
+        {"line": "return v.sped"},
+        r"own \(main.py:5\): line 8: v has no field 'sped'; it has speed",
+    ),
+    "a wrong type": (
+        {"line": 'return "north"'}, r"own \(main.py:5\): line 5: it returns .*, not a number",
+    ),
+    "too few numbers": (
+        {"declaration": '"1", 0, 1, size=2'},
+        r"own \(main.py:5\): line 5: it returns Lanes, not 2 numbers",
+    ),
+    "what the compiler cannot do": (
+        {"line": "return np.linalg.eigvals(v.x)"}, r"own \(main.py:5\): line 8: ",
+    ),
+}  # fmt: skip
+TERM_MISTAKES = {
+    "a name that is taken": ({"name": "slot"}, r"slot \(main.py:4\).*'slot' is taken by slot \("),
+    "no docstring": ({"docstring": ""}, r"own \(main.py:4\): its docstring.* is missing"),
+    "other parameters": ({"parameters": "t"}, r"own \(main.py:4\): its parameters are \(t\), not"),
+    "an unknown field": (
+        {"line": "return t.sped"}, r"own \(main.py:4\): line 7: t has no field 'sped'; it has",
+    ),
+    "a wrong type": (
+        {"line": "return t.x, t.y"}, r"own \(main.py:4\): line 4: it returns .*, not a number",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", FIELD_MISTAKES)
+def test_a_mistake_in_a_field_names_the_function_and_the_line(mistake: str, tmp_path: Path) -> None:
+    parts = {
+        "declaration": '"1", 0, 1', "parameters": "c, v", "docstring": '"""Mistaken."""',
+        "line": "return v.x",
+    }  # fmt: skip
+    changed, message = FIELD_MISTAKES[mistake]
+    assert_named(run(tmp_path, FIELD.format(**{**parts, **changed})), "observation field", message)
+
+
+@pytest.mark.parametrize("mistake", TERM_MISTAKES)
+def test_a_mistake_in_a_term_names_the_function_and_the_line(mistake: str, tmp_path: Path) -> None:
+    parts = {
+        "name": "own", "parameters": "c, w, t", "docstring": '"""Mistaken."""', "line": "return 1",
+    }  # fmt: skip
+    changed, message = TERM_MISTAKES[mistake]
+    assert_named(run(tmp_path, TERM.format(**{**parts, **changed})), "reward term", message)
+
+
+def assert_named(done: subprocess.CompletedProcess[str], kind: str, message: str) -> None:
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith(f"posse.registry.DeclarationError: {kind} "), last
+    assert re.search(message, last), last
+
+
+UNKNOWN = {
+    "extra_fields=['wall_distnce']":
+        "unknown observation field 'wall_distnce' (did you mean 'wall_distance'?)",
+    "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
+    "extra_fields=['speed']": "'speed' is in every observation: leave it out",
+    "extra_fields=['wall_distance'] * 2": "'wall_distance' is there twice",
+    "extra_fields=[1]": "extra_fields=[1] is not possible: it must be a tuple of names",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("settings", UNKNOWN)
+def test_a_setting_that_names_nothing_is_refused(settings: str, tmp_path: Path) -> None:
+    code = f"import posse, steady, walls\nposse.batch('obstacles', {settings})"
+    assert UNKNOWN[settings] in run(tmp_path, code, **examples(CHAPTER)).stderr

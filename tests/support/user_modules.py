@@ -1,0 +1,36 @@
+"""Modules of a user's own: the examples of the manual, written to a folder and run there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def examples(chapter: str) -> dict[str, str]:
+    """Return the modules of a chapter of the manual by name."""
+    text = (DOCS / chapter).read_text(encoding="utf-8")
+    return dict(re.findall(r'```python title="(\w+)\.py"\n(.*?)```', text, re.DOTALL))
+
+
+def snippets(chapter: str) -> list[str]:
+    """Return the other pieces of code of a chapter, in order."""
+    text = (DOCS / chapter).read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
+    """Run code beside modules of a user's own, in an interpreter of their own."""
+    for name, source in {**modules, "main": code}.items():
+        (folder / f"{name}.py").write_text(source, encoding="utf-8")
+    return subprocess.run(
+        [sys.executable, "main.py"], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def lines_of(source: str) -> int:
+    """Return how many lines hold code or a docstring."""
+    return sum(bool(line.strip()) for line in source.splitlines())
