@@ -26,7 +26,7 @@ SPLIT: Final = "validation"
 CHECK_SEED: Final = 2
 CHECK_WORLDS: Final = 32
 AGAIN_SEED: Final = 3
-AGAIN_WORLDS: Final = 200
+AGAIN_WORLDS: Final = 100
 _NOT_PLAYED: Final = {"name", "version", "reward_weights", "message_size"}
 """Fields of a scenario that change no score, or that a check states separately."""
 
