@@ -47,3 +47,49 @@ def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []
+
+
+# A room imports only what stands before it; rendering stands beside the adapters.
+ROOMS = ("shown", "numeric", "registry", "scenarios", "rules", "signals", "engine", "adapters")
+INTERNAL = ("posse.engine", "posse.numeric.")
+
+
+def imported_modules(source: Path) -> set[str]:
+    """The modules that a file imports when it is run or type-checked."""
+    modules: set[str] = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"), str(source))):
+        if isinstance(node, ast.Import):
+            modules.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            modules.add(node.module)
+    return modules
+
+
+def room_of(module: str) -> str:
+    return [*module.split("."), ""][1]
+
+
+def test_rooms_import_only_the_rooms_before_them() -> None:
+    wrong = []
+    for source in sorted((ROOT / "envs/posse").rglob("*.py")):
+        own = source.relative_to(ROOT / "envs/posse").with_suffix("").parts[0]
+        if own == "__init__":
+            continue
+        allowed = {*ROOMS[: ROOMS.index(own)], own} if own in ROOMS else {*ROOMS[:-1], own}
+        wrong += [
+            f"{source.relative_to(ROOT)} imports {module}"
+            for module in sorted(imported_modules(source))
+            if module.startswith("posse.") and room_of(module) not in allowed
+        ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("package", ["baselines", "training"])
+def test_nobody_else_imports_the_engine_s_internals(package: str) -> None:
+    wrong = [
+        f"{source.relative_to(ROOT)} imports {module}"
+        for source in sorted((ROOT / package).rglob("*.py"))
+        for module in sorted(imported_modules(source))
+        if module.startswith(INTERNAL)
+    ]
+    assert wrong == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from posse.registry import FIELDS, METRICS, REWARD_TERMS
 from posse.scenarios.formation import slot_offsets
@@ -15,13 +14,12 @@ from posse.scenarios.limits import (
     SAFE_MARGIN,
     START_CLEARANCE,
 )
+from posse.scenarios.scenario import Scenario, checked_by
 from posse.scenarios.setting import ScenarioError, fail, is_number
 from posse.shown import shown
 
-if TYPE_CHECKING:
-    from posse.scenarios.scenario import Scenario
 
-
+@checked_by
 def check_together(s: Scenario) -> None:
     """Raise where individually valid settings are inconsistent.
 

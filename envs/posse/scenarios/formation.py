@@ -8,14 +8,11 @@ follow every slot (:attr:`posse.scenarios.scenario.Scenario.slot_turn_rate`).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from posse.numeric import compiled
-
-if TYPE_CHECKING:
-    from posse.scenarios.scenario import Scenario
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
@@ -25,7 +22,20 @@ _ZERO: Final = np.float32(0.0)
 _DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
-def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
+class FormationSettings(Protocol):
+    """The settings of a scenario that its slots follow from."""
+
+    @property
+    def num_trackers(self) -> int: ...  # noqa: D102
+    @property
+    def formation(self) -> str: ...  # noqa: D102
+    @property
+    def formation_distance(self) -> float: ...  # noqa: D102
+    @property
+    def formation_spacing(self) -> float: ...  # noqa: D102
+
+
+def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
     """Return the (x, y) of each slot in the slot frame, m; x points ahead.
 
     ========== ====================================================================================

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from posse.registry import SENSORS, TARGET_MOTIONS
-from posse.scenarios.checks import check_together
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
     BREAK_CHOICES,
@@ -237,7 +236,8 @@ class Scenario:
             if setting.per_tracker and isinstance(getattr(self, name), list):
                 object.__setattr__(self, name, tuple(getattr(self, name)))
             check(name, getattr(self, name), setting)
-        check_together(self)
+        for check_together in _CHECKS:
+            check_together(self)
 
     @classmethod
     def settings(cls) -> dict[str, Setting]:
@@ -350,6 +350,15 @@ class Scenario:
         values = dataclasses.asdict(self)
         values["reward_weights"] = dict(self.reward_weights)
         return values
+
+
+_CHECKS: list[Callable[[Scenario], None]] = []
+
+
+def checked_by(function: Callable[[Scenario], None]) -> Callable[[Scenario], None]:
+    """Declare a function that raises ScenarioError where settings do not go together."""
+    _CHECKS.append(function)
+    return function
 
 
 def _names(setting: str, given: object) -> tuple[str, ...]:

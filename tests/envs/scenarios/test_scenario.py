@@ -79,7 +79,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"num_obstacles": 3}, "arena"),
     ({"num_obstacles": 61, **WALLED}, "60"),
     ({"num_obstacles": 30, **WALLED}, "fit"),
-    ({"num_obstacles": 8, "arena": 22.0, "target_turn_rate": 0.2}, "turn round"),
+    ({"num_obstacles": 8, "arena": 22.0, "target_turn_rate": 0.2}, "to turn"),
     ({"obstacle_radius": (0.0, 0.0), "num_obstacles": 1, **WALLED}, "above 0"),
     ({"obstacle_radius": (0.8, 0.4)}, "least"),
     ({"obstacle_radius": [0.4, 0.8]}, "tuple"),

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from posse_training.errors import SettingsError
-
-if TYPE_CHECKING:
-    from posse_training.runs.settings import TrainSettings
 
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 _CHOICES: Final = {
@@ -51,7 +48,7 @@ _LAYERS: Final = 16
 _WIDEST: Final = 8192
 
 
-def check_ranges(settings: TrainSettings) -> None:
+def check_ranges(settings: Any) -> None:
     """Raise if a setting is of a wrong type or out of its range.
 
     Raises:

@@ -24,8 +24,8 @@ from torchrl.data import Binary, Bounded, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 import posse
+from posse.adapters import check_seed, options_of
 from posse.adapters.actions import agent_names
-from posse.engine.arguments import check_seed, options_of
 
 TRACKERS: Final = "agents"
 """Group of the trackers, named as in TorchRL's multi-agent examples."""
