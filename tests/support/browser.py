@@ -65,7 +65,7 @@ def opened(
     assert [text for text in heard if not text.startswith(own)] == []
 
 
-def until(page: Page, expression: str, seconds: float = 10.0) -> None:
+def until(page: Page, expression: str, seconds: float = 40.0) -> None:
     """Wait for a JavaScript expression to be true; the page's policy forbids it to do so itself."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression):

@@ -198,4 +198,4 @@ def _as_array(action: npt.ArrayLike, subject: str) -> npt.NDArray[Any]:
     try:
         return np.asarray(action)
     except Exception:  # of numpy, or of a foreign object's own conversion
-        raise ValueError(f"{subject} is no array: {shown(action)}") from None
+        raise ValueError(f"{subject} is not an array: {shown(action)}") from None

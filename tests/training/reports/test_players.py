@@ -74,14 +74,14 @@ def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
 
 def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     started = time.monotonic()
-    settings = settings_for(tmp_path, "Sleeps", "SleepsInC", "Slow", limit=4.0)
+    settings = settings_for(tmp_path, "Sleeps", "SleepsInC", "Slow", limit=12.0)
     found = compare(settings)
-    assert time.monotonic() - started < 90
+    assert time.monotonic() - started < 240
     assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
     assert len(found.failed) == 3
-    assert all("exceeded the time limit of 4 s" in row["why"] for row in found.failed)
+    assert all("exceeded the time limit of 12 s" in row["why"] for row in found.failed)
     with pytest.raises(PolicyError, match="HangsOnLoad' cannot be loaded: it exceeded the time"):
-        compare(settings_for(tmp_path, "HangsOnLoad", limit=5.0))
+        compare(settings_for(tmp_path, "HangsOnLoad", limit=12.0))
 
 
 HANG = """
@@ -91,7 +91,7 @@ from posse_training.reports.compare import Settings, compare
 if __name__ == "__main__":
     compare(Settings(("tests.support.bad_policies:HangsWithPid",), ("constant",), 1,
                      out=Path(sys.argv[1], "out"), figures=False, planner_episodes=0,
-                     time_limit=3.0))
+                     time_limit=30.0))
 """
 
 

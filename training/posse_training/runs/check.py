@@ -86,20 +86,21 @@ def check_again(path: Path) -> LearnedPolicy:
     """Evaluate a shipped policy on the present scenarios, and write what it scores to its card.
 
     ``card["evaluated_again"]`` states the versions, the commit, and the mean score, safe score and
-    contact-free share over ``AGAIN_WORLDS`` worlds of each scenario.
+    contact-free share over some ``AGAIN_WORLDS`` worlds in all.
     """
     policy = LearnedPolicy.from_file(path)
     old = policy.card["check"]
     scenarios = check_scenarios(old)
+    worlds = max(8, AGAIN_WORLDS // len(scenarios))
     results = [
-        evaluate(policy, s, AGAIN_WORLDS, AGAIN_SEED, split=SPLIT, progress=False)
+        evaluate(policy, s, worlds, AGAIN_SEED, split=SPLIT, progress=False)
         for s in scenarios
     ]
     again = {
         "commit": commit(),
         "split": SPLIT,
         "seed": AGAIN_SEED,
-        "worlds": AGAIN_WORLDS,
+        "worlds": worlds,
         "versions": {s.name: s.version for s in scenarios},
         "trained_on_versions": policy.card.get("evaluated_again", {}).get(
             "trained_on_versions", {play["scenario"]: play["version"] for play in old["plays"]}
