@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterator
 
 import numba
 import numpy as np
@@ -41,6 +42,14 @@ CALLED = [
 ]
 
 pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_cached(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What these tests look at is there only when a kernel is compiled."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("POSSE_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 def test_the_overrides_are_found() -> None:
@@ -100,7 +109,7 @@ def test_a_function_inside_a_kernel_becomes_no_machine_code_of_its_own() -> None
 
 
 @pytest.fixture(scope="module")
-def code() -> str:
+def code(nothing_cached: None) -> str:
     """LLVM code of a kernel that loops over arrays."""
 
     @kernel
