@@ -93,8 +93,7 @@ def check_again(path: Path) -> LearnedPolicy:
     scenarios = check_scenarios(old)
     worlds = max(8, AGAIN_WORLDS // len(scenarios))
     results = [
-        evaluate(policy, s, worlds, AGAIN_SEED, split=SPLIT, progress=False)
-        for s in scenarios
+        evaluate(policy, s, worlds, AGAIN_SEED, split=SPLIT, progress=False) for s in scenarios
     ]
     again = {
         "commit": commit(),
