@@ -45,6 +45,10 @@ class Alarm:
             raise KeyboardInterrupt
 
 
+def workers() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "posse"]
+
+
 def state_of(batch: posse.Batch) -> bytes:
     return b"".join(np.ascontiguousarray(view).tobytes() for view in batch.state.values())
 
@@ -90,6 +94,7 @@ def campaign(
     second = twin.step(actions[1])
     of_second = {before: first, after: second}
 
+    most = len(workers())
     alarm, counts, failures = Alarm(), Counter[str](), []
     previous = signal.signal(signal.SIGALRM, alarm)
     end = time.monotonic() + seconds
@@ -119,10 +124,10 @@ def campaign(
                 time.sleep(0.002)  # whoever still writes shows
             if not np.array_equal(again, observed) or state_of(batch) != before:
                 failures.append(f"{name}: restored to something else")
-            if threading.active_count() > 3:
+            if len(workers()) > most:
                 time.sleep(0.1)  # one that has ended its work may not be gone yet
-                if threading.active_count() > 3:
-                    failures.append(f"{name}: {threading.active_count()} threads")
+                if len(workers()) > most:
+                    failures.append(f"{name}: {len(workers())} threads, not {most}")
     finally:
         signal.signal(signal.SIGALRM, previous)
     return counts, failures
