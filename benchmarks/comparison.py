@@ -17,13 +17,13 @@ import tyro
 import posse
 from posse_baselines import load
 from posse_baselines.registry import shipped
+from posse_training.provenance import commit
 from posse_training.reports.compare import PLANNER, compare
 from posse_training.reports.compare import Settings as CompareSettings
 from posse_training.reports.comparison import Comparison
 from posse_training.reports.contenders import play, read_contenders
 from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate
-from posse_training.runs.provenance import commit
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
 SCRIPTED = ("ddcs-distributed", "ddcs-centralized")

@@ -26,7 +26,7 @@ from posse.numeric import kernel
 from posse.rules import contact, motion, score
 from posse.rules import discs as survey
 from posse.rules.scratch import new_scratch
-from posse.signals import observing
+from posse.signals.observation import observing
 from posse.signals.parts import Writers, built_in_parts, rules_for, sums_for, writers_for
 
 PARTS = (

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from posse_training.runs.provenance import commit
+from posse_training.provenance import commit
 
 STAT = Path("/proc/stat")
 IDLE, IO_WAIT = 3, 4

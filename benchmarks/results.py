@@ -12,9 +12,9 @@ import numpy as np
 import tyro
 
 import posse
+from posse_training.provenance import commit
 from posse_training.reports.evaluation import Results, evaluate
 from posse_training.reports.statistics import Estimate, mean, share
-from posse_training.runs.provenance import commit
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
 PLANNER = "planner"

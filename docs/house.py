@@ -21,6 +21,7 @@ COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "
 # The picture from the top down.
 LINES = (
     ("posse_training.cli",),
+    ("posse_training.shipping",),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl"),
     ("posse_baselines.learned", "posse_baselines.policies"),
@@ -33,7 +34,7 @@ LINES = (
     ("posse.scenarios",),
     ("posse.numeric",),
 )
-PACKAGE_BEGINS = {0: "posse_training", 3: "posse_baselines", 6: "posse"}
+PACKAGE_BEGINS = {0: "posse_training", 4: "posse_baselines", 7: "posse"}
 WIDTH, HEIGHT, STEP, GAP = 8.0, 0.78, 0.95, 0.16
 
 

@@ -121,7 +121,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
 
 FIELDS: Final[Registry[Any]] = Registry("observation field")
-"""Of :class:`posse.signals.fields.FieldDeclaration`."""
+"""Of :class:`posse.signals.observation.fields.FieldDeclaration`."""
 METRICS: Final[Registry[Any]] = Registry("metric")
 """Of :class:`posse.signals.measuring.Metric`."""
 REWARD_TERMS: Final[Registry[Any]] = Registry("reward term")

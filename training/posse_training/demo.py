@@ -20,7 +20,7 @@ from posse import ObservationLayout, get_scenario
 from posse_baselines import Policy, load, policy_names
 from posse_training.reports import Results, evaluate
 from posse_training.reports.evaluation import progress_bar
-from posse_training.reports.film import film
+from posse_training.reports.pictures.film import film
 from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")

@@ -16,7 +16,7 @@ from posse.engine.arguments import options_of, real_numbers
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 from posse.shown import shown
-from posse.signals.layout import ObservationLayout
+from posse.signals.observation.layout import ObservationLayout
 
 
 class TeamEnv(gymnasium.Env[Any, Any]):

@@ -20,7 +20,7 @@ from posse.engine.arguments import options_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 from posse.shown import shown
-from posse.signals.layout import ObservationLayout
+from posse.signals.observation.layout import ObservationLayout
 
 _Infos = dict[str, dict[str, Any]]
 

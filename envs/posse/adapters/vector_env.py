@@ -24,7 +24,7 @@ from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
 from posse.shown import shown
-from posse.signals.layout import ObservationLayout
+from posse.signals.observation.layout import ObservationLayout
 
 _MODES: Final = {
     AutoresetMode.NEXT_STEP: "next_step",

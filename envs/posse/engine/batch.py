@@ -43,7 +43,7 @@ from posse.rules.state import (
 )
 from posse.scenarios import Scenario, ScenarioError
 from posse.shown import shown
-from posse.signals.layout import ObservationLayout
+from posse.signals.observation.layout import ObservationLayout
 from posse.signals.reward import TermsByName
 
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")

@@ -44,7 +44,12 @@ from posse.rules.state import (
     slot_records,
 )
 from posse.scenarios import Scenario
-from posse.signals.observing import TOGETHER, observe_sonar, observe_target, observe_together
+from posse.signals.observation.observing import (
+    TOGETHER,
+    observe_sonar,
+    observe_target,
+    observe_together,
+)
 from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
 from posse.signals.reward import weights_for
 from posse.signals.scratch import MOST_IN_TEAM

@@ -15,8 +15,8 @@ from posse.numeric.compiler.complaints import Complaint, unknown_attribute, why_
 from posse.numeric.simd.lane_code import tuple_of_lanes
 from posse.registry import DeclarationError, Function, Registry
 from posse.rules.state import CONFIG, TRACKER, WorldArrays
+from posse.signals.observation.views import Mate, View
 from posse.signals.parts import Parts, added
-from posse.signals.views import Mate, View
 
 typeof: Final[Any] = numba.typeof
 

@@ -6,10 +6,11 @@ import functools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-# These declare the built-in fields and metrics.
-import posse.signals.mate_fields
 import posse.signals.metrics
-import posse.signals.own_fields  # noqa: F401
+
+# These declare the built-in fields and metrics.
+import posse.signals.observation.mate_fields
+import posse.signals.observation.own_fields  # noqa: F401
 from posse.registry import (
     FIELDS,
     METRICS,
@@ -22,9 +23,9 @@ from posse.rules.declared import Rules, rules_of
 from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
 from posse.scenarios import Scenario
-from posse.signals.columns import empty_writer, row_writer, width_of
-from posse.signals.fields import FieldDeclaration
 from posse.signals.measuring import Metric, adding, clearing
+from posse.signals.observation.columns import empty_writer, row_writer, width_of
+from posse.signals.observation.fields import FieldDeclaration
 from posse.signals.reward import RewardTerm, reward_writer, terms_for
 
 Declarations = tuple[FieldDeclaration, ...]

@@ -15,8 +15,8 @@ from posse_baselines import PolicyError, load, policy_names
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.registry import SHIPPED, shipped
 from posse_training import evaluate
-from posse_training.runs.check import CHECK_WORLDS, check_scenarios, make_check, replay
-from posse_training.runs.ship import LARGEST
+from posse_training.shipping.check import CHECK_WORLDS, check_scenarios, make_check, replay
+from posse_training.shipping.ship import LARGEST
 
 FILES = sorted(SHIPPED.glob("*.safetensors"))
 CARDS = sorted(SHIPPED.glob("*.json"))

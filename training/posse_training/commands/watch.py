@@ -43,7 +43,7 @@ def main(arguments: Sequence[str]) -> None:
     overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
     scenario = get_scenario(which.scenario, **overrides)
     if which.gif is not None:
-        from posse_training.reports.film import film
+        from posse_training.reports.pictures.film import film
 
         print(
             film(

@@ -9,7 +9,7 @@ import posse
 from posse import REWARD_TERMS, Batch, Field, Scenario, ScenarioError, get_scenario
 from posse.rendering.style import TASKS
 from posse.scenarios.formation import slot_offsets
-from posse_training.runs.provenance import commit
+from posse_training.provenance import commit
 
 _OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")
 _BLOCKS: Final = ("own motion", "task", "target", "sonar", "team-mates")

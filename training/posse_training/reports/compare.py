@@ -183,7 +183,9 @@ class _Run:
 
     def draw(self) -> None:
         """Play what the figures need beside the scenarios, and draw them."""
-        from posse_training.reports import figures  # imports matplotlib, which takes a while
+        from posse_training.reports.pictures import (
+            figures,  # imports matplotlib, which takes a while
+        )
 
         found, settings = self.found, self.settings
         losses = [plays for (name, _), plays in found.plays.items() if name == LEADER_LOSS]

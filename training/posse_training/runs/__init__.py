@@ -1,4 +1,4 @@
-"""Training runs: settings, training, checkpoints, and policies that ship."""
+"""Training runs: settings, training, checkpoints."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from torch import nn
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.advice import MOTION, Adviser
-from posse_training.runs.provenance import commit
+from posse_training.provenance import commit
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.normalisation import LIMIT, Normaliser
 from posse_training.sb3.speedups import QuickTanh

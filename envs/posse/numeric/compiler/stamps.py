@@ -22,7 +22,7 @@ import numpy as np
 _POSSE: Final = Path(__file__).resolve().parents[2]
 _NO_KERNELS: Final = {
     "posse": ("adapters", "rendering"),
-    "posse_training": ("reports", "runs"),
+    "posse_training": ("commands", "replay", "reports", "runs", "shipping"),
 }
 """Rooms of a package without compiled code; kernels do not depend on them."""
 

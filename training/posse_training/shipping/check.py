@@ -1,6 +1,6 @@
 """The check of a shipped policy: scores on a few fixed worlds, which tests play again.
 
-    python -m posse_training.runs.check
+    python -m posse_training.shipping.check
 
 evaluates every shipped policy again, on the scenarios as they are now, and writes its card. Needed
 after a scenario's version rose, or an adviser changed. The policies themselves stay as trained.
@@ -19,8 +19,8 @@ from rich.console import Console
 from posse import Scenario, get_scenario
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import SHIPPED
+from posse_training.provenance import commit
 from posse_training.reports.evaluation import evaluate
-from posse_training.runs.provenance import commit
 
 SPLIT: Final = "validation"
 CHECK_SEED: Final = 2

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario
-from posse.signals.fields import SLACK, Field
+from posse.signals.observation.fields import SLACK, Field
 from posse.signals.parts import parts_for
 
 
@@ -34,7 +34,7 @@ def _sonar_fields(s: Scenario) -> list[Field]:
 
 
 def _message_fields(s: Scenario) -> list[Field]:
-    """Return the field of what a team-mate said, which :mod:`posse.signals.mates` writes."""
+    """Return the field of what a team-mate said, which :mod:`~.mates` writes."""
     if s.message_size == 0:
         return []
     return [

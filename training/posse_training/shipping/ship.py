@@ -23,9 +23,9 @@ from posse_baselines.registry import LEARNED, SHIPPED
 from posse_training.errors import SettingsError
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import mean
-from posse_training.runs.check import SPLIT, make_check
 from posse_training.runs.command import command_of
 from posse_training.runs.settings import TrainSettings, read_settings
+from posse_training.shipping.check import SPLIT, make_check
 
 CHOICE_SEED: Final = 1  # seed 0 is evaluated during training
 LARGEST: Final = 1_000_000

@@ -10,8 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from posse_training.reports.figure_parts import legend, names_of, panels, steps
-from posse_training.reports.figure_style import (
+from posse_training.reports.pictures.parts import legend, names_of, panels, steps
+from posse_training.reports.pictures.style import (
     BLACK,
     RC,
     STYLES,

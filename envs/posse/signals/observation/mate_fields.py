@@ -1,7 +1,7 @@
 """The built-in fields of what a robot observes of each team-mate, in order.
 
 Where the radio is perfect they tell of the team-mate now, else of what was heard of it last. To add
-a field, declare it here, or in a module of your own (:mod:`posse.signals.fields`).
+a field, declare it here, or in a module of your own (:mod:`posse.signals.observation.fields`).
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from posse.numeric import Lanes, Record
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
-from posse.signals.fields import SLACK, field
-from posse.signals.views import Mate, View, ego
+from posse.signals.observation.fields import SLACK, field
+from posse.signals.observation.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]
 

@@ -14,7 +14,7 @@ from posse.rendering.renderer import LEAST_SIZE, Renderer
 from posse.rendering.style import GRID
 from posse_baselines.policy import Policy, PolicyError, begin
 from posse_training.errors import SettingsError
-from posse_training.reports.gif import Frame, write_gif
+from posse_training.reports.pictures.gif import Frame, write_gif
 
 _SEAM: Final = 2  # px between panels
 

@@ -4,8 +4,8 @@ A field is declared on its formula. The parameters of the function determine its
 
 ========== =====================================================================================
 (c)        a setting of the scenario, a constant
-(c, v)     an observation of the robot itself or the target (:class:`posse.signals.views.View`)
-(c, v, m)  an observation of a team-mate (:class:`posse.signals.views.Mate`), for each of them
+(c, v)     an observation of the robot itself or the target (:class:`~.views.View`)
+(c, v, m)  an observation of a team-mate (:class:`~.views.Mate`), for each of them
 ========== =====================================================================================
 
 ``c`` is the scenario as kernels read it (:data:`posse.rules.state.CONFIG`). ``v`` and ``m`` hold

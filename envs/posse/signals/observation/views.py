@@ -26,8 +26,8 @@ from posse.numeric import (
 )
 from posse.rules.contact import touches_surroundings
 from posse.rules.state import CONDITION, FIX, NEVER, POSE, WorldArrays
-from posse.signals.columns import Observers, robot_of, world_of
-from posse.signals.team import own_numbers, team_columns
+from posse.signals.observation.columns import Observers, robot_of, world_of
+from posse.signals.observation.team import own_numbers, team_columns
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)

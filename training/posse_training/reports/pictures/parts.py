@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from posse_training.reports.figure_style import WIDTH, in_order, marker_of, style_of
+from posse_training.reports.pictures.style import WIDTH, in_order, marker_of, style_of
 from posse_training.reports.plays import Plays
 from posse_training.reports.sweeps import BOUND
 

@@ -2,7 +2,7 @@
 
 With a perfect radio the current state of team-mates is observed. In a small team observed as a
 whole, each mate is computed once and written to its place. With fewer places than team-mates or a
-large team, the nearest are listed first (:mod:`posse.signals.nearest`) and then written place by
+large team, the nearest are listed first (:mod:`~.nearest`) and then written place by
 place. The same applies to received messages, and to the observations of a target agent.
 """
 
@@ -29,12 +29,12 @@ from posse.numeric import (
 )
 from posse.rules.discs import natural
 from posse.rules.state import POSE, WorldArrays
-from posse.signals.columns import Observers, Rows, robot_of, world_of
-from posse.signals.nearest import keep_nearest, list_nearest
+from posse.signals.observation.columns import Observers, Rows, robot_of, world_of
+from posse.signals.observation.nearest import keep_nearest, list_nearest
+from posse.signals.observation.team import number_behind, seen_at, stride_of, way_behind
+from posse.signals.observation.views import View, ego, mate_heard, mate_now
 from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
-from posse.signals.team import number_behind, seen_at, stride_of, way_behind
-from posse.signals.views import View, ego, mate_heard, mate_now
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -53,7 +53,7 @@ def observe_mates(
 ) -> None:
     """Write the nearest team-mates of trackers from k on.
 
-    With a perfect radio, requires the team's rows (:func:`posse.signals.team.lay_out_team`).
+    With a perfect radio, requires the team's rows (:func:`~.team.lay_out_team`).
     """
     mates, places = natural(c.num_trackers - 1), natural(c.neighbours)
     if places == 0:

@@ -2,7 +2,7 @@
 
 *Ego* means the robot's own frame, x ahead and y to the left; the *common frame* is the one that the
 team agreed on at the start. Directions are cosine and sine. To add a field, declare it here, or in
-a module of your own (:mod:`posse.signals.fields`).
+a module of your own (:mod:`posse.signals.observation.fields`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from posse.numeric import Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.signals.fields import SLACK, field, setting
-from posse.signals.views import View, ego
+from posse.signals.observation.fields import SLACK, field, setting
+from posse.signals.observation.views import View, ego
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)

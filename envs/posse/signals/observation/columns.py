@@ -13,7 +13,7 @@ import numpy as np
 
 from posse.numeric import WIDTH, FloatArray, Lanes, compiled, eight, store, transpose, written
 from posse.rules.discs import natural
-from posse.signals.fields import FieldDeclaration
+from posse.signals.observation.fields import FieldDeclaration
 
 _FEW: Final = 2
 """Up to so many columns are written faster number by number than by a transposition."""

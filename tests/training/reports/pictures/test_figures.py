@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 import posse
 from posse_baselines import policy_names
-from posse_training.reports import figures
-from posse_training.reports.figure_style import STYLES, style_of
+from posse_training.reports.pictures import figures
+from posse_training.reports.pictures.style import STYLES, style_of
 from posse_training.reports.plays import Plays
 from posse_training.reports.results import Results
 from posse_training.reports.statistics import Estimate

@@ -1,6 +1,6 @@
 """Writes the observations.
 
-Eight trackers at once, one per lane (:mod:`posse.signals.views`): one tracker of eight worlds
+Eight trackers at once, one per lane (:mod:`~.views`): one tracker of eight worlds
 (``across`` is 1) or, with fewer worlds or a large team, eight trackers of one world (0). The sonar
 and the target agent are processed world by world.
 """
@@ -15,12 +15,12 @@ from posse.numeric import WIDTH, FloatArray, Record, Records, compiled
 from posse.rules.discs import natural
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
-from posse.signals.columns import Observers, Rows
-from posse.signals.mates import observe_mates, observe_trackers
+from posse.signals.observation.columns import Observers, Rows
+from posse.signals.observation.mates import observe_mates, observe_trackers
+from posse.signals.observation.team import lay_out_team
+from posse.signals.observation.views import view_of_target, view_of_trackers
 from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
-from posse.signals.team import lay_out_team
-from posse.signals.views import view_of_target, view_of_trackers
 
 TOGETHER: Final = WIDTH
 """Worlds processed together."""

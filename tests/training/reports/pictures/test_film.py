@@ -14,8 +14,8 @@ import posse
 from posse.rendering.renderer import Renderer
 from posse.rendering.style import TARGET
 from posse_baselines import load
-from posse_training.reports.film import film
-from posse_training.reports.gif import write_gif
+from posse_training.reports.pictures.film import film
+from posse_training.reports.pictures.gif import write_gif
 
 Frames = npt.NDArray[np.uint8]
 

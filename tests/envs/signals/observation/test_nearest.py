@@ -16,9 +16,9 @@ from posse.numeric import kernel
 from posse.rules.discs import BLOCK, lay_out_constants
 from posse.rules.scratch import new_scratch
 from posse.rules.state import TRACKER, config_record
-from posse.signals.nearest import list_nearest
+from posse.signals.observation.nearest import list_nearest
+from posse.signals.observation.team import lay_out_team
 from posse.signals.scratch import MOST_IN_TEAM
-from posse.signals.team import lay_out_team
 
 Numbers = npt.NDArray[np.float32]
 Teams = npt.NDArray[Any]

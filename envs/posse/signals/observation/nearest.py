@@ -28,7 +28,7 @@ from posse.numeric import (
     tagged,
 )
 from posse.rules.discs import FAR, blocks, natural, store_each
-from posse.signals.team import own_numbers, round_again, stride_of, way_behind
+from posse.signals.observation.team import own_numbers, round_again, stride_of, way_behind
 
 _CLOSER: Final = np.float32(1 - 2**-15)  # two tags and rounding change half of that
 _ABSENT: Final = FAR * FAR
@@ -43,7 +43,7 @@ def list_nearest(n: int, places: int, i: int, count: int, across: int, s: Record
     """List the nearest of a team of n to ``count`` trackers, the first of them i.
 
     At most eight; other lanes are undefined. Requires no more places than team-mates, and the
-    team's rows (:func:`posse.signals.team.lay_out_team`).
+    team's rows (:func:`posse.signals.observation.team.lay_out_team`).
     """
     together = places <= WIDTH
     if together:

@@ -16,10 +16,10 @@ from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.runs import TrainSettings, default_settings
-from posse_training.runs.check import replay
 from posse_training.runs.command import command_of
-from posse_training.runs.ship import CHOICE_SEED, Settings, ship
 from posse_training.runs.train import train
+from posse_training.shipping.check import replay
+from posse_training.shipping.ship import CHOICE_SEED, Settings, ship
 
 SETTINGS = TrainSettings(
     scenario="constant",
@@ -99,7 +99,7 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
 def test_a_file_too_large_is_not_left_behind(
     runs: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posse_training.runs.ship.LARGEST", 1000)
+    monkeypatch.setattr("posse_training.shipping.ship.LARGEST", 1000)
     with pytest.raises(SettingsError, match="1,000 are allowed"):
         ship(Settings(runs[:1], "learned-x", worlds=2, out=tmp_path))
     assert not list(tmp_path.iterdir())
