@@ -45,7 +45,7 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
 
     Written as ``@compiled``, it is inlined into whatever calls it: to pass arrays costs more than
     most of our functions take. Written as ``@compiled(seldom=True)``, for what is long and rarely
-    called, LLVM decides, so that the hot path fits the instruction cache.
+    called, it is never inlined, so that the hot path fits the instruction cache.
     """
 
     def decorate(function: F) -> F:

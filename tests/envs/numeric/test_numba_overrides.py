@@ -37,6 +37,7 @@ CALLED = [
     (CompileResult, "_reduce"),
     (CompileResult, "_rebuild"),
     (JITCPUCodegen, "magic_tuple"),
+    (JITCPUCodegen, "_module_pass_manager"),
     (Flags, "noalias"),
     (Flags, "forceinline"),
 ]
@@ -122,6 +123,39 @@ def code(nothing_cached: None) -> str:
     np.testing.assert_allclose(out, [1.0, 1 / 2, 1 / 3])
     (code,) = fill.inspect_llvm().values()  # type: ignore[attr-defined]
     return str(code)
+
+
+def test_a_loop_of_unknown_length_is_not_vectorised() -> None:
+    """Else LLVM makes a second loop, over vectors, and a test at run time of which one to take."""
+
+    @kernel
+    def double(out: Floats, source: Floats) -> None:
+        for i in range(out.shape[0]):
+            out[i] = 2.0 * source[i]
+
+    double(np.zeros(3), np.ones(3))
+    (code,) = double.inspect_llvm().values()  # type: ignore[attr-defined]
+    assert "x double>" not in code
+
+
+def test_a_rarely_called_function_is_not_inlined() -> None:
+    @compiled(seldom=True)
+    def apart_fn(x: float) -> float:
+        return x + 12345.5
+
+    @compiled
+    def inline_fn(x: float) -> float:
+        return x + 54321.5
+
+    @kernel
+    def both(x: float) -> float:
+        return apart_fn(x) if x > 0.0 else inline_fn(x)
+
+    assert both(1.0) == 12346.5
+    (code,) = both.inspect_llvm().values()  # type: ignore[attr-defined]
+    calls = [line for line in code.splitlines() if " call " in line]
+    assert any("apart_fn" in line for line in calls)
+    assert not any("inline_fn" in line for line in calls)
 
 
 def test_a_loop_of_unknown_length_is_not_unrolled(code: str) -> None:
