@@ -41,7 +41,7 @@ def _offset(record: np.dtype[Any], name: str) -> int:
     return next(at for field, (_, at, *_) in (record.fields or {}).items() if field == name)
 
 
-_F, _I, _U = np.float32, np.int32, np.uint64
+_F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
 
 CONFIG: Final = _record(
     ("num_trackers", _I), ("num_agents", _I), ("num_obstacles", _I), ("neighbours", _I),
@@ -144,11 +144,11 @@ TRACKER: Final = _record(
     # its best fix of the target, seen or heard
     *FIX_FIELDS, ("fix_vx", _F), ("fix_vy", _F),  # m/s, from successive fixes
     # the score's and the rewards' view
-    ("slot", _I),  # which slot it occupies, -1: none
+    ("slot", _S),  # which slot it occupies, -1: none
+    ("could_arrive", _S),  # 1: it could stand in a slot by now, straight on at full speed
     ("slot_distance", _F),  # to the nearest slot that nobody else occupies
     ("slot_progress", _F),  # by how much that shrank in this step
     ("start_x", _F), ("start_y", _F),
-    ("could_arrive", _I),  # 1: it could stand in a slot by now, straight on at full speed
 )  # fmt: skip
 """One tracker."""
 
