@@ -36,10 +36,10 @@ def batch(
     device: str = "cpu",
     **overrides: Any,
 ) -> Batch:
-    """Return a batch of worlds, the engine under every environment; see :class:`Batch`.
+    """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
 
-    With ``device="cuda"`` the worlds live on an NVIDIA GPU: see
-    :class:`posse.engine.cuda.CudaBatch`, which needs the extra ``cuda``.
+    With ``device="cuda"`` the worlds are simulated on an NVIDIA GPU: see
+    :class:`posse.engine.cuda.CudaBatch`, which requires the extra ``cuda``.
     """
     return _batch_class(device)(
         get_scenario(scenario, **overrides),
@@ -54,7 +54,7 @@ def batch(
 
 
 def _batch_class(device: str) -> type[Batch]:
-    """Return the class of batches on a device, or raise what keeps it from being used."""
+    """Return the batch class of a device, or raise if the device cannot be used."""
     if device == "cpu":
         return Batch
     if device == "cuda":
@@ -68,7 +68,7 @@ def _batch_class(device: str) -> type[Batch]:
 def observation_fields(
     scenario: str | Scenario = "constant", **overrides: Any
 ) -> tuple[Field, ...]:
-    """Return every field of a scenario's observation, in order: name, size, unit, range, ..."""
+    """Return the fields of a scenario's observation, in order: name, size, unit, range, ..."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
 
 

@@ -1,8 +1,8 @@
-"""What is declared by name, here or in a user's own module: observation fields, reward terms, ...
+"""Registries of declarations by name: observation fields, reward terms, metrics, ...
 
-A registry keeps one kind of thing in the order of declaration. What posse's own modules declare is
-*built in*: every world has it. What a user's module declares is there once that module has been
-imported, and a scenario asks for it by name.
+A registry holds the declarations of one kind in order. Those of posse's own modules are *built in*
+and apply to every world. Those of a user's module are available after its import, and a scenario
+selects them by name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _PACKAGE: Final = __name__.partition(".")[0]
 
 
 class DeclarationError(ValueError):
-    """A declared function that cannot be used. The message names it, and the line it stands in."""
+    """An invalid declaration. The message names the function, its file and line."""
 
 
 def place_of(function: Function) -> str:
@@ -32,10 +32,10 @@ def place_of(function: Function) -> str:
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """Things of one kind by name, in the order in which they were declared.
+    """Declarations of one kind by name, in order.
 
     Args:
-        kind: What they are, for messages: ``"reward term"``.
+        kind: Name of the kind for messages, such as ``"reward term"``.
     """
 
     def __init__(self, kind: str) -> None:
@@ -44,31 +44,36 @@ class Registry(Mapping[str, T], Generic[T]):
         self._functions: dict[str, Function] = {}
 
     def add(self, name: str, thing: T, function: Function) -> None:
-        """Add what a function declares.
+        """Add a declaration and the function that it is made on.
 
         Raises:
-            DeclarationError: The name is taken, or the function has no docstring.
+            DeclarationError: The name is invalid or taken, or the function has no docstring.
         """
         if not name.replace("-", "_").isidentifier():
-            raise self.error(function, f"{shown(name)} is no name: use letters, digits, _ and -")
+            raise self.error(function, f"invalid name {shown(name)}: use letters, digits, _ and -")
         taken = self._functions.get(name)
         if taken is not None:
             raise self.error(function, f"the name {name!r} is taken by {place_of(taken)}")
         if not (function.__doc__ or "").strip():
-            raise self.error(function, "its docstring, which says what it means, is missing")
+            raise self.error(function, "the docstring is missing; state the meaning there")
         self._things[name], self._functions[name] = thing, function
 
     def error(self, function: Function, reason: str) -> DeclarationError:
-        """Return the error that a declared function cannot be used."""
+        """Return the error for an invalid declaration."""
         return DeclarationError(f"{self.kind} {place_of(function)}: {reason}")
 
     def check_parameters(
         self, function: Function, allowed: tuple[str, ...], least: int | None = None
     ) -> None:
-        """Raise unless a function's parameters are those allowed, or the first ``least`` or more.
+        """Check a function's parameter names: all of ``allowed``, or at least the first few.
+
+        Args:
+            function: The declared function.
+            allowed: Parameter names in order.
+            least: Minimum number of parameters; default: all.
 
         Raises:
-            DeclarationError: They are others.
+            DeclarationError: The parameters differ.
         """
         names = tuple(inspect.signature(function).parameters)
         least = len(allowed) if least is None else least
@@ -79,33 +84,33 @@ class Registry(Mapping[str, T], Generic[T]):
             raise self.error(function, f"its parameters are ({', '.join(names)}), not {wanted}")
 
     def is_built_in(self, name: str) -> bool:
-        """Say whether posse itself declares it."""
+        """Return whether posse itself declares this name."""
         return self._functions[name].__module__.partition(".")[0] == _PACKAGE
 
     def built_in(self) -> tuple[T, ...]:
-        """Return what posse itself declares, in order."""
+        """Return the built-in declarations, in order."""
         return tuple(thing for name, thing in self._things.items() if self.is_built_in(name))
 
     def with_added(self, *names: str) -> tuple[T, ...]:
-        """Return what posse itself declares, then what is asked for by name beside it.
+        """Return the built-in declarations, then the named ones, each once.
 
         Raises:
-            KeyError: Nothing of a name has been declared; the message has near names.
+            KeyError: An unknown name; the message suggests similar ones.
         """
-        added = dict.fromkeys(names)  # each once
+        added = dict.fromkeys(names)
         return (
             *self.built_in(),
             *(self[name] for name in added if name not in self or not self.is_built_in(name)),
         )
 
     def unknown(self, name: object) -> str:
-        """Return the message that nothing of this name has been declared."""
+        """Return the message for an unknown name."""
         near = difflib.get_close_matches(shown(name), self._things, n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
         known = ", ".join(self._things) or "none"
         return (
             f"unknown {self.kind} {shown(name)}{hint}; known: {known}. "
-            "One of your own is known once its module has been imported"
+            "To use a declaration of your own, import its module first"
         )
 
     def __getitem__(self, name: str) -> T:
@@ -121,12 +126,12 @@ class Registry(Mapping[str, T], Generic[T]):
 
 
 FIELDS: Final[Registry[Any]] = Registry("observation field")
-"""Of :class:`posse.signals.observation.fields.FieldDeclaration`."""
+"""Values are :class:`posse.signals.observation.fields.FieldDeclaration`."""
 METRICS: Final[Registry[Any]] = Registry("metric")
-"""Of :class:`posse.signals.measuring.Metric`."""
+"""Values are :class:`posse.signals.measuring.Metric`."""
 REWARD_TERMS: Final[Registry[Any]] = Registry("reward term")
-"""Of :class:`posse.signals.reward.RewardTerm`."""
+"""Values are :class:`posse.signals.reward.RewardTerm`."""
 SENSORS: Final[Registry[Any]] = Registry("sensor")
-"""Of :class:`posse.rules.senses.declaring.Sensor`."""
+"""Values are :class:`posse.rules.senses.declaring.Sensor`."""
 TARGET_MOTIONS: Final[Registry[Any]] = Registry("target motion")
-"""Of :class:`posse.rules.targets.declaring.TargetMotion`."""
+"""Values are :class:`posse.rules.targets.declaring.TargetMotion`."""

@@ -12,7 +12,7 @@ def shown(value: object) -> str:
     """Return what ``repr`` says of a value, in at most about 150 characters; never raises."""
     try:
         text = repr(value)
-    except Exception:  # whoever wrote its class may raise anything; so does an int of 10,000 digits
+    except Exception:  # repr may raise anything; it also fails for an int of 10,000 digits
         return f"<{type(value).__name__} that is too long to show, or cannot be>"
     if len(text) <= LONGEST:
         return text

@@ -163,7 +163,7 @@ OTHERS = {
     ),
     "a metric per what there is not": (
         '@posse.metric("m", per="second")\ndef own(c, w):\n    """?"""',
-        r"metric own \(main.py:3\): per='second' is none of: step, tracker_step, episode",
+        r"metric own \(main.py:3\): unknown per='second'; allowed: step, tracker_step, episode",
     ),
     "a metric whose sum is taken": (
         '@posse.metric("m")\ndef score(c, w):\n    """?"""',

@@ -33,7 +33,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
     **Reward**: the mean over the trackers of the weighted sum of named terms.
 
     **Info** of every step: ``"score"`` in [0, 1]; ``"reward_terms"``, each term by name, unscaled,
-    (N,); ``"working"`` (N,), where trackers may break; at the end ``"metrics"``, each
+    (N,); ``"working"`` (N,), if trackers may break; at the end ``"metrics"``, each
     metric of the episode by name (``posse.METRICS``).
 
     **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
@@ -90,10 +90,10 @@ class TeamEnv(gymnasium.Env[Any, Any]):
     def fitting_scenario(
         cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
     ) -> Scenario:
-        """Return the scenario with its overrides, and its episodes cut to ``horizon`` steps.
+        """Return the scenario with overrides and ``horizon`` steps per episode.
 
         Raises:
-            ScenarioError: It is invalid, or does not fit an environment of one agent.
+            ScenarioError: It is invalid, or not suited to an environment of one agent.
         """
         return _with_scripted_target(scenario, horizon, overrides)
 
@@ -153,7 +153,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         over = world.advance()
         info: dict[str, Any] = {
             "score": world.score,
-            # Rows that already are an array: name_terms(*rows) would take longer.
+            # An array by rows already; name_terms(*rows) would take longer.
             "reward_terms": dict(zip(world.batch.term_names, world.terms.T.copy())),  # noqa: B905
         }
         if self._breakable:

@@ -43,7 +43,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
     negative of the team's score.
 
     **Info**, for each agent, of every step: ``"score"`` of the team in [0, 1]; ``"reward_terms"``,
-    each term by name, unscaled; ``"working"``, where trackers may break; at the end
+    each term by name, unscaled; ``"working"``, if trackers may break; at the end
     ``"metrics"``, each metric of the episode by name (``posse.METRICS``).
 
     **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first

@@ -213,7 +213,7 @@ def new_renderer(scenario: Scenario, render_mode: str) -> Any:
 
 
 def check_render_mode(render_mode: str | None) -> None:
-    """Raise ValueError for a render mode that there is not."""
+    """Raise ValueError for an unknown render mode."""
     if render_mode is not None and not is_one_of(RENDER_MODES, render_mode):
         raise ValueError(
             f"unknown render_mode {shown(render_mode)}; modes are: {', '.join(RENDER_MODES)}, None"

@@ -1,1 +1,1 @@
-"""Worlds by the thousand: kernels, and the batch that calls them."""
+"""Batches of worlds: kernels, and the classes that call them."""

@@ -1,4 +1,4 @@
-"""What callers pass to a batch, checked before anything is changed."""
+"""Validation of the arguments of a batch, before anything is changed."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from posse.shown import shown
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 MOST = 2**63
-"""Seeds and numbers of worlds lie below."""
+"""Seeds and numbers of worlds must be below."""
 
 
 def check_count(name: str, value: object, least: int) -> int:
-    """Return a whole number of at least ``least``.
+    """Return a whole number in [least, 2**63).
 
     Raises:
-        ScenarioError: It is none, or not below 2**63.
+        ScenarioError: The value is not a whole number, or out of range.
     """
     if not _is_whole(value) or not least <= value < MOST:  # type: ignore[operator]
         raise ScenarioError(
@@ -36,7 +36,7 @@ def check_seed(seed: object) -> int:
     """Return a seed.
 
     Raises:
-        ScenarioError: It is no whole number in [0, 2**63).
+        ScenarioError: The value is not a whole number in [0, 2**63).
     """
     if not _is_whole(seed) or not 0 <= seed < MOST:  # type: ignore[operator]
         raise ScenarioError(f"seed={shown(seed)} must be a whole number in [0, 2**63)")
@@ -51,7 +51,7 @@ def options_of(options: object) -> dict[str, Any]:
     """Return the options of a reset.
 
     Raises:
-        ValueError: They are no mapping.
+        ValueError: They are not a mapping.
     """
     if options is None:
         return {}
@@ -61,25 +61,25 @@ def options_of(options: object) -> dict[str, Any]:
 
 
 def as_array(name: str, value: object) -> npt.NDArray[Any]:
-    """Return what was given as an array of any type.
+    """Return a value as an array of any type.
 
     Raises:
-        ValueError: It is none: rows of different lengths, say.
+        ValueError: It is not an array: its rows differ in length, for instance.
     """
     try:
         return np.asarray(value)
-    except Exception:  # ValueError of numpy, or what a foreign object's own conversion raises
+    except Exception:  # numpy's ValueError, or any error of a foreign object's conversion
         raise ValueError(
             f"{name} must be an array, or nested lists of one length, got {shown(value)}"
         ) from None
 
 
 def real_numbers(name: str, value: object) -> npt.NDArray[Any]:
-    """Return what was given as an array of real numbers.
+    """Return a value as an array of real numbers.
 
     Raises:
-        ValueError: It holds anything else: complex numbers, texts, objects, truth values, whole
-            numbers of more than 64 bits.
+        ValueError: It holds anything else: complex numbers, strings, objects, booleans, integers of
+            more than 64 bits.
     """
     array = as_array(name, value)
     if array.dtype.kind not in "fiu":
@@ -90,13 +90,13 @@ def real_numbers(name: str, value: object) -> npt.NDArray[Any]:
 
 
 def to_float32(array: npt.NDArray[Any]) -> FloatArray:
-    """Return real numbers as float32; those that are too large for it become infinite."""
+    """Return real numbers as float32; numbers out of its range become infinite."""
     with np.errstate(over="ignore"):
         return array.astype(np.float32)
 
 
 def check_mask(mask: npt.ArrayLike | None, num_worlds: int) -> BoolArray:
-    """Return which worlds a mask chooses, (E,): all without a mask."""
+    """Return which worlds a mask selects, (E,); all worlds if it is None."""
     if mask is None:
         return np.ones(num_worlds, np.bool_)
     array = as_array("reset_mask", mask)
@@ -109,7 +109,7 @@ def check_mask(mask: npt.ArrayLike | None, num_worlds: int) -> BoolArray:
 
 
 def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
-    """Return what is raised for actions[index]."""
+    """Return the error for actions[index]."""
     e, i, k = index
     return ValueError(
         f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or "
@@ -118,7 +118,7 @@ def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
 
 
 def check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
-    """Raise if an array is not what compiled code takes it for without looking."""
+    """Raise if an array is not as compiled code assumes without checking."""
     if not isinstance(array, np.ndarray):
         raise ValueError(f"{name} must be a numpy array, got {type(array).__name__}")
     if array.dtype != np.float32 or array.shape != shape or not array.flags.carray:
@@ -137,7 +137,7 @@ def check_settings(
     num_threads: int | None,
     own_kernel: bool,
 ) -> None:
-    """Raise ScenarioError if a batch cannot have these settings."""
+    """Raise ScenarioError if these settings of a batch are invalid."""
     num_worlds = check_count("num_worlds", num_worlds, 1)
     first_world = check_count("first_world", first_world, 0)
     if first_world + num_worlds > MOST:

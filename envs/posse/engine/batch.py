@@ -1,6 +1,6 @@
-"""The engine: many worlds stepped together.
+"""Simulation of many worlds together.
 
-Everything else (PettingZoo, Gymnasium, training, evaluation) stands on :class:`Batch`.
+The environments, training and evaluation are built on :class:`Batch`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A batch in mid-episode, to go back to: :meth:`Batch.save`, :meth:`Batch.restore`."""
+    """A saved state of a batch: :meth:`Batch.save`, :meth:`Batch.restore`."""
 
     scenario: Scenario
     arrays: WorldArrays
@@ -61,33 +61,32 @@ class Batch(Stepping):
     """A batch of E worlds of one scenario, N trackers each.
 
     Args:
-        scenario: What the worlds are like.
+        scenario: Settings of the worlds.
         num_worlds: E, at least 1.
-        seed: Of every random draw, in [0, 2**63). World i of a seed is the same world in every
+        seed: Seed of all random draws, in [0, 2**63). World i of a seed is the same world in every
             batch.
         split: ``"train"``, ``"validation"`` or ``"test"``: part of the key of every draw, so that
-            no world of one is ever a world of another.
-        first_world: Index of the batch's first world; the last one's is below 2**63.
+            the splits have no world in common.
+        first_world: Index of the batch's first world; that of the last must be below 2**63.
             ``first_world=17, num_worlds=1`` replays world 17 alone.
-        autoreset: What happens when an episode ends. ``"next_step"``: the following step starts
+        autoreset: Behaviour at the end of an episode. ``"next_step"``: the following step starts
             the next episode and ignores its action; ``"same_step"``: the next episode starts at
             once and the last observation is ``infos["final_obs"]``; ``"disabled"``: the caller
             resets, with ``options={"reset_mask": mask}``.
-        num_threads: Threads that step the worlds; default: as many as cores. Never changes a
-            result.
-        own_kernel: Whether to step by a kernel that is compiled for this scenario alone: about a
-            third faster, and never another result. It takes as long to compile as the kernel for
-            all scenarios, once for each scenario, and is kept on disk.
+        num_threads: Threads that step the worlds; default: one per core. Never changes a result.
+        own_kernel: Whether to use a kernel compiled for this scenario: about a third faster, with
+            the same results. It takes as long to compile as the kernel for all scenarios, once per
+            scenario, and is cached on disk.
 
     Attributes:
-        layout: Where each field lies in an observation.
+        layout: Position of each field in an observation.
         term_names: Names of the reward terms, in the order in which they are reported.
-        observation_shape: (E, rows, F); rows = N, and one more where the target is an agent.
+        observation_shape: (E, rows, F); rows = N, plus one if the target is an agent.
         action_shape: (E, rows, 2 + message_size).
 
     Raises:
         ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode,
-            an ``own_kernel`` that is no truth value.
+            an ``own_kernel`` that is not a boolean.
     """
 
     def __init__(
@@ -127,19 +126,19 @@ class Batch(Stepping):
         self._prepare()
 
     def save(self) -> Snapshot:
-        """Return the worlds as they stand, for :meth:`restore`.
+        """Return the current state of the worlds, for :meth:`restore`.
 
         Raises:
-            ResetNeeded: Before the first :meth:`reset`, when there are no worlds to save.
+            ResetNeeded: Before the first :meth:`reset`.
         """
         self._check_started("save")
         return Snapshot(self.scenario, self._arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
-        """Go back to a snapshot and return its observations.
+        """Restore a snapshot and return its observations.
 
         Raises:
-            ValueError: No snapshot, or one of another scenario or number of worlds; nothing is
+            ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
                 changed.
         """
         if not isinstance(snapshot, Snapshot):
@@ -155,7 +154,7 @@ class Batch(Stepping):
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
 
     def observe(self) -> FloatArray:
-        """Return the observations (E, rows, F) of the worlds as they stand.
+        """Return the current observations of the worlds, (E, rows, F).
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`.
@@ -166,19 +165,19 @@ class Batch(Stepping):
     def copies(
         self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None
     ) -> Batch:
-        """Return ``count`` copies of every world as it stands, to play ahead in.
+        """Return ``count`` copies of the current state of every world, for planning ahead.
 
-        Copy j of world e is world ``e * count + j`` of the returned batch. Copies go on from the
-        present of their original, under keys of their own: they draw other noise, losses and faults
-        than it will. What they draw follows from the original's key and step, ``seed`` and j. The
-        originals do not change. A copy whose episode ends begins an episode that is no world's.
+        Copy j of world e is world ``e * count + j`` of the returned batch. A copy has the present
+        state of its original but another key, so its future noise, losses and faults differ. They
+        are determined by the original's key and step, ``seed`` and j. The originals do not change.
+        If the episode of a copy ends, the next one belongs to no world of a batch.
 
         Args:
             count: Copies of each world, at least 1.
-            seed: Of what the copies draw.
-            alike: Whether all copies of a world draw the same, to compare what is done in them.
+            seed: Seed of the random draws of the copies.
+            alike: Whether all copies of a world have equal draws, for comparing actions.
             into: A batch of this scenario with ``num_worlds * count`` worlds to overwrite and
-                return, instead of making one: a small part of the time of a step.
+                return, which takes much less time than creating one.
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`.
@@ -208,14 +207,14 @@ class Batch(Stepping):
 
         Args:
             seed: Start over from episode 0 of this seed; ``None``: each world's next episode.
-            options: ``"reset_mask"`` (E,) bool: only these worlds, maybe none;
+            options: ``"reset_mask"`` (E,) bool: only these worlds, possibly none;
                 ``"tracker_pose"`` (N, 3) or (E, N, 3) and ``"target_pose"`` (3,) or (E, 3):
                 start from these (x, y, θ).
 
         Raises:
-            ValueError: An unknown option, or one of a wrong shape, not finite, or that puts robots
-                inside each other, an obstacle or a wall, or leaves a scripted target no room to
-                turn. Nothing is changed.
+            ValueError: An unknown option, or one of a wrong shape or not finite; start poses in
+                which robots overlap each other, an obstacle or a wall, or a scripted target has no
+                room to turn. Nothing is changed.
         """
         options = options_of(options)
         chosen = self.check_reset(seed, options)
@@ -247,9 +246,9 @@ class Batch(Stepping):
         return observations
 
     def check_reset(self, seed: int | None, options: Mapping[str, Any]) -> BoolArray:
-        """Return which worlds a reset starts, (E,), or raise what is wrong with its arguments.
+        """Return which worlds a reset starts, (E,); raise if its arguments are invalid.
 
-        Start poses are looked at later.
+        Start poses are checked later.
         """
         for key in options:
             if key not in _OPTIONS:
@@ -268,12 +267,12 @@ class Batch(Stepping):
 
         Args:
             actions: (E, rows, 2 + message_size) numbers in [-1, 1]: the speed (-1 is 0, 1 the
-                greatest), the turn rate (1 is the greatest to the left), the message. Up to 1e-6
-                outside, as rounding may carry them, they are taken for the bound.
+                greatest), the turn rate (1 is the greatest to the left), the message. Numbers up
+                to 1e-6 outside, which may result from rounding, are clipped.
 
         Returns:
             observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
-            ``infos["score"]`` (E,) is the present step's score; ``infos["reward_terms"]`` maps each
+            ``infos["score"]`` (E,) is the score of the step; ``infos["reward_terms"]`` maps each
             term to (E, rows); when episodes end, ``infos["metrics"]`` maps each metric to (E,),
             valid where ``infos["_metrics"]`` (E,) is true. Arrays are never overwritten later.
 
@@ -302,21 +301,20 @@ class Batch(Stepping):
         rewards: FloatArray,
         terms: FloatArray,
     ) -> Callable[[], int]:
-        """Return a function that advances every world by one control step, and packs up nothing.
+        """Return a function that advances every world by one control step, without other overhead.
 
-        For the environments of one world, where to look up what a step needs, and to pack up what
-        it gives, would take longer than the step. Each call reads the actions anew, writes to the
-        other arrays, and returns how many worlds' episodes are over. It works on the calling
-        thread alone, starts no episode in the mode "same_step", and checks nothing: the worlds
-        must have been reset, and the actions been through as good a check as
-        :meth:`check_actions`. Made before the first :meth:`reset` it is slower than afterwards.
-        All four arrays are float32, contiguous and writable, and no two overlap.
+        This is for environments of one world, where :meth:`step` spends more time on arguments and
+        results than on the simulation. Each call reads the actions, writes to the other arrays and
+        returns the number of worlds whose episodes are over. It runs on the calling thread, starts
+        no episode in the mode "same_step", and checks nothing: the worlds must have been reset, and
+        the actions must be valid as for :meth:`check_actions`. A stepper created before the first
+        :meth:`reset` is slower. The arrays are float32, contiguous, writable and do not overlap.
 
         Args:
-            actions: Where to read the actions from, (E, rows, 2 + message_size).
-            observations: Where to write the observations, (E, rows, F).
-            rewards: Where to write the rewards, (E, rows).
-            terms: Where to write the reward terms, (E, rows, K) in the order of ``term_names``.
+            actions: Input array of the actions, (E, rows, 2 + message_size).
+            observations: Output array of the observations, (E, rows, F).
+            rewards: Output array of the rewards, (E, rows).
+            terms: Output array of the reward terms, (E, rows, K) in the order of ``term_names``.
 
         Raises:
             ValueError: An array of another type, shape or layout.

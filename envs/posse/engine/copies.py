@@ -1,8 +1,8 @@
-"""Copies of worlds as they stand, whose noise, losses and faults are drawn anew.
+"""Copies of worlds with the same present state, and different future random draws.
 
-A copy shares the present with its original: poses, speeds, fixes, messages in flight, outages and
-breaks that have begun. What is drawn from now on hangs on a key of its own, so that a controller
-that plays ahead in copies knows the present and not the future.
+A copy has its original's poses, speeds, fixes, messages in flight, and current outages and breaks.
+Its future draws have another key, so a controller that plans in copies knows the present state but
+not the future noise, losses and faults.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from posse.rules.randomness import mix
 from posse.rules.state import WorldArrays
 from posse.scenarios import Scenario
 
-_COPIES: Final = np.uint64(0x636F70696573)  # sets keys of copies apart from those of episodes
+_COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes
 _SEED: Final = np.uint64(1)
 _POSITIVE: Final = np.uint64(2**63 - 1)
 _ONE: Final = np.uint64(1)
@@ -28,7 +28,7 @@ _ONE: Final = np.uint64(1)
 def draw_anew(
     config: Records, world: Records, tracker: Records, count: int, seed: int, alike: bool
 ) -> None:
-    """Give copies, ``count`` in a row of each world, keys of their own, and redraw their faults."""
+    """Give copies, ``count`` consecutive ones per world, new keys, and redraw their faults."""
     c = config[0]
     for i in range(len(world)):
         w = world[i]
@@ -42,7 +42,7 @@ def draw_anew(
 def write_copies(
     config: Records, original: WorldArrays, copies: WorldArrays, count: int, seed: int, alike: bool
 ) -> None:
-    """Overwrite ``copies`` with ``count`` copies of each world of ``original``, side by side."""
+    """Overwrite ``copies`` with ``count`` consecutive copies of each world of ``original``."""
     for theirs, mine in zip(original, copies, strict=True):
         if theirs.size:
             _rows(mine, len(theirs))[...] = _rows(theirs, len(theirs))
@@ -52,7 +52,7 @@ def write_copies(
 def check_fit(
     scenario: Scenario, num_worlds: int, count: int, other: Scenario, other_worlds: int
 ) -> None:
-    """Raise ValueError if copies of worlds do not fit another batch."""
+    """Raise ValueError if another batch does not fit the copies."""
     if other != scenario or other_worlds != num_worlds * count:
         raise ValueError(
             f"{count} copies of {num_worlds} worlds of {scenario.name!r} do not fit "
@@ -61,6 +61,6 @@ def check_fit(
 
 
 def _rows(array: npt.NDArray[Any], num_worlds: int) -> npt.NDArray[np.uint8]:
-    """Return an array's memory as (worlds, copies, bytes of one): plain bytes copy fastest."""
+    """Return an array's memory as (worlds, copies, bytes), since plain bytes are copied fastest."""
     size = array.nbytes // len(array)
     return array.reshape(-1).view(np.uint8).reshape(num_worlds, -1, size)

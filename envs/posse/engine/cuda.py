@@ -75,7 +75,7 @@ class CudaBatch(Batch):
 
     Raises:
         ImportError: numba-cuda is not installed.
-        RuntimeError: There is no usable GPU.
+        RuntimeError: No GPU is usable.
         ValueError: As :class:`posse.Batch`; ``num_threads`` or ``own_kernel`` given.
     """
 

@@ -1,10 +1,10 @@
 """A control step of one world, and the kernels that step all worlds.
 
-actions → faults → the target decides → physics (target first, then trackers by number) → the slot
-frame follows → contacts → sensing → radio → score → reward → end → observation.
+Order: actions, faults, target's decision, physics (target first, then trackers by number), slot
+frame, contacts, sensing, radio, score, reward, end of the episode, observation.
 
-Only the kernels at the end loop over a batch; everything else is about one world, or about eight
-that are observed together.
+Only the kernels at the end loop over a batch; the other functions process one world, or eight that
+are observed together.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _ONE: Final = np.float32(1.0)
 
 
 class Tables(NamedTuple):
-    """Constants of all worlds of a batch."""
+    """Constants common to the worlds of a batch."""
 
     config: Records
     """(1,) :data:`posse.rules.state.CONFIG`."""
@@ -90,7 +90,7 @@ def sense(c: Record, worlds: WorldArrays, e: int, rules: Rules, scratch: Record)
     w, trackers = worlds.world[e], worlds.tracker[e]
     seeing = look(c, w, trackers, rules.sees, rules.measure, scratch)
     if c.perfect_radio:
-        if seeing < c.num_trackers:  # else every tracker has a fix of this step
+        if seeing < c.num_trackers:  # otherwise all have a fix of this step
             share_fixes(c, trackers)
     else:
         broadcast, message = worlds.broadcast[e], worlds.message[e]
@@ -157,7 +157,7 @@ def act(
 
 @compiled
 def end_step(c: Record, w: Record, trackers: Records, slots: Records, add_to_sums: Any) -> None:
-    """Add the step to the episode's sums, and see whether the episode is over."""
+    """Add the step to the episode's sums, and determine whether the episode is over."""
     add_to_sums(c, w, trackers, slots)
     settle(c, w)
     if c.terminate_on_contact:
@@ -202,13 +202,13 @@ def advance_worlds(
     """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
 
     ================== =============================================================================
-    STEP               a control step; or, where the episode is over, the start of the next one
-    START              an episode drawn from the world's key
-    START_FROM_POSES   an episode from the poses that stand in the arrays
-    LOOK               nothing but the observations
+    STEP               a control step, or the start of the next episode if this one is over
+    START              start of an episode with drawn poses
+    START_FROM_POSES   start of an episode from the poses in the arrays
+    LOOK               observations only
     ================== =============================================================================
 
-    At most TOGETHER worlds. The scratch memory has been through :func:`prepare`.
+    ``count`` is at most TOGETHER. The scratch memory must be initialised by :func:`prepare`.
     """
     c, over = tables.config[0], 0
     for e in range(first, first + count):
@@ -216,7 +216,7 @@ def advance_worlds(
         observations, flags = results.observations[e], results.flags
         rewards, terms = results.rewards[e], results.terms[e]
         if count > 1 and trackers.shape[0] <= FETCHED:
-            fetch_all(observations)  # written below, after the last of these worlds
+            fetch_all(observations)  # written below, after the loop
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
@@ -256,7 +256,7 @@ def advance_worlds(
 
 @compiled
 def prepare(tables: Tables, scratch: Record) -> None:
-    """Write what is the same for all worlds to a thread's scratch memory."""
+    """Write the values common to all worlds to a thread's scratch memory."""
     lay_out_constants(tables.config[0], tables.beams, scratch)
 
 
@@ -271,9 +271,9 @@ def tables_of(scenario: Scenario) -> Tables:
 
 
 def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario, or of the one of these tables.
+    """Return the kernel that steps worlds of any scenario, or of one whose tables are given.
 
-    The configuration, slots and beams of the latter become constants in the code.
+    Configuration, slots and beams of a given scenario become constants in the code.
     """
     own_fields, mate, terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
@@ -318,11 +318,10 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
 @functools.cache
 def kernel_of(parts: Parts) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario that consists of these parts.
+    """Return the kernel that steps worlds of any scenario with these parts.
 
-    It executes the orders of a thread's worlds, the only loop over a batch.
-    See :func:`advance_worlds`. Returns how many of the episodes of the worlds that it took are
-    over.
+    It executes the orders of the worlds that a thread claims (:func:`advance_worlds`), and returns
+    the number of those whose episodes are over.
     """
     return _stepping(parts, None)
 
@@ -332,8 +331,7 @@ def own_kernel(scenario: Scenario) -> Callable[..., int]:
     """Return :data:`advance` for one scenario alone.
 
     The scenario is constant in the code: loops over trackers, slots and beams have known lengths,
-    and unused parts are removed. Results are bit-identical. Each scenario's kernel is
-    compiled by itself, and kept on disk as any other.
+    and unused parts are removed. Results are bit-identical. The kernel is cached on disk.
     """
     return _stepping(parts_for(scenario), tables_of(scenario))
 

@@ -1,4 +1,4 @@
-"""Memory of the arrays that a batch returns, used again when nobody holds them any more."""
+"""Reuse of the memory of returned arrays once they are no longer referenced."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from posse.numeric import FloatArray
 
 _RECYCLED_FROM: Final = 1 << 16
-"""Bytes from which an array's memory is worth keeping for the next step."""
+"""Size from which the memory of an array is kept for the next step, bytes."""
 _FLOAT32: Final = np.dtype(np.float32)
 
 
 class Recycler:
-    """Gives out arrays of one shape; takes the memory back once nobody else refers to it.
+    """Returns arrays of one shape, and reuses their memory once nothing else refers to it.
 
-    What was returned is never overwritten while anyone holds it (a view, a tensor made from it):
-    each of these is a reference to the array that owns the memory. Fresh memory for every step
-    would cost as much as the step: the system hands it out page by page.
+    Memory is never overwritten while an array, a view or a tensor on it exists, since each of them
+    refers to the array that owns the memory. Allocating memory in every step would take as long as
+    the step, since the system maps it page by page.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -29,11 +29,11 @@ class Recycler:
         self._arrays: list[FloatArray] = []
 
     def take(self) -> FloatArray:
-        """Return an uninitialised array that nobody else refers to."""
+        """Return an uninitialised array to which there is no other reference."""
         if not self._recycle:
             return np.empty(self._shape, _FLOAT32)
         for k in range(len(self._arrays)):
-            # Two references: this list's, and the argument's of the call itself.
+            # Two references: of this list, and of the call's argument.
             if sys.getrefcount(self._arrays[k]) == 2:
                 return self._arrays[k]
         array = np.empty(self._shape, np.float32)

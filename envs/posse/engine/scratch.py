@@ -1,4 +1,4 @@
-"""The scratch memory of the kernels: what rules and signals need of it, in one record."""
+"""The scratch memory of the kernels: the fields of rules and signals in one record."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from posse.rules.scratch import MOVING, SENSING, WORLD_FIELDS, scratch_record
 from posse.signals.scratch import observing
 
 _KEPT: Final = (
-    ("prepared", 8),  # not 0 once what is the same for all worlds stands there
+    ("prepared", 8),  # not 0 once the values common to all worlds are written
     *WORLD_FIELDS,
 )
 
 SCRATCH: Final = scratch_record(_KEPT, MOVING, SENSING, observing(worlds=8))
 SCRATCH_FOR_ONE: Final = scratch_record(_KEPT, MOVING, SENSING, observing(worlds=1))
-"""Where worlds are stepped one by one, and memory is short."""
+"""For worlds stepped one by one with little memory, as on a GPU."""

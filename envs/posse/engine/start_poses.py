@@ -1,4 +1,4 @@
-"""Start poses that a user gives to a reset: checked before the worlds start from them."""
+"""Start poses given to a reset, and their validation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from posse.scenarios.limits import SAFE_MARGIN
 Poses = dict[str, npt.NDArray[np.float64]]
 
 _ROUNDING: Final = 1e-3
-"""By how much a turning circle may be too wide for its room, m: float32 has rounded the pose."""
+"""Tolerance of the room for a turning circle, m, since the pose is rounded to float32."""
 
 
 def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) -> Poses:
@@ -53,7 +53,7 @@ def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) ->
 
 
 def check_overlap(s: Scenario, arrays: WorldArrays, chosen: BoolArray) -> None:
-    """Raise ValueError if robots stand inside each other, an obstacle or a wall."""
+    """Raise ValueError if robots overlap each other, an obstacle or a wall."""
     world, tracker = arrays.world, arrays.tracker
     robots = np.stack(
         [np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen] for k in ("x", "y")],

@@ -1,4 +1,4 @@
-"""How a batch calls its kernel: what it prepares once, and what it hands over at each call."""
+"""Calls of a batch's kernel: preparation, arguments and results."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from posse.signals.parts import parts_for
 
 
 class Stepping(WorldViews):
-    """The kernel of a batch, its scratch memory, and the arrays that it writes."""
+    """The kernel of a batch, its scratch memory and its output arrays."""
 
     num_worlds: int
     num_threads: int
@@ -38,7 +38,7 @@ class Stepping(WorldViews):
     action_shape: tuple[int, int, int]
 
     def _prepare(self) -> None:
-        """Set what follows from the rest, and is not pickled."""
+        """Set the derived attributes, which are not pickled."""
         scenario, (num_worlds, rows, size) = self.scenario, self.observation_shape
         parts = parts_for(scenario)
         check_fields(parts, self._arrays)
@@ -51,7 +51,7 @@ class Stepping(WorldViews):
             own_kernel(scenario) if self.own_kernel else kernel_of(parts)
         )
         self._kernel: Callable[..., int] = direct(self._untyped)
-        self._score: FloatArray = self._arrays.world["score"]  # a view, made once
+        self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
         self._orders = np.full(num_worlds, STEP, np.uint8)
         threads = threads_for(num_worlds, rows, self.num_threads)
         self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
@@ -68,7 +68,7 @@ class Stepping(WorldViews):
         self._prepare()
 
     def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
-        """Return the actions as the kernels take them, or raise what is wrong with them."""
+        """Return the actions as kernel input, or raise if they are invalid."""
         array = self.cast_actions(actions)
         position = bad_action(array)
         if position >= 0:
@@ -89,9 +89,9 @@ class Stepping(WorldViews):
         return np.ascontiguousarray(array)
 
     def _run(self, orders: npt.NDArray[np.uint8], actions: FloatArray, results: Results) -> int:
-        """Have the kernel do what each world is ordered to, spread over the threads.
+        """Execute the order of each world in several threads.
 
-        Returns how many worlds' episodes are over.
+        Returns the number of worlds whose episodes are over.
         """
         kernel, scratch = self._kernel, self._scratch
         arguments = (self._tables, self._arrays, actions, results, orders)
@@ -102,13 +102,13 @@ class Stepping(WorldViews):
         return sum(run_threads(work, self.num_worlds, len(scratch)))
 
     def _new_results(self) -> Results:
-        """Return room for what a pass over the worlds writes."""
+        """Return output arrays for a pass over the worlds."""
         return Results(
             self._observations.take(), self._rewards.take(), self._terms.take(), self._new_flags()
         )
 
     def _new_flags(self) -> BoolArray:
-        """Return room for what a step says of episodes' ends: terminated, truncated, (2, E)."""
+        """Return an output array for the ends of episodes: terminated, truncated, (2, E)."""
         return np.empty((2, self.num_worlds), np.bool_)
 
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
@@ -121,5 +121,5 @@ class Stepping(WorldViews):
         except Exception:
             explain(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])
             raise
-        self._kernel = direct(self._untyped)  # by now there is one
+        self._kernel = direct(self._untyped)  # now compiled
         return results.observations

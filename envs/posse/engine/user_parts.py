@@ -1,4 +1,4 @@
-"""Mistakes in functions that a user's module declares, told by function and line."""
+"""Errors in functions that users' modules declare, reported by function and line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ typeof: Final[Any] = numba.typeof
 
 
 def check_fields(parts: Parts, worlds: WorldArrays) -> None:
-    """Raise where a user's function reads or writes what a record has not.
+    """Raise if a user's function accesses a field that a record lacks.
 
     Raises:
         DeclarationError: Names the function, the line and the field.
@@ -36,7 +36,7 @@ def check_fields(parts: Parts, worlds: WorldArrays) -> None:
 
 
 def explain(parts: Parts, tables: Tables, worlds: WorldArrays, scratch: Records) -> None:
-    """Raise what keeps a user's function from being compiled, if anything does.
+    """Raise if a user's function cannot be compiled.
 
     Raises:
         DeclarationError: Names the function, the line and the reason.

@@ -1,4 +1,4 @@
-"""What can be read of a batch at any time: its state, and figures of the episodes as they stand."""
+"""Read access to a batch: the state of its worlds, and metrics of the current episodes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class WorldViews:
 
     @property
     def score(self) -> FloatArray:
-        """(E,) the score of the present step; 0 at the start."""
+        """(E,) the score of the current step; 0 at the start."""
         return self._score.copy()
 
     @property
@@ -54,14 +54,14 @@ class WorldViews:
 
     @property
     def arrays(self) -> WorldArrays:
-        """The arrays themselves; whoever writes to them changes the worlds."""
+        """The arrays themselves, not copies: writing to them changes the worlds."""
         return self._arrays
 
     @property
     def bytes_per_world(self) -> int:
-        """Memory that the state of one world takes, in bytes."""
+        """Size of the state of one world, bytes."""
         return self._arrays.bytes_per_world
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Return every metric by name, (E,), of the episodes as they stand."""
+        """Return the metrics of the current episodes by name, (E,) each."""
         return episode_metrics(self.scenario, self._arrays.world)

@@ -1,7 +1,7 @@
-"""What rules, policies and a user's own functions are written with.
+"""Numerical building blocks for rules, policies and users' own functions.
 
-Arrays and records, lanes (eight numbers at a time), the decorators that compile, and the spread of
-many worlds over threads. Knows nothing of worlds: every other room may import it.
+Arrays and records, lanes (blocks of eight numbers), the decorators that compile functions, and
+distribution of work over threads. It depends on no other room, and every room may import it.
 """
 
 from posse.numeric.arrays import BoolArray, FloatArray, OwnArrays, Record, Records

@@ -1,4 +1,4 @@
-"""Names for the types that kernels and their callers share."""
+"""Array types shared by kernels and their callers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 Record = Any
-"""One element of a structured array: fields are read and written as attributes, in place."""
+"""One element of a structured array; its fields are attributes that write in place."""
 Records = npt.NDArray[Any]
 """A structured array, or a row of one."""
 FloatArray = npt.NDArray[np.float32]
@@ -16,10 +16,10 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 class OwnArrays:
-    """A base for classes that hold arrays, on their own or in tuples, and are pickled.
+    """Base of classes with arrays, or tuples of arrays, as attributes; copies them on unpickling.
 
-    Where the data travels out of band (pickle's protocol 5, as Ray and joblib use it), an unpickled
-    array is read-only and may lie at any address. Kernels need it writable and aligned: copy it.
+    Arrays pickled out of band (protocol 5, as in Ray and joblib) are read-only and possibly
+    unaligned afterwards, but kernels require writable, aligned arrays.
     """
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -1,11 +1,10 @@
-"""How functions are compiled: the one place that knows numba's options.
+"""The decorators that compile functions, and numba's options.
 
-Two decorators. :func:`compiled` is for the small scalar functions that say one thing about one
-robot or one world. :func:`kernel` is for the few functions that Python calls, each of which
-compiles everything below it: what it compiles to is kept on disk, so that only the first process
-after a change waits for the compiler.
+:func:`compiled` is for small functions of one robot or one world. :func:`kernel` is for the few
+functions called from Python, each compiled together with everything that it calls and cached on
+disk, so that only the first process after a change has to compile.
 
-No fast-math, here or anywhere: a result must not depend on the place of a world in its batch.
+There is no fast-math, since a result must not depend on the position of a world in its batch.
 With ``NUMBA_DISABLE_JIT=1`` both decorators return the plain function, for debugging.
 """
 
@@ -41,11 +40,11 @@ def compiled(*, seldom: bool = ...) -> Callable[[F], F]: ...
 
 
 def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable[[F], F]:
-    """Compile a function that kernels, and other compiled functions, call.
+    """Compile a function that is called by kernels and other compiled functions.
 
-    Written as ``@compiled``, it is inlined into whatever calls it: to pass arrays costs more than
-    most of our functions take. Written as ``@compiled(seldom=True)``, for what is long and rarely
-    called, it is never inlined, so that the hot path fits the instruction cache.
+    ``@compiled`` inlines it into its callers, since passing arrays takes longer than most of these
+    functions. ``@compiled(seldom=True)``, for long and rarely called functions, never inlines it,
+    so that the hot path fits the instruction cache.
     """
 
     def decorate(function: F) -> F:
@@ -69,18 +68,19 @@ def kernel(*, sources: Iterable[Callable[..., Any]] = ...) -> Callable[[F], F]: 
 def kernel(
     function: F | None = None, *, sources: Iterable[Callable[..., Any]] = ()
 ) -> F | Callable[[F], F]:
-    """Compile a function that Python calls, and keep the result on disk.
+    """Compile a function that is called from Python, and cache the result on disk.
 
-    The arrays that a kernel is given must not overlap: what it has read from one, it does not read
-    again after it wrote to another.
+    The arrays passed to a kernel must not overlap: the compiler assumes that writing to one does
+    not change another.
 
-    It is compiled again when a file of a package changes that it, or a function that it calls,
-    stands in, or a constant of theirs. The directory is ``$POSSE_CACHE_DIR``, or ``posse`` in the
-    user's cache directory; where it cannot be used, every process compiles anew, and says why.
+    A kernel is compiled again if any file of its package, or of the packages of the functions that
+    it calls, or one of their constants changes. The cache directory is ``$POSSE_CACHE_DIR``, or
+    ``posse`` in the user's cache directory; if it cannot be used, each process compiles and prints
+    the reason.
 
     Args:
         function: The function.
-        sources: Functions that it calls, but that neither its globals nor its closure lead to, as
+        sources: Functions that it calls but that its globals and closure do not refer to, such as
             those of a registry.
     """
 
@@ -96,12 +96,12 @@ def kernel(
 
 
 def direct(function: F) -> F:
-    """Return a kernel's compiled form, which takes its arguments for what they were the first time.
+    """Return the machine code of a kernel, which does not check the types of its arguments.
 
-    numba's own call looks up the type of every argument, which takes longer than a world's step.
-    Whoever calls the compiled form has to pass arguments of just those types. Where a kernel has
-    not been called yet, or has been with several types, it is returned as it is. Plain Python is
-    kept from warning where compiled code would not.
+    numba's dispatch looks up the type of every argument, which takes longer than a world's step.
+    Callers must pass arguments of the types of the kernel's first call. A kernel that has not been
+    called yet, or with several types, is returned unchanged. Uncompiled kernels are returned with
+    numpy's overflow warnings off, since compiled code does not warn.
     """
     if UNCOMPILED:
         return np.errstate(over="ignore", under="ignore")(function)

@@ -1,7 +1,7 @@
-"""Worlds spread over threads: each thread takes block after block of them, in compiled code.
+"""Distribution of worlds over threads, which claim blocks of worlds in compiled code.
 
-Waiters spin briefly, then block: to wake a blocked thread can take longer than a step of a thousand
-worlds, and to hand over Python's lock longer than one of a hundred.
+Waiters spin briefly, then block: waking a blocked thread can take longer than a step of a thousand
+worlds, and handing over Python's lock longer than a step of a hundred.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from posse.numeric.simd.lanes import WIDTH
 
 T = TypeVar("T")
 Blocks = npt.NDArray[np.int64]
-"""Worlds that are still to do: a row for each thread, (threads, 16)."""
+"""Unclaimed worlds: a row for each thread, (threads, 16)."""
 
-NEXT: Final = 0  # world that the next block begins with; first in its row, for atomics
-SIZE: Final = 1  # worlds of a block; 0: there is one thread, and one block
+NEXT: Final = 0  # first world of the next block; first in its row, for atomics
+SIZE: Final = 1  # worlds of a block; 0: one thread and one block
 END: Final = 2  # world after the last
 _BLOCKS_EACH: Final = 16
-_SERIAL_BELOW: Final = 2048  # robots; a second thread costs more than it saves
-_LOOKS: Final = 400_000  # some tenths of a millisecond
-_PAUSE: Final = 10_000  # until the caller is in its kernel, and has let go of Python's lock
+_SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it saves
+_LOOKS: Final = 400_000  # turns of a spin, some tenths of a millisecond
+_PAUSE: Final = 10_000  # turns until the caller's kernel has released Python's lock
 _ENDED: Final = 2**62
 _CORES: Final = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
 MOST_THREADS: Final = len(_CORES)
-"""Threads that :func:`over_worlds` uses at most: as many as this process may use cores."""
+"""Most threads that :func:`over_worlds` uses: the number of cores available to the process."""
 
 
 @functools.lru_cache(maxsize=64)
 def divide(num_worlds: int, threads: int) -> Blocks:
-    """Return worlds in blocks that nobody has taken; those of one thread may be used again."""
-    # Eights, where there are enough worlds: they are observed together.
+    """Return unclaimed blocks of worlds; those for one thread are never modified."""
+    # Multiples of eight where possible, since eight worlds are observed together.
     grain = WIDTH if num_worlds >= threads * _BLOCKS_EACH * WIDTH // 2 else 1
     edges = [num_worlds * k // (threads * grain) * grain for k in range(threads)] + [num_worlds]
     blocks = np.zeros((threads, 16), np.int64)  # no two threads' rows share a cache line
@@ -56,9 +56,10 @@ def divide(num_worlds: int, threads: int) -> Blocks:
 
 @compiled
 def blocks_of(thread: int, blocks: Blocks) -> Iterator[tuple[int, int]]:
-    """Yield blocks that nobody has taken, until there are none: first world, world after the last.
+    """Claim and yield blocks while there are any: first world, world after the last.
 
-    A thread takes its own first, which lie in its core's cache from the step before; then others'.
+    A thread claims its own blocks first, which its core has cached in the previous step, then those
+    of other threads.
     """
     if blocks[0, SIZE] == 0:
         yield 0, blocks[0, END]
@@ -81,7 +82,7 @@ def worlds_of(thread: int, blocks: Blocks) -> Iterator[int]:
 
 @kernel
 def _spin(own: Blocks, counter: Blocks, target: int, looks: int, pause: int) -> None:
-    """Add one to a counter; then look until another has reached a target, and a pause longer."""
+    """Increment a counter; then spin until another one reaches a target, and a pause longer."""
     atomics.add(own, 1)
     for _ in range(looks):
         if atomics.read(counter) >= target:
@@ -91,7 +92,7 @@ def _spin(own: Blocks, counter: Blocks, target: int, looks: int, pause: int) -> 
 
 
 def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
-    """Return how many threads so many worlds are worth, at most ``most``."""
+    """Return the number of threads for a number of worlds, at most ``most``."""
     return 1 if num_worlds * robots_each < _SERIAL_BELOW else min(most, num_worlds)
 
 
@@ -104,11 +105,12 @@ def over_worlds(
 
 
 def run_threads(work: Callable[[int, Blocks], T], num_worlds: int, threads: int) -> list[T]:
-    """Call ``work(thread, blocks)`` in at most so many threads; return what the calls returned.
+    """Call ``work(thread, blocks)`` in up to ``threads`` threads; return the results of the calls.
 
-    Each takes worlds from :func:`worlds_of` or :func:`blocks_of`. The caller is thread 0, and alone
-    while another thread of the program uses the workers. If a signal handler raises, the error goes
-    on when all worlds are done, or none was begun: nothing is half done or written afterwards.
+    Each call takes worlds from :func:`worlds_of` or :func:`blocks_of`. The caller is thread 0, and
+    the only one while another thread of the program uses the workers. An exception raised by a
+    signal handler propagates only when all worlds are done, or before any is started, so no worker
+    writes afterwards.
     """
     if threads == 1 or UNCOMPILED:
         return [work(0, divide(num_worlds, 1))]
@@ -120,7 +122,7 @@ def run_threads(work: Callable[[int, Blocks], T], num_worlds: int, threads: int)
             _end(workers)
             raise
     except BaseException:
-        _end(workers)  # a second error may have come before the first call could begin
+        _end(workers)  # a second exception may have interrupted the first call
         raise
 
 
@@ -130,7 +132,7 @@ def _share(work: Callable[[int, Blocks], T], blocks: Blocks, workers: list[_Work
             workers.append(_idle.pop())
         except IndexError:
             if len(_alive) >= max(len(blocks), MOST_THREADS) - 1:
-                break  # another thread of the program has them
+                break  # in use by another thread of the program
             workers.append(_Worker())
     for thread, worker in enumerate(workers, 1):
         worker.tasks.put(functools.partial(work, thread, blocks))
@@ -148,42 +150,42 @@ def _share(work: Callable[[int, Blocks], T], blocks: Blocks, workers: list[_Work
 
 
 class _Worker:
-    """A thread, the tasks that it was given, and what came of them."""
+    """A thread with its queues of tasks and results."""
 
     def __init__(self) -> None:
         self.tasks: SimpleQueue[Callable[[], Any] | None] = SimpleQueue()
         self.results: SimpleQueue[tuple[Any, BaseException | None]] = SimpleQueue()
         self.given, self.done = np.zeros(1, np.int64), np.full(1, -1)
-        self.looks = _LOOKS if len(_alive) < MOST_THREADS - 1 else 0  # to spin takes a core
-        weakref.finalize(self, self.tasks.put, None)  # nobody can give it another task
+        self.looks = _LOOKS if len(_alive) < MOST_THREADS - 1 else 0  # spinning occupies a core
+        weakref.finalize(self, self.tasks.put, None)  # ends the thread
         arguments = self.tasks, self.results, self.given, self.done, self.looks
         threading.Thread(target=_serve, args=arguments, name="posse", daemon=True).start()
         _alive.add(self)
 
 
 def _serve(tasks: Any, results: Any, given: Any, done: Any, looks: int) -> None:
-    """Do what comes, until it is None. Knows no worker, so that one can be freed."""
+    """Execute tasks until one is None. Holds no reference to the worker, so it can be freed."""
     for count in itertools.count(1):
-        _spin(done, given, count, looks, _PAUSE)  # counts the last task without Python's lock
+        _spin(done, given, count, looks, _PAUSE)  # counts the last task, without Python's lock
         task = tasks.get()
         if task is None:
             break
         try:
             outcome: Any = task(), None
-        except BaseException as error:  # for the caller to raise
+        except BaseException as error:  # raised by the caller
             outcome = None, error
-        del task  # it holds the step's arrays, whose memory is used again
+        del task  # releases the step's arrays, whose memory is reused
         results.put(outcome)
     done[0] = _ENDED
 
 
 def _end(workers: list[_Worker]) -> None:
-    """Wait until workers have done what they were given and ended, whatever is raised meanwhile."""
+    """Wait until workers have finished their tasks and ended, ignoring exceptions meanwhile."""
     while workers:
         try:
             for worker in workers:
                 worker.tasks.put(None)
-            # Not Thread.join: interrupted, it takes a thread that runs for one that has ended.
+            # Not Thread.join, which after an interrupt takes a running thread for an ended one.
             while any(worker.done[0] != _ENDED for worker in workers):
                 time.sleep(1e-4)
             _alive.difference_update(workers)

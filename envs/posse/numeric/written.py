@@ -1,6 +1,6 @@
-"""Compiled functions whose lines are written out, one for each declared function that they call.
+"""Compiled functions generated as source text, with one line per declared function called.
 
-To call functions of a tuple one after the other, numba would have to know all of them as one type.
+numba cannot loop over a tuple of functions, since each function has a type of its own.
 """
 
 from __future__ import annotations
@@ -14,15 +14,13 @@ from posse.numeric.compiling import compiled
 def written(
     name: str, parameters: Sequence[str], lines: Sequence[str], names: Mapping[str, Any]
 ) -> Callable[..., Any]:
-    """Return a compiled function of these parameters and lines.
-
-    It is called after the functions that it calls.
+    """Return a compiled function generated from source lines.
 
     Args:
-        name: What it is called.
-        parameters: Their names.
-        lines: Of its body, indented as within it.
-        names: What the lines use: functions, numbers.
+        name: Name of the function; the names of the functions that it calls are appended.
+        parameters: Names of the parameters.
+        lines: Lines of the body, indented relative to it.
+        names: Global names used in the body: functions and numbers.
     """
     body = "\n".join(f"    {line}" for line in lines or ("pass",))
     scope: dict[str, Any] = {**names, "__name__": __name__}

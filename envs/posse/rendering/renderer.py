@@ -41,7 +41,7 @@ class Renderer:
         mode: ``"rgb_array"``: frames are returned, no display is needed; ``"human"``: they appear
             in a window, in real time.
         size: Width and height of a frame, px.
-        title: Shown above the frame, beside the scenario's name; default: the name alone.
+        title: Shown above the frame after the scenario's name; default: only the name.
 
     Raises:
         ValueError: An unknown mode, or a size below :data:`LEAST_SIZE`.

@@ -14,7 +14,7 @@ class Window:
         rate: Maximum frames per second.
 
     Raises:
-        RuntimeError: There is no display.
+        RuntimeError: No display is available.
     """
 
     def __init__(self, size: tuple[int, int], caption: str, rate: float) -> None:

@@ -1,1 +1,1 @@
-"""What happens to one world in a control step."""
+"""Dynamics, contacts, sensing, radio and scoring of one world."""

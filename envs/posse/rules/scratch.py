@@ -1,8 +1,8 @@
-"""A thread's scratch memory: one record, whose fields are arrays of float32.
+"""A thread's scratch memory: one record whose fields are float32 arrays.
 
-First what is kept for a world, or for all; then what the phases of a step need, each for itself:
-the fields of one phase lie over those of another. Loops go over blocks of eight, so lengths are
-multiples of eight, and rows hold what fills the last block.
+The fields kept throughout a step come first, then those of the phases of a step, which overlay each
+other. Loops run over blocks of eight, so lengths are multiples of eight, including padding of the
+last block.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ Fields = tuple[tuple[str, int], ...]
 
 TEAM: Final = MAX_TRACKERS
 ROBOTS: Final = TEAM + WIDTH
-"""The trackers, the target, and what fills the last block."""
+"""Length of rows of trackers, target and padding."""
 DISCS: Final = ROBOTS + -(-MAX_OBSTACLES // WIDTH) * WIDTH
-"""The robots, the obstacles, and what fills the last block."""
+"""Length of rows of robots, obstacles and padding."""
 BEAMS: Final = 64
 
 WORLD_FIELDS: Final[Fields] = (
@@ -29,45 +29,45 @@ WORLD_FIELDS: Final[Fields] = (
     ("x", DISCS),  # common frame, m
     ("y", DISCS),
     ("radius", DISCS),  # m
-    ("heard2", DISCS),  # within which the sonar has it, the square, and a little more, m²
+    ("heard2", DISCS),  # squared distance, with a margin, within which the sonar detects it, m²
     ("index", ROBOTS),  # 0, 1, 2, …
     # The sonar's beams.
     ("beam_cos", BEAMS),
     ("beam_sin", BEAMS),
     ("reading", BEAMS),  # m
     # Trackers.
-    ("gap", TEAM),  # free width to the nearest disc, m
-    ("excess", TEAM),  # not above 0 if anything is near
-    ("slot", TEAM),  # the nearest slot, or the nearest that is free
-    ("slot_distance", TEAM),  # and how far it is, m
-    ("slot_distance2", TEAM),  # the same squared, m²
+    ("gap", TEAM),  # clearance to the nearest disc, m
+    ("excess", TEAM),  # above 0 only if nothing is near
+    ("slot", TEAM),  # number of the nearest slot, or of the nearest free one
+    ("slot_distance", TEAM),  # distance to it, m
+    ("slot_distance2", TEAM),  # squared, m²
 )
 MOVING: Final[Fields] = (
-    ("worth", 2 * WIDTH),  # of each direction that a smart target weighs
-    ("wanted_speed", TEAM),  # what each tracker's action asks for
+    ("worth", 2 * WIDTH),  # value of each direction considered by a smart target
+    ("wanted_speed", TEAM),  # commanded by each tracker's action
     ("wanted_turn", TEAM),
     ("new_pose", WIDTH * TEAM),  # eight numbers for each tracker
-    ("near", ROBOTS),  # the robots that something is near to, the target last: which,
-    ("near_x", ROBOTS + WIDTH),  # and where
+    ("near", ROBOTS),  # numbers of the robots that are near anything, the target last
+    ("near_x", ROBOTS + WIDTH),  # their positions
     ("near_y", ROBOTS + WIDTH),
 )
 SENSING: Final[Fields] = (
     ("fixed_at", TEAM),  # control step of each tracker's last fix
-    ("seen_dx", TEAM),  # where it sees the target, m
+    ("seen_dx", TEAM),  # vector to the target as seen, m
     ("seen_dy", TEAM),
     ("new_fix", WIDTH * TEAM),  # eight numbers for each tracker
 )
 
 
 def scratch_record(kept: Fields, *phases: Fields) -> np.dtype[Any]:
-    """Return the record of scratch memory; phases are given the same memory."""
+    """Return the record of scratch memory, in which the phases overlay each other."""
     formats: dict[str, tuple[int, int]] = {}
     begin = end = 0
     for fields in (kept, *phases):
         at = begin
         for name, length in fields:
             if name in formats:
-                raise ValueError(f"two fields of scratch memory are called {name!r}")
+                raise ValueError(f"two fields of scratch memory have the name {name!r}")
             formats[name] = (at, length)
             at += 4 * length
         end = max(end, at)
@@ -84,5 +84,5 @@ def scratch_record(kept: Fields, *phases: Fields) -> np.dtype[Any]:
 def new_scratch(record: np.dtype[Any]) -> Records:
     """Return zeroed scratch memory for one thread and one scenario, an array of one record."""
     memory = np.zeros(record.itemsize + 64, np.uint8)
-    start = -memory.ctypes.data % 64  # a line of the cache
+    start = -memory.ctypes.data % 64  # bytes of a cache line
     return memory[start : start + record.itemsize].view(record)

@@ -35,7 +35,7 @@ def is_clear(
     x: np.float32,
     y: np.float32,
 ) -> bool:
-    """Say whether a tracker fits at (x, y) beside the walls, obstacles and ``placed`` trackers."""
+    """Return whether a tracker at (x, y) is clear of walls, obstacles and ``placed`` trackers."""
     if c.walled:
         inner = c.half_arena - c.radius - _CLEARANCE
         if abs(x) > inner or abs(y) > inner:

@@ -1,8 +1,8 @@
-"""What a batch of worlds is made of: records with a leading axis E, each field with its meaning.
+"""The state of a batch: records with a leading axis E, with the meaning of each field.
 
-E = worlds, N = trackers, M = obstacles, D = radio delay in steps, m = message size. One world lies
-contiguously in memory, so that a core that steps it touches little else. The dtypes do not depend
-on any size: kernels compile once for all scenarios.
+E = worlds, N = trackers, M = obstacles, D = radio delay in steps, m = message size. The data of one
+world are contiguous, for locality of memory access. The dtypes do not depend on any size, so
+kernels are compiled once for all scenarios.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
 
 SPLITS: Final = ("train", "validation", "test")
 NEVER: Final = np.int32(2**30)
-"""A control step that no episode reaches."""
+"""A control step later than any."""
 
 
 def _record(*fields: tuple[str, type], size: int | None = None) -> np.dtype[Any]:
@@ -37,7 +37,7 @@ def _record(*fields: tuple[str, type], size: int | None = None) -> np.dtype[Any]
 
 
 def _offset(record: np.dtype[Any], name: str) -> int:
-    """Return how many bytes into a record a field begins."""
+    """Return the offset of a field in a record, in bytes."""
     return next(at for field, (_, at, *_) in (record.fields or {}).items() if field == name)
 
 
@@ -50,7 +50,7 @@ CONFIG: Final = _record(
     ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("break_number", _I),
     ("motion", _I), ("mirrored", _I), ("target_agent", _I),
     ("sensor", _I), ("fix_bearing", _I),  # 1: a fix is a bearing, else a position
-    ("measured", _I),  # 0: sensors have the target where it is
+    ("measured", _I),  # 0: sensors return the target's true position
     ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
     ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
     ("dt", _F), ("physics_dt", _F),
@@ -65,16 +65,16 @@ CONFIG: Final = _record(
     ("radio_range", _F), ("radio_loss", _F), ("sensor_outages", _F), ("radio_outages", _F),
     ("formation_distance", _F), ("formation_spacing", _F),
     ("per_acceleration", _F), ("per_turn_acceleration", _F),  # 1 / limit; 0: no limit
-    ("told_sensing_range", _F), ("told_arena", _F),  # -1: boundless
+    ("told_sensing_range", _F), ("told_arena", _F),  # as observed; -1: unlimited
 )  # fmt: skip
-"""A scenario as the kernels read it."""
+"""The scenario, for kernels."""
 
 _WORLD: Final = (
-    ("seed", _U),  # the user's
+    ("seed", _U),  # as given by the user
     ("split", _I),  # index into SPLITS
-    ("index", np.int64),  # which world of the seed
-    ("episode", np.int64),  # which episode of the world
-    ("key", _U),  # of this episode's random draws
+    ("index", np.int64),  # number of the world within the seed
+    ("episode", np.int64),  # number of the episode within the world
+    ("key", _U),  # key of the episode's random draws
     ("step", _I),  # control steps since the start
     ("over", _I),  # 1: the episode has ended, the world must be reset
     ("terminated", _I),
@@ -82,29 +82,29 @@ _WORLD: Final = (
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
     ("frame_cos", _F), ("frame_sin", _F),  # the slot frame, ψ
-    ("goal_cos", _F), ("goal_sin", _F),  # where a scripted target wants to head
-    ("touching", _U),  # trackers that touch the target, a bit each
+    ("goal_cos", _F), ("goal_sin", _F),  # goal heading of a scripted target
+    ("touching", _U),  # bit mask of the trackers that touch the target
     ("near", _I),  # 1: something may touch the target in the next step
     ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
     ("breaks_left", _I),
-    # what the metrics are worked out from
-    ("working", _I),  # trackers that work
-    ("score", _F),  # of the present step
-    ("tracker_steps", _F),  # control steps, of all trackers that work
-    ("held", _I),  # steps on end with every working tracker in a slot of its own
+    # inputs of the metrics
+    ("working", _I),  # number of working trackers
+    ("score", _F),  # of the current step
+    ("tracker_steps", _F),  # control steps of all working trackers
+    ("held", _I),  # consecutive steps with each working tracker in its own slot
     ("settled_at", _I), ("detected_at", _I), ("lost_at", _I), ("recovered_at", _I),
     ("contacts_tracker", _I), ("contacts_obstacle", _I), ("contacts_target", _I),
     ("least_gap", _F),
 )  # fmt: skip
 WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
-"""Fields that every world has, whatever is declared beside them."""
+"""Fields of every world, without those of declared metrics and motions."""
 
 
 def world_record(scenario: Scenario) -> np.dtype[Any]:
-    """Return the record of one world: its identity, its target, its clock, its sums.
+    """Return the record of one world.
 
-    And what motions of the target remember, and the sums behind metrics: of those that are built
-    in, and those that the scenario names.
+    It includes the memories of the target motions and the sums of the metrics, both of the built-in
+    ones and of those that the scenario names.
     """
     return _world_record(scenario.target_motion, scenario.metrics)
 
@@ -125,35 +125,35 @@ FIX_FIELDS: Final = (
     ("fix_cos", _F), ("fix_sin", _F),  # its heading; a bearing: 0
     ("fix_frame_cos", _F), ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
 )  # fmt: skip
-"""A fix of the target, in the common frame. Its kind is the sensor's
+"""A fix of the target, in the common frame: a position or a bearing, depending on the sensor
 (:mod:`posse.rules.senses.declaring`)."""
 
 TRACKER: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
-    ("max_speed", _F), ("max_turn_rate", _F),  # its own limits, as the scenario sets them
+    ("max_speed", _F), ("max_turn_rate", _F),  # its own limits, from the scenario
     ("per_speed", _F), ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
     ("broken_at", _I),  # control step at which it broke, NEVER while it works
     ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
-    ("sensor_dead_from", _I), ("radio_dead_from", _I),  # outages, of outage_time each
-    ("sees", _I),  # 1: its sensor has the target now
+    ("sensor_dead_from", _I), ("radio_dead_from", _I),  # start of outages of outage_time
+    ("sees", _I),  # 1: its sensor sees the target
     ("near", _I),  # 1: something may touch it in the next step
     ("touching", _I),  # 1: it touches anything
     ("onsets", _I),  # contacts that began in this step
-    ("touching_trackers", _U), ("touching_obstacles", _U),  # a bit each; bits 60 to 63: walls
-    # its best fix of the target, seen or heard
+    ("touching_trackers", _U), ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
+    # its best fix of the target, from its sensor or by radio
     *FIX_FIELDS, ("fix_vx", _F), ("fix_vy", _F),  # m/s, from successive fixes
-    # the score's and the rewards' view
-    ("slot", _S),  # which slot it occupies, -1: none
-    ("could_arrive", _S),  # 1: it could stand in a slot by now, straight on at full speed
-    ("slot_distance", _F),  # to the nearest slot that nobody else occupies
-    ("slot_progress", _F),  # by how much that shrank in this step
+    # inputs of score and rewards
+    ("slot", _S),  # number of the slot that it occupies; -1: none
+    ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
+    ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
+    ("slot_progress", _F),  # decrease of slot_distance in this step
     ("start_x", _F), ("start_y", _F),
 )  # fmt: skip
 """One tracker."""
 
-# Kernels read and write these of a tracker's fields eight at a time; what they do not change, they
-# write as they read it. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
+# Kernels read and write these fields of a tracker in blocks of eight; unchanged fields are written
+# as they were read. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
 POSE: Final = _offset(TRACKER, "x")
 FIX: Final = _offset(TRACKER, "fix_x")
 CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
@@ -161,15 +161,15 @@ CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 
 SLOT: Final = _record(("x", _F), ("y", _F))
-"""A slot's place in the slot frame; one table for all worlds."""
+"""Position of a slot in the slot frame; one table for all worlds."""
 
 HEARD: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
     ("step", _I),  # when it was sent; -1: never heard
-    size=32,  # to be read eight numbers at a time, as TRACKER is from x on
+    size=32,  # so that it can be read as a block of eight, like TRACKER from x on
 )  # fmt: skip
-"""What a tracker last heard of a team-mate: (E, receiver, sender)."""
+"""The last message that a tracker received from a team-mate: (E, receiver, sender)."""
 
 BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
@@ -177,11 +177,11 @@ BROADCAST: Final = _record(
     ("speed", _F), ("turn_rate", _F),
     *FIX_FIELDS,
 )  # fmt: skip
-"""What a tracker sent, kept until it has been heard: (E, D + 1, N), by step modulo D + 1."""
+"""A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 
 
 class WorldArrays(NamedTuple):
-    """Every array of a batch. With the scenario, they are its whole state."""
+    """The arrays of a batch, which together with the scenario are its complete state."""
 
     world: Records
     """(E,) :func:`world_record`."""
@@ -190,13 +190,13 @@ class WorldArrays(NamedTuple):
     obstacle: Records
     """(E, M) :data:`OBSTACLE`."""
     heard: Records
-    """(E, N, N) :data:`HEARD`; (E, 0, 0) where the radio is perfect and nothing need be kept."""
+    """(E, N, N) :data:`HEARD`; (E, 0, 0) if the radio is perfect, which stores nothing."""
     broadcast: Records
-    """(E, D + 1, N) :data:`BROADCAST`; (E, 0, 0) where the radio is perfect."""
+    """(E, D + 1, N) :data:`BROADCAST`; (E, 0, 0) if the radio is perfect."""
     heard_message: FloatArray
-    """(E, N, N, m) float32."""
+    """Message parts written by policies, (E, N, N, m) float32, by receiver and sender."""
     message: FloatArray
-    """(E, D + 1, N, m) float32."""
+    """The same of messages sent, (E, D + 1, N, m) float32, by step modulo D + 1."""
 
     @classmethod
     def allocate(cls, scenario: Scenario, num_worlds: int) -> WorldArrays:
@@ -230,7 +230,7 @@ class WorldArrays(NamedTuple):
             mine[...] = theirs
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Unpickled out of band, arrays would be read-only, at any address.
+        # Arrays unpickled out of band would be read-only and possibly unaligned.
         return _copied, tuple(self)
 
     @property
@@ -255,7 +255,7 @@ def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
 
 
 def perfect_radio(scenario: Scenario) -> bool:
-    """Say whether every tracker hears every other at once, always; what breaks falls silent."""
+    """Return whether working trackers always receive each other's messages without delay."""
     return (
         math.isinf(scenario.radio_range)
         and scenario.radio_delay == 0
@@ -277,7 +277,7 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 
 
 def config_record(scenario: Scenario) -> Records:
-    """Return the scenario as the kernels read it, an array of one :data:`CONFIG`."""
+    """Return the scenario for kernels, an array of one :data:`CONFIG`."""
     s = scenario
     config = np.zeros(1, CONFIG)
     c: Record = config[0]

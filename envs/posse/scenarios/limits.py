@@ -1,4 +1,4 @@
-"""Limits of every scenario, including those of float32."""
+"""Limits of all scenarios, including those of float32."""
 
 from __future__ import annotations
 

@@ -213,12 +213,12 @@ class Scenario:
         above=True,
     )  # fmt: skip
 
-    # Beside what is built in
+    # Declarations of the user's own
     extra_fields: tuple[str, ...] = declare(
         (), Setting("other", "1", "observation fields of your own, by name: docs/extend.md")
     )
     metrics: tuple[str, ...] = declare(
-        (), Setting("other", "1", "further metrics by name, which a module of your own declares")
+        (), Setting("other", "1", "metrics of your own, by name: docs/extend.md")
     )
 
     # Reward

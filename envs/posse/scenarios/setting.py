@@ -183,7 +183,7 @@ def _check_text(name: str, value: object, setting: Setting) -> None:
 
 
 def is_one_of(names: Container[str], value: object) -> bool:
-    """Say whether a value is a string among names; an array, say, is none."""
+    """Return whether a value is a string and one of the names."""
     return isinstance(value, str) and value in names
 
 
@@ -195,11 +195,11 @@ def is_number(value: object) -> bool:
 
 
 def near(name: str, names: Iterable[str]) -> str:
-    """Return a hint at the names that resemble one that is unknown, or nothing."""
+    """Return a hint with the names similar to an unknown one, or an empty string."""
     found = difflib.get_close_matches(name[:LONGEST], tuple(names), n=3)
     return f" (did you mean {' or '.join(map(repr, found))}?)" if found else ""
 
 
 def fail(name: str, value: object, allowed: str) -> NoReturn:
-    """Raise that a value is not possible, and what is."""
+    """Raise the error for an invalid value, with what is allowed."""
     raise ScenarioError(f"{name}={shown(value)} is not possible: {allowed}")

@@ -1,1 +1,1 @@
-"""What is told of a world: observations, rewards, metrics, the global state."""
+"""Observations, rewards, metrics and the global state of worlds."""

@@ -45,7 +45,7 @@ class StateLayout:
     Attributes:
         entries: Every :class:`StateEntry`, in order.
         size: S, length of the vector.
-        offsets: Where each entry begins, by name.
+        offsets: Index of the first number of each entry, by name.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -65,7 +65,7 @@ class StateLayout:
         return low.astype(np.float32), high.astype(np.float32)
 
     def vector(self, arrays: WorldArrays) -> FloatArray:
-        """Return the states of a batch's worlds, (E, S) float32, a copy."""
+        """Return the states of a batch's worlds, a new array (E, S) float32."""
         num_worlds = len(arrays.world)
         vectors = np.empty((num_worlds, self.size), np.float32)
         for entry in self.entries:
@@ -201,7 +201,7 @@ def _target_entries(s: Scenario) -> list[StateEntry]:
         *memory,
         StateEntry("next_break", (), "s", *times, "when the nearest tracker breaks; -1: never",
                    _when("world", "break_step", dt)),
-        StateEntry("breaks_left", (), "count", 0, s.breaks, "trackers that will yet break",
+        StateEntry("breaks_left", (), "count", 0, s.breaks, "trackers that are still to break",
                    _scaled("world", "breaks_left")),
     ]  # fmt: skip
 
@@ -232,7 +232,7 @@ def _tracker_entries(s: Scenario) -> list[StateEntry]:
             ("radio_dead_from", "radio_dead_from", "start of its radio's outage; -1: none"),
         )
     ]  # fmt: skip
-    sees = StateEntry("tracker_sees", (n,), "1", 0, 1, "1 while it has the target in sight",
+    sees = StateEntry("tracker_sees", (n,), "1", 0, 1, "1 while it sees the target",
                       _scaled("tracker", "sees"))  # fmt: skip
     return [*named, *velocity, *times, sees]
 
@@ -255,7 +255,7 @@ def _radio_entries(s: Scenario) -> list[StateEntry]:
     entries: list[StateEntry] = []
     if m:
         entries.append(
-            StateEntry("message", (kept, n, m), "1", -1, 1, "what policies added, newest first",
+            StateEntry("message", (kept, n, m), "1", -1, 1, "policies' messages, newest first",
                        lambda arrays: _in_order_of_age(arrays, arrays.message))
         )  # fmt: skip
     if perfect_radio(s):
@@ -263,7 +263,7 @@ def _radio_entries(s: Scenario) -> list[StateEntry]:
     limits, duration = _limits(s), s.duration * _SLACK
     if m:
         entries.append(
-            StateEntry("heard_message", (n, n, m), "1", -1, 1, "heard last: receiver, sender",
+            StateEntry("heard_message", (n, n, m), "1", -1, 1, "last received: receiver, sender",
                        lambda arrays: arrays.heard_message)
         )  # fmt: skip
     entries.append(
@@ -271,20 +271,20 @@ def _radio_entries(s: Scenario) -> list[StateEntry]:
                    _when("heard", "step", dt))
     )  # fmt: skip
     entries += [
-        StateEntry(f"heard_{name}", (n, n), *limits[name], "of the sender, as heard last",
+        StateEntry(f"heard_{name}", (n, n), *limits[name], "of the sender, as last received",
                    _of_heard(name))
         for name in _POSE
     ]  # fmt: skip
     entries.append(
-        StateEntry("sent", (kept, n), "1", 0, 1, "1: it was sent; in flight, newest first",
+        StateEntry("sent", (kept, n), "1", 0, 1, "1: a message was sent; in flight, newest first",
                    _of_broadcast("sent"))
     )  # fmt: skip
     entries.append(
-        StateEntry("sent_fix_time", (kept, n), "s", -1, duration, "of the fix in it; -1: none",
+        StateEntry("sent_fix_time", (kept, n), "s", -1, duration, "time of the fix sent; -1: none",
                    _sent_fix_time(dt))
     )  # fmt: skip
     entries += [
-        StateEntry(f"sent_{name}", (kept, n), *limits[name], "as it was sent, newest first",
+        StateEntry(f"sent_{name}", (kept, n), *limits[name], "as sent, newest first",
                    _of_broadcast(name))
         for name in (*_POSE, *_FIX)
     ]  # fmt: skip

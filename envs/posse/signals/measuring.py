@@ -1,16 +1,17 @@
-"""How a metric is declared, and how the declared ones become part of a kernel.
+"""Declaration of metrics, and generation of the code that updates their sums.
 
-A metric is declared on what it adds to a running sum in each control step. The sum is a field of
-the world's record, ``<name>_sum``; at the end of the episode it becomes the figure. The parameters
-of the function say of what it is a sum:
+A metric is declared on the function whose value is added to a running sum in each control step. The
+sum is the field ``<name>_sum`` of the world's record, and is divided at the end of the episode. The
+parameters of the function determine what is summed:
 
 ========================= ========================================================================
-(c, w)                    of a number of the world
-(c, w, t)                 over the trackers that work
-(c, w, trackers)          of a number of the team; (c, w, trackers, slots) likewise
+(c, w)                    a value of the world
+(c, w, t)                 a value of each working tracker
+(c, w, trackers)          a value of the team
+(c, w, trackers, slots)   a value of the team, with the slots
 ========================= ========================================================================
 
-What has no sum of its own is declared on the figure, as a function of the worlds' records.
+A metric without a sum is declared on a function of the worlds' records.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ _STEPS: Final[dict[str, str | None]] = {
 
 @dataclass(frozen=True, eq=False)
 class Metric:
-    """One figure of an episode."""
+    """One metric of an episode."""
 
     name: str
     unit: str
@@ -49,40 +50,39 @@ class Metric:
     function: Figure
     """(scenario, worlds) -> (E,)."""
     each_step: Function | None = None
-    """What is added to its sum in a control step; None: it has none."""
+    """Returns the value added to the sum in a control step; None: there is no sum."""
     sum_type: type = np.float64
 
     @property
     def sum_name(self) -> str:
-        """The field of the world's record that holds its sum."""
+        """Name of the field of the world's record that holds the sum."""
         return f"{self.name}_sum"
 
     @property
     def fields(self) -> tuple[tuple[str, type], ...]:
-        """What it needs in the world's record."""
+        """Fields that the metric adds to the world's record."""
         return () if self.each_step is None else ((self.sum_name, self.sum_type),)
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions of it that are compiled, and what each returns."""
+        """The compiled functions of the metric, and what each returns."""
         return () if self.each_step is None else ((self.each_step, "number"),)
 
 
 def metric(
     unit: str, *, per: str = "step", sum_type: type = np.float64
 ) -> Callable[[Function], Function]:
-    """Declare what a metric of the function's name adds up; the docstring is the meaning.
+    """Declare a metric with the function's name; the function's docstring is the meaning.
 
     Args:
-        unit: Of the figure.
-        per: What the sum is divided by: ``"step"``, by the control steps of the episode;
-            ``"tracker_step"``, by the control steps of all trackers that work; ``"episode"``, by
-            nothing.
-        sum_type: Of the sum.
+        unit: Unit of the metric.
+        per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
+            control steps of all working trackers; ``"episode"``: 1.
+        sum_type: Type of the sum.
 
     Raises:
-        DeclarationError: The name is taken, the docstring is missing, the parameters are none of
-            those above, or there is no such ``per``.
+        DeclarationError: The name is taken, the docstring is missing, the parameters are not among
+            those above, or ``per`` is unknown.
     """
 
     def declare(function: Function) -> Function:
@@ -91,7 +91,7 @@ def metric(
             allowed = " or ".join(f"({', '.join(each)})" for each in _PARAMETERS)
             raise METRICS.error(function, f"its parameters are ({', '.join(names)}), not {allowed}")
         if per not in _STEPS:
-            raise METRICS.error(function, f"per={per!r} is none of: {', '.join(_STEPS)}")
+            raise METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
         name = function.__name__
         if f"{name}_sum" in WORLD_NAMES:
             raise METRICS.error(function, f"a world has a field '{name}_sum': choose another name")
@@ -104,7 +104,7 @@ def metric(
 
 
 def figure(unit: str) -> Callable[[Figure], Figure]:
-    """Declare a function (scenario, worlds (E,)) -> (E,) as a metric of its name."""
+    """Declare a function (scenario, worlds (E,)) -> (E,) as a metric with its name."""
 
     def declare(function: Figure) -> Figure:
         name = function.__name__

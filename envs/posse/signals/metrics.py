@@ -1,8 +1,8 @@
-"""What an episode is summed up by: the score, and beside it figures in physical units.
+"""The metrics of an episode: the score, and further quantities in physical units.
 
-To add a metric, declare it here or in a module of your own (:mod:`posse.signals.measuring`). It
-then arrives in ``info`` at the end of every episode; one of your own where the scenario names it.
-``nan`` stands for "never happened".
+To add a metric, declare it here or in a module of your own (:mod:`posse.signals.measuring`).
+``info`` reports it at the end of every episode, one of your own if the scenario names it. ``nan``
+stands for "never happened".
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ def _time(steps: npt.NDArray[Any], scenario: Scenario) -> Column:
 
 @metric("1")
 def score(c: Record, w: Record) -> np.float32:
-    """Mean over the steps of occupied slots per working tracker, at most 1 a step."""
+    """Mean over the steps of occupied slots per working tracker, at most 1 in each step."""
     return np.float32(w.score)
 
 
 @metric("1")
 def safe_score(c: Record, w: Record) -> np.float32:
-    """The score, where every step counts 0 from the first contact of any tracker on."""
+    """The score, where every step from the team's first contact on counts 0."""
     contacts = w.contacts_tracker + w.contacts_obstacle + w.contacts_target
     return np.float32(w.score) if contacts == 0 else _ZERO
 
 
 @metric("1", sum_type=np.float32)
 def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32:
-    """What the score could have been at most: every tracker straight to a slot, then in place."""
+    """Upper bound of the score: every tracker drives straight to a slot and then stays in it."""
     count = 0
     for i in range(c.num_trackers):
         t = trackers[i]
@@ -56,37 +56,37 @@ def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32
 
 @figure("s")
 def detection_time(s: Scenario, w: Records) -> Column:
-    """When a tracker first had the target in sight; nan: never."""
+    """Time at which a tracker first had the target in sight; nan: never."""
     return _time(w["detected_at"], s)
 
 
 @figure("s")
 def settling_time(s: Scenario, w: Records) -> Column:
-    """When every working tracker had a slot of its own, kept for settle_time; nan: never."""
+    """Start of the first settle_time with each working tracker in its own slot; nan: never."""
     return _time(w["settled_at"], s)
 
 
 @figure("s")
 def recovery_time(s: Scenario, w: Records) -> Column:
-    """From the first break of a tracker to when the others had settled anew; nan: never."""
+    """Time from a tracker's first break until the others settled again; nan: never."""
     return np.where(w["recovered_at"] >= 0, _time(w["recovered_at"] - w["lost_at"], s), np.nan)
 
 
 @metric("m", per="tracker_step")
 def tracking_error(c: Record, w: Record, t: Record) -> np.float32:
-    """Mean distance of a working tracker from its own slot, or from the nearest free one."""
+    """Mean distance of a working tracker from its own slot, or the nearest free one."""
     return np.float32(t.slot_distance)
 
 
 @metric("1", per="tracker_step")
 def time_in_sight(c: Record, w: Record, t: Record) -> np.float32:
-    """Share of the working trackers' time with the target in their own sight."""
+    """Share of the working trackers' time with the target in sight of their own sensor."""
     return np.float32(t.sees)
 
 
 @figure("count")
 def tracker_contacts(s: Scenario, w: Records) -> Column:
-    """Contacts between two trackers, each counted once, when it begins."""
+    """Contacts between two trackers, each counted once at its beginning."""
     return np.asarray(w["contacts_tracker"], np.float64)
 
 
@@ -111,7 +111,7 @@ def contact_free(s: Scenario, w: Records) -> Column:
 
 @figure("m")
 def least_gap(s: Scenario, w: Records) -> Column:
-    """Least free width that was between a tracker and anything else, at a control step."""
+    """Least clearance of a tracker from anything else, over all control steps."""
     return np.asarray(w["least_gap"], np.float64)
 
 
@@ -124,7 +124,7 @@ def control_effort(c: Record, w: Record, t: Record) -> np.float32:
 
 @metric("1")
 def time_connected(c: Record, w: Record, trackers: Records) -> np.float32:
-    """Share of the time that the working trackers were one radio graph."""
+    """Share of the time in which the radio graph of the working trackers was connected."""
     return _ONE if c.perfect_radio or connected(c, w, trackers) else _ZERO
 
 
@@ -139,9 +139,9 @@ METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
 
 
 def episode_metrics(scenario: Scenario, worlds: Records) -> dict[str, Column]:
-    """Return every metric by name, (E,) float64, of the episodes as they stand.
+    """Return the metrics of the current episodes by name, (E,) float64.
 
-    The built-in ones, and those that the scenario names.
+    These are the built-in ones and those that the scenario names.
     """
     metrics = registry.METRICS.with_added(*scenario.metrics)
     return {m.name: m.function(scenario, worlds) for m in metrics}

@@ -1,4 +1,4 @@
-"""Which declared functions the kernel of a scenario is made of."""
+"""The declarations that the kernel of a scenario is composed of."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import posse.signals.metrics
 
-# These declare the built-in fields and metrics.
+# Imported for their declarations of the built-in fields and metrics.
 import posse.signals.observation.mate_fields
 import posse.signals.observation.own_fields  # noqa: F401
 from posse.registry import (
@@ -32,65 +32,66 @@ Declarations = tuple[FieldDeclaration, ...]
 
 
 class Parts(NamedTuple):
-    """Declared things, in the order in which they are worked out."""
+    """The declarations of a scenario, each kind in order of evaluation."""
 
     fields: Declarations
-    """Of an observation, but for sonar and team-mates."""
+    """Observation fields, except sonar and team-mates."""
     mate_fields: Declarations
-    """Of a team-mate, but for what it said."""
+    """Fields of a team-mate, except its message."""
     motions: tuple[TargetMotion, ...]
-    """Of the target."""
+    """Target motions."""
     sensors: tuple[Sensor, ...]
-    """That have the target in sight."""
+    """Target sensors."""
     metrics: tuple[Metric, ...]
-    """Of an episode."""
+    """Metrics of an episode."""
     reward_terms: tuple[RewardTerm, ...]
+    """Reward terms."""
 
     @property
     def width(self) -> int:
-        """Numbers of an observation before the sonar's."""
+        """Length of the observation before the sonar."""
         return width_of(self.fields)
 
     @property
     def mate_width(self) -> int:
-        """Numbers of a team-mate, what it said apart."""
+        """Length of a team-mate's part, without its message."""
         return width_of(self.mate_fields)
 
     @property
     def term_names(self) -> tuple[str, ...]:
-        """Of the reward terms."""
+        """Names of the reward terms."""
         return tuple(term.name for term in self.reward_terms)
 
 
 class Writers(NamedTuple):
-    """The functions that write what is told of a world, for compiled code."""
+    """Functions for compiled code that write observations and rewards."""
 
     own: Any
-    """(c, v, s, rows): writes what eight robots observe of themselves and of the target."""
+    """(c, v, s, rows): writes the own fields of eight observers."""
     mate: Any
-    """(c, v, m, s, rows): writes what they observe of a team-mate."""
+    """(c, v, m, s, rows): writes the fields of a team-mate of each."""
     reward: Any
     """(c, w, t, weights, values) -> reward: writes the terms."""
     empty: Any
-    """(o, k): writes the place of a team-mate that nobody fills."""
+    """(o, k): writes an empty place of a team-mate."""
     width: int
-    """Numbers of an observation before the sonar's."""
+    """Length of the observation before the sonar."""
     mate_width: int
-    """Numbers of a team-mate, what it said apart."""
+    """Length of a team-mate's part, without its message."""
 
 
 class Sums(NamedTuple):
-    """The functions that work out what the metrics are made from, for compiled code."""
+    """Functions for compiled code that update the sums of the metrics."""
 
     clear: Any
     """(w): sets the sums to zero."""
     add: Any
-    """(c, w, trackers, slots): adds a control step to them."""
+    """(c, w, trackers, slots): adds a control step to the sums."""
 
 
 @functools.cache
 def built_in_parts() -> Parts:
-    """Return the parts that every scenario has."""
+    """Return the parts of every scenario."""
     return Parts(
         *_own_and_mates(FIELDS.built_in()),
         motions=TARGET_MOTIONS.built_in(),
@@ -108,7 +109,7 @@ def _own_and_mates(fields: Declarations) -> tuple[Declarations, Declarations]:
 
 
 def parts_for(scenario: Scenario) -> Parts:
-    """Return the parts for a scenario: the built-in ones, and those that it asks for by name."""
+    """Return the parts of a scenario: the built-in ones, and those that it names."""
     return Parts(
         *_own_and_mates(FIELDS.with_added(*scenario.extra_fields)),
         motions=TARGET_MOTIONS.with_added(scenario.target_motion),
@@ -119,7 +120,7 @@ def parts_for(scenario: Scenario) -> Parts:
 
 
 def added(parts: Parts) -> Iterator[tuple[Registry[Any], Any]]:
-    """Yield what a user's modules have declared among parts, each with its registry."""
+    """Yield the parts that users' modules have declared, each with its registry."""
     groups: tuple[tuple[Registry[Any], tuple[Any, ...]], ...] = (
         (FIELDS, parts.fields), (FIELDS, parts.mate_fields), (REWARD_TERMS, parts.reward_terms),
         (TARGET_MOTIONS, parts.motions), (SENSORS, parts.sensors), (METRICS, parts.metrics),
@@ -129,13 +130,13 @@ def added(parts: Parts) -> Iterator[tuple[Registry[Any], Any]]:
 
 
 def rules_for(parts: Parts) -> Rules:
-    """Return the functions that parts of the rules are carried out by."""
+    """Return the functions that dispatch to the target motions and sensors of parts."""
     return rules_of(parts.motions, parts.sensors)
 
 
 @functools.cache
 def writers_for(parts: Parts) -> Writers:
-    """Return the functions that write parts."""
+    """Return the functions that write the observations and rewards of parts."""
     return Writers(
         row_writer(parts.fields, ("c", "v")),
         row_writer(parts.mate_fields, ("c", "v", "m")),
@@ -148,5 +149,5 @@ def writers_for(parts: Parts) -> Writers:
 
 @functools.cache
 def sums_for(parts: Parts) -> Sums:
-    """Return the functions that work out the sums behind the metrics of parts."""
+    """Return the functions that update the sums of the metrics of parts."""
     return Sums(clearing(parts.metrics), adding(parts.metrics))

@@ -1,7 +1,7 @@
-"""The reward: named, unscaled terms. A scenario weighs them; ``info`` reports each by name.
+"""The reward: named, unscaled terms, weighted by the scenario; ``info`` reports each by name.
 
-A term is declared on its formula, here or in a module of your own. Those declared here are worked
-out and reported for every scenario, others for a scenario that weighs them.
+A term is declared on its formula, here or in a module of your own. Those declared here are computed
+and reported in every scenario, others in scenarios that give them a weight.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ONE: Final = np.float32(1.0)
 
 @dataclass(frozen=True)
 class RewardTerm:
-    """One term: what it is called, what it is measured in, and what it means."""
+    """One term: name, unit, meaning and formula."""
 
     name: str
     unit: str
@@ -34,18 +34,18 @@ class RewardTerm:
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions that it consists of, and what each returns."""
+        """The compiled functions of the term, and what each returns."""
         return ((self.function, "number"),)
 
 
 def reward_term(unit: str) -> Callable[[Function], Function]:
-    """Declare a function as a reward term of its name; its docstring is the meaning.
+    """Declare a function as a reward term with its name; its docstring is the meaning.
 
-    The function takes ``(c, w, t)``, the scenario as kernels read it, the world's record and a
-    tracker's (:mod:`posse.rules.state`), after the step, and returns a number.
+    The function takes ``(c, w, t)``: the records of the scenario, the world and a tracker
+    (:mod:`posse.rules.state`) after the step. It returns a number.
 
     Raises:
-        DeclarationError: The name is taken, the docstring is missing, or the parameters are others.
+        DeclarationError: The name is taken, the docstring is missing, or the parameters differ.
     """
 
     def declare(function: Function) -> Function:
@@ -65,19 +65,19 @@ def slot(c: Record, w: Record, t: Record) -> np.float32:
 
 @reward_term("m")
 def progress(c: Record, w: Record, t: Record) -> np.float32:
-    """By how much the distance to the nearest slot that nobody else occupies shrank."""
+    """Decrease in this step of the distance to the nearest slot that no other tracker occupies."""
     return np.float32(t.slot_progress)
 
 
 @reward_term("m")
 def distance(c: Record, w: Record, t: Record) -> np.float32:
-    """Distance to the nearest slot that nobody else occupies."""
+    """Distance to the nearest slot that no other tracker occupies."""
     return np.float32(t.slot_distance)
 
 
 @reward_term("1")
 def sight(c: Record, w: Record, t: Record) -> np.float32:
-    """1 while the tracker's own sensor has the target, else 0."""
+    """1 while the tracker's own sensor sees the target, else 0."""
     return _ONE if t.sees else _ZERO
 
 
@@ -89,7 +89,7 @@ def contact(c: Record, w: Record, t: Record) -> np.float32:
 
 @reward_term("1")
 def effort(c: Record, w: Record, t: Record) -> np.float32:
-    """(V / V_max)² + (ω / ω_max)² of the motion the tracker made."""
+    """(V / V_max)² + (ω / ω_max)² of the tracker's actual motion."""
     v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
     return np.float32(v * v + turn * turn)
 
@@ -101,16 +101,16 @@ def team(c: Record, w: Record, t: Record) -> np.float32:
 
 
 REWARD_TERMS: Final[tuple[RewardTerm, ...]] = TERMS.built_in()
-"""The terms of every scenario, in the order in which they are reported."""
+"""The built-in terms, in the order in which they are reported."""
 
 
 def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
-    """Return the terms of a scenario: the built-in ones, then others that it weighs."""
+    """Return the terms of a scenario: the built-in ones, then others with a weight."""
     return TERMS.with_added(*dict(scenario.reward_weights))
 
 
 def weights_for(scenario: Scenario) -> FloatArray:
-    """Return the weight of each term of a scenario, (K,) float32."""
+    """Return the weights of a scenario's terms, (K,) float32."""
     weights = dict(scenario.reward_weights)
     return np.array([weights.get(term.name, 0.0) for term in terms_for(scenario)], np.float32)
 
@@ -119,7 +119,7 @@ def reward_writer(terms: Sequence[RewardTerm]) -> Any:
     """Return (c, w, t, weights (K,), values (K,)) -> reward, compiled; it fills ``values``."""
     lines = [f"values[{k}] = term_{k}(c, w, t)" for k in range(len(terms))]
     lines.append("reward = ZERO")
-    # From the last on, as it always was: another order of rounding would change results.
+    # From last to first: another order would round differently and change results.
     lines.extend(
         f"reward = float32(weights[{k}] * values[{k}] + reward)"
         for k in range(len(terms) - 1, -1, -1)
@@ -131,10 +131,10 @@ def reward_writer(terms: Sequence[RewardTerm]) -> Any:
 
 @functools.cache
 def namer(names: tuple[str, ...]) -> Callable[..., dict[str, float]]:
-    """Return a function (a tracker's terms, in order) -> them by name.
+    """Return a function from a tracker's terms, in order, to a dictionary by name.
 
-    Written out as a literal, which is made in half the time of ``dict(zip(...))``: to name the
-    terms is a third of a step of one world.
+    The dictionary is a literal, created in half the time of ``dict(zip(...))``; this is a third of
+    the time of a step of one world.
     """
     literal = ", ".join(f"{name!r}: {name}" for name in names)
     naming: Callable[..., dict[str, float]] = eval(f"lambda {', '.join(names)}: {{{literal}}}")
@@ -144,7 +144,7 @@ def namer(names: tuple[str, ...]) -> Callable[..., dict[str, float]]:
 class TermsByName(Mapping[str, FloatArray]):
     """The terms (E, rows, K) of a step by name, (E, rows) each.
 
-    A view is made when it is asked for: to make all of them takes a third of a world's step.
+    Views are created on access: creating all of them takes a third of the time of a world's step.
     """
 
     __slots__ = ("_names", "_terms")

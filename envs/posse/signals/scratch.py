@@ -1,4 +1,4 @@
-"""What observations need of a thread's scratch memory (:mod:`posse.rules.scratch`)."""
+"""Fields of a thread's scratch memory used by observations (:mod:`posse.rules.scratch`)."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from posse.numeric import WIDTH
 from posse.rules.scratch import TEAM, Fields
 
 MOST_IN_TEAM: Final = 16
-"""Up to this team size, eight worlds are observed together."""
+"""Largest team size for which eight worlds are observed together."""
 
 
 def observing(worlds: int) -> Fields:
-    """Return the fields for observing one world, or eight together."""
-    # A team is there twice, and then comes room for the last block: of one world, or of eight.
+    """Return the fields for observing one world (``worlds`` is 1) or eight together."""
+    # A row holds the team twice, then padding for the last block.
     row = (2 * WIDTH * MOST_IN_TEAM if worlds > 1 else 2 * TEAM) + WIDTH
     return (
-        # Of eight observers.
+        # Eight observers.
         ("step", WIDTH),  # control steps since the start
         ("fix_step", WIDTH),
-        # Of eight team-mates.
-        ("column", WIDTH),  # of an observation
-        ("start", WIDTH),  # where in an observation each belongs
-        ("filled", WIDTH),  # how many team-mates an observer knows of
-        # Of a team that is observed as a whole.
-        ("distance", WIDTH * MOST_IN_TEAM),  # how far each mate is, m
-        ("place", WIDTH * MOST_IN_TEAM),  # how many are nearer
+        # Eight team-mates, one of each observer.
+        ("column", WIDTH),  # values of one column
+        ("start", WIDTH),  # index in the observation at which each team-mate begins
+        ("filled", WIDTH),  # number of team-mates that the observer knows of
+        # A team that is observed as a whole.
+        ("distance", WIDTH * MOST_IN_TEAM),  # of each team-mate, m
+        ("place", WIDTH * MOST_IN_TEAM),  # number of nearer team-mates
         # The team.
         ("team_x", row),
         ("team_y", row),
@@ -33,9 +33,9 @@ def observing(worlds: int) -> Fields:
         ("team_sin", row),
         ("team_speed", row),
         ("team_turn_rate", row),
-        # The nearest.
-        ("listed", WIDTH * TEAM),  # the nearest to each of eight, the second nearest, and so on
-        ("so_far", TEAM),  # of one: how far, m
-        ("who", TEAM),  # and which
-        ("certain", WIDTH),  # 0: a list has to be made again, exactly
+        # The nearest team-mates.
+        ("listed", WIDTH * TEAM),  # nearest to each of eight, then second nearest, and so on
+        ("so_far", TEAM),  # distances in the list of one observer, m
+        ("who", TEAM),  # and numbers
+        ("certain", WIDTH),  # 0: the list has to be computed again by exact distances
     )

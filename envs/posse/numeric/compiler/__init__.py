@@ -1,1 +1,1 @@
-"""numba's options, passes and cache: nothing to know of to change a rule."""
+"""numba's compiler passes and the kernel cache; not needed to change a rule."""

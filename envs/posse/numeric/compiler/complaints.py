@@ -1,4 +1,4 @@
-"""What is wrong with a function that does not compile, in one line."""
+"""Compile errors of a user's function, reduced to one line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ARTICLES: Final = {
 
 
 class Complaint(NamedTuple):
-    """What is wrong with a function."""
+    """An error in a function."""
 
     line: int
     reason: str
@@ -36,18 +36,18 @@ class Complaint(NamedTuple):
 def unknown_attribute(
     function: Callable[..., Any], attributes: Mapping[str, Iterable[str]]
 ) -> Complaint | None:
-    """Return where a function reads or writes an attribute that a parameter has not.
+    """Return the first use of an attribute that a parameter lacks, or None.
 
     Args:
-        function: Plain, or compiled.
-        attributes: What the parameters have, by name; of others nothing is known.
+        function: Plain or compiled.
+        attributes: Attributes of each parameter by name; other parameters are not checked.
     """
     code = getattr(function, "py_func", function).__code__
     instructions = list(dis.get_instructions(code))
     known = dict(attributes)
     for each in instructions:
         if each.opname.startswith("STORE_FAST") and isinstance(each.argval, str):
-            known.pop(each.argval, None)  # it is something else from there on
+            known.pop(each.argval, None)  # reassigned
     of = ""
     for each in instructions:
         if of in known and each.opname in ("LOAD_ATTR", "LOAD_METHOD", "STORE_ATTR"):
@@ -65,13 +65,13 @@ def unknown_attribute(
 def why_not_compiled(
     function: Callable[..., Any], arguments: Sequence[Any], returns: str
 ) -> Complaint | None:
-    """Compile a function for numba types by itself; return what is wrong with it, if anything is.
+    """Compile a function alone for the given numba types; return its error, or None.
 
     Args:
-        function: Plain, or compiled.
-        arguments: The types of its arguments.
-        returns: ``"nothing"``, ``"number"``, ``"pair"``, ``"truth"``, or
-            how many numbers in a tuple, ``"3 numbers"``. Eight numbers at once count as one.
+        function: Plain or compiled.
+        arguments: Types of the arguments.
+        returns: Required result: ``"nothing"``, ``"number"``, ``"pair"``, ``"truth"``, or a tuple
+            such as ``"3 numbers"``. Lanes count as a number.
     """
     plain = getattr(function, "py_func", function)
     code = plain.__code__
@@ -80,9 +80,9 @@ def why_not_compiled(
         alone.compile(tuple(arguments))
         form: Any = alone.overloads[tuple(arguments)]
         found: Any = form.signature.return_type
-    except KeyError as error:  # how numba takes an unknown field
+    except KeyError as error:  # raised by numba for an unknown field
         return Complaint(code.co_firstlineno, f"a record that it reads has no field {error}")
-    except Exception as error:  # whatever the compiler raises
+    except Exception as error:  # the compiler may raise anything
         text = _COLOURS.sub("", str(error))
         return Complaint(_line(text, code), _reason(text))
     count, _, numbers = returns.partition(" ")
@@ -104,7 +104,7 @@ def _is_number(found: Any) -> bool:
 
 
 def _line(text: str, code: Any) -> int:
-    """Return the last line of the function that the compiler's message is about."""
+    """Return the last line of the function named in the compiler's message."""
     file = re.escape(Path(code.co_filename).name)
     lines = re.findall(rf'{file}(?:" *, line | \()(\d+)', text)
     return int(lines[-1] if lines else code.co_firstlineno)

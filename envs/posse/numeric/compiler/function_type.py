@@ -1,4 +1,4 @@
-"""What a compiled function is as a value, so that named tuples of functions reach kernels."""
+"""numba type of functions as values, so that kernels can take named tuples of functions."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numba.core.imputils import lower_constant
 
 
 class FunctionType(types.Dispatcher):
-    """A function as compiled code has it: a type, which says what to call, and no value.
+    """A function whose type identifies what to call, without a value at run time.
 
-    numba's own has the function's address for a value, which no cache could keep.
+    numba's own type holds the function's address, which cannot be cached on disk.
     """
 
 

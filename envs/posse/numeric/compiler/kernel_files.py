@@ -1,8 +1,8 @@
-"""Files that keep compiled kernels, one each, in a directory that only the user can write to.
+"""Compiled kernels on disk, one file each, in a directory that only the user can write to.
 
-A file is code: it is unpickled and run. So nothing is read from a directory that somebody else
-could have written to, and a file is used only if it is whole, by a hash that it begins with.
-Whatever is wrong with a directory or a file, the kernel is compiled again.
+A file is unpickled and executed. Therefore files in a directory that another user could have
+written to are not read, and each file begins with a hash of its contents, which is verified. If a
+directory or file cannot be used, the kernel is compiled.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _HASH: Final = 32  # bytes of SHA-256
 _SUFFIX: Final = ".kernel"
 _UNFINISHED: Final = ".tmp"
 _KEPT: Final = 256
-"""Files that are kept, the last used; a kernel takes up to about a megabyte."""
+"""Maximum number of files; the least recently used are deleted. A kernel takes up to 1 MB."""
 _HOUR: Final = 3600.0
 
 
 def cache_directory() -> Path | None:
-    """Where kernels are kept, or None where there is not even a home directory."""
+    """Return the directory of the kernels, or None without a home directory."""
     chosen = os.environ.get("POSSE_CACHE_DIR")
     if chosen:
         return Path(chosen).absolute()
@@ -42,7 +42,7 @@ def cache_directory() -> Path | None:
 
 
 def read(name: str) -> bytes | None:
-    """Return what was written under a name, or None if it is not there, whole and trusted."""
+    """Return what was written under a name, or None if it is missing, damaged or not trusted."""
     directory = _open_directory()
     if isinstance(directory, str):
         return None
@@ -56,12 +56,12 @@ def read(name: str) -> bytes | None:
     if content[:start] != _MAGIC + _hash(name, content[start:]):
         return None
     with contextlib.suppress(OSError):
-        os.utime(path)  # it is in use: to be kept longer
+        os.utime(path)  # mark as recently used
     return content[start:]
 
 
 def write(name: str, content: bytes) -> None:
-    """Keep something under a name, if there is room and a directory to trust."""
+    """Store content under a name; do nothing if the directory cannot be used or is full."""
     directory = _open_directory()
     if isinstance(directory, str):
         return
@@ -77,16 +77,16 @@ def write(name: str, content: bytes) -> None:
             Path(unfinished).unlink(missing_ok=True)
 
 
-@functools.cache  # once a process, however many kernels it compiles
+@functools.cache  # once per process
 def announce() -> None:
-    """Say that the user has to wait, and whether only this time."""
+    """Print that kernels are being compiled, and whether the result is kept."""
     directory = _open_directory()
     if isinstance(directory, str):
-        kept = f"each time: {directory}"
+        kept = f"in each process: {directory}"
     elif os.access(directory, os.W_OK):
-        kept = f"once; kept in {directory}"
+        kept = f"once; cached in {directory}"
     else:
-        kept = f"each time: cannot write to {directory}"
+        kept = f"in each process: cannot write to {directory}"
     sys.stderr.write(f"posse: compiling kernels, which takes some seconds ({kept})\n")
 
 
@@ -95,7 +95,7 @@ def _hash(name: str, content: bytes) -> bytes:
 
 
 def _open_directory() -> Path | str:
-    """Return the directory, made if it was not there, or why it cannot be used and what to do."""
+    """Return the directory, created if missing, or the reason why it cannot be used and the fix."""
     directory = cache_directory()
     if directory is None:
         return "there is no home directory; set POSSE_CACHE_DIR"
@@ -110,8 +110,8 @@ def _open_directory() -> Path | str:
 
 
 def _distrust(status: os.stat_result) -> str | None:
-    """Return why somebody else could have written to a file or a directory, and what to do."""
-    if not hasattr(os, "getuid"):  # Windows: whoever may write to the user's profile is the user
+    """Return why another user could have written to a file or directory, and the fix, or None."""
+    if not hasattr(os, "getuid"):  # Windows protects the user's profile by itself
         return None
     if status.st_uid != os.getuid():
         return "it belongs to another user; set POSSE_CACHE_DIR to a directory of your own"
@@ -121,7 +121,7 @@ def _distrust(status: os.stat_result) -> str | None:
 
 
 def _open_regular(path: Path) -> int:
-    """Open a file to read, but nothing that could block or that others could have written."""
+    """Open a regular file for reading, if no other user could have written it."""
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0))
     status = os.fstat(handle)
     if not stat.S_ISREG(status.st_mode) or _distrust(status):
@@ -131,7 +131,7 @@ def _open_regular(path: Path) -> int:
 
 
 def _prune(directory: Path) -> None:
-    """Drop what has not been used for longest, and what a process that was killed left behind."""
+    """Delete the least recently used kernels, and unfinished files of killed processes."""
     files = sorted(directory.glob(f"*{_SUFFIX}"), key=lambda path: path.stat().st_mtime)
     left = [
         path

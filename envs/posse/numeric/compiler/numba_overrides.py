@@ -1,8 +1,8 @@
-"""Every use of numba's private parts, and what each one buys.
+"""Every use of numba's private parts, and what each one gains.
 
 =========================== ======================================================================
-``_InnerLibrary``           A function inside a kernel is optimised and made machine code with the
-                            kernel, not by itself as well: cold start 14 s, else 20 s.
+``_InnerLibrary``           A function inlined into a kernel becomes machine code only as a part of
+                            the kernel, not separately as well: cold start 14 s, else 20 s.
 ``_InnerDispatcher``        A function is compiled once for all integers that it is called with,
                             not for each constant and each width: cold start 14 s, else 19 s.
 ``_Library``                Loops of unknown length are not unrolled, and rarely called functions
@@ -13,7 +13,7 @@
 ``KernelCache``             Warm start 0.6 s; numba's own cache goes stale and reads damaged files.
 =========================== ======================================================================
 
-Cold start: first step of ``smart``, nothing cached. A test checks that numba still has all of this.
+Cold start: first step of ``smart``, no cached kernels. A test checks that numba has all of this.
 """
 
 from __future__ import annotations
@@ -48,22 +48,22 @@ class _Library(JITCodeLibrary):
 
 
 class _InnerLibrary(_Library):
-    """LLVM code that is only linked into kernels, and optimised there."""
+    """LLVM code that is only linked into kernels, where it is optimised."""
 
     def _optimize_final_module(self) -> None:
         pass
 
     def _finalize_final_module(self) -> None:
-        self._finalized = True  # without handing it to LLVM's engine, which makes machine code
+        self._finalized = True  # without LLVM's engine, which would generate machine code
 
     @property
     def codegen(self) -> Any:
-        # numba would register the function's globals there, which needs machine code.
+        # numba would register the function's globals here, which requires machine code.
         return SimpleNamespace(set_env=lambda name, environment: None)
 
 
 class _Compiler(CompilerBase):
-    """numba's own passes, into a library of ours."""
+    """numba's standard passes with another library class."""
 
     library: type[JITCodeLibrary] = _Library
 
@@ -86,7 +86,7 @@ class _KernelLibrary(_Library):
 
 
 class KernelCompiler(_Compiler):
-    """Compiles a kernel, whose arrays do not overlap."""
+    """Compiles a kernel, assuming that its arrays do not overlap."""
 
     library = _KernelLibrary
 
@@ -96,7 +96,7 @@ class KernelCompiler(_Compiler):
 
 
 class CompiledFunction(CPUDispatcher):
-    """A function in two forms: for Python, compiled if Python calls it; and for kernels to link."""
+    """A function in two compiled forms: one for calls from Python, one to link into kernels."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function, targetoptions=options)
@@ -120,21 +120,21 @@ def _widest(kind: Any) -> Any:
 
 
 class KernelCache(NullCache):
-    """Where numba looks for a kernel before it compiles it, and puts it afterwards."""
+    """Cache in which numba looks a kernel up before compiling, and stores it afterwards."""
 
     def __init__(self, *stamped: Any) -> None:
         self._stamped = stamped
 
     @functools.cached_property
     def _stamp(self) -> Stamp:
-        return Stamp(*self._stamped)  # only now: a kernel may call what stands below it
+        return Stamp(*self._stamped)  # lazily: a kernel may call functions defined below it
 
     def _name(self, sig: Any, codegen: Any) -> str:
         return self._stamp.hexdigest(str(sig), *map(str, codegen.magic_tuple()))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return a kernel for these types, or None."""
-        with contextlib.suppress(Exception):  # whatever it is, the kernel is compiled
+        with contextlib.suppress(Exception):  # after any error, compile
             kept = kernel_files.read(self._name(sig, target_context.codegen()))
             signature, parts = pickle.loads(kept) if kept is not None else (None, ())  # noqa: S301
             if signature == sig:
@@ -143,7 +143,7 @@ class KernelCache(NullCache):
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a kernel for these types."""
+        """Store a kernel for these types."""
         with contextlib.suppress(Exception):
             if self._stamp.holds() and not data.library.has_dynamic_globals:
                 kernel_files.write(self._name(sig, data.codegen), dumps((sig, data._reduce())))

@@ -1,7 +1,7 @@
-"""What a kernel is compiled from, as a hash: while that is the same, so is the kernel.
+"""Hashes of the sources of a kernel; a cached kernel is valid while its hash is unchanged.
 
-A kernel may be inlined from many files, so a stamp covers the package of the kernel and of every
-function that it is said or seen to call, and the values that become constants in its code.
+Functions of many files are inlined into a kernel. The hash covers the packages of the kernel and of
+every function that it calls, and the values that become constants in its code.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NO_KERNELS: Final = {
     "posse": ("adapters", "rendering"),
     "posse_training": ("commands", "replay", "reports", "runs", "shipping"),
 }
-"""Rooms of a package without compiled code; kernels do not depend on them."""
+"""Rooms without compiled code, by package; kernels do not depend on them."""
 
 _STAMPED_BY_VERSION: Final = ("numba", "llvmlite", "numpy")
 _CONFIG: Final[Any] = numba.config  # Any: numba sets its names at run time
@@ -40,9 +40,9 @@ _COMPILERS: Final = (
 
 @functools.cache
 def _source(filename: str) -> Path | None:
-    """The outermost package that a file belongs to; the file itself; None if there is no file."""
+    """Return a file's outermost package, the file itself if it has none, or None without a file."""
     path = Path(filename).resolve()
-    if not path.is_file():  # code that was written by a program, or typed in
+    if not path.is_file():  # generated or interactive code
         return None
     source = path
     for directory in path.parents:
@@ -53,7 +53,7 @@ def _source(filename: str) -> Path | None:
 
 
 def _read(source: Path) -> bytes:
-    """A hash of a file, or of the names and contents of a package's files that matter."""
+    """Return a hash of a file, or of a package's file names and contents."""
     digest = hashlib.sha256(source.name.encode())
     without = [source / room for room in _NO_KERNELS.get(source.name, ())]
     for path in sorted(source.rglob("*.py")) if source.is_dir() else [source]:
@@ -61,19 +61,19 @@ def _read(source: Path) -> bytes:
             continue
         try:
             content = path.read_bytes()
-        except OSError:  # an editor's temporary file that is gone by now
+        except OSError:  # deleted since it was listed
             content = b""
         digest.update(path.relative_to(source.parent).as_posix().encode())
         digest.update(hashlib.sha256(content).digest())
     return digest.digest()
 
 
-# Remembered: this process goes on with what it has imported, whatever is written later.
+# Cached, since a process keeps running what it imported even if the file changes later.
 _as_imported: Final = functools.cache(_read)
 
 
 def remember(function: Callable[..., Any]) -> None:
-    """Hash a function's source now, while it is what this process has imported."""
+    """Hash a function's source now, before the file can change."""
     source = _source(function.__code__.co_filename)
     for each in (_POSSE, source):
         if each is not None:
@@ -81,11 +81,11 @@ def remember(function: Callable[..., Any]) -> None:
 
 
 class Stamp:
-    """A hash of what a kernel is compiled from.
+    """A hash of the sources and constants of a kernel.
 
     Args:
         function: The kernel.
-        others: Functions that it calls in a way that cannot be seen from its globals and closure.
+        others: Functions that it calls but that its globals and closure do not refer to.
 
     Raises:
         TypeError: A constant of the code cannot be hashed.
@@ -101,13 +101,13 @@ class Stamp:
             self._digest.update(_as_imported(source))
 
     def hexdigest(self, *more: str) -> str:
-        """Return the hash, together with more that the machine code depends on."""
+        """Return the hash, with further strings that the machine code depends on."""
         digest = self._digest.copy()
         digest.update(repr(more).encode())
         return digest.hexdigest()
 
     def holds(self) -> bool:
-        """Whether the sources are still what this process has imported."""
+        """Return whether the sources are unchanged since this process imported them."""
         return all(_read(source) == _as_imported(source) for source in self._sources)
 
     def _add(self, value: Any) -> None:
@@ -147,7 +147,7 @@ class Stamp:
             self._add_code(function.__code__, function.__globals__)
 
     def _add_code(self, code: CodeType, scope: dict[str, Any]) -> None:
-        """Add bytecode, which is what numba compiles, and the globals that it names."""
+        """Add the bytecode, which is what numba compiles, and the globals that it refers to."""
         self._write(code.co_code, code.co_names, code.co_varnames)
         for constant in code.co_consts:
             if isinstance(constant, CodeType):

@@ -1,1 +1,1 @@
-"""Eight numbers at a time, and what they compile to."""
+"""Blocks of eight numbers, and their compilation to vector instructions."""

@@ -1,4 +1,4 @@
-"""Atomic operations on memory that threads share, for compiled code."""
+"""Atomic operations on memory shared by threads, for compiled code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def _first(context: Any, builder: Any, sig: Any, values: Any) -> Any:
 
 
 def _add(typing: Any, array: Any, value: Any) -> Any:
-    """Add to an array's first number atomically; return what it was."""
+    """Atomically add to the first element of an array; return its previous value."""
     return types.int64(
         array, types.int64
     ), lambda context, builder, sig, values: builder.atomic_rmw(
@@ -22,7 +22,7 @@ def _add(typing: Any, array: Any, value: Any) -> Any:
 
 
 def _read(typing: Any, array: Any) -> Any:
-    """Read an array's first number from memory, where another thread may have written it."""
+    """Read the first element of an array from memory, which another thread may have written."""
     return types.int64(array), lambda context, builder, sig, values: builder.load_atomic(
         _first(context, builder, sig, values), "acquire", 8
     )

@@ -1,4 +1,4 @@
-"""What numba compiles :mod:`posse.numeric.simd.lanes` to: LLVM's vectors of eight."""
+"""Compilation of :mod:`posse.numeric.simd.lanes` to LLVM vectors of eight."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class LanesType(types.Type):
         super().__init__(name="Lanes")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """Take a plain number for eight of itself (numba's name for it)."""
+        """Convert a number to eight copies of itself (numba's interface)."""
         if other == types.float32:
             return Conversion.safe
         return Conversion.unsafe if isinstance(other, (types.Float, types.Integer)) else None
@@ -101,7 +101,7 @@ def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any
 def _declare(
     function: Any, result: Any, arguments: tuple[Any, ...], emit: Callable[..., Any]
 ) -> None:
-    """Tell numba what a function or an operator takes and gives, and which instructions it is."""
+    """Declare the types and the instructions of a function or operator to numba."""
 
     @infer_global(function)
     class Template(ConcreteTemplate):
@@ -113,7 +113,7 @@ def _declare(
 
 
 def _pick(sign: str) -> Callable[..., Any]:
-    """Return what emits the choice of the second number where it compares so with the first."""
+    """Return an emitter that selects the second value where ``second <sign> first`` holds."""
 
     def emit(builder: Any, value: Any, other: Any) -> Any:
         return builder.select(builder.fcmp_ordered(sign, other, value), other, value)
@@ -150,7 +150,7 @@ def _emit_counts(builder: Any, value: Any) -> Any:
 
 def _emit_least(builder: Any, value: Any) -> Any:
     lesser_of = _pick("<")
-    for size in (4, 2, 1):  # the upper half comes to lie over the lower
+    for size in (4, 2, 1):  # upper half onto the lower half
         places = [(k + size) % WIDTH for k in range(WIDTH)]
         value = lesser_of(builder, value, _shuffle(builder, value, value, places))
     return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
@@ -169,7 +169,7 @@ def _shuffle(builder: Any, value: Any, other: Any, places: list[int]) -> Any:
 
 
 def _emit_transpose(builder: Any, *rows: Any) -> Any:
-    """Swap ever larger squares across the diagonal: of one number, two by two, four by four."""
+    """Swap blocks of 1, 2x2 and 4x4 numbers across the diagonal in three rounds."""
     for size in (1, 2, 4):
         upper = [k if k & size == 0 else k - size + WIDTH for k in range(WIDTH)]
         lower = [k + size if k & size == 0 else k + WIDTH for k in range(WIDTH)]

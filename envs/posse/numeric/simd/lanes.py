@@ -1,15 +1,15 @@
-"""Eight numbers that the processor works on at once.
+"""Blocks of eight numbers (SIMD).
 
-``Lanes`` are eight float32, a ``Mask`` eight truth values; compiled code holds each in a vector
-register. A formula that is written for a number, ``x * x + y * y``, then holds for eight discs or
-beams, in the time of one. A float32 stands for eight of itself. Nothing is rounded otherwise than
-for a number alone: a lane does not depend on its neighbours.
+``Lanes`` are eight float32 values, a ``Mask`` eight booleans; compiled code holds each in a vector
+register. A formula such as ``x * x + y * y`` is written as for single numbers and computes eight
+discs or beams in the time of one. A float32 is broadcast to eight copies. Rounding is the same as
+for single numbers: a lane does not depend on its neighbours.
 
-Lanes know ``+ - * /``, ``abs`` and ``< <= > >= ==``, which give masks; masks know ``&`` and ``|``.
-The functions below are what else there is; ``choose``, ``lesser``, ``greater`` and ``root`` take
-plain numbers, too, so that a formula need not be written twice. The bodies here are for where
-nothing is compiled, and work on numpy arrays; :mod:`posse.numeric.simd.lane_code` says what they
-compile to.
+Lanes support ``+ - * /``, ``abs`` and the comparisons ``< <= > >= ==``, which return masks; masks
+support ``&`` and ``|``. All other operations are the functions below; ``choose``, ``lesser``,
+``greater`` and ``root`` also accept single numbers, so that a formula is written only once. The
+function bodies work on numpy arrays and are used only if nothing is compiled;
+:mod:`posse.numeric.simd.lane_code` defines what they compile to.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ WIDTH: Final = 8
 Lanes = Any
 """Eight float32."""
 Mask = Any
-"""Eight truth values."""
+"""Eight booleans."""
 
 
 def load(array: FloatArray, index: int) -> Lanes:
-    """Return the eight numbers that begin at ``index``, which is not negative."""
+    """Return the eight numbers from ``index`` on, which must not be negative."""
     return np.array([array[index + k] for k in range(WIDTH)], np.float32)
 
 
@@ -41,19 +41,16 @@ def store(array: FloatArray, index: int, value: Lanes) -> None:
 
 
 def fetch(array: npt.NDArray[Any], offset: int) -> None:
-    """Have the processor bring what lies so many bytes into an array into its cache.
-
-    To be written soon: nothing else follows from it.
-    """
+    """Prefetch the cache line ``offset`` bytes into an array, for writing; no other effect."""
 
 
 def eight(value: np.float32) -> Lanes:
-    """Return eight of a number: to begin with, where lanes are to be gathered in a loop."""
+    """Return eight copies of a number, for instance as the initial value of a loop variable."""
     return np.full(WIDTH, value, np.float32)
 
 
 def choose(mask: Mask, value: Lanes, other: Lanes) -> Lanes:
-    """Return ``value`` where the mask is true, else ``other``; both are worked out everywhere."""
+    """Return ``value`` where the mask is true, else ``other``; both are always evaluated."""
     return np.asarray(np.where(mask, value, other))[()]
 
 
@@ -78,45 +75,45 @@ def least(value: Lanes) -> np.float32:
 
 
 def tagged(value: Lanes, number: int) -> Lanes:
-    """Return numbers that are not negative with a number below 64 in place of their last six bits.
+    """Return non-negative numbers with their last six bits replaced by a tag below 64.
 
-    They compare as before where they differ by more than a 65,536th, and say whose they are
-    (:func:`tag`).
+    The order of numbers that differ by more than 1/65,536 relatively is kept; :func:`tag` reads
+    the tag.
     """
     whole = np.asarray(value, np.float32).view(np.uint32)
     return (whole & np.uint32(0xFFFFFFC0) | np.uint32(number)).view(np.float32)
 
 
 def tag(value: Lanes) -> Lanes:
-    """Return the numbers that :func:`tagged` put in."""
+    """Return the tags set by :func:`tagged`, as float32."""
     return (np.asarray(value, np.float32).view(np.uint32) & np.uint32(63)).astype(np.float32)
 
 
 def counts(value: Lanes) -> Lanes:
-    """Return whole numbers, int32 that were loaded as they stand in a record, as float32."""
+    """Return int32 values, loaded from a record as raw bits, converted to float32."""
     return np.asarray(value, np.float32).view(np.int32).astype(np.float32)
 
 
 def bits(mask: Mask) -> int:
-    """Return the mask as a number: its lowest bit is the first lane, its eighth the last."""
+    """Return the mask as an integer; bit k is lane k."""
     return sum(1 << k for k, true in enumerate(np.broadcast_to(mask, WIDTH)) if true)
 
 
 def lowest_bit(number: int) -> int:
-    """Return the place of the lowest bit that is set in a number other than 0."""
+    """Return the index of the lowest set bit of a number other than 0."""
     whole = int(number)
     return (whole & -whole).bit_length() - 1
 
 
 def load_fields(record: Record, offset: int) -> Lanes:
-    """Return the eight float32 that begin ``offset`` bytes into a record."""
+    """Return the eight float32 from ``offset`` bytes into a record on."""
     return np.frombuffer(record.tobytes(), np.float32, WIDTH, offset)
 
 
 def store_fields(record: Record, offset: int, value: Lanes) -> None:
     """Write eight float32 from ``offset`` bytes into a record on.
 
-    What is no float32 there has to be given back as :func:`load_fields` returned it.
+    Lanes over fields of other types must hold what :func:`load_fields` returned.
     """
     for name, (kind, at, *_) in record.dtype.fields.items():
         if kind == np.float32 and offset <= at < offset + 4 * WIDTH:
@@ -126,7 +123,7 @@ def store_fields(record: Record, offset: int, value: Lanes) -> None:
 def transpose(
     a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes
 ) -> tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]:
-    """Return the first of all, the second of all, and so on."""
+    """Return the transposed 8 x 8 matrix: the first lanes of all, the second lanes of all, ..."""
     first, second, third, fourth, fifth, sixth, seventh, eighth = np.array(
         [np.broadcast_to(v, WIDTH) for v in (a, b, c, d, e, f, g, h)], np.float32
     ).T

@@ -16,7 +16,7 @@ from posse.rules.discs import natural
 from posse.signals.observation.fields import FieldDeclaration
 
 _FEW: Final = 2
-"""Up to so many columns are written faster number by number than by a transposition."""
+"""Number of columns up to which writing single numbers is faster than a transposition."""
 
 Declarations = Sequence[FieldDeclaration]
 

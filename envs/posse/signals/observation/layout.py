@@ -1,9 +1,8 @@
-"""The observation of one robot: a flat float32 vector, its fields by name.
+"""Layout of a robot's observation: a flat float32 vector of named fields.
 
-First the fields of what it knows of itself, its task and the target (:mod:`.own_fields`, and those
-that the scenario asks for beside), then the sonar, then a place for each team-mate
-(:mod:`.mate_fields`, likewise), with what it said. A quantity that is
-not known holds the field's ``unknown`` value.
+The own fields (:mod:`.own_fields`, and those named by the scenario) come first, then the sonar,
+then for each place of a team-mate its fields (:mod:`.mate_fields`, and those named by the scenario)
+and message. Unknown quantities hold the field's ``unknown`` value.
 """
 
 from __future__ import annotations
@@ -21,37 +20,37 @@ from posse.signals.parts import parts_for
 
 
 def _sonar_fields(s: Scenario) -> list[Field]:
-    """Return the sonar's field, which :func:`posse.rules.senses.sonar.ping` writes."""
+    """Return the sonar's field, written by :func:`posse.rules.senses.sonar.ping`."""
     if s.sonar_beams == 0:
         return []
     return [
         Field(
             "sonar", s.sonar_beams, "m", 0, s.sonar_range * SLACK,
-            "Distance from its rim to anything, each beam from straight ahead to the left; "
-            "sonar_range where nothing is near.",
+            "Distance from its rim to the nearest disc or wall along each beam, from straight "
+            "ahead to the left; sonar_range if there is none.",
         )
     ]  # fmt: skip
 
 
 def _message_fields(s: Scenario) -> list[Field]:
-    """Return the field of what a team-mate said, which :mod:`~.mates` writes."""
+    """Return the field of a team-mate's message, written by :mod:`~.mates`."""
     if s.message_size == 0:
         return []
     return [
         Field(
-            "neighbour_message", s.message_size, "1", -1, 1, "What its policy added.", 0,
+            "neighbour_message", s.message_size, "1", -1, 1, "Message from its policy.", 0,
             of_neighbour=True,
         )
     ]  # fmt: skip
 
 
 class ObservationLayout:
-    """Where each field lies in the flat observation of a scenario, and what it may hold.
+    """Position and range of each field in the flat observation of a scenario.
 
     Attributes:
         fields: Every :class:`Field`, in order; those of a team-mate once.
         size: F, length of the flat observation.
-        neighbours: Places for team-mates.
+        neighbours: Number of places for team-mates.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -75,7 +74,7 @@ class ObservationLayout:
 
     @property
     def stride(self) -> int:
-        """Length of one team-mate's part."""
+        """Length of the part of one team-mate."""
         return self._stride
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -93,8 +92,8 @@ class ObservationLayout:
     def views(self, observations: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
         """Return named views of flat observations (..., F), sharing their memory.
 
-        A field of size 1 is (...), one of size k is (..., k); a team-mate's field has one more
-        axis before, (..., places) or (..., places, k).
+        A field of size 1 has shape (...), one of size k (..., k); a field of team-mates has an
+        axis of places before that, (..., places) or (..., places, k).
 
         Raises:
             ValueError: The last axis is not F long.
@@ -121,7 +120,7 @@ class ObservationLayout:
         """Return the flat observations (..., F) of named values; the inverse of :meth:`views`.
 
         Raises:
-            ValueError: A field is missing, unknown, or of a shape that does not fit.
+            ValueError: A missing or unknown field, or a wrong shape.
         """
         names = [field.name for field in self.fields]
         if set(views) != set(names):

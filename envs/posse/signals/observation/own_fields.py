@@ -1,7 +1,7 @@
-"""The built-in fields of what a robot observes of itself, its task and its target, in order.
+"""The built-in observation fields of the robot itself, its task and its target, in order.
 
-*Ego* means the robot's own frame, x ahead and y to the left; the *common frame* is the one that the
-team agreed on at the start. Directions are cosine and sine. To add a field, declare it here, or in
+*Ego* means the robot's own frame, x ahead and y to the left; the *common frame* is a fixed frame
+shared by the team. Directions are given as cosine and sine. To add a field, declare it here, or in
 a module of your own (:mod:`posse.signals.observation.fields`).
 """
 
@@ -27,7 +27,7 @@ Pair = tuple[Lanes, Lanes]
 
 
 def most_turn(s: Scenario) -> float:
-    """Return a bound of every robot's turn rate, rad/s."""
+    """Return an upper bound of every robot's turn rate, rad/s."""
     return max(*s.tracker_turn_rates, s.target_turn_rate) * SLACK
 
 
@@ -88,7 +88,7 @@ def _one_if(truth: bool) -> np.float32:
 
 @field("1", 0, 1, size=len(FORMATIONS))
 def formation(c: Record) -> tuple[np.float32, np.float32, np.float32]:
-    """The formation asked for: 1 at its place among wedge, ring, rows."""
+    """Required formation, one-hot: wedge, ring, rows."""
     return _one_if(c.formation == 0), _one_if(c.formation == 1), _one_if(c.formation == 2)
 
 
@@ -100,19 +100,19 @@ def number(c: Record, v: View) -> Lanes:
 
 @field("1", lambda s: s.num_trackers, lambda s: s.num_trackers)
 def team_size(c: Record) -> np.float32:
-    """N, trackers in the team."""
+    """N, number of trackers in the team."""
     return np.float32(c.num_trackers)
 
 
 @setting("m", lambda s: s.formation_distance)
 def formation_distance(c: Record) -> np.float32:
-    """Wanted distance from the target to the nearest slot."""
+    """Required distance from the target to the nearest slot."""
     return np.float32(c.formation_distance)
 
 
 @setting("m", lambda s: s.formation_spacing)
 def formation_spacing(c: Record) -> np.float32:
-    """Wanted distance between neighbouring slots."""
+    """Required distance between neighbouring slots."""
     return np.float32(c.formation_spacing)
 
 
@@ -130,55 +130,55 @@ def max_turn_rate(c: Record, v: View) -> Lanes:
 
 @field("s", 0, lambda s: max(s.tracker_speeds) / s.tracker_acceleration * SLACK)
 def acceleration_time(c: Record, v: View) -> Lanes:
-    """From rest to full speed; 0: at once."""
+    """Time from rest to full speed; 0: no acceleration limit."""
     return v.acceleration_time
 
 
 @field("s", 0, lambda s: max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK)
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
-    """From no turn to the greatest turn rate; 0: at once."""
+    """Time from turn rate 0 to the greatest turn rate; 0: no acceleration limit."""
     return v.turn_acceleration_time
 
 
 @setting("m", lambda s: s.tolerance)
 def tolerance(c: Record) -> np.float32:
-    """How near to a slot counts as in it."""
+    """Greatest distance from a slot at which a robot occupies it."""
     return np.float32(c.tolerance)
 
 
 @setting("m", lambda s: s.robot_radius)
 def robot_radius(c: Record) -> np.float32:
-    """Of every robot's disc."""
+    """Radius of every robot's disc."""
     return np.float32(c.radius)
 
 
 @setting("s", lambda s: s.control_step)
 def control_step(c: Record) -> np.float32:
-    """From one action to the next."""
+    """Time between two actions."""
     return np.float32(c.dt)
 
 
 @setting("m", lambda s: s.sensing_range)
 def sensing_range(c: Record) -> np.float32:
-    """How far its sensor reaches; -1: any distance."""
+    """Range of its target sensor; -1: unlimited."""
     return np.float32(c.told_sensing_range)
 
 
 @setting("m", lambda s: s.sonar_range)
 def sonar_range(c: Record) -> np.float32:
-    """How far its sonar reaches."""
+    """Range of its sonar."""
     return np.float32(c.sonar_range)
 
 
 @setting("m", lambda s: s.arena)
 def arena(c: Record) -> np.float32:
-    """Side of the walled square round the origin; -1: no walls."""
+    """Side of the walled square around the origin; -1: no walls."""
     return np.float32(c.told_arena)
 
 
 @field("s", 0, lambda s: s.duration * SLACK)
 def time_left(c: Record, v: View) -> Lanes:
-    """Until the episode is truncated."""
+    """Time until the episode is truncated."""
     return (np.float32(c.horizon) - v.step) * c.dt
 
 
@@ -192,26 +192,26 @@ def _if_known(v: View, value: Lanes) -> Lanes:
 
 @compiled
 def _direction(v: View, x: Lanes, y: Lanes) -> Pair:
-    """Return a unit vector of the common frame, ego; 0 where the target is not known."""
+    """Return a unit vector of the common frame in the ego frame; 0 if the target is unknown."""
     ahead, left = ego(v, x, y)
     return _if_known(v, within_one(ahead)), _if_known(v, within_one(left))
 
 
 @field("1", 0, 1)
 def target_known(c: Record, v: View) -> Lanes:
-    """1 once it has a fix of the target, seen or heard."""
+    """1 once it has a fix of the target, from its sensor or by radio."""
     return choose(v.target_known, _ONE, _ZERO)
 
 
 @field("1", 0, 1)
 def target_seen(c: Record, v: View) -> Lanes:
-    """1 while its own sensor has the target."""
+    """1 while its own sensor sees the target."""
     return v.target_seen
 
 
 @field("s", -1, lambda s: s.duration * SLACK, unknown=-1)
 def target_age(c: Record, v: View) -> Lanes:
-    """Age of the fix that the following fields are about."""
+    """Age of the fix described by the following fields."""
     return choose(v.target_known, (v.step - v.target_step) * c.dt, _MINUS_ONE)
 
 
@@ -221,7 +221,7 @@ def _farthest_fix(s: Scenario) -> float:
 
 @field("m", -1, _farthest_fix, unknown=-1)
 def target_range(c: Record, v: View) -> Lanes:
-    """Distance of the fix from here."""
+    """Distance from the robot to the fix."""
     if c.fix_bearing != 0:
         return eight(_MINUS_ONE)
     return choose(v.target_known, v.target_distance, _MINUS_ONE)
@@ -229,7 +229,7 @@ def target_range(c: Record, v: View) -> Lanes:
 
 @field("1", -1, 1, unknown=0, size=2)
 def target_bearing(c: Record, v: View) -> Pair:
-    """Direction of the fix, ego."""
+    """Direction from the robot to the fix, ego."""
     per_metre = _ONE / greater(v.target_distance, _TINY)
     ahead, left = ego(v, v.target_dx * per_metre, v.target_dy * per_metre)
     ahead = choose(v.target_distance > _ZERO, within_one(ahead), _ONE)
@@ -250,6 +250,6 @@ def target_frame(c: Record, v: View) -> Pair:
 
 @field("m/s", lambda s: -_fast(s), _fast, unknown=0, size=2)
 def target_velocity(c: Record, v: View) -> Pair:
-    """Velocity of the target from successive fixes, ego."""
+    """Velocity of the target, estimated from successive fixes, ego."""
     ahead, left = ego(v, v.target_vx, v.target_vy)
     return _if_known(v, ahead), _if_known(v, left)
