@@ -1,17 +1,17 @@
-# Needs nothing but make and Python 3.11 or newer. `make` alone lists the commands.
+# Requires make and Python 3.11 or newer. `make` without arguments lists the commands.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := posse_training.demo
 
-# What is installed depends on these two files alone; each stamp records one set of packages.
+# The installed packages depend only on these two files; each stamp marks one installed set.
 PINS := pyproject.toml constraints.txt
 BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-# Quietens a notice about later versions of the docs tools; pyproject.toml keeps to these.
+# Suppresses a notice about later versions of mkdocs, which pyproject.toml excludes.
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
@@ -20,53 +20,53 @@ export NO_MKDOCS_2_WARNING := 1
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(BASE) ## Watch teams at work; installs the base packages only, no torch
+demo: $(BASE) ## Show teams in action; installs only the base packages, without torch
 	$(BIN)/python -m $(DEMO)
 
-test: lint ## Everything that must pass: lint, types, tests, docs
+test: lint ## Run all checks: lint, types, tests, docs
 	$(BIN)/python -m pytest -n auto --dist worksteal
 	$(BIN)/mkdocs build --strict --quiet
 
-fuzz: $(FULL) ## Look for faults at random, each campaign for MINUTES=1
+fuzz: $(FULL) ## Run randomised tests, MINUTES=1 per campaign
 	$(BIN)/python -m tests.fuzz --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0)
 
-lint: $(FULL) ## Style and types
+lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py
 
-format: $(FULL) ## Rewrite the sources in the project's style
+format: $(FULL) ## Format the sources
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
 docs: $(FULL) ## Build the manual into site/
 	$(BIN)/mkdocs build --strict
 
-bench: $(FULL) ## Measure the speed of the worlds on this machine
+bench: $(FULL) ## Measure throughput on this machine
 	$(BIN)/python benchmarks/speed.py
 
-bench-costs: $(FULL) ## Measure where the time of a step goes, and how it grows
+bench-costs: $(FULL) ## Measure the time of each part of a step, and how it scales
 	$(BIN)/python benchmarks/costs.py
 
-bench-training: $(FULL) ## Measure how fast PPO learns, and whose the time is
+bench-training: $(FULL) ## Measure throughput and time shares of PPO training
 	$(BIN)/python benchmarks/training.py
 
-bench-peers: $(FULL) ## Measure the speed beside other simulators
+bench-peers: $(FULL) ## Compare throughput with other simulators
 	$(BIN)/python benchmarks/peers.py
 
-results: $(FULL) ## Score every shipped policy on every scenario (long)
+results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 	$(BIN)/python benchmarks/results.py
 	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
 
-reproduce: $(FULL) ## Redo the paper's experiments
+reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce
 
-clean: ## Remove what these commands made, the virtual environment too
+clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find envs baselines training tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The check comes first, so that an old Python is named rather than met as a syntax error.
+# Checked first, so that an old Python gives a clear message and not a syntax error.
 $(BIN)/python:
 	@command -v "$(PYTHON)" >/dev/null 2>&1 \
 		|| { echo "posse: no '$(PYTHON)' found; install Python 3.11 or newer, or name one: make PYTHON=python3.12 ..." >&2; exit 1; }

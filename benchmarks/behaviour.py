@@ -64,7 +64,7 @@ def look(name: str, s: Settings) -> dict[str, float]:
             seen.setdefault(key, []).append(float(value))
     return {
         **{key: float(np.mean(values)) for key, values in seen.items()},
-        "darts in an episode": darts / s.worlds,
+        "darts per episode": darts / s.worlds,
     }
 
 

@@ -34,7 +34,7 @@ FIGURES = {
     "team-size": "Safe score against the size of the team.",
     "radio-loss": "Safe score against the share of messages lost.",
     "target-speed": "Safe score against the speed of the target.",
-    "recovery": "Share of teams that have settled anew, by the time since their leader broke.",
+    "recovery": "Share of teams that have settled again, by time since their leader broke.",
 }
 
 
@@ -43,19 +43,19 @@ class Settings:
     """Command-line arguments."""
 
     groups: tuple[str, ...] = ()
-    """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals over seeds, too."""
+    """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals that include seeds."""
     scenarios: tuple[str, ...] = SCENARIOS
     """Scenarios."""
     episodes: int = 500
     """Worlds for each policy and scenario."""
     planner_episodes: int = 500
-    """Worlds that the planner plays, at least 1, of those of the others."""
+    """Worlds that the planner plays, the first of those of the other policies; at least 1."""
     sweep_episodes: int = 100
     """Worlds at each point of the figures that vary a setting."""
     seed: int = 2026
-    """Of the worlds."""
+    """Seed of the worlds."""
     split: str = "test"
-    """Of the worlds."""
+    """Split of the worlds."""
     page: Path = Path("docs/comparison.md")
     """The page to fill."""
     rows: Path = Path("runs/comparison")
@@ -63,13 +63,13 @@ class Settings:
 
 
 THEIR_COMMANDS: Final = (
-    "They come from these commands, each at its commit. They state what the defaults of a scenario "
-    "say now, and did not yet say then."
+    "The policies were trained with these commands, each at its commit. The commands include "
+    "settings that have become defaults of a scenario since."
 )
 ANOTHER_TRAINING: Final = (
-    "The difference to the better DDCS model, with training seeds and worlds resampled. Of the "
-    "policies of a training, the best alone is shipped: to make this section again, train the "
-    "others with the commands above, and name all the files in `SEEDS`."
+    "The difference to the better DDCS model, with training seeds and worlds resampled. Only the "
+    "best seed of each policy is shipped: to repeat this section, train the others with the "
+    "commands above, and name all files in `SEEDS`."
 )
 
 
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settings = tyro.cli(Settings, args=arguments)
     learned = tuple(shipped())
     if not learned:
-        print(f"no learned policy is shipped: {settings.page} stays as it is")
+        print(f"no learned policy is shipped: {settings.page} is not changed")
         return
     found = compare(
         CompareSettings(
@@ -97,17 +97,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def fill(page: Path, block: str) -> None:
-    """Replace what follows the mark of a page."""
+    """Replace the part of a page below its mark."""
     text = page.read_text(encoding="utf-8")
     if text.count(MARK) != 1:
-        raise ValueError(f"{page} needs the line {MARK!r}, once")
+        raise ValueError(f"{page} must contain the line {MARK!r} exactly once")
     page.write_text(f"{text.partition(MARK)[0]}{MARK}\n\n{block}", encoding="utf-8")
 
 
 def report(
     settings: Settings, found: Comparison, learned: Sequence[str], figures: Sequence[str]
 ) -> str:
-    """Return what is written below the mark."""
+    """Return the part of the page below its mark."""
     cards: dict[str, Mapping[str, Any]] = {name: load(name).card for name in learned}  # type: ignore[attr-defined]
     worlds = f"{settings.episodes:,} worlds of the `{settings.split}` split for each row"
     lines = [
@@ -141,7 +141,7 @@ def report(
                 )
             )  # fmt: skip
     if found.left_out:
-        lines += ["", "Left out, because they cannot play there:", ""]
+        lines += ["", "Incompatible with the scenario:", ""]
         lines += [f"- `{out['policy']}` on {out['what']}: {out['why']}" for out in found.left_out]
     lines += ["", *training_seeds(cards)]
     if settings.groups:
@@ -163,7 +163,7 @@ def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
     lines = [
         "## Training seeds",
         "",
-        "Of each policy, the seed that did best on validation worlds is shipped.",
+        "The seed of each policy with the best score on validation worlds is shipped.",
         "",
         "| policy | training seed | score on validation worlds | steps |",
         "|---|---|---|---|",

@@ -30,7 +30,7 @@ from posse.signals.observation import observing
 from posse.signals.parts import Writers, built_in_parts, rules_for, sums_for, writers_for
 
 PARTS = (
-    "motion", "where the discs are, and how near", "contact", "target sensor and radio", "score",
+    "motion", "positions and distances of discs", "contact", "target sensor and radio", "score",
     "metrics", "reward", "observations",
 )  # fmt: skip
 
@@ -58,7 +58,7 @@ SUMS = sums_for(built_in_parts())
 def one_part(  # type: ignore[no-untyped-def]
     part, tables, worlds, actions, results, memory
 ):
-    """Do one part of a step in every world."""
+    """Execute one part of a step in every world."""
     scratch = memory[0]
     writers = Writers(OWN, MATE, REWARD, EMPTY, WIDTH, MATE_WIDTH)
     world.prepare(tables, scratch)
@@ -103,7 +103,7 @@ def best(call: Callable[[], object], seconds: float) -> float:
 
 
 def moving(scenario: str, count: int, **overrides: Any) -> tuple[posse.Batch, Any]:
-    """Return worlds in which everything moves, and actions for them."""
+    """Return worlds in mid-episode, and actions for them."""
     batch = posse.batch(scenario, count, num_threads=1, horizon=1_000_000, **overrides)
     batch.reset(seed=0)
     rng = np.random.default_rng(0)
@@ -161,11 +161,11 @@ def main() -> None:
     console = Console()
     for title, column, rows in (
         *(
-            (f"a step of {name}, part by part", "part", figures["parts"][name])
+            (f"a step of {name} by part", "part", figures["parts"][name])
             for name in s.scenarios
         ),
-        ("smart, by team size (8 nearest team-mates at most)", "trackers", figures["team_size"]),
-        ("obstacles, by their number", "obstacles", figures["obstacles"]),
+        ("smart, by team size (at most 8 nearest team-mates)", "trackers", figures["team_size"]),
+        ("obstacles, by number of obstacles", "obstacles", figures["obstacles"]),
         ("smart, by number of worlds", "worlds", figures["worlds"]),
     ):
         table = Table(title=title)
@@ -175,7 +175,7 @@ def main() -> None:
             table.add_row(f"{key:,}" if isinstance(key, int) else key, f"{nanoseconds:,.0f}")
         console.print(table)
     busy = figures["cores_busy_with_other_work"]
-    console.print(f"cores busy with other work meanwhile: {busy:.2f}")
+    console.print(f"cores used by other processes meanwhile: {busy:.2f}")
     s.out.parent.mkdir(parents=True, exist_ok=True)
     s.out.write_text(json.dumps(figures, indent=2) + "\n")
     console.print(f"figures: {s.out}")

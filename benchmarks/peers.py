@@ -117,7 +117,7 @@ class Patience:
 
 
 class Runner:
-    """A runner's process, used as a context; see ``peers/serve.py`` for what it is asked."""
+    """A runner's process, used as a context; ``peers/serve.py`` describes the requests."""
 
     def __init__(self, peer: Peer, threads: int) -> None:
         self._peer = peer
@@ -186,7 +186,7 @@ def python_of(peer: Peer) -> Path:
 
 
 def install(name: str) -> None:
-    """Make a peer's virtual environment, unless one stands that was made from the same pins."""
+    """Create a peer's virtual environment, unless one with the same pins exists."""
     requirements = RUNNERS / f"requirements-{name}.txt"
     stamp = ENVIRONMENTS / name / "requirements.stamp"
     digest = hashlib.sha256(requirements.read_bytes()).hexdigest()
@@ -208,8 +208,8 @@ def install(name: str) -> None:
 def ocean_source() -> None:
     """Put Ocean's ``target.h`` into ``.venv-peers/ocean``.
 
-    pip unpacks the source distribution before it asks its build script, which fails for want of
-    packages that the one header does not need; the unpacked source is kept and searched.
+    pip unpacks the source distribution before it runs the build script, which fails because
+    packages are missing that this header does not need; the unpacked source is kept and searched.
     """
     directory = ENVIRONMENTS / "ocean"
     if (directory / "target.h").exists():
@@ -233,7 +233,7 @@ def ocean_source() -> None:
 def measure(
     runner: Runner, row: Row, yardstick: Runner, yardstick_agents: int, patience: Patience
 ) -> None:
-    """Take the samples of one row, each with one of mpe2 just before it."""
+    """Take the samples of one row, each immediately after a sample of mpe2."""
     while len(row.samples) < SAMPLES:
         began = time.perf_counter()
         reference, sample = yardstick.sample(), runner.sample()
@@ -251,7 +251,7 @@ def measure(
 
 
 def run(peers: list[Peer], patience: Patience) -> tuple[list[Row], dict[str, str]]:
-    """Measure every peer; return the rows, and why some are missing."""
+    """Measure every peer; return the rows, and the reasons for missing ones."""
     rows: list[Row] = []
     missing: dict[str, str] = {}
     cores = len(os.sched_getaffinity(0))
@@ -283,15 +283,15 @@ def report(row: Row) -> None:
     print(
         f"{row.name:30} {row.threads} thread{'s' if row.threads > 1 else ' '} "
         f"batch {row.batch:6,}: {middle:12,.0f} agent-steps/s  spread {spread:4.0%}  "
-        f"{statistics.median(row.per_core):12,.0f} a core  "
+        f"{statistics.median(row.per_core):12,.0f} per core  "
         f"{statistics.median(ratios):10,.1f} x mpe2  "
-        f"(spoilt {row.spoilt}, dropped {row.dropped})",
+        f"(disturbed {row.spoilt}, dropped {row.dropped})",
         flush=True,
     )
 
 
 def prepare(peers: list[Peer]) -> tuple[list[Peer], dict[str, str]]:
-    """Install what the peers need; return those that can run, and why the others cannot."""
+    """Install the peers; return those that can run, and the reasons why others cannot."""
     ready: list[Peer] = []
     missing: dict[str, str] = {}
     install("mpe2")
@@ -311,13 +311,19 @@ def prepare(peers: list[Peer]) -> tuple[list[Peer], dict[str, str]]:
 
 def main() -> None:
     """Measure, then write the results and the page of the manual."""
-    parser = argparse.ArgumentParser(description="Speed beside other simulators.")
-    parser.add_argument("--only", nargs="+", metavar="WORD", help="peers whose name has a word")
+    parser = argparse.ArgumentParser(description="Throughput compared with other simulators.")
+    parser.add_argument(
+        "--only", nargs="+", metavar="WORD", help="only peers whose names contain this word"
+    )
     parser.add_argument(
         "--patience", type=float, default=120.0, metavar="S",
         help="time limit for repeating samples with other load, s (default 120)",
     )  # fmt: skip
-    parser.add_argument("--page", action="store_true", help="write the page from the last results")
+    parser.add_argument(
+        "--page",
+        action="store_true",
+        help="write the page from the last results, without measuring",
+    )
     arguments = parser.parse_args()
     if arguments.page:
         write_page(json.loads(RESULTS.read_text(encoding="utf-8")), PAGE)

@@ -1,4 +1,4 @@
-"""Part of ``make results``: the scripted teams on every scenario, 1,000 test worlds each.
+"""Part of ``make results``: evaluates the scripted teams on every scenario, 1,000 test worlds each.
 
 Writes docs/results.md, with seed and commit, and its data. Nothing was tuned on these worlds.
 """
@@ -31,8 +31,8 @@ ABLATIONS = (
 )
 
 SMART_COST = (
-    "The scenario `smart`, and the same starts, speeds and limits with a target that runs straight "
-    '(`target_motion="constant"`).'
+    "The scenario `smart`, compared with the same starts, speeds and limits and a target that "
+    'moves straight ahead (`target_motion="constant"`).'
 )
 
 
@@ -73,15 +73,14 @@ def page(
     results: dict[tuple[str, str], Results],
     straight: dict[str, Results],
 ) -> str:
-    """Return the page; ``straight`` holds plays of ``smart`` with a target that runs straight."""
+    """Return the page; ``straight`` has results of ``smart`` with a target that moves straight."""
     made = (
         f"Made by `make results` at commit `{commit()}`: {settings.episodes:,} worlds of the "
         f"`{settings.split}` split for each row, seed {settings.seed}. Nothing was tuned on these "
-        "worlds. In brackets 95 % intervals: bootstrap for means, Wilson's for shares. Teams are "
-        "ranked by the *safe score*, in which every step counts 0 from a team's first contact on. "
-        "The *planner* reads the state and plays ahead in copies of the worlds: a reference, no "
-        "contestant. The *bound* on the score is what it could have been had every tracker gone "
-        "straight to a slot at full speed."
+        "worlds. Brackets are 95 % intervals: bootstrap for means, Wilson's for shares. Teams are "
+        "ranked by the *safe score*, in which every step from a team's first contact on counts 0. "
+        "The *planner*, a reference, reads the full state and plans in copies of the worlds. The "
+        "*bound* is the score if every tracker moved straight to a slot at full speed and stayed."
     )
     header = (
         "| scenario | policy | safe score | of the planner's | score | contact-free | bound "
@@ -113,7 +112,7 @@ def page(
         )
     lines += [
         "",
-        "## What the smart target costs",
+        "## Cost of the smart target",
         "",
         SMART_COST,
         "",
@@ -132,7 +131,7 @@ def page(
 def ranked(
     results: dict[tuple[str, str], Results],
 ) -> list[tuple[tuple[str, str], Results]]:
-    """Return the results by scenario, and on each by safe score, the highest first."""
+    """Return the results sorted by scenario, then by safe score in descending order."""
     return sorted(
         results.items(),
         key=lambda item: (SCENARIOS.index(item[0][0]), -item[1]["safe_score"].mean()),

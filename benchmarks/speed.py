@@ -1,7 +1,7 @@
 """``make bench``: throughput on this machine.
 
 Agent-steps/s of batches, compared with a plain copy of the observations; steps/s of single-world
-environments, alone and beside busy processes; time of the first step of a fresh process. With
+environments, alone and with other busy processes; time of the first step of a new process. With
 ``--device cuda``: batches on the GPU, and their share of its memory bandwidth.
 """
 
@@ -53,7 +53,7 @@ class Settings:
     seconds: float = 1.0
     """Total time of the five runs of each figure, s."""
     cold: bool = True
-    """Also time the first step of a fresh process, without and with cached kernels."""
+    """Also time the first step of a new process, without and with cached kernels."""
     out: Path = Path("runs/bench/speed.json")
 
 
@@ -254,7 +254,7 @@ class Pace:
 
 
 def beside_others(settings: Settings) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the speed of a single world beside busy processes, relative to running alone.
+    """Return the speed of a single world with other busy processes, relative to running alone.
 
     Alternating every 10 ms with a plain loop as a reference, since clock rate and scheduling
     depend on the load.
@@ -354,7 +354,7 @@ def main() -> None:
     for count, shares in figures["beside_busy_processes"].items():
         fair = min(1.0, (os.cpu_count() or 1) / (int(count) + 1))
         console.print(
-            f"beside busy processes, {count}, of the speed alone: "
+            f"with other busy processes, {count}, relative to the speed alone: "
             + ", ".join(
                 f"{name} {s['share']:.2f} ({s['of_the_processor']:.2f} per second of processor)"
                 for name, s in shares.items()
@@ -362,8 +362,8 @@ def main() -> None:
             + f"; share of the cores: {fair:.2f}"
         )
     for name, seconds in figures.get("first_step_seconds", {}).items():
-        console.print(f"first step of a fresh process, {name}: {seconds:.1f} s")
-    console.print(f"cores busy with other work meanwhile: {disturbed:.2f}")
+        console.print(f"first step of a new process, {name}: {seconds:.1f} s")
+    console.print(f"cores used by other processes meanwhile: {disturbed:.2f}")
     settings.out.parent.mkdir(parents=True, exist_ok=True)
     settings.out.write_text(json.dumps(figures, indent=2) + "\n")
     console.print(f"figures: {settings.out}")

@@ -102,7 +102,7 @@ def main() -> None:
     console = Console()
     console.print(table)
     busy = others.cores(time.process_time() - own)
-    console.print(f"cores busy with other work meanwhile: {busy:.2f}")
+    console.print(f"cores used by other processes meanwhile: {busy:.2f}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""CAMAR: 5 robots with differential drive to their goals on a small map with 3 obstacles."""
+"""CAMAR: 5 differential-drive robots drive to their goals on a small map with 3 obstacles."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from serve import Built, serve
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return a batch; two physics steps in a step, as in ours; episodes never end."""
+    """Return a batch with two physics steps per step, as in posse; episodes never end."""
     env = camar_v0(
         "random_grid",
         dynamic="DiffDriveDynamic",

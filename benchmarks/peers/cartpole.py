@@ -1,4 +1,4 @@
-"""Gymnasium's own vector CartPole: numpy over the whole batch, one agent a world."""
+"""Gymnasium's vector CartPole: numpy over the whole batch, one agent per world."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from serve import ACTION_SETS, Built, serve
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return a batch that resets itself."""
+    """Return a batch with automatic resets."""
     envs = gymnasium.make_vec(
         "CartPole-v1", num_envs=worlds, vectorization_mode="vector_entry_point"
     )

@@ -1,4 +1,4 @@
-"""How the simulators in JAX are stepped: worlds by vmap, steps by scan, compiled as a whole."""
+"""Stepping of JAX simulators: worlds by vmap, steps by scan, compiled as a whole."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import jax
 import jax.numpy as jnp
 from serve import ACTION_SETS, Built
 
-# Compiling takes longer than measuring. What is compiled depends on the number of threads.
+# Cached, since compiling takes longer than measuring. The code depends on the number of threads.
 _KEPT = Path(sys.prefix) / f"compiled-{len(os.sched_getaffinity(0))}"
 jax.config.update("jax_compilation_cache_dir", str(_KEPT))
 
 Tree = Any
-"""Arrays in whatever structure."""
+"""Arrays in any structure."""
 
 
 def build(
@@ -31,12 +31,12 @@ def build(
     """Return a batch of worlds.
 
     Args:
-        env: Has ``reset(key)`` -> observations, state.
-        step: Of one world: (key, state, actions) -> observations, state, rewards.
+        env: Environment with ``reset(key)`` -> observations, state.
+        step: Step of one world: (key, state, actions) -> observations, state, rewards.
         draw_actions: (key, B) -> actions of B worlds.
-        worlds: B.
-        agents: Agents in a world.
-        observation: Numbers in one agent's observation.
+        worlds: B, number of worlds.
+        agents: Number of agents in a world.
+        observation: Length of an agent's observation.
     """
     key = jax.random.key(0)
     key, reset_key, action_key = jax.random.split(key, 3)
@@ -46,8 +46,8 @@ def build(
     observations, state = jax.jit(jax.vmap(env.reset))(jax.random.split(reset_key, worlds))
     chunk = max(1, min(256, 8192 // worlds))
 
-    # The latest observations and the sum of the rewards are kept, so that no step's can be left
-    # out; a learner that keeps all of them would pay for more memory traffic than this.
+    # The latest observations and the sum of the rewards are kept, so that the compiler cannot omit
+    # them. A learner that keeps the observations of all steps needs more memory bandwidth.
     def one_step(carry: Tree, k: Any) -> tuple[Tree, None]:
         key, state, _, returns = carry
         key, step_key = jax.random.split(key)

@@ -11,7 +11,7 @@ from serve import Built, serve
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return a batch that resets itself."""
+    """Return a batch with automatic resets."""
     env = jaxmarl.make(
         "MPE_simple_tag_v3", num_adversaries=5, num_good_agents=1, action_type="Continuous"
     )

@@ -8,7 +8,7 @@ from serve import ACTION_SETS, Built, serve
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return one world; episodes as long as ours."""
+    """Return one world with episodes as long as posse's."""
     env = simple_tag_v3.parallel_env(
         num_good=1, num_adversaries=5, num_obstacles=2, max_cycles=600, continuous_actions=True
     )

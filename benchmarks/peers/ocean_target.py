@@ -1,7 +1,7 @@
-"""PufferLib Ocean `target`, in C on one core: 5 agents and 1 goal, as many as ours has robots.
+"""PufferLib Ocean `target`, in C on one core: 5 agents and 1 goal, as many robots as in `smart`.
 
-The loop over steps and worlds is C too: the mark for what compiled code reaches. Its source comes
-out of PufferLib's source distribution; see ``ocean_source`` in ``peers.py``.
+The loop over steps and worlds is in C as well, as a reference for compiled code. The source is
+taken from PufferLib's source distribution; see ``ocean_source`` in ``peers.py``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ AGENTS, GOALS = 5, 1
 
 
 def library() -> Path:
-    """Compile the worlds, once for each run of the benchmark, and return the shared library."""
+    """Compile the simulator, once per run of the benchmark, and return the shared library."""
     path = SOURCE / "worlds.so"
     subprocess.run(
         [
@@ -37,7 +37,7 @@ worlds_in_c = ctypes.CDLL(str(library()))
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return a number of worlds; what an earlier call allocated is not given back."""
+    """Return a number of worlds; memory allocated by earlier calls is not freed."""
     size = worlds_in_c.build(worlds, AGENTS, GOALS)
     draws = random.Random(0)
     numbers = ACTION_SETS * worlds * AGENTS

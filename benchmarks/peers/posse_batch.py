@@ -1,6 +1,6 @@
-"""Ours: the engine itself, worlds of 5 trackers.
+"""posse: a batch of worlds of 5 trackers.
 
-The variant is the scenario, with ", own kernel" after it where it is to have one.
+The variant is the scenario, followed by ", own kernel" for a kernel compiled for it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import posse
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return a batch; as many threads as this process may use."""
+    """Return a batch with one thread per available core."""
     scenario, _, own_kernel = variant.partition(", ")
     threads = len(os.sched_getaffinity(0))
     batch = posse.batch(

@@ -1,4 +1,4 @@
-"""Ours through PettingZoo: one `smart` world of 5 trackers, dictionaries in and out."""
+"""posse through PettingZoo: one `smart` world of 5 trackers, with dictionaries by agent."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import posse
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return one world; an episode that ends is followed by the next."""
+    """Return one world, which is reset at the end of an episode."""
     env = posse.parallel_env("smart")
     env.reset(seed=0)
     agents = env.possible_agents

@@ -1,4 +1,4 @@
-"""PettingZoo SISL `pursuit`: 5 pursuers on a grid, each given a 7 x 7 window of 3 layers."""
+"""PettingZoo SISL `pursuit`: 5 pursuers on a grid, each observing a 7 x 7 window of 3 layers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from serve import ACTION_SETS, Built, serve
 
 
 def build(worlds: int, variant: str) -> Built:
-    """Return one world of 5 pursuers and 1 evader; episodes as long as ours."""
+    """Return one world of 5 pursuers and 1 evader with episodes as long as posse's."""
     env = pursuit_v5.parallel_env(n_pursuers=5, n_evaders=1, max_cycles=600)
     env.reset(seed=0)
     agents = env.possible_agents

@@ -1,16 +1,16 @@
-"""What every runner does alike: build a simulator, step it for a while, say how long it took.
+"""Common part of the runners: build a simulator, time some of its steps, report.
 
-A runner is a small script, run by the interpreter of its own virtual environment. It talks with
-``peers.py`` over its standard streams, one JSON object a line, and waits, taking no processor time,
-between two requests:
+A runner is a small script, executed by the interpreter of its own virtual environment. It
+communicates with ``peers.py`` over its standard streams, one JSON object per line, and blocks
+between requests:
 
 ===================================  ============================================================
-``{"build": B, "variant": name}``    builds B worlds, warms up, finds out how many steps fill a
-                                     sample; answers what it built
-``{"sample": true}``                 steps them; answers how often, and in what time
+``{"build": B, "variant": name}``    builds B worlds, warms up, determines the number of steps of a
+                                     sample; answers with a description
+``{"sample": true}``                 steps the worlds; answers with number of steps and time
 ===================================  ============================================================
 
-This file needs nothing but Python, since it runs in every peer's environment.
+This file requires only Python, since it runs in every peer's environment.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from dataclasses import dataclass
 from typing import Any
 
 ACTION_SETS = 16
-"""Random actions are drawn before the clock starts, so many for every agent, and then repeated."""
+"""Random actions per agent, drawn before timing starts and then repeated."""
 SAMPLE_SECONDS = 0.25
 
 
 @dataclass(frozen=True)
 class Built:
-    """B worlds of one simulator, ready to be stepped."""
+    """B worlds of one simulator, ready for stepping."""
 
     run: Callable[[int], None]
-    """Make a number of steps, with fresh actions for each; return when they are done."""
+    """Makes a number of steps with new actions each, and returns when they are done."""
     agents: int
-    """Agents in a world that are given an action."""
+    """Number of agents in a world that receive an action."""
     observation: int
-    """Numbers in one agent's observation (the longest, where they differ)."""
+    """Length of an agent's observation, the longest one if they differ."""
     chunk: int = 1
-    """Steps are made in whole multiples of this."""
+    """The number of steps is a multiple of this."""
 
 
 def serve(build: Callable[[int, str], Built], *packages: str) -> None:

@@ -55,7 +55,7 @@ class Registry(Mapping[str, T], Generic[T]):
         if taken is not None:
             raise self.error(function, f"the name {name!r} is taken by {place_of(taken)}")
         if not (function.__doc__ or "").strip():
-            raise self.error(function, "the docstring is missing; state the meaning there")
+            raise self.error(function, "its docstring, which must state its meaning, is missing")
         self._things[name], self._functions[name] = thing, function
 
     def error(self, function: Function, reason: str) -> DeclarationError:

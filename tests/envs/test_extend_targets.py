@@ -171,7 +171,7 @@ OTHERS = {
     ),
     "a fix of no kind": (
         '@posse.sensor("own", fix="range")\ndef own(c, w, t, dx, dy):\n    """?"""',
-        r"sensor own \(main.py:3\): fix='range' is no kind: position or bearing",
+        r"sensor own \(main.py:3\): unknown fix='range'; allowed: position, bearing",
     ),
     "another parameter of measure": (
         BLUR + '@posse.sensor("own", measure=blur)\ndef own(c, w, t, dx, dy):\n    """?"""',

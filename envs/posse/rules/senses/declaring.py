@@ -73,7 +73,7 @@ def sensor(
         if measure is not None:
             SENSORS.check_parameters(measure, MEASURE_PARAMETERS)
         if fix not in FIX_KINDS:
-            raise SENSORS.error(function, f"fix={fix!r} is no kind: {' or '.join(FIX_KINDS)}")
+            raise SENSORS.error(function, f"unknown fix={fix!r}; allowed: {', '.join(FIX_KINDS)}")
         sight = compiled(function)
         measuring = None if measure is None else compiled(measure)
         SENSORS.add(

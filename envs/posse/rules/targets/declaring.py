@@ -121,7 +121,7 @@ def _check_memory(function: Function, memory: Sequence[Memory]) -> None:
                 function, f"a world has a field {each.name!r}: choose another name for the memory"
             )
         if not each.name.isidentifier():
-            raise TARGET_MOTIONS.error(function, f"{each.name!r} is no name for a memory")
+            raise TARGET_MOTIONS.error(function, f"invalid name {each.name!r} of a memory")
         taken.add(each.name)
 
 
