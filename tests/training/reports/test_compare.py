@@ -14,7 +14,7 @@ from posse_training.cli import main
 from posse_training.reports.compare import Settings, compare
 from posse_training.reports.comparison import table
 from posse_training.reports.contenders import read_contenders
-from posse_training.reports.statistics import difference_over_seeds
+from posse_training.reports.statistics import difference
 from posse_training.reports.sweeps import BOUND, SWEEPS
 
 
@@ -135,7 +135,7 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
             scores.append([float(row["safe_score"]) for row in csv.DictReader(file)])
     assert len({tuple(row) for row in scores}) == 3
     reference = found.plays["constant", "pursuit"]["safe_score"]
-    assert found.rows[1]["difference"] == difference_over_seeds(scores, reference)
+    assert found.rows[1]["difference"] == difference(scores, reference)
     better = (np.array(scores) > reference) + 0.5 * (np.array(scores) == reference)
     assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
 

@@ -13,7 +13,7 @@ from benchmarks import comparison
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training import evaluate
-from posse_training.reports.statistics import Estimate, difference_over_seeds, paired_difference
+from posse_training.reports.statistics import Estimate, difference
 
 ROOT = Path(__file__).parents[3]
 
@@ -85,10 +85,10 @@ def test_the_page_says_what_was_played(page: Path, tmp_path: Path) -> None:
             (scores(name, scenario) for name in comparison.SCRIPTED), key=lambda s: float(s.mean())
         )
         line = next(row for row in text.splitlines() if row.startswith(f"| {scenario} | `learned"))
-        assert str(paired_difference(scores(policy, scenario), ddcs)) in line
+        assert str(difference(scores(policy, scenario), ddcs)) in line
         assert ("| yes |" in line) == (scenario == "constant")
     ddcs = max((scores(n, "constant") for n in comparison.SCRIPTED), key=lambda s: float(s.mean()))
-    expected = difference_over_seeds([scores(seed, "constant") for seed in seeds], ddcs)
+    expected = difference([scores(seed, "constant") for seed in seeds], ddcs)
     assert f"| constant | `mine` | 3 | {expected} |" in text
     assert "| `learned-any` | 2 (shipped) | 0.250 [0.200, 0.300] | 1,000 |" in text
     for seed in (1, 2, 3):

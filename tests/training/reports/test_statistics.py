@@ -4,12 +4,11 @@ from scipy import stats
 
 from posse_training.reports import statistics
 from posse_training.reports.statistics import (
-    difference_over_seeds,
+    difference,
+    improvement,
     interquartile_mean,
     mean,
     over_seeds,
-    paired_difference,
-    probability_of_improvement,
     share,
 )
 
@@ -52,15 +51,17 @@ def test_a_paired_difference_is_sharper_than_two_means() -> None:
     rng = np.random.default_rng(4)
     worlds = rng.normal(size=300)
     first = worlds + 0.1 + 0.01 * rng.normal(size=300)
-    difference = paired_difference(first, worlds)
-    assert difference.low > 0.09
-    assert difference.high < 0.11
-    with pytest.raises(ValueError, match="same episodes"):
-        paired_difference(first, worlds[:-1])
+    paired = difference(first, worlds)
+    assert paired.low > 0.09
+    assert paired.high < 0.11
+    with pytest.raises(ValueError, match="same worlds"):
+        difference(first, worlds[:-1])
 
 
-def test_probability_of_improvement_counts_ties_half() -> None:
-    assert probability_of_improvement([1, 2, 3, 4], [1, 1, 3, 5]).value == pytest.approx(0.5)
+def test_improvement_counts_ties_half() -> None:
+    assert improvement([1, 2, 3, 4], [1, 1, 3, 5]).value == pytest.approx(0.5)
+    with pytest.raises(ValueError, match="same worlds"):
+        improvement([1, 2], [1, 2, 3])
 
 
 def test_a_share_has_wilsons_interval() -> None:
@@ -99,8 +100,8 @@ class TestTrainingSeeds:
         assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * deviation, rel=0.1)
 
     def test_one_seed_is_a_plain_bootstrap_of_worlds(self) -> None:
-        first, second = np.random.default_rng(6).normal(size=(2, 400))
-        plain, nested = paired_difference(first, second), difference_over_seeds(first, second)
+        values = np.random.default_rng(6).normal(size=400)
+        plain, nested = mean(values), over_seeds(values)
         assert nested.value == pytest.approx(plain.value)
         assert nested.low == pytest.approx(plain.low, abs=0.01)
         assert nested.high == pytest.approx(plain.high, abs=0.01)
@@ -109,20 +110,24 @@ class TestTrainingSeeds:
         rng = np.random.default_rng(7)
         worlds = 10 * rng.normal(size=200)
         trained = worlds + 0.5 + 0.05 * rng.normal(size=(5, 200))
-        difference = difference_over_seeds(trained, worlds)
-        assert difference.value == pytest.approx(0.5, abs=0.02)
-        assert difference.high - difference.low < 0.1
+        paired = difference(trained, worlds)
+        assert paired.value == pytest.approx(0.5, abs=0.02)
+        assert paired.high - paired.low < 0.1
         assert over_seeds(trained).high - over_seeds(trained).low > 1
-        turned = difference_over_seeds(worlds, trained)
-        assert turned.value == pytest.approx(-difference.value)
-        assert turned.low == pytest.approx(-difference.high, abs=0.02)
+        turned = difference(worlds, trained)
+        assert turned.value == pytest.approx(-paired.value)
+        assert turned.low == pytest.approx(-paired.high, abs=0.02)
 
     def test_seeds_that_disagree_leave_the_sign_open(self) -> None:
         """Many worlds are no substitute for seeds."""
         rng = np.random.default_rng(8)
         trained = np.array([[0.3], [0.25], [-0.2]]) + 0.05 * rng.normal(size=(3, 5000))
-        assert difference_over_seeds(trained, np.zeros(5000)).low < 0
-        assert paired_difference(trained.reshape(-1), np.zeros(15_000)).low > 0  # were they worlds
+        assert difference(trained, np.zeros(5000)).low < 0
+        assert difference(trained.reshape(-1), np.zeros(15_000)).low > 0  # if all were worlds
+
+    def test_improvement_compares_every_pair_of_seeds(self) -> None:
+        mine, theirs = np.array([[1.0, 4.0], [2.0, 4.0]]), np.array([[0.0, 4.0], [2.0, 5.0]])
+        assert improvement(mine, theirs).value == pytest.approx((1 + 0 + 1 + 0.5 + 4 * 0.25) / 8)
 
     def test_the_truth_is_in_as_often_as_is_said(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(statistics, "RESAMPLES", 300)
@@ -136,6 +141,6 @@ class TestTrainingSeeds:
 
     def test_worlds_that_do_not_match_are_refused(self) -> None:
         with pytest.raises(ValueError, match="same worlds"):
-            difference_over_seeds(np.zeros((3, 5)), np.zeros(4))
+            difference(np.zeros((3, 5)), np.zeros(4))
         with pytest.raises(ValueError, match="numbers"):
             over_seeds([[np.nan, 1.0]])

@@ -12,12 +12,12 @@ from posse import Scenario
 from posse_training.reports.results import Results
 from posse_training.reports.statistics import (
     Estimate,
-    difference_over_seeds,
+    difference,
+    improvement,
     interquartile_mean,
     mean,
     middle_mean,
     over_seeds,
-    paired_difference,
     share,
 )
 
@@ -56,19 +56,11 @@ class Plays:
 
     def difference(self, reference: Plays) -> Estimate:
         """Return the mean difference of the safe score to the reference, paired by world."""
-        mine, theirs = self._paired(reference)
-        if len(mine) == len(theirs) == 1:
-            return paired_difference(mine[0], theirs[0])
-        return difference_over_seeds(mine, theirs)
+        return difference(*self._paired(reference))
 
     def improvement(self, reference: Plays) -> Estimate:
-        """Return the probability of improvement on the reference in a world, ties counted half.
-
-        By the safe score.
-        """
-        mine, theirs = self._paired(reference)
-        better = ((mine[:, None] > theirs) + 0.5 * (mine[:, None] == theirs)).mean(axis=1)
-        return mean(better[0]) if len(better) == 1 else over_seeds(better)
+        """Return the probability of a higher safe score than the reference's in a world."""
+        return improvement(*self._paired(reference))
 
     def ratio(self, reference: Plays) -> float:
         """Return the mean safe score as a share of the reference's, in the worlds of both."""

@@ -78,24 +78,6 @@ def middle_mean(sample: Values, axis: int = -1) -> Any:
     return stats.trim_mean(sample, 0.25, axis=axis)
 
 
-def paired_difference(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
-    """Return the mean of first - second over the same worlds, with a bootstrap interval.
-
-    Raises:
-        ValueError: Different numbers of episodes.
-    """
-    a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
-    if a.shape != b.shape:
-        raise ValueError(f"paired values need the same episodes, got {a.shape} and {b.shape}")
-    return mean(a - b)
-
-
-def probability_of_improvement(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
-    """Return the share of worlds in which the first is better, ties counted half."""
-    a, b = np.asarray(first, np.float64), np.asarray(second, np.float64)
-    return mean((a > b) + 0.5 * (a == b))
-
-
 def share(happened: npt.ArrayLike) -> Estimate:
     """Return the share of episodes in which something happened, with Wilson's interval."""
     events = np.asarray(happened, bool).reshape(-1)
@@ -126,18 +108,40 @@ def over_seeds(values: npt.ArrayLike, statistic: Statistic = np.mean) -> Estimat
     return _resample((array,), lambda sample: float(statistic(sample.reshape(-1))))
 
 
-def difference_over_seeds(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
-    """Return the mean of first - second, with seeds and worlds resampled as in :func:`over_seeds`.
+def difference(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
+    """Return the mean of first - second, paired by world.
 
-    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds.
+    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. With one policy
+    each the interval is a bootstrap over worlds, else as in :func:`over_seeds`.
 
     Raises:
         ValueError: Different numbers of worlds.
     """
+    mine, theirs = _paired(first, second)
+    if len(mine) == len(theirs) == 1:
+        return mean(mine[0] - theirs[0])
+    return _resample((mine, theirs), lambda a, b: float(a.mean() - b.mean()))
+
+
+def improvement(first: npt.ArrayLike, second: npt.ArrayLike) -> Estimate:
+    """Return the probability that the first has the higher value in a world, ties counted half.
+
+    Each is one policy, (W,), or several training seeds, (S, W), on the same worlds. All pairs of
+    seeds are compared; the seeds of the first and the worlds are resampled.
+
+    Raises:
+        ValueError: Different numbers of worlds.
+    """
+    mine, theirs = _paired(first, second)
+    higher = ((mine[:, None] > theirs) + 0.5 * (mine[:, None] == theirs)).mean(axis=1)
+    return mean(higher[0]) if len(higher) == 1 else over_seeds(higher)
+
+
+def _paired(first: npt.ArrayLike, second: npt.ArrayLike) -> tuple[Values, Values]:
     mine, theirs = _seeds_by_worlds(first), _seeds_by_worlds(second)
     if mine.shape[1] != theirs.shape[1]:
         raise ValueError(f"paired values need the same worlds, got {mine.shape} and {theirs.shape}")
-    return _resample((mine, theirs), lambda a, b: float(a.mean() - b.mean()))
+    return mine, theirs
 
 
 def _seeds_by_worlds(values: npt.ArrayLike) -> Values:
