@@ -160,10 +160,7 @@ def main() -> None:
     figures["cores_busy_with_other_work"] = others.cores(time.process_time() - own)
     console = Console()
     for title, column, rows in (
-        *(
-            (f"a step of {name} by part", "part", figures["parts"][name])
-            for name in s.scenarios
-        ),
+        *((f"a step of {name} by part", "part", figures["parts"][name]) for name in s.scenarios),
         ("smart, by team size (at most 8 nearest team-mates)", "trackers", figures["team_size"]),
         ("obstacles, by number of obstacles", "obstacles", figures["obstacles"]),
         ("smart, by number of worlds", "worlds", figures["worlds"]),

@@ -1,58 +1,52 @@
-"""``posse/Tracker-v0``: a learner drives one tracker, its team-mates run any policy."""
+"""``posse/Tracker-v0``: the agent controls one tracker, its team-mates run a policy."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
-import numpy.typing as npt
 from gymnasium import spaces
 
-from posse import ObservationLayout, Scenario, ScenarioError
+from posse import Scenario, ScenarioError
 from posse.adapters.actions import ActionReader, single_action_space
-from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
+from posse.adapters.single_world import shortened
 from posse.adapters.spaces import box
+from posse.adapters.world_env import OneAgentEnv
 from posse.numeric import FloatArray, OwnArrays
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
 
-class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
-    """One tracker among scripted (or learned) team-mates.
+class TrackerEnv(OwnArrays, OneAgentEnv):
+    """One tracker whose team-mates run a scripted or learned policy.
 
-    **Observation**: ``Box`` (F,) float32, what this tracker is given, the messages of its
-    team-mates included. **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``.
-    **Reward**: this tracker's own. **Info**, **start** and **end** as in ``posse/Team-v0``; reward
-    terms are plain numbers. The score is the whole team's: one tracker raises it by at most 1/N.
+    **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages
+    of its team-mates. **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``.
+    **Reward**: of this tracker. **Info**, **start** and **end** as in ``posse/Team-v0``, with
+    scalar reward terms. The score is that of the team: one tracker contributes at most 1/N.
 
-    The scenario's ``message_size`` is as large as the team-mates need. A learner that has nothing
-    to say sends zeros: with ``silent=True`` (the default) its action has two parts, and its message
-    is always zeros.
+    The scenario's ``message_size`` is raised to that of the team-mates' policy. With
+    ``silent=True`` (the default) the action has no message part, and the message is zeros.
 
     Args:
-        scenario: Name of a scenario, or one; two trackers at least.
-        number: Which tracker is driven, 0 to N - 1.
-        teammates: What drives the others: a policy, or what :func:`posse_baselines.load` takes.
-        silent: Whether the learner's action leaves out the message.
-        discrete_actions: Whether actions are discrete; needs ``silent``.
+        scenario: Name of a scenario, or a scenario, with at least two trackers.
+        number: Number of the controlled tracker, 0 to N - 1.
+        teammates: Policy of the others, or an argument of :func:`posse_baselines.load`.
+        silent: Whether the action has no message part.
+        discrete_actions: Whether actions are discrete; requires ``silent``.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
-        seed: Of every random draw; ``None``: an arbitrary one.
+        seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Which world of the seed.
-        max_episode_steps: Cuts episodes to this many steps; ``None``: the scenario's horizon.
+        first_world: Index of the world within the seed.
+        max_episode_steps: Steps per episode; ``None``: the scenario's horizon.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown or impossible setting, a team of one, a target that is an agent.
+        ScenarioError: An unknown or invalid setting, a team of one, a target that is an agent.
         ValueError: ``number`` not in the team, an unknown split or render mode.
         PolicyError: Unknown team-mates.
     """
-
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 10,
-    }
 
     def __init__(
         self,
@@ -71,22 +65,16 @@ class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
         settings = shortened(scenario, max_episode_steps, overrides)
-        self.scenario = settings.replace(
+        settings = settings.replace(
             message_size=max(settings.message_size, self.teammates.message_size)
         )
-        _check(self.scenario, number)
+        _check(settings, number)
         self.number = number
-        self._world = SingleWorld(
-            self.scenario, seed=seed, split=split, first_world=first_world, render_mode=render_mode
+        self._open(
+            settings, render_mode=render_mode, seed=seed, split=split, first_world=first_world
         )
-        self.metadata = {  # type: ignore[misc]
-            **type(self).metadata,
-            "render_fps": frames_per_second(self.scenario),
-        }
-        self.render_mode = render_mode
-        self.layout: ObservationLayout = self._world.batch.layout
         self.observation_space: spaces.Box = box(self.layout.bounds())
-        # What the learner's action is read by: a scenario without messages, where it is silent.
+        # Scenario by which the action is read: without messages if it has no message part.
         spoken = self.scenario.replace(message_size=0) if silent else self.scenario
         self.action_space = single_action_space(spoken, discrete_actions)
         self._reader = ActionReader(spoken, discrete_actions)
@@ -101,11 +89,8 @@ class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
         Raises:
             ValueError: A bad seed or option; nothing is changed.
         """
-        self._observations = self._world.reset(seed, options)[None]
-        super().reset(seed=None if seed is None else int(seed))
+        self._observations = self._begin(seed, options)[None]
         self._memory = begin(self.teammates, self._world.batch)
-        if self.render_mode == "human":
-            self.render()
         return self._own(self._observations), {}
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
@@ -125,32 +110,15 @@ class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
         team[0, self.number] = 0
         team[0, self.number, : len(own)] = own
         over = world.advance()
-        self._observations = world.observations[None].copy()  # team-mates may keep what they saw
+        self._observations = world.observations[None].copy()  # policies may keep observations
         info: dict[str, Any] = {
             "score": world.score,
             "reward_terms": world.name_terms(*world.terms[self.number].tolist()),
             "working": bool(world.working()[self.number]),
         }
-        terminated = truncated = False
-        if over:
-            terminated, info["metrics"] = world.end()
-            truncated = not terminated
-        if self.render_mode == "human":
-            self.render()
+        terminated, truncated = self._end(over, info)
         reward = float(world.rewards[self.number])
         return self._own(self._observations), reward, terminated, truncated, info
-
-    def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the world as it stands: (H, W, 3) uint8 in the mode "rgb_array".
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
-        return self._world.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._world.close()
 
     def _own(self, observations: FloatArray) -> FloatArray:
         own: FloatArray = observations[0, self.number].copy()
@@ -160,7 +128,7 @@ class TrackerEnv(OwnArrays, gymnasium.Env[Any, Any]):
 def _check(scenario: Scenario, number: int) -> None:
     if scenario.target_motion == "agent":
         raise ScenarioError(
-            "target_motion='agent' has no place in posse/Tracker-v0, whose learner is a tracker: "
+            "target_motion='agent' is not possible in posse/Tracker-v0, whose agent is a tracker: "
             "use posse.parallel_env(..., target='agent')"
         )
     if scenario.num_trackers < 2:
@@ -174,6 +142,6 @@ def _check(scenario: Scenario, number: int) -> None:
 
 
 def register() -> None:
-    """Make ``posse/Tracker-v0`` known to Gymnasium, once however often it is called."""
+    """Register ``posse/Tracker-v0`` with Gymnasium; repeated calls have no effect."""
     if "posse/Tracker-v0" not in gymnasium.registry:
         gymnasium.register("posse/Tracker-v0", entry_point="posse_baselines.tracker_env:TrackerEnv")

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
-import gymnasium
 import numpy as np
-import numpy.typing as npt
 from gymnasium import spaces
 
 from posse.adapters.actions import MOTIONS, single_action_space
-from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
+from posse.adapters.single_world import shortened
 from posse.adapters.spaces import box
+from posse.adapters.world_env import OneAgentEnv
 from posse.engine.arguments import options_of, real_numbers
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
@@ -19,7 +18,7 @@ from posse.shown import shown
 from posse.signals.observation.layout import ObservationLayout
 
 
-class TeamEnv(gymnasium.Env[Any, Any]):
+class TeamEnv(OneAgentEnv):
     """``posse/Team-v0``: one agent controls the whole team.
 
     **Observation**: ``Box`` (N, F) float32, the observation of each tracker; its fields are
@@ -56,11 +55,6 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         ValueError: An unknown split or render mode, a negative seed.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 10,
-    }
-
     def __init__(
         self,
         scenario: str | Scenario = "constant",
@@ -72,19 +66,11 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         first_world: int = 0,
         **overrides: Any,
     ) -> None:
-        self.scenario = self.fitting_scenario(scenario, None, overrides)
-        self._world = SingleWorld(
-            self.scenario, discrete_actions=discrete_actions, seed=seed, split=split,
-            first_world=first_world, render_mode=render_mode,
+        self._open(
+            self.fitting_scenario(scenario, None, overrides), render_mode=render_mode,
+            discrete_actions=discrete_actions, seed=seed, split=split, first_world=first_world,
         )  # fmt: skip
-        self.metadata = {  # type: ignore[misc]
-            **type(self).metadata,
-            "render_fps": frames_per_second(self.scenario),
-        }
-        self.render_mode = render_mode
-        self.layout: ObservationLayout = self._world.batch.layout
         self.observation_space, self.action_space = self.spaces_of(self.scenario, discrete_actions)
-        self._breakable = self.scenario.breaks > 0
 
     @classmethod
     def fitting_scenario(
@@ -111,19 +97,6 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         assert single.shape is not None
         return observation_space, spaces.Box(-1.0, 1.0, (n, *single.shape), np.float32)
 
-    @property
-    def state_layout(self) -> Any:
-        """Names, units and ranges of what :meth:`state` returns."""
-        return self._world.state_layout
-
-    def state(self) -> FloatArray:
-        """Return the full state of the world, (S,) float32.
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
-        return self._world.state()
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
@@ -132,11 +105,7 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         Raises:
             ValueError: A bad seed or option; nothing is changed.
         """
-        observations = self._world.reset(seed, options)
-        super().reset(seed=None if seed is None else int(seed))
-        if self.render_mode == "human":
-            self.render()
-        return observations, {}
+        return self._begin(seed, options), {}
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -158,26 +127,9 @@ class TeamEnv(gymnasium.Env[Any, Any]):
         }
         if self._breakable:
             info["working"] = world.working()
-        terminated = truncated = False
-        if over:
-            terminated, info["metrics"] = world.end()
-            truncated = not terminated
-        if self.render_mode == "human":
-            self.render()
+        terminated, truncated = self._end(over, info)
         rewards = world.rewards.tolist()
         return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
-
-    def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array".
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
-        return self._world.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._world.close()
 
 
 class SoloEnv(TeamEnv):
@@ -233,12 +185,7 @@ class SoloEnv(TeamEnv):
             "score": world.score,
             "reward_terms": world.name_terms(*world.terms[0].tolist()),
         }
-        terminated = truncated = False
-        if over:
-            terminated, info["metrics"] = world.end()
-            truncated = not terminated
-        if self.render_mode == "human":
-            self.render()
+        terminated, truncated = self._end(over, info)
         return world.observations[0].copy(), world.rewards.item(), terminated, truncated, info
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
@@ -14,18 +13,18 @@ from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
 from posse.adapters.actions import agent_names, single_action_space
-from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second, shortened
+from posse.adapters.single_world import shortened
 from posse.adapters.spaces import box
+from posse.adapters.world_env import WorldEnv
 from posse.engine.arguments import options_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 from posse.shown import shown
-from posse.signals.observation.layout import ObservationLayout
 
 _Infos = dict[str, dict[str, Any]]
 
 
-class TeamParallelEnv(ParallelEnv[str, Any, Any]):
+class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     """A team of unicycle robots finds, follows and holds formation on one mobile target.
 
     **Agents**: ``tracker_0`` ... ``tracker_{N-1}``, and ``target_0`` where the target is an agent.
@@ -71,9 +70,8 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {
+        **WorldEnv.metadata,
         "name": "posse_track_v0",
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 10,
         "is_parallelizable": True,
     }
 
@@ -90,17 +88,11 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         first_world: int = 0,
         **overrides: Any,
     ) -> None:
-        self.scenario = shortened(scenario, max_cycles, target_overrides(target, overrides))
-        self._world = SingleWorld(
-            self.scenario, discrete_actions=discrete_actions, seed=seed, split=split,
-            first_world=first_world, render_mode=render_mode,
+        self._open(
+            shortened(scenario, max_cycles, target_overrides(target, overrides)),
+            render_mode=render_mode, discrete_actions=discrete_actions, seed=seed, split=split,
+            first_world=first_world,
         )  # fmt: skip
-        self.metadata = {  # type: ignore[misc]
-            **type(self).metadata,
-            "render_fps": frames_per_second(self.scenario),
-        }
-        self.render_mode = render_mode
-        self.layout: ObservationLayout = self._world.batch.layout
         self.possible_agents = agent_names(self.scenario)
         self.agents: list[str] = []
         bounds = self.layout.bounds()
@@ -109,8 +101,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             agent: single_action_space(self.scenario, discrete_actions)
             for agent in self.possible_agents
         }
-        self._breakable = self.scenario.breaks > 0
-        self._nobody = dict.fromkeys(self.possible_agents, False)
+        self._none_ended = dict.fromkeys(self.possible_agents, False)
         self._state_space: spaces.Box | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -122,24 +113,11 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         return self.action_spaces[agent]
 
     @property
-    def state_layout(self) -> Any:
-        """Names, units and ranges of what :meth:`state` returns."""
-        return self._world.state_layout
-
-    @property
     def state_space(self) -> spaces.Box:
         """Space of :meth:`state`."""
         if self._state_space is None:
             self._state_space = box(self.state_layout.bounds())
         return self._state_space
-
-    def state(self) -> FloatArray:
-        """Return the full state of the world, (S,) float32.
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
-        return self._world.state()
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -191,7 +169,7 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
         }
         if self._breakable:
             self._report_working(infos)
-        terminated, truncated = self._nobody.copy(), self._nobody.copy()
+        terminated, truncated = self._none_ended.copy(), self._none_ended.copy()
         if over:
             was_terminated, metrics = world.end()
             ended = terminated if was_terminated else truncated
@@ -221,18 +199,6 @@ class TeamParallelEnv(ParallelEnv[str, Any, Any]):
             ValueError: Of a wrong type or shape, not finite, or out of its space.
         """
         self._world.actions.one(agent, action)
-
-    def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array".
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
-        return self._world.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._world.close()
 
 
 def target_overrides(target: str | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
