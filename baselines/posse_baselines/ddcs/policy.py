@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
-from posse.rules.state import beam_directions, slot_records
+from posse.rules import beam_directions, slot_records
 from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs.controller import decide_all
 from posse_baselines.ddcs.memory import GRID, MATE, MIND

@@ -16,7 +16,7 @@ from posse_baselines.ddcs.monitoring import is_there, mate_now
 from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import length
 from posse_baselines.laws.slots import rotate
-from posse_baselines.laws.steering import intercept_time
+from posse_baselines.laws.steering import time_to_slot
 
 _HALF_TURN = 0.25 * math.pi  # of the turning time, per 1 - cos
 _BIT = np.uint64(1)
@@ -65,8 +65,8 @@ def choose_slot(
             ahead_x, ahead_y = float(mates[j].heading_cos), float(mates[j].heading_sin)
             at_x, at_y = mate_now(f, s, d, mates[j])
         elif f.neighbours < n - 1 and mates[j].slot >= 0:
-            # No place for it in the observation, but it claimed a slot. Were it there
-            # still, and near, it would have a place.
+            # It has no place in the observation but claimed a slot. If it were still near its
+            # slot, and the slot were near, it would have a place.
             slot_x, slot_y, _, _ = slot_place(d, slots[mates[j].slot])
             if length(slot_x - x, slot_y - y) < d.horizon - s.in_place:
                 mates[j].slot = -1
@@ -81,10 +81,8 @@ def choose_slot(
             slot = slots[k]
             place_x, place_y, _, _ = slot_place(d, slot)
             dx, dy = place_x - at_x, place_y - at_y
-            time = intercept_time(dx, dy, vx, vy, max_speed)
-            if time > s.weave_time:
-                time = intercept_time(dx, dy, d.mean_x, d.mean_y, max_speed)
-            # Turning towards it takes time, too; up to half a turn where it lies behind.
+            time = time_to_slot(dx, dy, vx, vy, d.mean_x, d.mean_y, s.weave_time, max_speed)
+            # Time for turning towards it, up to half a turn.
             facing = (dx * ahead_x + dy * ahead_y) / max(length(dx, dy), 1e-6)
             time += _HALF_TURN * (1.0 - facing) / max_omega * min(1.0, time)
             if held == k:

@@ -37,6 +37,28 @@ def intercept_time(x: float, y: float, speed_x: float, speed_y: float, max_speed
 
 
 @compiled
+def time_to_slot(
+    x: float,
+    y: float,
+    speed_x: float,
+    speed_y: float,
+    mean_x: float,
+    mean_y: float,
+    weave_time: float,
+    max_speed: float,
+) -> float:
+    """Return the intercept time (s) of a slot at (x, y) from the tracker, m.
+
+    The target is assumed to keep its velocity (m/s), or its mean velocity (m/s) if the intercept
+    takes longer than ``weave_time`` (s).
+    """
+    time = intercept_time(x, y, speed_x, speed_y, max_speed)
+    if time > weave_time:
+        time = intercept_time(x, y, mean_x, mean_y, max_speed)
+    return time
+
+
+@compiled
 def approach_velocity(
     offset_x: float,
     offset_y: float,

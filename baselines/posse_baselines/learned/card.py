@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from posse.rules.state import SPLITS
+from posse.rules import SPLITS
 from posse_baselines.policy import PolicyError
 
 LONGEST_NAME: Final = 100

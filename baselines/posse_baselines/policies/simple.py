@@ -8,7 +8,7 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.numeric import FloatArray, kernel
-from posse.rules.randomness import mix
+from posse.rules import mix
 from posse_baselines.policy import (
     BasePolicy,
     Memory,

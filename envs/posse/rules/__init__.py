@@ -1,1 +1,37 @@
-"""Dynamics, contacts, sensing, radio and scoring of one world."""
+"""Dynamics, contacts, sensing, radio and scoring of one world.
+
+The names below are public: records, constants and functions for policies and users' own modules.
+"""
+
+from posse.rules.kinematics import arc
+from posse.rules.randomness import SENSOR_NOISE, TARGET, between, mix, normal_pair, uniform
+from posse.rules.score import place
+from posse.rules.state import (
+    CONFIG,
+    NEVER,
+    SPLITS,
+    TRACKER,
+    beam_directions,
+    config_record,
+    slot_records,
+    world_record,
+)
+
+__all__ = [
+    "CONFIG",
+    "NEVER",
+    "SENSOR_NOISE",
+    "SPLITS",
+    "TARGET",
+    "TRACKER",
+    "arc",
+    "beam_directions",
+    "between",
+    "config_record",
+    "mix",
+    "normal_pair",
+    "place",
+    "slot_records",
+    "uniform",
+    "world_record",
+]

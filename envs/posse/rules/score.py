@@ -1,8 +1,8 @@
-"""The score: who occupies which slot.
+"""The score, from the slots that are occupied.
 
 At each control step, score = occupied slots / working trackers, at most 1. A slot is occupied when
-a working tracker that touches nothing is within tolerance of it; who stands where is free.
-The safe score counts a step only while no tracker has touched anything since the episode began.
+a working tracker that touches nothing is within tolerance of it; any tracker may occupy any slot.
+For the safe score, steps count only until the first contact of any tracker.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def place(c: Record, w: Record, t: Record) -> tuple[np.float32, np.float32]:
 
 @compiled
 def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -> None:
-    """Work out who occupies which slot, and how far everyone is from a slot that is free.
+    """Determine which tracker occupies which slot, and the distance of each from a free slot.
 
-    Where the discs are stands in ``s`` (:func:`posse.rules.discs.lay_out`).
+    Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
@@ -55,7 +55,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
                 t.slot = best
     for first in range(0, n if taken != _NO_BITS else 0, BLOCK):
         last = min(first + BLOCK, n)
-        looking = False  # anyone for whom the nearest slot of all is another's
+        looking = False  # whether the nearest slot of any is occupied by another
         for i in range(first, last):
             if trackers[i].slot < 0 and s.slot[i] >= _ZERO:
                 looking |= taken & (_BIT << np.uint64(s.slot[i])) != _NO_BITS
@@ -76,7 +76,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
 
 @compiled
 def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
-    """Say whether a tracker, straight on from its start at full speed, could be in a slot now."""
+    """Return whether a tracker, straight from its start at full speed, could be in a slot."""
     reach = t.max_speed * np.float32(w.step) * c.dt + c.tolerance
     dx, dy = t.start_x - w.x, t.start_y - w.y
     most = reach + c.slots_reach
@@ -92,7 +92,7 @@ def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
 
 @compiled
 def settle(c: Record, w: Record) -> None:
-    """Note when the team has settled, and when it has recovered from a loss."""
+    """Record when the team has settled, and when it has recovered from a loss."""
     if w.held >= c.settle_steps:
         begun = w.step - w.held + 1
         if w.settled_at < 0:

@@ -12,8 +12,7 @@ import numpy as np
 
 from posse import Batch
 from posse.numeric import FloatArray, Records, kernel
-from posse.rules.score import place
-from posse.rules.state import NEVER, config_record
+from posse.rules import NEVER, config_record, place
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)

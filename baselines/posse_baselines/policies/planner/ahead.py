@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from posse import Batch, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
-from posse.rules.state import config_record, slot_records
+from posse.rules import config_record, slot_records
 from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.heading import BODY
 from posse_baselines.laws.safeguard import DISC, PLAYS

@@ -1,4 +1,4 @@
-"""Who goes to which slot, and what is remembered of that."""
+"""Assignment of trackers to slots, and its memory."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse.rules.state import NEVER
+from posse.rules import NEVER
 from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.slots import rotate
-from posse_baselines.laws.steering import intercept_time
+from posse_baselines.laws.steering import time_to_slot
 from posse_baselines.policies.planner.foresight import arrival_time
 
 WEAVE_TIME: Final = 1.5
-"""How long a target is taken to keep its velocity before its mean one counts, s."""
-_LOYALTY: Final = 0.5  # s; how much sooner another assignment has to be for a tracker to change
-_TURNING: Final = 0.5  # share of the time for a turn on the spot that delays an arrival
+"""Time for which the target is assumed to keep its velocity; then its mean one is used, s."""
+_LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
+_TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
 
 PLAN: Final[np.dtype[Any]] = np.dtype(
     (
@@ -26,14 +26,14 @@ PLAN: Final[np.dtype[Any]] = np.dtype(
         np.dtype(
             [
                 ("slot", np.int32),  # -1: none yet
-                ("mean_x", np.float32),  # running mean of the target's velocity, m/s; the first's
-                ("mean_y", np.float32),  # alone is kept
+                ("mean_x", np.float32),  # running mean of the target's velocity, m/s; used only in
+                ("mean_y", np.float32),  # the first record
             ],
             align=True,
         ),
     )
 )
-"""What is remembered of a tracker from step to step."""
+"""Memory of one tracker."""
 
 
 @compiled
@@ -49,7 +49,7 @@ def assign_slots(
     cost: FloatArray,
     work: FloatArray,
 ) -> None:
-    """Assign the working trackers to slots so that they arrive soonest in total."""
+    """Assign the working trackers to slots with the least total arrival time."""
     n, rows = c.num_trackers, 0
     vx, vy = float(w.speed * w.heading_cos), float(w.speed * w.heading_sin)
     for i in range(n):
@@ -63,10 +63,10 @@ def assign_slots(
             if since >= 0 and ways[i].foresees > 0.0:
                 time = arrival_time(path, float(since), slots[k], t.x, t.y, speed, c.dt)
             else:
-                time = intercept_time(x, y, vx, vy, speed)
-                if time > WEAVE_TIME:
-                    time = intercept_time(x, y, plans[0].mean_x, plans[0].mean_y, speed)
-            # Turning towards it takes time, too.
+                time = time_to_slot(
+                    x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, WEAVE_TIME, speed
+                )
+            # Time for turning towards it.
             away = wrap(math.atan2(y, x) - math.atan2(t.heading_sin, t.heading_cos))
             time += _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:

@@ -22,7 +22,7 @@ from posse.numeric import (
     kernel,
     worlds_of,
 )
-from posse.rules.state import NEVER
+from posse.rules import NEVER
 from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.heading import regulate
 from posse_baselines.laws.safeguard import safe_velocity
