@@ -1,33 +1,33 @@
-"""The columns of a recorded episode: which there are, how fine they are kept, how they are made.
+"""The columns of a recorded episode: names, resolutions and sources.
 
 ========================== ================= ======================================================
 column                     shape of a row    what it holds
 ========================== ================= ======================================================
-tracker_x, tracker_y       (N,) m            where each tracker is
+tracker_x, tracker_y       (N,) m            position of each tracker
 tracker_heading            (N,) rad          its heading, without jumps of 2π
-tracker_sees               (N,)              1: its own sensor has the target
+tracker_sees               (N,)              1: its own sensor sees the target
 tracker_slot               (N,)              the slot that it occupies; -1: none
 tracker_onsets             (N,)              contacts that began in this step
 tracker_broken             (N,)              1: it is broken
 tracker_sensor_dead        (N,)              1: its target sensor is in an outage
 tracker_radio_dead         (N,)              1: its radio is in an outage
-tracker_fix_step           (N,)              when its best fix of the target was taken; -1: none
-tracker_fix_x, _y          (N,) m            where that fix is
+tracker_fix_step           (N,)              step of its best fix of the target; -1: none
+tracker_fix_x, _y          (N,) m            position of that fix
 tracker_fix_heading        (N,) rad          the target's heading in it
-heard_step                 (N, N)            when what i last heard of j was sent; -1: never. Left
-                                             out where the radio is perfect
+heard_step                 (N, N)            step at which the last message that i received from j
+                                             was sent; -1: never. Omitted if the radio is perfect
 target_x, _y, _heading     () m, rad         the target
 target_frame               () rad            heading of the slot frame, ψ
 target_dart                ()                1: a smart target darts
-score                      ()                the present step's score
-action                     (rows, 2)         what was chosen, in [-1, 1]: speed, turn rate
-message                    (rows, m)         what was added to the broadcast
-reward/NAME                (rows,)           each term that the scenario weighs, unweighted
-belief/NAME                (N, ...)          what the policy tells of itself
+score                      ()                score of the step
+action                     (rows, 2)         speed and turn rate, in [-1, 1]
+message                    (rows, m)         message of the policy
+reward/NAME                (rows,)           each term with a weight in the scenario, unweighted
+belief/NAME                (N, ...)          annotations by the policy
 observation/NAME           (rows, ...)       each field; only the sonar without ``observations``
 ========================== ================= ======================================================
 
-Rows are trackers, and after them the target where it is an agent.
+Rows are the trackers, followed by the target if it is an agent.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ from posse_training.replay.episode import Column
 
 _PLACE: Final = 0.001  # m
 _ANGLE: Final = 0.001  # rad
-_FIX: Final = 0.01  # m, a measured place
+_FIX: Final = 0.01  # m, of a measured position
 _ACTION: Final = 0.002
 _COARSE_ACTION: Final = 0.008
 _MESSAGE: Final = 1 / 512
 _SCORE: Final = 0.0001
-_DRAWN: Final = 0.05  # what is only drawn
+_DRAWN: Final = 0.05  # for quantities that are only drawn
 _BELIEF: Final = 0.01
 _RESOLUTIONS: Final = {"m": 0.001, "m/s": 0.001, "rad": 0.001, "rad/s": 0.001, "s": 0.01}
 _FINE: Final = 0.001
@@ -71,12 +71,12 @@ States = dict[str, npt.NDArray[Any]]
 
 
 def last_kept(rows: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    """Return T rows as T + 1: nothing is chosen in the last frame, which keeps what was."""
+    """Return T rows as T + 1; the last frame, which has no action, repeats the row before."""
     return np.stack([*rows, rows[-1]])
 
 
 def _number_column(values: npt.NDArray[Any], resolution: float) -> Column:
-    """Return a column that is kept exactly where it holds whole numbers."""
+    """Return a column that is stored exactly if its values are whole numbers."""
     finite = np.isfinite(values)
     whole = np.array_equal(values[finite], np.rint(values[finite]))
     return Column(values, 1.0 if whole else resolution)
@@ -122,7 +122,7 @@ def state_columns(states: States, scenario: Scenario) -> dict[str, Column]:
 
 
 def reward_columns(terms: dict[str, list[npt.NDArray[Any]]]) -> dict[str, Column]:
-    """Return a column of each term of T steps; there is none of the start, which gives nothing."""
+    """Return a column of each term of T steps; the first frame has no reward."""
     return {
         f"reward/{name}": _number_column(np.stack([np.zeros_like(column[0]), *column]), _FINE)
         for name, column in terms.items()
@@ -130,13 +130,13 @@ def reward_columns(terms: dict[str, list[npt.NDArray[Any]]]) -> dict[str, Column
 
 
 def belief_columns(beliefs: States, whole: bool) -> dict[str, Column]:
-    """Return a column of each thing that the policy tells; coarse if not whole."""
+    """Return a column of each annotation of the policy, coarse unless ``whole``."""
     finest = _BELIEF if whole else _DRAWN
     return {f"belief/{name}": _number_column(value, finest) for name, value in beliefs.items()}
 
 
 def action_columns(actions: Sequence[FloatArray], whole: bool) -> dict[str, Column]:
-    """Return the columns of T actions (rows, 2 + m); coarse if not whole."""
+    """Return the columns of T actions (rows, 2 + m), coarse unless ``whole``."""
     if not actions:
         return {}
     values = last_kept(actions)
@@ -149,7 +149,7 @@ def action_columns(actions: Sequence[FloatArray], whole: bool) -> dict[str, Colu
 def observation_columns(
     layout: ObservationLayout, observations: FloatArray, whole: bool
 ) -> dict[str, Column]:
-    """Return a column of each field of observations (T + 1, rows, F); of the sonar if not whole."""
+    """Return a column of each field of observations (T + 1, rows, F), or only of the sonar."""
     columns = {}
     views = layout.views(observations)
     for field in layout.fields:

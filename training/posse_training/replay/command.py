@@ -21,27 +21,27 @@ class _Replay:
 
     players: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Policies: names, files, or "package.module:Class"; or replays (.html) of the same world,
-    whose players are taken over."""
+    whose players are included."""
     scenario: str = "smart"
-    """What to play."""
+    """Name of the scenario."""
     world: int = 0
-    """Which world of the seed."""
+    """Index of the world within the seed."""
     seed: int = 7
-    """Of the world."""
+    """Seed of the world."""
     split: str = "test"
-    """Of which split."""
+    """Split of the world: train, validation or test."""
     num_trackers: int | None = None
     """Trackers in the team; default: the scenario's."""
     seconds: float | None = None
-    """Play so long at most, s; default: the whole episode."""
+    """Longest duration, s; default: the whole episode."""
     observations: bool = True
-    """Keep what every tracker observed: most of the file's size."""
+    """Record the observations of every tracker, which are most of the file's size."""
     out: Path = Path("replay.html")
-    """Where to write."""
+    """File to write."""
 
 
 def main(arguments: list[str]) -> None:
-    """Play, and write the page."""
+    """Play the world and write the page."""
     which = tyro.cli(_Replay, prog="posse replay", args=arguments)
     replays: list[Replay] = []
     for player in which.players:

@@ -1,8 +1,8 @@
-"""What a replay holds: one world, and what each player did in it, as named columns over time.
+"""Contents of a replay: one world, and the episode of each player as named columns over time.
 
 A *frame* is the world at a control step: frame 0 is the start, frame T the end. Row t of a column
-is frame t. An action and a belief in row t are what was chosen in frame t; a reward term in row t
-is of the step that led to it.
+is frame t. Actions and beliefs in row t are those of frame t; a reward term in row t is that of the
+step before it.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Column:
     """One quantity over an episode.
 
     Attributes:
-        values: (T + 1, ...), one row a frame; not a number: there is none in this frame.
-        resolution: A page keeps the values to half of this. 1: they are whole numbers.
-        unit: Of the values.
+        values: (T + 1, ...), one row per frame; nan: no value in this frame.
+        resolution: A page stores the values to half of this. 1: they are whole numbers.
+        unit: Unit of the values.
     """
 
     values: npt.NDArray[Any]
@@ -36,13 +36,13 @@ class Column:
 
 @dataclass(frozen=True)
 class Event:
-    """Something worth a tick on the timeline.
+    """An event marked on the timeline.
 
     Attributes:
-        step: The frame in which it is first there.
+        step: The first frame after the event.
         kind: One of :data:`EVENT_KINDS`.
-        text: What happened, for people.
-        robots: Numbers of the trackers that it is about.
+        text: Description.
+        robots: Numbers of the trackers involved.
     """
 
     step: int
@@ -56,11 +56,11 @@ class Player:
     """One team's episode.
 
     Attributes:
-        name: What the page calls it.
-        columns: By name; :mod:`posse_training.replay.columns` lists them.
-        events: In order of time.
-        metrics: Every metric of the episode, as far as it was played; nan: never happened.
-        about: What is known of the policy, such as the card of a learned one; plain JSON.
+        name: Name on the page.
+        columns: Columns by name; :mod:`posse_training.replay.columns` lists them.
+        events: Events in order of time.
+        metrics: Every metric of the recorded part of the episode; nan: never happened.
+        about: Description of the policy, such as the card of a learned one; plain JSON.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Player:
 
     @property
     def frames(self) -> int:
-        """T + 1, how many frames there are."""
+        """T + 1, number of frames."""
         return len(next(iter(self.columns.values())).values)
 
 
@@ -80,7 +80,7 @@ class Replay:
     """One world, played by one to four players.
 
     Attributes:
-        world: What the players have in common: scenario, seed, obstacles, ...; plain JSON, with
+        world: Common data of the players: scenario, seed, obstacles, ...; plain JSON, with
             infinite numbers.
         players: Left to right.
     """
@@ -90,7 +90,7 @@ class Replay:
 
 
 def _identity(world: dict[str, Any]) -> dict[str, Any]:
-    """Return what has to be equal for two episodes to be of the same world."""
+    """Return the data that are equal if two episodes are of the same world."""
     settings = {k: v for k, v in world["settings"].items() if k != "message_size"}
     return {"settings": settings, "obstacles": world["obstacles"]} | {
         key: world[key] for key in ("seed", "split", "world", "episode")
@@ -98,10 +98,10 @@ def _identity(world: dict[str, Any]) -> dict[str, Any]:
 
 
 def join(replays: Sequence[Replay]) -> Replay:
-    """Put the players of several replays of the same world into one.
+    """Combine the players of several replays of the same world.
 
     Raises:
-        SettingsError: None, more than four players, or worlds that differ.
+        SettingsError: No player, more than four, or different worlds.
     """
     players = tuple(player for replay in replays for player in replay.players)
     if not 1 <= len(players) <= MOST_PLAYERS:

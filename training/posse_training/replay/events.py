@@ -1,4 +1,4 @@
-"""What happened in an episode, found in its states: the ticks of the timeline."""
+"""Events of an episode for the timeline, derived from its states."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def find_events(
     Args:
         states: Engine states by name, (T + 1, ...) each.
         control_step: Length of a step, s.
-        leader: Whom each tracker follows, (T + 1, N), -1: nobody; ``None``: nobody tells.
+        leader: Leader of each tracker, (T + 1, N), -1: none; ``None``: not known.
     """
     found = [
         *_marks(states, control_step),
@@ -39,7 +39,7 @@ def find_events(
 
 
 def _marks(states: _States, control_step: float) -> list[Event]:
-    """Return what the engine itself notes the time of."""
+    """Return the events whose times the engine records."""
     events = []
     for name, kind, text in (
         ("world_detected_at", "detection", "target detected"),
@@ -53,7 +53,7 @@ def _marks(states: _States, control_step: float) -> list[Event]:
 
 
 def _rises(happens: npt.NDArray[np.bool_]) -> npt.NDArray[Any]:
-    """Return where a truth value over time (T + 1,) becomes true."""
+    """Return the frames in which a boolean over time (T + 1,) becomes true."""
     return np.flatnonzero(happens & ~np.concatenate([[False], happens[:-1]]))
 
 
@@ -89,7 +89,7 @@ def _breaks(states: _States) -> list[Event]:
 
 
 def _exchanges(leader: npt.NDArray[Any]) -> list[Event]:
-    """Return when the leader that more than half of the team follow became another."""
+    """Return the changes of the leader that more than half of the team follow."""
     n = leader.shape[1]
     middle = np.sort(leader, axis=1)[:, n // 2]
     agreed = np.count_nonzero(leader == middle[:, None], axis=1) > n / 2

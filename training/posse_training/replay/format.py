@@ -1,12 +1,12 @@
-"""How a replay is written: a JSON header, and one deflated stream of whole numbers.
+"""Encoding of a replay: a JSON header, and one deflated stream of whole numbers.
 
-A column of shape (T + 1, ...) is divided by its resolution and rounded, K series of T + 1 whole
-numbers. Each series is replaced ``order`` times by its differences (the first number by its
-difference from 0); these are folded to numbers that are not negative (0, -1, 1, -2, ... become
+A column of shape (T + 1, ...) is divided by its resolution and rounded, which gives K series of
+T + 1 whole numbers. Each series is replaced ``order`` times by its differences (the first number by
+its difference from 0). The differences are mapped to non-negative numbers (0, -1, 1, -2, ... become
 0, 1, 2, 3, ...) and stored as ``width`` planes of bytes, lowest first, each plane series by series.
-All columns stand one after another, and the whole is deflated (zlib). The header says of each
-column its ``name``, ``shape`` of a row, ``scale``, ``unit``, ``order``, ``width``, and the number
-``missing`` that stands for "not a number", if any.
+The columns are concatenated and deflated (zlib). The header states for each column its ``name``,
+``shape`` of a row, ``scale``, ``unit``, ``order``, ``width``, and the number ``missing`` that
+encodes nan, if any.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def encode(replay: Replay) -> tuple[str, bytes]:
     """Return the JSON header and the deflated columns.
 
     Raises:
-        SettingsError: A column with numbers too great for its resolution.
+        SettingsError: A column with numbers too large for its resolution.
     """
     parts: list[bytes] = []
     players = []
@@ -57,10 +57,10 @@ def encode(replay: Replay) -> tuple[str, bytes]:
 
 
 def decode(header: str, data: bytes) -> Replay:
-    """Return what :func:`encode` was given, each number to half its column's resolution.
+    """Return the argument of :func:`encode`, each number to half its column's resolution.
 
     Raises:
-        SettingsError: Data of another format, or cut short.
+        SettingsError: Data of another format, or truncated.
     """
     try:
         described = _from_json(json.loads(header))
@@ -133,7 +133,7 @@ def _unpack(column: dict[str, Any], frames: int, raw: bytes) -> Column:
     return Column(values, float(column["scale"]), column["unit"])
 
 
-# JSON has no number that is infinite or none: they are written as {"number": "inf"}.
+# JSON has no infinity or nan: they are written as {"number": "inf"}.
 
 
 def _to_json(value: Any) -> Any:

@@ -1,10 +1,9 @@
-"""The page: one HTML file that holds style, code and data, and asks for nothing from elsewhere.
+"""The page: one HTML file with style, code and data that loads nothing else.
 
-The code is that of the modules in ``web/``, one after another in one module: a page opened from a
-file may not import from another. It is deflated, as the data are, so that a page can be mailed;
-``web/loader.js`` unpacks and runs it. What comes from outside (names, cards, settings) is written
-as data, never as markup or code, and a policy in the page (Content-Security-Policy) lets the
-browser run no other code than this.
+The code consists of the modules in ``web/``, concatenated to one module, since a page opened from a
+file cannot import other files. Code and data are deflated, for a small file; ``web/loader.js``
+unpacks and runs the code. External text (names, cards, settings) is written as data, never as
+markup or code, and the page's Content-Security-Policy forbids all other code.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ MODULES: Final = (
     "robots.js", "view.js", "events.js", "timeline.js", "values.js", "panel.js", "header.js",
     "export.js", "legend.js", "controls.js", "main.js",
 )  # fmt: skip
-"""The page's code, each after those that it imports from."""
+"""Modules of the page's code, each after those that it imports from."""
 _COLOURS: Final = (
     "PAPER", "GROUND", "GRID", "WALL", "OBSTACLE", "OBSTACLE_RIM", "INK", "FAINT_INK", "TARGET",
     "SLOT", "SLOT_FILLED", "TRACKER", "TRACKER_RIM", "TRAIL", "BROKEN", "LINK", "SENSING",
@@ -45,12 +44,12 @@ _DATA: Final = re.compile(
 
 
 def write_replay(replay: Replay, path: str | Path) -> Path:
-    """Write a page that shows a replay; folders are made, a file there is replaced.
+    """Write a page that shows a replay; folders are created, an existing file is replaced.
 
     Args:
-        replay: What :func:`posse_training.replay.record` or a
-            :class:`~posse_training.replay.Recorder` returns.
-        path: Where to, ending in ``.html``.
+        replay: Result of :func:`posse_training.replay.record` or a
+            :class:`~posse_training.replay.Recorder`.
+        path: File to write, ending in ``.html``.
 
     Raises:
         SettingsError: A path that does not end in ``.html``.
@@ -68,7 +67,7 @@ def read_replay(path: str | Path) -> Replay:
     """Return the replay that a page shows, each number to half its column's resolution.
 
     Raises:
-        SettingsError: No such file, or one that is no replay.
+        SettingsError: No such file, or not a replay.
     """
     path = Path(path)
     try:
@@ -104,7 +103,7 @@ def page(replay: Replay) -> str:
         "code": _in_letters(zlib.compress(code.encode(), 9)),
         "loader": loader,
     }
-    # In one pass: what is put in is not looked at again.
+    # In one pass, so that inserted text is not searched again.
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
 
 
@@ -114,7 +113,7 @@ def _title(replay: Replay) -> str:
 
 
 def code_of_page() -> str:
-    """Return the modules as one: without their imports and the word "export"."""
+    """Return the modules concatenated, without imports and the keyword "export"."""
     modules = (_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in MODULES)
     return "".join(
         f"// --- {name} ---\n{text}\n" for name, text in zip(MODULES, modules, strict=True)
@@ -126,7 +125,7 @@ def _in_letters(data: bytes) -> str:
 
 
 def colours() -> dict[str, Any]:
-    """Return the colours of figures and films as the page has them, light and dark."""
+    """Return the colours of figures and films for the page, light and dark."""
 
     def css(colour: style.Colour) -> str:
         return "#" + "".join(f"{part:02x}" for part in colour)
@@ -148,7 +147,7 @@ def colours() -> dict[str, Any]:
 
 
 def _as_data(text: str) -> str:
-    """Return JSON that means the same, and that nothing in a page takes for markup."""
+    """Return equivalent JSON that cannot be parsed as markup in a page."""
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     return text

@@ -1,4 +1,4 @@
-"""Plays one world with one or more policies, and records it."""
+"""Plays and records one world with one or more policies."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ def record(
     Args:
         policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs
             (label, policy).
-        scenario: By name or as a value; its messages are made as long as each policy needs.
-        seed: Of the world.
-        world: Its index.
+        scenario: Scenario or its name; ``message_size`` is raised to that of each policy.
+        seed: Seed of the world.
+        world: Index of the world within the seed.
         split: ``"train"``, ``"validation"`` or ``"test"``.
-        seconds: Play so long at most, s; ``None``: to the end.
-        observations: Whether to keep what every tracker observed: most of a page's size.
+        seconds: Longest duration, s; ``None``: the whole episode.
+        observations: Whether to record all observations, which are most of a page's size.
         **overrides: Settings of the scenario.
 
     Raises:
         SettingsError: No policy, more than four, ``seconds`` not above 0.
         PolicyError: A policy that does not fit the scenario, or a target that is an agent.
-        ScenarioError: An unknown scenario or split, an impossible setting, seed or world.
+        ScenarioError: An unknown scenario or split, an invalid setting, seed or world.
     """
     settings = get_scenario(scenario, **overrides)
     if not 1 <= len(policies) <= MOST_PLAYERS:
@@ -80,7 +80,7 @@ def record(
 
 
 def _about(policy: Policy) -> dict[str, Any]:
-    """Return what is known of a policy: of a learned one's card, what fits a line each."""
+    """Return a description of a policy, including the short entries of a learned one's card."""
     about: dict[str, Any] = {"reads_state": True} if policy.reads_state else {}
     card = getattr(policy, "card", None)
     for name, value in card.items() if isinstance(card, Mapping) else ():

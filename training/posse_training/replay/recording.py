@@ -1,4 +1,4 @@
-"""Keeps, frame by frame, what a replay shows of an episode that somebody plays."""
+"""Records an episode of a batch for a replay."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from posse_training.runs.settings import SettingsError
 
 
 class Recorder:
-    """A batch that remembers what happens in one of its worlds, for a replay.
+    """A batch that records one of its worlds for a replay.
 
-    Use it in the place of the batch, one episode at a time::
+    It is used instead of the batch, one episode at a time::
 
         recorder = Recorder(batch, "mine")
         observations = recorder.reset()
@@ -39,14 +39,14 @@ class Recorder:
 
     Args:
         batch: The worlds.
-        name: What the page calls the player.
-        world: Which world of the batch is recorded.
-        observations: Whether to keep what every robot observed.
-        about: What is known of the policy; plain JSON.
+        name: Name of the player on the page.
+        world: Index of the recorded world in the batch.
+        observations: Whether to record all observations.
+        about: Description of the policy; plain JSON.
 
     Raises:
-        SettingsError: No such world in the batch, or a batch whose worlds begin anew in the step
-            that ends them: their last states are lost.
+        SettingsError: No such world in the batch, or autoreset "same_step", which overwrites the
+            last state of an episode.
     """
 
     def __init__(
@@ -103,8 +103,7 @@ class Recorder:
 
         Args:
             actions: (E, rows, 2 + message_size) in [-1, 1].
-            beliefs: What the policy had in mind when it chose them, (E, N, ...) each:
-                ``policy.annotations(memory)``.
+            beliefs: Annotations by the policy, (E, N, ...) each: ``policy.annotations(memory)``.
 
         Raises:
             SettingsError: Before :meth:`reset`, or after the end of the recorded episode.
@@ -134,10 +133,10 @@ class Recorder:
         }
 
     def player(self) -> Player:
-        """Return what has been played so far.
+        """Return the episode recorded so far.
 
         Raises:
-            SettingsError: Nothing has.
+            SettingsError: Nothing has been recorded.
         """
         if not self._observations:
             raise SettingsError("nothing is recorded before reset: call the recorder's reset()")
@@ -155,6 +154,6 @@ class Recorder:
         return Player(self.name, columns, events, dict(self._metrics), self._about)
 
     def replay(self) -> Replay:
-        """Return what has been played so far as a replay of its own."""
+        """Return the episode recorded so far as a replay with one player."""
         player = self.player()
         return Replay(self._described, (player,))

@@ -1,4 +1,4 @@
-"""What a page says of the world that was played: scenario, settings, where things stand."""
+"""Description of a recorded world for the page: scenario, settings, positions."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _BLOCKS: Final = ("own motion", "task", "target", "sonar", "team-mates")
 
 
 def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, Any]:
-    """Return what all players of a world have in common, as plain JSON with infinite numbers.
+    """Return the common data of all players of a world, as plain JSON with infinite numbers.
 
-    Of the observation's fields, only the sonar is described without ``observations``.
+    Without ``observations``, the sonar is the only observation field described.
     """
     scenario, state = batch.scenario, batch.state
     weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
@@ -59,7 +59,7 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
 
 
 def _settings(scenario: Scenario) -> dict[str, Any]:
-    """Return every setting by name; pairs as lists, as JSON has them."""
+    """Return every setting by name, with pairs as lists."""
     return {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in scenario.to_dict().items()
@@ -80,7 +80,7 @@ def _describe(field: Field) -> dict[str, Any]:
 
 
 def _block(field: Field) -> str:
-    """Return under which heading a field stands in the panel."""
+    """Return the heading in the panel under which a field is listed."""
     if field.of_neighbour:
         return _BLOCKS[4]
     if field.name == "sonar":
@@ -93,8 +93,8 @@ def _block(field: Field) -> str:
 def changed_settings(scenario: Scenario) -> dict[str, list[Any]]:
     """Return the settings that differ from the named scenario's: [there, here] by name.
 
-    ``message_size`` is left out: it is what the policy needs. Of a name that is not known, what
-    differs from the plainest scenario is returned.
+    ``message_size`` is omitted, since it is set by the policy. A scenario with an unknown name is
+    compared with the default settings.
     """
     try:
         named = get_scenario(scenario.name)

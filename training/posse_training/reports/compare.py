@@ -24,7 +24,7 @@ from posse_training.reports.plays import Plays
 from posse_training.reports.sweeps import LEADER_LOSS, SWEEPS, play_sweeps, write_points
 
 PLANNER: Final = "planner"
-"""The reference that every team is shown beside."""
+"""The reference that is shown with every team."""
 SUMMARY: Final = "summary.json"
 POINTS: Final = "sweeps.csv"
 
@@ -46,24 +46,24 @@ class Settings:
     """Split of the worlds: train, validation or test."""
     out: Path = Path("runs/compare")
     """Folder for the rows (CSV), the summary (JSON) and the figures (PNG and SVG). It is replaced
-    as a whole when all is done, and refused if it holds files that no comparison wrote."""
+    as a whole at the end, and refused if it contains files that no comparison wrote."""
     figures: bool = True
     """Draw figures."""
     planner_episodes: int = 100
-    """Worlds that the planner plays as a reference, of those of the others, at most; 0: none. It
-    takes about 0.4 s of processor time a world. Named among the policies it plays all."""
+    """Largest number of the worlds that the planner plays as a reference; 0: none. It takes about
+    0.4 s of processor time per world. If named among the policies, it plays all worlds."""
     sweep_episodes: int = 200
-    """Worlds at each point of the figures that vary a setting; 0: none of these figures."""
+    """Worlds at each point of the figures that vary a setting; 0: omit these figures."""
     time_limit: float = 1800.0
-    """Seconds that a policy may take on one scenario (each training seed); then it is ended and
-    left out of what remains."""
+    """Time limit of a policy on one scenario, for each training seed, s; a policy that exceeds it
+    is stopped and skipped on the remaining scenarios."""
 
 
 def compare(settings: Settings) -> Comparison:
-    """Play everything; write rows, summary and figures.
+    """Evaluate all policies; write rows, summary and figures.
 
-    A policy that does not fit a scenario is left out there; one that fails is listed under
-    ``failed``. The others are played all the same.
+    A policy that is incompatible with a scenario is omitted there; one that fails is listed under
+    ``failed``. The other policies are not affected.
 
     Raises:
         SettingsError: No episodes to play, or an invalid time limit.
@@ -182,9 +182,9 @@ class _Run:
         return written
 
     def draw(self) -> None:
-        """Play what the figures need beside the scenarios, and draw them."""
+        """Evaluate the sweeps of the figures, and draw the figures."""
         from posse_training.reports.pictures import (
-            figures,  # imports matplotlib, which takes a while
+            figures,  # imports matplotlib, which is slow
         )
 
         found, settings = self.found, self.settings

@@ -1,4 +1,4 @@
-"""What a comparison found: estimates, their table and their summary."""
+"""Results of a comparison: estimates, their table and their summary."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from posse_training.reports.sweeps import Point
 
 @dataclass
 class Comparison:
-    """Everything that was played, and who could not play what."""
+    """All results, with the policies that were omitted or failed."""
 
     reference: str
-    """The policy that differences are to."""
+    """The baseline of the differences."""
     plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
     """By scenario and policy."""
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -111,7 +111,7 @@ def table(found: Comparison, worlds: _Worlds) -> Table:
 
 
 def _cell(column: str, value: Estimate | float | None) -> str:
-    """Return a table's cell; the bound without its interval, for want of room."""
+    """Return a table's cell; the bound is shown without its interval, to save space."""
     if column == "bound" and isinstance(value, Estimate):
         value = value.value
     if isinstance(value, float):

@@ -37,7 +37,7 @@ class FileNames:
 
 @contextlib.contextmanager
 def replaced(out: Path) -> Iterator[Path]:
-    """Yield a new folder beside ``out`` that replaces it when the block ends without an error.
+    """Yield a new folder next to ``out`` that replaces it when the block ends without an error.
 
     On an error or a kill the folder ``out`` stays as it was. A process that is killed between the
     two renames at the end leaves the old one as ``.NAME.previous``, from where the next call
@@ -164,7 +164,7 @@ def _swap(partial: Path, out: Path, previous: Path) -> None:
 
 
 def _keep(partial: Path, out: Path) -> Path:
-    """Give a finished comparison a name of its own beside ``out``."""
+    """Rename a finished comparison to an unused name next to ``out``."""
     kept = next(
         path for k in range(2, 10_000) if not (path := out.with_name(f"{out.name}-{k}")).exists()
     )

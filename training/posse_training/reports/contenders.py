@@ -1,4 +1,4 @@
-"""Who takes part in a comparison: one policy, or one policy for each of several training seeds."""
+"""Contenders of a comparison: one policy, or one policy for each of several training seeds."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ class Contender:
 
     Attributes:
         label: The label.
-        policies: Loaded policies; a text is ``package.module:Class``, loaded by whoever plays it.
+        policies: Loaded policies; a string is ``package.module:Class``, loaded in the process that
+            plays it.
     """
 
     label: str

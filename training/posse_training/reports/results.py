@@ -81,7 +81,7 @@ class Results:
         ]
 
     def write(self, path: Path) -> None:
-        """Write the rows as CSV and, beside it, the settings as JSON.
+        """Write the rows as CSV and the settings as a JSON file of the same name.
 
         Raises:
             OSError: A file could not be written; an old one of that name is unchanged.

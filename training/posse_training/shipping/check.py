@@ -1,9 +1,9 @@
-"""The check of a shipped policy: scores on a few fixed worlds, which tests play again.
+"""The check of a shipped policy: scores on a few fixed worlds, which tests reproduce.
 
     python -m posse_training.shipping.check
 
-evaluates every shipped policy again, on the scenarios as they are now, and writes its card. Needed
-after a scenario's version rose, or an adviser changed. The policies themselves stay as trained.
+evaluates every shipped policy again on the current scenarios and updates its card, without changing
+the policy. This is necessary after a change of a scenario's version or of an adviser.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def make_check(policy: LearnedPolicy, scenarios: Sequence[Scenario]) -> dict[str
 
 
 def replay(policy: LearnedPolicy, check: Mapping[str, Any]) -> list[float]:
-    """Return the present scores of a policy on the worlds of a check."""
+    """Return the current scores of a policy on the worlds of a check."""
     return [
         float(
             evaluate(
@@ -61,7 +61,7 @@ def replay(policy: LearnedPolicy, check: Mapping[str, Any]) -> list[float]:
 
 
 def check_scenarios(check: Mapping[str, Any]) -> list[Scenario]:
-    """Return the scenarios of a check, in their present versions."""
+    """Return the scenarios of a check, in their current versions."""
     return [
         get_scenario(
             play["scenario"],
@@ -83,10 +83,10 @@ def _settings_of(scenario: Scenario) -> dict[str, Any]:
 
 
 def check_again(path: Path) -> LearnedPolicy:
-    """Evaluate a shipped policy on the present scenarios, and write what it scores to its card.
+    """Evaluate a shipped policy on the current scenarios, and write its scores to its card.
 
     ``card["evaluated_again"]`` states the versions, the commit, and the mean score, safe score and
-    contact-free share over some ``AGAIN_WORLDS`` worlds in all.
+    contact-free share over about ``AGAIN_WORLDS`` worlds in total.
     """
     policy = LearnedPolicy.from_file(path)
     old = policy.card["check"]
