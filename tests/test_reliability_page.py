@@ -1,4 +1,4 @@
-"""The tests that the page of promises names are there."""
+"""The tests named on the page docs/reliability.md exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds for every policy: shapes, ranges, equality over batches, restarts, clear refusals."""
+"""Properties of every policy: shapes, ranges, equality over batches, restarts, refusals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def batch_for(policy: Policy, scenario: str, worlds: int, **settings: Any) -> po
 
 
 def trace(policy: Policy, batch: posse.Batch, steps: int) -> tuple[list[Any], list[Any]]:
-    """The observations that a policy was given, and the actions that it chose."""
+    """Observations and actions of a policy."""
     observations, memory = batch.reset(), begin(policy, batch)
     seen, done = [], []
     for _ in range(steps):
@@ -83,7 +83,7 @@ def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> N
         with pytest.raises(PolicyError, match="sonar"):  # its network reads it
             begin(policy, batch)
         return
-    _, done = trace(policy, batch, 12)  # the batch refuses what is not a number in [-1, 1]
+    _, done = trace(policy, batch, 12)  # the batch refuses numbers outside [-1, 1]
     assert done[0].shape == batch.action_shape
     assert done[0].dtype == np.float32
 
@@ -113,7 +113,7 @@ def test_what_it_does_follows_from_what_it_is_given_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
 def test_trackers_know_only_their_own_observation(name: str) -> None:
-    # Whatever the others are given, tracker 0 does the same.
+    # Tracker 0 acts independently of the observations of others.
     policy = load(name)
     seen, done = trace(policy, batch_for(policy, "constant", 2), 20)
     memory = policy.begin(batch_for(policy, "constant", 2).layout, 2)

@@ -1,4 +1,4 @@
-"""Observation fields and reward terms from a user's own module: the chapter's examples, at work."""
+"""Observation fields and reward terms of a user's module: the examples of the manual."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ print("hits", sum(batch._untyped.stats.cache_hits.values()))
 
 
 def play(folder: Path, own_kernel: bool, breaks: int, **changed: str) -> tuple[str, str]:
-    """Return what a game with the examples says, and its errors."""
+    """Return the output and the errors of a game with the examples."""
     code = PLAY.replace("OWN", str(own_kernel)).replace("BREAKS", str(breaks))
     done = run(folder, code, **{**examples(CHAPTER), "twice": TWICE, **changed})
     return done.stdout, done.stderr

@@ -1,4 +1,4 @@
-"""Target motions, sensors and metrics from a user's own module: the chapter's examples, at work."""
+"""Target motions, sensors and metrics of a user's module: the examples of the manual."""
 
 from __future__ import annotations
 

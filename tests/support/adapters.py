@@ -1,4 +1,4 @@
-"""What the adapters' tests share."""
+"""Helpers of the adapters' tests."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import posse
 SOLO_SCENARIOS = tuple(
     name for name in posse.scenario_names() if posse.get_scenario(name).breaks == 0
 )
-"""Scenarios that a single tracker fits: none in which one of several breaks."""
+"""Scenarios possible with a single tracker: without breaks."""
 
-# Short, with everything in it that an episode can have.
+# Short, with every feature of an episode.
 EVERYTHING: dict[str, Any] = {
     "scenario": "field", "horizon": 12, "settle_time": 0.5, "break_window": (0.2, 0.6),
     "sensor_outages": 1.0, "radio_outages": 1.0, "outage_time": 0.4,
@@ -23,12 +23,12 @@ EVERYTHING: dict[str, Any] = {
 
 
 def f32(values: Any) -> npt.NDArray[np.float32]:
-    """Return an array as policies give it."""
+    """Return an array of actions as policies return it."""
     return np.array(values, np.float32)
 
 
 def out_of_band(thing: Any) -> Any:
-    """Return what comes out of a pickle whose arrays travelled beside it, as Ray sends them.
+    """Return an object after pickling with out-of-band arrays, as in Ray.
 
     They come back read-only, and here at addresses that suit no number.
     """
@@ -40,7 +40,7 @@ def out_of_band(thing: Any) -> Any:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Say whether two nested structures are equal: types, keys, dtypes, values; nan equals nan."""
+    """Return whether nested structures are equal: types, keys, dtypes, values; nan equals nan."""
     if type(a) is not type(b):
         return False
     if isinstance(a, dict):

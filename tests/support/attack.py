@@ -1,4 +1,4 @@
-"""Every kind of environment behind one face: what is wrong to pass to it, and what it holds."""
+"""A common interface to every kind of environment: invalid inputs, and the whole state."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ class Subject:
         return self.env.reset(**arguments)
 
     def step(self, action: Any) -> Any:
-        """Step with what the kind's ``step`` takes; where agents take turns, one turn."""
+        """Step with an argument of the kind's ``step``; one turn if agents act in turns."""
         return self.env.step(action)
 
     def good_action(self, rng: np.random.Generator) -> Any:
-        """Return an action that is taken now."""
+        """Return a valid action."""
         scenario = self.batch.scenario
         drawn = rng.uniform(-1, 1, (self.batch.num_worlds, scenario.num_trackers, 2))
         actions = drawn.astype(np.float32)
@@ -91,7 +91,7 @@ class Subject:
         return shape.get(self.kind, actions[:, 0] if self.kind == "solo vector" else actions)
 
     def bad_actions(self) -> Iterator[Any]:
-        """Yield what no step takes, at any time."""
+        """Yield arguments that are always invalid."""
         if self.kind == "torchrl":
             import torch
 
@@ -114,7 +114,7 @@ class Subject:
                 yield {**good, LONG_NAME: value}
 
     def held(self) -> list[Any]:
-        """Return copies of all that the environment holds, to compare by :func:`same`."""
+        """Return copies of the environment's whole state, for comparison by :func:`same`."""
         batch, env = self.batch, self.env
         kept: list[Any] = [
             {name: array.copy() for name, array in batch.state.items()},
@@ -161,5 +161,5 @@ BAD_OPTIONS: tuple[Any, ...] = (
 
 
 def unchanged(before: list[Any], after: list[Any]) -> bool:
-    """Say whether nothing that is held has changed."""
+    """Return whether the state is unchanged."""
     return same(before, after)

@@ -1,4 +1,4 @@
-"""Policies that fail in every way that a policy can."""
+"""Policies with every kind of failure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from posse_baselines import BasePolicy
 
 
 class _Still(BasePolicy):
-    """Moves nobody."""
+    """Returns zero actions."""
 
     name = "still"
 
@@ -27,7 +27,7 @@ class _Still(BasePolicy):
 
 
 class Still(_Still):
-    """Nothing is wrong with this one."""
+    """A valid policy."""
 
 
 class Raises(_Still):
@@ -68,7 +68,7 @@ class Sleeps(_Still):
 
 
 class SleepsInC(_Still):
-    """Hangs outside the interpreter and with its lock, so that no thread could stop it."""
+    """Hangs in native code that holds the interpreter's lock, so no thread can stop it."""
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         ctypes.PyDLL(None).sleep(600)
@@ -76,7 +76,7 @@ class SleepsInC(_Still):
 
 
 class HangsWithPid(SleepsInC):
-    """Hangs, and says in which process."""
+    """Hangs, after writing its process id."""
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         Path(os.environ["PID_FILE"]).write_text(str(os.getpid()))
@@ -84,7 +84,7 @@ class HangsWithPid(SleepsInC):
 
 
 class Slow(_Still):
-    """Never hangs in a step, but takes too long for all of them."""
+    """Takes too long in total, but not in a single step."""
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         time.sleep(0.3)

@@ -1,4 +1,4 @@
-"""A headless Chromium for tests of web pages, if there is one; else the tests are skipped."""
+"""A headless Chromium for tests of web pages; without one, the tests are skipped."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _OPTIONS = (
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """Start a browser; skip the test where none is installed."""
+    """Start a browser; skip the test if none is installed."""
     api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
     path = next(filter(None, map(shutil.which, _NAMES)), None)
     if path is None:
@@ -44,7 +44,7 @@ def opened(
     dark: bool = False,
     touch: bool = False,
 ) -> Iterator[Page]:
-    """Open a file; fail if it asks for anything, or says anything on the console."""
+    """Open a file; fail if it makes a request or writes to the console."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         color_scheme="dark" if dark else "light",
@@ -66,7 +66,7 @@ def opened(
 
 
 def until(page: Page, expression: str, seconds: float = 40.0) -> None:
-    """Wait for a JavaScript expression to be true; the page's policy forbids it to do so itself."""
+    """Wait until a JavaScript expression is true."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression):
         assert time.monotonic() < end, f"never true: {expression}"

@@ -1,4 +1,4 @@
-"""Teams that chase and crowd the target, and an oracle of what is inside what."""
+"""Teams that chase and crowd the target, and an independent computation of overlaps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TOLERANCE = 1e-4  # m
 
 
 def points(batch: posse.Batch, name: str, x: str = "x", y: str = "y") -> Complexes:
-    """Return x + iy of what the state calls ``name``, in float64."""
+    """Return positions x + iy of the state array ``name``, in float64."""
     state = batch.state
     return np.asarray(state[f"{name}_{x}"].astype(np.float64) + 1j * state[f"{name}_{y}"])
 
@@ -26,7 +26,7 @@ def headings(batch: posse.Batch, name: str) -> Complexes:
 
 
 def depth(batch: posse.Batch) -> Floats:
-    """Return how far the deepest disc of each world is inside another or a wall, (E,) m."""
+    """Return the deepest overlap of a disc with another or a wall in each world, (E,) m."""
     s = batch.scenario
     robots = np.concatenate([points(batch, "tracker"), points(batch, "world")[:, None]], axis=1)
     apart = np.abs(robots[:, :, None] - robots[:, None, :])
@@ -43,7 +43,7 @@ def depth(batch: posse.Batch) -> Floats:
 
 
 class Team:
-    """Everybody at full speed: at the target, or in front of it side by side; now and then away.
+    """All trackers at full speed: to the target, or side by side in front of it; sometimes away.
 
     How far in front, and how wide, is drawn for each world.
 

@@ -1,4 +1,4 @@
-"""What the tests of the GPU engine share: the games to play on both devices."""
+"""Helpers of the tests of the GPU engine: games played on both devices."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def make(case: str, device: str, **settings: Any) -> posse.Batch:
 
 
 def actions_for(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
-    """Fast, every other agent in circles, so that much happens."""
+    """Actions at high speed, every other agent in circles, for many contacts."""
     rng = np.random.default_rng(step)
     actions = rng.uniform(-1.0, 1.0, batch.action_shape)
     actions[:, :, 0] = np.minimum(1.0, actions[:, :, 0] + 1.0)
@@ -47,7 +47,7 @@ def on_host(array: Any) -> npt.NDArray[Any]:
 
 
 def play(batch: posse.Batch) -> dict[str, npt.NDArray[Any]]:
-    """Return all that a batch gives out over the steps, and its state at the end."""
+    """Return all outputs of a batch over the steps, and its final state."""
     made: dict[str, list[npt.NDArray[Any]]] = {"observations": [on_host(batch.reset())]}
     ended = 0
     for step in range(STEPS):
@@ -73,11 +73,11 @@ def play(batch: posse.Batch) -> dict[str, npt.NDArray[Any]]:
 
 
 def run_in_simulator(tests: Path, **environment: str) -> None:
-    """Run a file of tests where numba simulates a GPU in plain Python."""
+    """Run a file of tests with numba's simulator of a GPU in plain Python."""
     done = subprocess.run(
         [
             sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
-            # numpy's integers tell of the overflow that the random draws rest on.
+            # numpy warns about the integer overflow that the random draws use.
             "-W", "ignore:overflow encountered:RuntimeWarning",
             str(tests),
         ],

@@ -20,7 +20,7 @@ from posse.engine.cuda_kernels import cuda
 
 @pytest.mark.parametrize("case", CASES)
 def test_the_worlds_are_those_of_the_cpu(case: str) -> None:
-    """Integers to the bit, float32 within rounding: beside the compiled CPU engine's."""
+    """Compared with the CPU engine: integers are equal, float32 differ by rounding."""
     folder = Path(os.environ["POSSE_TEST_EXPECTED"])
     with np.load(folder / f"{case}.npz") as expected:
         made = play(make(case, "cuda"))

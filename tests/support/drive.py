@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class Instant:
-    """Where everybody is before a step, what the team has in mind, and what it commands then.
+    """Poses before a step, the team's annotations, and its commands.
 
     Attributes:
         time: s.

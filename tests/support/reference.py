@@ -1,4 +1,4 @@
-"""A world worked out again in plain numpy and float64, to hold the engine against.
+"""An independent computation of a world in plain numpy and float64.
 
 Written from the contract and not from the kernels, and in another form wherever there is one:
 complex numbers for directions, assignment for slots, graph routines for the radio, Python integers
@@ -99,19 +99,19 @@ def normal_pair(key: int, step: int, stream: int, index: int) -> tuple[float, fl
 def on_arc(
     place: complex, heading: complex, speed: float, turn_rate: float, time: float
 ) -> tuple[complex, complex]:
-    """Return place and heading after a time on the circle of (V, ω)."""
+    """Return position and heading after a time on the circle of (V, ω)."""
     turned = heading * np.exp(1j * turn_rate * time)
     if turn_rate == 0.0:
         return place + speed * time * heading, turned
-    # The circle's centre would be so far away, for a small turn, that the difference of two points
-    # seen from there is all rounding.
+    # For a small turn the circle's centre is so far away that the difference of two points
+    # relative to it is dominated by rounding.
     return place + heading * speed * np.expm1(1j * turn_rate * time) / (1j * turn_rate), turned
 
 
 def free_motion(
     s: posse.Scenario, before: State, after: State, actions: npt.NDArray[Any]
 ) -> tuple[Complexes, Complexes, Array]:
-    """Return where everyone is and heads after a step in which nothing is touched.
+    """Return all positions and headings after a step without contacts.
 
     And the speed and turn rate of the trackers, (2, N). What a scripted target decided is read off
     ``after``.
@@ -142,7 +142,7 @@ def free_motion(
 
 
 def free_gaps(s: posse.Scenario, state: State) -> Array:
-    """Return the free width between every tracker and everything else, (N, N + 1 + M + 4), m.
+    """Return the clearance between every tracker and everything else, (N, N + 1 + M + 4), m.
 
     The others: the trackers (its own place holds inf), the target, the obstacles, the walls.
     """
@@ -158,7 +158,7 @@ def free_gaps(s: posse.Scenario, state: State) -> Array:
 
 
 def path_gaps(s: posse.Scenario, before: State, after: State, freely: Complexes) -> Array:
-    """Return a lower bound of every robot's free width on its way through a step, (N + 1,), m."""
+    """Return a lower bound of every robot's clearance during a step, (N + 1,), m."""
     n = s.num_trackers
     start, end = positions(before), positions(after)
     centres, radii = obstacles(before)
@@ -181,7 +181,7 @@ def path_gaps(s: posse.Scenario, before: State, after: State, freely: Complexes)
 
 
 def is_occluded(eye: complex, goal: complex, centres: Complexes, radii: Array) -> bool:
-    """Say whether a disc lies across the segment from one point to another."""
+    """Return whether a disc intersects the segment between two points."""
     if not len(radii):
         return False
     along = np.clip(((centres - eye) * np.conj(goal - eye)).real / abs(goal - eye) ** 2, 0, 1)
@@ -189,7 +189,7 @@ def is_occluded(eye: complex, goal: complex, centres: Complexes, radii: Array) -
 
 
 def can_see(s: posse.Scenario, state: State, i: int) -> bool:
-    """Say whether tracker i's sensor has the target."""
+    """Return whether tracker i's sensor sees the target."""
     p, h = positions(state), headings(state)
     step, dead = int(state["world_step"]), int(state["tracker_sensor_dead_from"][i])
     offset = p[-1] - p[i]
@@ -210,7 +210,7 @@ def radio_alive(s: posse.Scenario, state: State, i: int) -> bool:
 
 @dataclass
 class Fix:
-    """A fix of the target: when, where, its heading and frame; and a velocity."""
+    """A fix of the target: time, position, heading, frame and velocity."""
 
     step: int = -1
     place: complex = 0.0
@@ -219,7 +219,7 @@ class Fix:
     velocity: complex = 0.0
 
     def newer(self, s: posse.Scenario, other: Fix) -> Fix:
-        """Return the other fix, with the velocity from here to there."""
+        """Return the other fix with the velocity between the two."""
         steps, velocity = other.step - self.step, 0j
         if self.step >= 0 and steps * s.control_step <= 1.0 + 1e-6:
             velocity = (other.place - self.place) / (steps * s.control_step)
@@ -232,7 +232,7 @@ class Fix:
 
 @dataclass
 class Said:
-    """What one tracker sent at one step."""
+    """A message of one tracker."""
 
     step: int
     place: complex
@@ -245,7 +245,7 @@ class Said:
 
 @dataclass
 class Senses:
-    """Sight and radio of one world, followed step by step from the start of its episode."""
+    """Sensing and radio of one world, computed step by step from the start of its episode."""
 
     scenario: posse.Scenario
     sees: list[bool] = field(default_factory=list)
@@ -254,7 +254,7 @@ class Senses:
     sent: list[list[Said | None]] = field(default_factory=list)
 
     def follow(self, state: State, actions: npt.NDArray[Any] | None = None) -> None:
-        """Take in the state after the next step, and the actions that led to it."""
+        """Process the state after the next step, and the actions of the step."""
         s, n = self.scenario, self.scenario.num_trackers
         key, step = int(state["world_key"]), int(state["world_step"])
         if not self.fixes:
@@ -334,7 +334,7 @@ def sonar(s: posse.Scenario, state: State, i: int) -> Array:
 def _in_order(
     recent: list[tuple[float, int, Said]], told: npt.NDArray[Any]
 ) -> list[tuple[float, int, Said]]:
-    """Return team-mates, nearest first; where rounding alone decides, in the order told."""
+    """Return team-mates, nearest first; those equally near within rounding in the given order."""
     places = [int(number) for number in told]
     ordered = list(recent)
     for k in range(len(ordered)):
@@ -349,7 +349,7 @@ def _in_order(
 def observation(
     s: posse.Scenario, state: State, i: int, senses: Senses, told: npt.NDArray[Any]
 ) -> dict[str, Array]:
-    """Return what tracker i is given, by field name, as ``ObservationLayout.views`` has it.
+    """Return the observation of tracker i by field name, as ``ObservationLayout.views``.
 
     ``told`` holds the numbers of the team-mates in the engine's order, for those equally far.
     """
@@ -454,7 +454,7 @@ def slots(s: posse.Scenario) -> Complexes:
 
 @dataclass
 class Episode:
-    """Every figure of an episode, worked out from its states one after the other."""
+    """Every metric of an episode, computed from its states."""
 
     scenario: posse.Scenario
     score: float = 0.0
@@ -480,7 +480,7 @@ class Episode:
     _sums: dict[str, float] = field(default_factory=dict)
 
     def follow(self, state: State) -> None:
-        """Take in the state after the next step; the first is the start of the episode."""
+        """Process the state after the next step; the first one is the start of the episode."""
         s, n = self.scenario, self.scenario.num_trackers
         p, alive, step = positions(state), working(state), int(state["world_step"])
         first = self._start is None
@@ -607,7 +607,7 @@ class Episode:
 
 @dataclass
 class Recording:
-    """An episode of one world: what went in and what came out, step by step."""
+    """An episode of one world: inputs and outputs of every step."""
 
     batch: posse.Batch
     states: list[State]
@@ -658,7 +658,7 @@ CASES: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = (
     ("radio", (("num_trackers", 2), ("formation", "ring"), ("sonar_beams", 1))),
     ("radio", (("num_trackers", 7), ("formation", "rows"), ("sonar_beams", 0))),
 )
-"""Every scenario, and what else makes a difference: to be recorded and worked out again."""
+"""Every scenario, and variants of settings, to be recorded and computed independently."""
 
 
 def case_name(case: tuple[str, tuple[tuple[str, Any], ...]]) -> str:
@@ -667,7 +667,7 @@ def case_name(case: tuple[str, tuple[tuple[str, Any], ...]]) -> str:
 
 @functools.cache
 def record(name: str, overrides: tuple[tuple[str, Any], ...] = (), steps: int = 160) -> Recording:
-    """Return an episode in which the team heads for its slots, more or less.
+    """Return an episode in which the team moves roughly to its slots.
 
     Short, and from starts nearby, so that much happens: contacts, settling, breaks, recovery.
     """

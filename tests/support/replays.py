@@ -14,7 +14,7 @@ ATTACK: Final = (
     "</script><script>window.ran=1</script><img src=x onerror=window.ran=1>"
     "<!--<script>'\"`${window.ran=1}&lt;\u2028]]>{{code}}\\u003c"
 )
-"""Runs, wherever a page takes a name for markup or code."""
+"""A name that would run as code if a page treated it as markup."""
 
 
 @cache
@@ -28,7 +28,7 @@ def short(scenario: str = "field", observations: bool = True) -> Replay:
 
 @cache
 def hostile() -> Replay:
-    """A replay in which every text that can come from outside is an attack."""
+    """A replay in which every external text is an attack."""
     scenario = posse.get_scenario("constant", name=ATTACK, horizon=40)
     replay = record([(ATTACK, load("pursuit"))], scenario)
     player = replace(

@@ -1,4 +1,4 @@
-"""Trainings of a second, and what they leave."""
+"""Trainings of about a second, and their results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ALGORITHMS = ("ppo", "mappo", "sac", "td3")
 
 
 def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:
-    """Settings of a training that takes a second."""
+    """Settings of a training that takes about a second."""
     settings = TrainSettings(
         scenario="constant",
         algorithm=algorithm,  # type: ignore[arg-type]
@@ -49,7 +49,7 @@ def quiet() -> Console:
 
 
 def numbers(folder: Path) -> dict[str, Any]:
-    """Everything that a finished training leaves, but the time it took."""
+    """All results of a finished training, without its duration."""
     arrays, state = read_checkpoint(folder)
     state.pop("seconds")
     for point in state["curve"]:

@@ -19,7 +19,7 @@ SHORT: dict[str, Any] = {"horizon": 4, "settle_time": 0.2, "num_trackers": 2}
 
 @pytest.fixture
 def simulated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give environments the GPU's engine, with tensors that stay on the CPU: torch has no other."""
+    """Use the GPU engine in environments, with tensors on the CPU."""
 
     def batch(name: str, num_worlds: int, *, device: str, **settings: Any) -> posse.Batch:
         return CudaBatch(posse.get_scenario(name, **SHORT), num_worlds, **settings)
@@ -44,7 +44,7 @@ def test_rollouts_are_those_of_the_cpu(request: pytest.FixtureRequest) -> None:
     request.getfixturevalue("simulated")
     env = torchrl_env.PosseEnv("smart", 2, seed=5)
     assert isinstance(env.batch, CudaBatch)
-    # All steps are held until the end: nothing that an engine overwrites may be among them.
+    # All steps are kept until the end, to detect memory that the engine overwrites.
     for made, wanted in zip(played(env), expected, strict=True):
         for key in wanted.keys(include_nested=True, leaves_only=True):
             np.testing.assert_allclose(made[key].numpy(), wanted[key].numpy(), 1e-4, 1e-5)

@@ -1,4 +1,4 @@
-"""Modules of a user's own: the examples of the manual, written to a folder and run there."""
+"""Users' modules: the examples of the manual, written to a folder and run there."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def snippets(chapter: str) -> list[str]:
 
 
 def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
-    """Run code beside modules of a user's own, in an interpreter of their own."""
+    """Run code with a user's modules in a new interpreter."""
     for name, source in {**modules, "main": code}.items():
         (folder / f"{name}.py").write_text(source, encoding="utf-8")
     return subprocess.run(
@@ -32,5 +32,5 @@ def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[
 
 
 def lines_of(source: str) -> int:
-    """Return how many lines hold code or a docstring."""
+    """Return the number of lines with code or docstrings."""
     return sum(bool(line.strip()) for line in source.splitlines())

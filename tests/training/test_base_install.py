@@ -1,4 +1,4 @@
-"""Without the packages of an extra, commands either work or say what to install."""
+"""Without the packages of an extra, commands work or name what to install."""
 
 from __future__ import annotations
 

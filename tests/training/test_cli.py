@@ -1,4 +1,4 @@
-"""The command line: quick where nothing is learned, clear where something is wrong."""
+"""The command line: fast start, clear errors."""
 
 from __future__ import annotations
 

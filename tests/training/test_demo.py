@@ -1,4 +1,4 @@
-"""The demo, with a learned team and without."""
+"""The demo with and without a learned team."""
 
 from __future__ import annotations
 

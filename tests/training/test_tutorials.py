@@ -1,4 +1,4 @@
-"""The tutorials of the manual, run as they stand with few steps."""
+"""The tutorials of the manual, run unchanged with few steps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NUMBER = r"(\d\.\d+)"
 
 @pytest.fixture(autouse=True)
 def threads() -> Iterator[None]:
-    """A tutorial may set torch's threads; what follows has those that it had."""
+    """Restore torch's number of threads, which a tutorial may change."""
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)
@@ -59,7 +59,7 @@ def test_own_policy(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtu
     run("own_policy.py", monkeypatch, "--episodes", 30)
     shown = dict(re.findall(rf"^(\S+) +score {NUMBER}", capsys.readouterr().out, re.MULTILINE))
     assert float(shown["pursuit"]) < float(shown["own-slot"]) < float(shown["ddcs-distributed"])
-    # As the tutorial says, a class is loaded by where it is, and it plays where messages are sent.
+    # As in the tutorial, a class is loaded by module and name, and plays with messages.
     monkeypatch.syspath_prepend(str(TUTORIALS))
     policy = load("own_policy:OwnSlot")
     results = evaluate(policy, "search", 2, message_size=3, horizon=50, progress=False)
@@ -102,7 +102,7 @@ def test_one_tracker(
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
     found = re.search(rf"score of the team {NUMBER} in 1 worlds", capsys.readouterr().out)
     assert found is not None
-    # The four others are scripted: whatever the learner does, they find most of their places.
+    # The four others are scripted and reach most of their slots, whatever the learner does.
     assert float(found[1]) > 0.4
 
 
@@ -119,7 +119,7 @@ def test_cleanrl_ppo(
     numbers = load_file(file)
     assert all(np.isfinite(array).all() for array in numbers.values())
     assert not np.array_equal(numbers["mean"], np.zeros_like(numbers["mean"]))
-    # Where an episode was cut, what follows still has a value, and nothing flows back over it.
+    # A truncated episode has a value after its end, and advantages do not cross the end.
     assert left["ends"].sum() == 10  # two worlds of five trackers, once each
     at = left["ends"].nonzero()[0, 0]
     assert (left["nexts"][at] != 0).all()

@@ -1,4 +1,4 @@
-"""Who leads: selection and exchange by section 3.5, agreed on over the radio."""
+"""Selection and exchange of leaders by section 3.5, agreed on by radio."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Monitoring: the estimate of the target, and what is heard."""
+"""Monitoring: the estimate of the target, and received messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from posse_baselines import begin, load
 
 @dataclass(frozen=True)
 class Seen:
-    """A step: what the team was given, and what it had in mind then."""
+    """A step: the team's observations and annotations."""
 
     views: dict[str, Any]
     notes: dict[str, Any]
@@ -38,7 +38,7 @@ def estimate_error(seen: Seen) -> Any:
 
 
 def fix_error(seen: Seen) -> Any:
-    """By how much the fix itself, as it was given, is off the target's present place."""
+    """Distance of the observed fix from the target's current position."""
     v = seen.views
     c, s = v["heading"][..., 0], v["heading"][..., 1]
     bx, by = v["target_bearing"][..., 0], v["target_bearing"][..., 1]

@@ -1,4 +1,4 @@
-"""Settings declare themselves: unit, range, use in tuning; impossible ones are refused."""
+"""Settings are declared with unit, range and use in tuning; invalid ones are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Slots are shared out, whatever the formation, the size of the team and the radio."""
+"""Slots are assigned for all formations, team sizes and radios."""
 
 from __future__ import annotations
 

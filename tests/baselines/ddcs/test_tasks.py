@@ -1,4 +1,4 @@
-"""The four tasks: when they change, what each does, and what a team loses without each change."""
+"""The four tasks: conditions of changes, behaviour, and effects of leaving a change out."""
 
 from __future__ import annotations
 

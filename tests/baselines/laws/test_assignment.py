@@ -17,7 +17,7 @@ def test_the_sum_of_the_costs_is_the_least(rows: int, more: int, seed: int, ties
     cost = np.random.default_rng(seed).uniform(-5, 20, (rows, columns))
     if ties:
         cost = np.round(cost / 5)
-    # Whatever lies in the work space, or beyond the rows and columns in use, has no effect.
+    # Other contents of the work space and of unused rows and columns have no effect.
     wide = np.full((rows + 2, columns + 3), -1e6)
     wide[:rows, :columns] = cost
     work = np.full((WORK_ROWS, columns + 4), 7.0)

@@ -1,4 +1,4 @@
-"""l-φ, l-l and the slot law: what they ask of a follower, recomputed in complex numbers."""
+"""l-φ, l-l and the slot law: demands on a follower, recomputed in complex numbers."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ SPEED = 0.6 + 0j
 
 
 def asked(point: complex, theta: float) -> complex:
-    """What l-l asks of a control point, in the common frame; both leaders go straight on."""
+    """Demand of l-l on a control point, in the common frame; both leaders move straight ahead."""
     seen = []
     for leader in LEADERS:
         arm, wanted = point - leader, PLACE - leader

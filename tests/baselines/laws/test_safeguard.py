@@ -37,7 +37,7 @@ def body_of(theta: float, speed: float, limits: tuple[float, float]) -> Any:
 
 
 def drive(body: Any, x: float, y: float, wanted: tuple[float, float]) -> tuple[float, float]:
-    """Move a body for one control step as it commands, in short steps; return the new place."""
+    """Move a body for one control step in short steps; return the new position."""
     speed, omega = regulate(body, *wanted, 0.0)
     for _ in range(10):
         dv, dw = body.acceleration * DT / 10, body.turn_acceleration * DT / 10

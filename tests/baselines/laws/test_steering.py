@@ -1,4 +1,4 @@
-"""When a moving point can be met, and how a slot is approached."""
+"""Intercept times, and velocities towards a slot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Learned policies that listen to a scripted one."""
+"""Learned policies with a scripted adviser."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAID = load(DDCS).message_size
 
 
 def listener(layout: posse.ObservationLayout, answer: tuple[float, float]) -> LearnedPolicy:
-    """Return a policy whose network gives one answer, whatever it is told."""
+    """Return a policy whose network has a constant output."""
     encoding = Encoding.of(layout, "slots")
     size = encoding.size + 2
     network = Network(

@@ -1,4 +1,4 @@
-"""Encodings find their fields in any layout that has them."""
+"""Encodings find their fields by name in any layout."""
 
 from __future__ import annotations
 

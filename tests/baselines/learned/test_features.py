@@ -33,7 +33,7 @@ def test_own_slot_is_where_the_state_says() -> None:
     away = np.hypot(ahead - mine[..., :1], left - mine[..., 1:])
     chosen = away.argmin(axis=2)
     np.testing.assert_allclose(away.min(axis=2), 0, atol=0.02)
-    # With a perfect radio all come to the same assignment: nobody shares a slot.
+    # With a perfect radio all compute the same assignment, so each slot is assigned once.
     assert all(len(set(row)) == 5 for row in chosen)
 
 

@@ -1,4 +1,4 @@
-"""Files whose digest is right and whose contents are not: a named error, and no code runs."""
+"""Files with a correct digest and invalid contents: a named error, and no code runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A learned policy plays what its network says, whatever else is in the batch."""
+"""A learned policy executes its network's output, independent of other worlds in the batch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Policy files: read back unchanged, and refused where they are damaged."""
+"""Policy files are read back unchanged, and refused if damaged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The learned policies that come with the package: whole, small, and as good as their cards say."""
+"""The shipped learned policies: intact, small, and with the scores of their cards."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FILES = sorted(SHIPPED.glob("*.safetensors"))
 CARDS = sorted(SHIPPED.glob("*.json"))
 
 TOLERANCE = 0.003
-"""How far the mean score of a check may lie from its card's.
+"""Allowed difference between the mean score of a check and that of its card.
 
 On one kind of machine it lies at 0. Others round sines and hyperbolic tangents differently in the
 last bit, and so decide otherwise once in a while. With every weight of a trained policy disturbed
@@ -45,7 +45,7 @@ def test_a_name_that_is_not_shipped_is_refused_with_those_that_are() -> None:
 
 
 def problems_of(path: Path) -> list[str]:
-    """What keeps a file from being shipped: nothing, if all is well."""
+    """Reasons against shipping a file; none if it is valid."""
     found = []
     if path.stat().st_size > LARGEST:
         found.append(f"{path.stat().st_size:,} bytes")
@@ -86,7 +86,7 @@ def problems_of(path: Path) -> list[str]:
     return found
 
 
-# With nothing shipped there is nothing to look at; with a file, no part of this can be skipped.
+# Without shipped files there is nothing to check; with one, no check is skipped.
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_shipped_file_has_all_that_it_needs(path: Path) -> None:
     assert problems_of(path) == []
@@ -141,7 +141,7 @@ def card_of(policy: LearnedPolicy) -> dict[str, Any]:
 
 
 def seeker(gain: float = 1.0) -> LearnedPolicy:
-    """A network that turns towards its own slot, and drives on: one layer, written by hand."""
+    """A hand-written network of one layer that turns towards its slot and drives."""
     from posse_baselines.learned import Network
 
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "slots")

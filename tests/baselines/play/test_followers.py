@@ -20,7 +20,7 @@ LIMITS: dict[str, Any] = {
     "tracker_speed": 2.0, "tracker_turn_rate": 10.0, "target_speed": 1.2, "num_trackers": 2,
     "start_distance": (0.5, 6.0),
 }  # fmt: skip
-"""So wide that none is hit. Nobody has moved yet, and 0.6 of the own speed is what is expected."""
+"""Wide enough to avoid limits. In the first step, 0.6 of the own speed is expected of others."""
 WING = 1.2 * math.sqrt(0.5)
 PLACE = complex(-WING, WING)
 """Of the second slot of the wedge, from the first, in the frame of the formation."""
@@ -141,7 +141,7 @@ def test_l_l_closes_the_distances_to_two_robots(dt: float, allowed: float) -> No
             ]
         )
         off = np.abs(arms) - abs(PLACE.conjugate() + OFFSET - place)
-        # In the first step nobody knows yet who is in its place: that one is l-φ.
+        # In the first step it is not known which robots are in their places: l-φ is used.
         np.testing.assert_allclose(off[2:], off[2] * decay[2:] / decay[2], atol=allowed)
 
 

@@ -1,4 +1,4 @@
-"""The guidance laws as policies play them, against what is known of them in closed form."""
+"""The guidance laws as policies execute them, against closed-form solutions."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def test_it_changes_nothing_in_the_worlds_that_it_reads() -> None:
 
 
 def test_it_does_not_know_the_faults_to_come() -> None:
-    """Worlds that differ in nothing but when a tracker will break are played alike."""
+    """Worlds that differ only in the future break of a tracker are played equally."""
     planned = []
     for when in (10, 500):
         batch = posse.batch("leader-loss", 30, seed=3, start_distance=(1.5, 3.0))

@@ -1,4 +1,4 @@
-"""Actions in any supported form are read correctly."""
+"""Actions of every supported form are read correctly."""
 
 from __future__ import annotations
 

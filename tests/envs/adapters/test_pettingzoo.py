@@ -40,7 +40,7 @@ variants = pytest.mark.parametrize(
 
 
 def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
-    """Play with actions drawn from a seed; return everything that came back."""
+    """Play with actions drawn from a seed; return all results."""
     rng = np.random.default_rng(seed)
     returned: list[Any] = []
     for _ in range(steps):
@@ -314,7 +314,7 @@ def test_the_state_holds_what_decides_how_a_world_goes_on() -> None:
     assert views["target_frame_cos"] == arrays.world["frame_cos"][0]
     assert views["time"] == pytest.approx(3.0)
     assert (views["tracker_breaks_at"] >= 0).sum() == 1
-    # Two steps of delay: what was sent now, one and two steps ago, the newest first.
+    # Two steps of delay: messages sent now, one and two steps ago, newest first.
     assert np.array_equal(views["sent_x"][0], arrays.tracker["x"][0])
     now = views["sent_x"][0].copy(), views["message"][0].copy()
     play(env, 1)

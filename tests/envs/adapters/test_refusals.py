@@ -1,4 +1,4 @@
-"""What no environment takes is refused by a documented error that leaves everything as it was."""
+"""Invalid input raises a documented error in every environment, and nothing changes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LONGEST_MESSAGE = 1000
 
 
 def refused(subject: Subject, call: Any, *errors: type[Exception]) -> str:
-    """Return the message of a refused call, after looking whether it changed anything."""
+    """Return the message of a refused call, after checking that it changed nothing."""
     before = subject.held()
     with pytest.raises(errors or ValueError) as caught:
         call()

@@ -116,7 +116,7 @@ def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
 
 @modes
 def test_what_is_returned_is_never_overwritten(mode: AutoresetMode) -> None:
-    # Large enough for the memory of arrays that nobody holds to be used again.
+    # Large enough that the memory of unreferenced arrays is reused.
     env = vector(autoreset_mode=mode, num_envs=80, horizon=6, settle_time=0.3)
     returned: list[Any] = [env.reset(seed=0)]
     kept = copy.deepcopy(returned)

@@ -1,4 +1,4 @@
-"""Bad input gets an error that names it and says what is allowed, and changes nothing."""
+"""Invalid input raises an error that names it and the valid range, and changes nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The batch: determinism, replays, resets, saving, and that nothing returned ever changes."""
+"""The batch: determinism, replays, resets, saving, and returned arrays that never change."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def actions_for(batch: posse.Batch, step: int) -> npt.NDArray[np.float32]:
 
 
 def play(batch: posse.Batch, steps: int) -> list[npt.NDArray[Any]]:
-    """Return all that a batch gives out over a number of steps."""
+    """Return all outputs of a batch over a number of steps."""
     out: list[npt.NDArray[Any]] = [batch.reset()]
     for step in range(steps):
         observations, rewards, terminated, truncated, infos = batch.step(actions_for(batch, step))
@@ -151,7 +151,7 @@ def test_a_stepper_makes_the_batch_s_own_steps_and_takes_nothing_but_its_arrays(
 
 
 def test_autoreset_modes_play_the_same_episodes() -> None:
-    """One after the other, told apart only by when the next one begins."""
+    """Consecutive episodes, distinguished by the start of the next one."""
     make: dict[str, Any] = {"seed": 4, "horizon": 20, "num_trackers": 3, "settle_time": 1.0}
     episodes: dict[str, list[list[npt.NDArray[Any]]]] = {}
     for mode in ("next_step", "same_step", "disabled"):
@@ -235,7 +235,7 @@ def test_saving_restoring_and_pickling_in_mid_episode(name: str) -> None:
 
 @pytest.mark.parametrize("worlds", [2, 600])
 def test_what_is_returned_is_never_overwritten(worlds: int) -> None:
-    """Whoever holds an array, or a view of one, however small, keeps what he was given."""
+    """A returned array, or any view of it, is never overwritten while it is referenced."""
     batch = posse.batch("constant", worlds, horizon=15, autoreset="same_step", settle_time=1.0)
     held: list[tuple[npt.NDArray[Any], npt.NDArray[Any]]] = []
 

@@ -32,7 +32,7 @@ def actions_for(batch: posse.Batch, step: int, copies: int = 1) -> NDArray[np.fl
 
 
 def gone_on(batch: posse.Batch, copies: posse.Batch, count: int, steps: int = 30) -> bool:
-    """Play both by the same actions; say whether copies saw what their originals saw."""
+    """Play both with the same actions; return whether copies observe the same as originals."""
     alike = True
     for step in range(100, 100 + steps):
         seen = copies.step(actions_for(batch, step, count))[0]

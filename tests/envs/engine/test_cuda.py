@@ -1,4 +1,4 @@
-"""The engine on a GPU, without one: in numba's simulator, beside the compiled CPU engine."""
+"""The GPU engine in numba's simulator, compared with the compiled CPU engine."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.parametrize("case", CASES)
 def test_on_a_gpu(case: str) -> None:
-    """Ten steps: integers as on the CPU, float32 within rounding; torch takes what is returned."""
+    """Ten steps: integers as on the CPU, float32 within rounding; torch accepts the results."""
     try:
         batch = make(case, "cuda")
     except (ImportError, RuntimeError) as error:

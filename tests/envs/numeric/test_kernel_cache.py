@@ -238,7 +238,7 @@ def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(
 def test_kernels_with_other_constants_are_not_taken_for_each_other(
     herd: Herd, tmp_path: Path
 ) -> None:
-    """As kernels of their own are made: one source, the scenario's numbers built in."""
+    """As for own kernels: one source, with the scenario's numbers as constants."""
     (herd.root / "herd" / "kernels.py").write_text(CLOSURE_KERNEL)
     for number, hits in ((2, 0), (5, 0), (2, 1), (5, 1)):
         run = Herd(herd.root, CLOSURE_MAIN.format(number=number)).run(tmp_path / "cache")
@@ -250,7 +250,7 @@ def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_st
 ) -> None:
     cache = tmp_path / "cache"
     kernels = herd.root / "herd" / "kernels.py"
-    # The module rewrites its own helper file after import, as an editor might.
+    # The module rewrites its helper file after the import, as an edit would.
     kernels.write_text(
         KERNEL
         + "\nfrom pathlib import Path\n"
@@ -263,7 +263,7 @@ def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_st
 
 
 def test_an_edit_of_a_room_without_kernels_recompiles_nothing(herd: Herd, tmp_path: Path) -> None:
-    """A window and an interface may change; a rule may not."""
+    """Edits of rendering and adapters keep kernels; an edit of a rule does not."""
     copy = tmp_path / "posse"
     shutil.copytree(Path(posse.__file__).parent, copy)
     cache = tmp_path / "cache"
@@ -294,7 +294,7 @@ def test_an_edit_of_another_package_that_a_kernel_calls_compiles_it_again(
 def test_an_edit_of_a_function_given_as_a_source_compiles_the_kernel_again(
     herd: Herd, tmp_path: Path, file: str
 ) -> None:
-    """A user's function reaches the kernel by a registry, which the program fills."""
+    """A user's function reaches the kernel through a registry filled at run time."""
     cache = tmp_path / "cache"
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     (herd.root / file).parent.mkdir(exist_ok=True)
@@ -309,7 +309,7 @@ def test_an_edit_of_a_function_given_as_a_source_compiles_the_kernel_again(
 def test_a_script_of_the_user_is_cached_and_compiled_again_when_a_constant_changes(
     herd: Herd, tmp_path: Path
 ) -> None:
-    """Even if its file does not: constants of compiled code can come from outside."""
+    """Even if its file does not, since constants of compiled code can come from elsewhere."""
     cache = tmp_path / "cache"
     script = herd.root / "script.py"
     script.write_text(SCRIPT)
@@ -391,7 +391,7 @@ def test_a_planted_file_runs_nothing(herd: Herd, tmp_path: Path) -> None:
 
 
 def test_a_full_disk_costs_time_only(herd: Herd, tmp_path: Path) -> None:
-    """No file may grow beyond some bytes: writing fails half way."""
+    """With a limit of the file size, writing fails half way."""
     resource = pytest.importorskip("resource")
     cache = tmp_path / "cache"
     limit = f"import resource as r\nr.setrlimit(r.RLIMIT_FSIZE, (1000, {resource.RLIM_INFINITY}))\n"

@@ -1,4 +1,4 @@
-"""Lanes: each equals the scalar result, independent of the other lanes."""
+"""Each lane equals the scalar result, independent of the other lanes."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ def test_records_are_read_and_written_where_their_fields_are(
 
 @pytest.mark.parametrize("function", [keep_pose, getattr(keep_pose, "py_func", keep_pose)])
 def test_whole_numbers_among_the_fields_keep_their_bits(function: Callable[..., None]) -> None:
-    """Whatever they are: as a float32, some would be no number at all."""
+    """For any bits, some of which are nan as float32."""
     trackers = np.zeros(2, TRACKER)
     trackers["broken_at"], trackers["breaks_at"] = 2**30, 0x7FA00001
     before = trackers.copy()

@@ -1,4 +1,4 @@
-"""numba still has the private parts that posse overrides, and the overrides still take effect."""
+"""The installed numba has the private parts that posse overrides, and the overrides work."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
 
 @pytest.fixture(scope="module", autouse=True)
 def nothing_cached(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """What these tests look at is there only when a kernel is compiled."""
+    """These tests require that a kernel is compiled."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("POSSE_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
         yield

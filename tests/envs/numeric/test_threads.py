@@ -1,4 +1,4 @@
-"""Threads: every world is done once, and nothing that goes wrong is left behind."""
+"""Threads: every world is processed once, and errors leave no unfinished work."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from posse.numeric import Blocks, kernel, run_threads, threads, worlds_of
 
 @kernel
 def count(times: npt.NDArray[np.int64], thread: int, blocks: Blocks) -> int:
-    """Count how often each world was done; return how many this thread did."""
+    """Count how often each world is processed; return the number processed by this thread."""
     worlds = 0
     for e in worlds_of(thread, blocks):
         times[e] += 1
@@ -30,7 +30,7 @@ def count(times: npt.NDArray[np.int64], thread: int, blocks: Blocks) -> int:
 
 
 class Ledger:
-    """Counts how often each world was done, and by whom; some threads begin late."""
+    """Counts how often each world is processed, and by which thread; some threads start late."""
 
     def __init__(self, worlds: int, late: tuple[int, ...] = ()) -> None:
         self.times = np.zeros(worlds, np.int64)
@@ -87,7 +87,7 @@ def test_nobody_waits_for_a_slow_thread(late: tuple[int, ...]) -> None:
 
 
 def test_a_thread_begins_with_worlds_of_its_own() -> None:
-    """They are in its core's cache from the step before."""
+    """Its core has cached them in the previous step."""
     begun = {}
 
     @kernel
@@ -158,7 +158,7 @@ def test_an_error_goes_on_when_the_workers_have_done_all_worlds() -> None:
 
 
 def test_a_second_interrupt_does_not_cut_the_wait_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor a third: whatever ``time.sleep`` raises while a worker is busy."""
+    """Also for a third exception, raised by ``time.sleep`` while a worker is busy."""
     ended, interrupts, sleep = [], 0, time.sleep
 
     def interrupted(seconds: float) -> None:
@@ -295,7 +295,7 @@ time.sleep({pause})
 
 
 def test_memory_of_observations_is_used_again_with_threads_too() -> None:
-    """Workers keep nothing of a step that is over."""
+    """Workers keep no references to a finished step."""
     batch = posse.batch("smart", 600, num_threads=2)
     batch.reset(seed=0)
     actions = np.zeros(batch.action_shape, np.float32)

@@ -1,4 +1,4 @@
-"""Frames show what the worlds hold, the same ones each time, with a display and without."""
+"""Frames show the state of the worlds, reproducibly, with a display and without."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_each_world_of_a_batch_is_its_own_picture() -> None:
     assert (of_many != first).any()
 
 
-# --- what lies where -----------------------------------------------------------------------------
+# --- positions -----------------------------------------------------------------------------------
 
 
 def test_robots_are_drawn_where_they_are() -> None:
@@ -183,7 +183,7 @@ def test_robots_are_drawn_where_they_are() -> None:
     batch = placed([(5, 0, 1.57), (0, 5, 3.0)])
     renderer = Renderer(batch.scenario, size=SIZE)
     frame = picture(renderer, batch)
-    # Beside the centre, since the line of the heading begins there.
+    # Not at the centre, where the line of the heading begins.
     assert like(colour_at(renderer, frame, 5, -0.07), TRACKER)
     assert like(colour_at(renderer, frame, 0.07, 5), TRACKER)
     assert like(colour_at(renderer, frame, 0, 0), TARGET)
@@ -297,7 +297,7 @@ def test_the_camera_moves_smoothly_and_settles() -> None:
         assert camera.scale == pytest.approx(settled, rel=1e-6)
 
 
-# --- what is told --------------------------------------------------------------------------------
+# --- annotations ---------------------------------------------------------------------------------
 
 
 def test_links_are_drawn_between_trackers_that_hear_each_other() -> None:
@@ -342,7 +342,7 @@ def test_tasks_colour_the_trackers_and_leaders_are_marked() -> None:
     for (x, y), colour in zip(((3, 3), (-3, 3), (3, -3), (-3, -3)), TASK_COLOURS, strict=True):
         assert like(colour_at(renderer, frame, x, y - 0.07), colour)
         assert like(colour_at(renderer, plain, x, y - 0.07), TRACKER)
-    # The mark stands over the leader, and over nobody else.
+    # The mark is drawn over the leader only.
     above = renderer.project([[3, 3], [-3, 3], [3, -3], [-3, -3]]) - (0, 20)
     inked = [
         like(tuple(frame[row, column].tolist()), INK) for column, row in above.round().astype(int)

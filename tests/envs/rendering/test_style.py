@@ -1,4 +1,4 @@
-"""The colours are told apart by readers of every colour vision, on light and on dark.
+"""The colours are distinguishable with every colour vision, on light and on dark.
 
 Dichromacy is simulated as by Machado, Oliveira and Fernandes (2009), severity 1; distances are
 Euclidean in CIE L*a*b* (about 2.3 is just noticeable).
@@ -71,7 +71,7 @@ def linear(colour: Colour) -> Floats:
 
 
 def seen(colour: Colour, vision: str) -> Floats:
-    """Return L*, a*, b* of what is seen."""
+    """Return L*, a*, b* of a perceived colour."""
     t = _TO_XYZ @ np.clip(VISIONS[vision] @ linear(colour), 0, 1) / _WHITE
     f = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
     return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])

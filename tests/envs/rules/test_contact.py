@@ -141,7 +141,7 @@ def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
 
 
 def test_a_robot_that_is_far_from_all_is_swept_as_soon_as_it_matters() -> None:
-    """The engine sweeps only robots that something is near to; that must never be too late."""
+    """The engine sweeps only robots that are near something, which must be detected in time."""
     batch = posse.batch(
         "obstacles", 32, num_trackers=16, tracker_speed=3.0, start_distance=(1.0, 10.0),
         tracker_acceleration=math.inf, tracker_turn_acceleration=math.inf,

@@ -115,7 +115,7 @@ def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
         assert (views["speed"][broken(batch)] == 0).all()
         assert (views["turn_rate"][broken(batch)] == 0).all()
         assert (views["target_seen"][broken(batch)] == 0).all()
-        # Its team-mates hear no more of it: what they have grows older, then is dropped.
+        # Its team-mates receive no more messages: the last one ages, then is dropped.
         number = np.flatnonzero(broken(batch)[0])[0]
         mate = 0 if number else 1
         heard = views["neighbour_number"][0, mate] == number

@@ -1,4 +1,4 @@
-"""Motion: the exact arc, its limits, and what float32 makes of it."""
+"""Motion: the exact arc, its limits, and the error of float32."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_approach_and_turn_towards() -> None:
 def test_a_turn_is_the_angle_within_its_limit(
     heading: float, limit: float, share: float, side: float
 ) -> None:
-    """However near it lies to the limit, to nothing, or to an about-turn."""
+    """Also close to the limit, to zero and to an about-turn."""
     error = side * min(share * limit, math.pi)
     most, time = F(limit / 0.1), F(0.1)
     cosine, sine = F(math.cos(heading)), F(math.sin(heading))

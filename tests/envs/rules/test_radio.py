@@ -116,7 +116,7 @@ def test_an_outage_is_silent_both_ways() -> None:
 
 
 def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
-    """A chain of four out of which only the first sees; each hop takes the delay and a step."""
+    """A chain of four of which only the first sees the target; each hop takes delay plus a step."""
     batch = posse.batch(
         num_trackers=4, sensing_range=3.0, radio_range=4.5, radio_delay=2, target_speed=0.0,
         start_distance=(1.0, 16.0),
@@ -146,7 +146,7 @@ def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
 
 @pytest.mark.parametrize("name", ["constant", "accelerating", "smart", "search", "leader-loss"])
 def test_a_radio_without_limits_is_one_with_a_huge_range(name: str) -> None:
-    """The engine has a shorter way for a perfect radio; it makes no difference but rounding."""
+    """The engine's shortcut for a perfect radio changes results only by rounding."""
     without = posse.batch(name, 6, message_size=2, horizon=120, range_noise=0.02)
     huge = posse.batch(name, 6, message_size=2, horizon=120, range_noise=0.02, radio_range=1e5)
     np.testing.assert_allclose(without.reset(seed=3), huge.reset(seed=3), rtol=1e-5, atol=2e-5)

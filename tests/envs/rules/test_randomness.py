@@ -1,4 +1,4 @@
-"""The random draws: their values, their spread, and that no two uses share one."""
+"""The random draws: values, distribution, and independence of uses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The score, settling, recovery and the bound, against an independent working."""
+"""The score, settling, recovery and the bound, against an independent computation."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_every_step_s_score_equals_an_independent_working(case: Any) -> None:
 
 
 def in_place(batch: posse.Batch, shift: complex = 0.0, **poses: complex) -> None:
-    """Start a team in its slots, all heading with the target along x; but for some of them."""
+    """Start a team in its slots, heading like the target along x, with some exceptions."""
     places = slots(batch.scenario) + shift
     for name, place in poses.items():
         places[int(name.removeprefix("tracker_"))] = place

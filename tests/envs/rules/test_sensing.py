@@ -1,4 +1,4 @@
-"""What a tracker senses: sight, its limits and noise, and the sonar."""
+"""Sensing: sight, its limits and noise, and the sonar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the smart target behaves: every promise of its module and of docs/scenarios.md."""
+"""Behaviour of the smart target as documented in its module and docs/scenarios.md."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def flying_blind(batch: posse.Batch) -> npt.NDArray[np.float32]:
 
 
 class Play:
-    """What was seen while a team played: arrays over T + 1 moments."""
+    """Recording of a team's play: arrays over T + 1 frames."""
 
     def __init__(self, batch: posse.Batch, team: Controller, steps: int) -> None:
         target, nearest, heading, touched, score = [], [], [], [], []
@@ -202,7 +202,7 @@ def test_a_dart_breaks_the_formation_and_touches_nobody() -> None:
 
 
 def test_it_turns_away_from_a_tracker_that_comes_too_near() -> None:
-    # Nobody keeps station: one tracker alone comes from behind at full speed.
+    # No formation: a single tracker comes from behind at full speed.
     trackers = [[-1.0, 0.0, 0.0], *([-19.0 + k, 0.0, 0.0] for k in range(4))]
     batch = start(1, tracker_pose=trackers, target_pose=[0.0, 0.0, 0.0])
     play = Play(batch, pursuing, 25)

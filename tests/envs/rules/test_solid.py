@@ -112,7 +112,7 @@ def tight_spots(batch: posse.Batch, rng: np.random.Generator) -> Complexes:
 def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(
     motion: str, turn: float, arena: float
 ) -> None:
-    """Put, as trackers that hold it can, where and how it would never go by itself."""
+    """Place the target as trackers can push it, in poses that it would not reach on its own."""
     batch = posse.batch(
         "obstacles", 1000, target_motion=motion, target_turn_rate=turn, arena=arena,
         **{**CROWDED, "num_trackers": 1},

@@ -63,7 +63,7 @@ def test_distance_bearing_and_heading_are_uniform() -> None:
         (state["world_x"] + 10) / 20,
         (state["world_y"] + 10) / 20,
     ):
-        # Trackers that would overlap are drawn anew: a little less than uniform.
+        # Trackers that would overlap are drawn again, so the distribution is slightly non-uniform.
         assert stats.kstest(shares.ravel(), "uniform").statistic < 0.035
     assert abs(np.corrcoef(np.angle(heading).ravel(), np.angle(offset).ravel())[0, 1]) < 0.05
 

@@ -1,4 +1,4 @@
-"""How the target moves: constant, accelerating, and what keeps it from walls and obstacles."""
+"""Target motions: constant, accelerating, and avoidance of walls and obstacles."""
 
 from __future__ import annotations
 

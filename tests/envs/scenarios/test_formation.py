@@ -1,4 +1,4 @@
-"""Slots: where they are, that they can be followed, and the frame that carries them."""
+"""Slots: positions, feasibility, and the slot frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The named scenarios: the registry, and that each of them is what docs/scenarios.md says."""
+"""The named scenarios: the registry, and their properties stated in docs/scenarios.md."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_it_plays_to_its_horizon(name: str) -> None:
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_the_bound_leaves_room_for_the_approach_and_for_a_score(name: str) -> None:
-    """A bound near 0 or at 1 would make a scenario that tells nobody apart."""
+    """With a bound near 0 or at 1 a scenario could not distinguish teams."""
     batch = posse.batch(name, num_worlds=50, seed=5, autoreset="disabled")
     batch.reset()
     idle = np.zeros(batch.action_shape, np.float32)
@@ -175,7 +175,7 @@ def test_in_search_nobody_sees_the_target_at_the_start() -> None:
 def test_obstacles_stand_in_the_way_and_in_the_view() -> None:
     batch = started("obstacles")
     assert batch.state["obstacle_x"].shape == (200, 8)
-    # Sight is unlimited: whoever does not see the target has an obstacle before it.
+    # Sight is unlimited: only obstacles hide the target.
     unseen = (batch.state["tracker_sees"] == 0).mean()
     assert 0.1 < unseen < 0.6
 

@@ -20,7 +20,7 @@ FOLLOWS: Final = (
     # from poses: contacts, and who is near to what (test_contact)
     "world_touching", "world_near", "tracker_touching", "tracker_touching_trackers",
     "tracker_touching_obstacles", "tracker_near",
-    "tracker_onsets",  # counted anew where anything is near, and 0 elsewhere
+    "tracker_onsets",  # counted again if anything is near, else 0
     # from poses, the slot frame and contacts: who occupies which slot (test_score)
     "tracker_slot", "tracker_slot_distance",
     # from the scenario, always the same
@@ -48,7 +48,7 @@ def disturb(scenario: posse.Scenario, arrays: WorldArrays, rng: np.random.Genera
             disturbed.add(name)
         else:
             array[...] = before
-    # Of what was never heard or sent, the vector holds no more than that.
+    # Of messages never received or sent, the vector holds only that.
     for name, record, absent in (
         ("heard", arrays.heard, arrays.heard["step"] < 0),
         ("broadcast", arrays.broadcast, arrays.broadcast["sent"] == 0),

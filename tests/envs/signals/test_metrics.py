@@ -1,4 +1,4 @@
-"""Every metric, against an independent working from the states."""
+"""Every metric against an independent computation from the states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reward terms and their weighted sum, against an independent working."""
+"""Reward terms and their weighted sum against an independent computation."""
 
 from __future__ import annotations
 

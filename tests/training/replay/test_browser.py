@@ -1,4 +1,4 @@
-"""The page in a real browser. Skipped where there is none."""
+"""The page in a real browser; skipped without one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ticks of a timeline are what the engine itself counted."""
+"""The events of a timeline agree with the engine's counts."""
 
 from __future__ import annotations
 

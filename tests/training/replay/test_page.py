@@ -1,4 +1,4 @@
-"""A page is one small file that asks for nothing and runs nothing but its own code."""
+"""A page is one small file that makes no requests and runs only its own code."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_the_same_replay_is_the_same_page() -> None:
 
 
 class Tags(HTMLParser):
-    """Every tag with its attributes, and what stands in scripts and style."""
+    """Every tag with its attributes, and the contents of scripts and style."""
 
     def __init__(self, text: str) -> None:
         super().__init__()

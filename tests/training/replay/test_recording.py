@@ -1,4 +1,4 @@
-"""What is recorded is what happened, step by step, also after it was written and read."""
+"""Recordings agree with the played steps, also after writing and reading."""
 
 from __future__ import annotations
 

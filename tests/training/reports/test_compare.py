@@ -166,7 +166,7 @@ def test_who_cannot_play_is_left_out_with_a_line(
     assert left_out == [("few-beams", "any-0")]
     played = [(row["scenario"], row["policy"]) for row in summary["comparison"]]
     assert played == [("few-beams", "pursuit"), ("constant", "any-0"), ("constant", "pursuit")]
-    # The one to compare with did not play: there is no difference to anybody else in its place.
+    # The baseline did not play, so there is no difference, not even to another policy.
     assert summary["comparison"][0]["difference"] is None
     assert summary["comparison"][2]["difference"] is not None
 

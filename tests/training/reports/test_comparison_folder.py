@@ -1,4 +1,4 @@
-"""A comparison's folder is replaced as a whole or not at all, and other files are not touched."""
+"""The folder of a comparison is replaced as a whole or not at all; other files are kept."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write(out: Path, *names: str) -> None:
 
 
 def only(out: Path) -> None:
-    """Nothing is left beside the folder."""
+    """No file is left next to the folder."""
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 

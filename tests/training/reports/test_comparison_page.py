@@ -1,4 +1,4 @@
-"""The comparison page: numbers are those of the plays, and what is written by hand stays."""
+"""The comparison page: numbers agree with the results, and hand-written text is kept."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_the_page_says_what_was_played(page: Path, tmp_path: Path) -> None:
     for name in re.findall(r"\(media/(\S+)\)", text):
         assert (page.parent / "media" / name).is_file()
     assert text.count("](media/") == 2
-    # Made again, it is the same: nothing is added to what was there.
+    # Made again, the page is the same.
     again = fill(page, "--groups", f"mine={','.join(map(str, files))}")
     assert again == text
 

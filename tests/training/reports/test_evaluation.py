@@ -33,7 +33,7 @@ class Spinning(BasePolicy):
 
 
 def test_every_policy_meets_the_same_worlds() -> None:
-    # Neither leaves its place, so what depends on starts and target alone has to be equal.
+    # Neither moves, so metrics that depend only on starts and target are equal.
     first = evaluate("idle", "constant", 20, horizon=300, progress=False)
     second = evaluate(Spinning(), "constant", 20, horizon=300, progress=False)
     assert first["bound"].all()

@@ -1,4 +1,4 @@
-"""The failure of a policy is named, and costs only its own rows."""
+"""The failure of a policy is reported, and affects only its own rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BAD = "tests.support.bad_policies:"
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    """Compile what the time limits below are not meant for."""
+    """Compile the kernels outside the time limits."""
     for policy in ("idle", "pursuit"):
         evaluate(policy, "constant", 2, progress=False)
 
@@ -63,7 +63,7 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
 
 
 def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
-    """A process of its own changes no result."""
+    """A separate process does not change results."""
     settings = Settings(
         ("posse_baselines.policies.pursuit:Pursuit", "pursuit"), ("constant",), episodes=3,
         out=tmp_path / "out", figures=False, planner_episodes=0,

@@ -119,7 +119,7 @@ class TestTrainingSeeds:
         assert turned.low == pytest.approx(-paired.high, abs=0.02)
 
     def test_seeds_that_disagree_leave_the_sign_open(self) -> None:
-        """Many worlds are no substitute for seeds."""
+        """Many worlds do not replace training seeds."""
         rng = np.random.default_rng(8)
         trained = np.array([[0.3], [0.25], [-0.2]]) + 0.05 * rng.normal(size=(3, 5000))
         assert difference(trained, np.zeros(5000)).low < 0

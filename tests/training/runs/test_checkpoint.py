@@ -1,4 +1,4 @@
-"""Forged checkpoints, whose digest is right and whose contents are not, are named errors."""
+"""Forged checkpoints with a correct digest and invalid contents raise named errors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Every place in a nest of dictionaries and lists."""
+    """Every path in nested dictionaries and lists."""
     items: Any = ()
     if isinstance(value, dict):
         items = value.items()
@@ -48,7 +48,7 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(data=st.data())
 def test_a_forged_state_is_refused_or_taken(run: Path, data: st.DataObject) -> None:
-    """Whatever stands in one place of the state: a named error, or a run that can be resumed."""
+    """Any value at one path of the state: a named error, or a run that can be resumed."""
     before = (run / "checkpoint.safetensors").read_bytes()
     arrays, state = read_checkpoint(run)
     place = data.draw(st.sampled_from(places(state)[1:]))

@@ -1,4 +1,4 @@
-"""A policy that is exported acts as its model does."""
+"""An exported policy acts like its model."""
 
 from __future__ import annotations
 

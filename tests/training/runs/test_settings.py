@@ -124,7 +124,7 @@ def test_more_memory_than_there_is(
 
 
 def write(folder: Path, **changes: Any) -> Path:
-    """A settings file of somebody else."""
+    """A settings file with code to import."""
     folder.mkdir(exist_ok=True)
     path = folder / "settings.json"
     path.write_text(json.dumps({**small(folder).to_dict(), "folder": None, **changes}))

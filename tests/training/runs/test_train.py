@@ -77,7 +77,7 @@ def test_the_best_policy_is_kept_not_the_last(
 def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(
     tmp_path: Path,
 ) -> None:
-    """Whole rollouts are made: what is left of the steps may be less than nothing."""
+    """Rollouts are complete, so the number of remaining steps may be negative."""
     settings = small(tmp_path, steps=100, learning_rate=1e-3, final_learning_rate=1e-4)
     env = make_env(settings)
     schedule = make_model(settings, env).lr_schedule

@@ -1,4 +1,4 @@
-"""MAPPO: the state of the world reaches the value, and no action."""
+"""MAPPO: the state of the world influences values, but not actions."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from posse_training.sb3.imitation import imitate
 
 
 class _Circle(BasePolicy):
-    """An expert that is easy to copy, and says a word that the copy is not given."""
+    """An expert that is easy to imitate, with a message that the imitation does not observe."""
 
     name = "circle"
     message_size = 1
@@ -45,7 +45,7 @@ def test_imitation_copies(tmp_path: Path) -> None:
     mine, _ = policy.act(observations, policy.begin(batch.layout, 20))
     side = batch.layout.views(observations)["target_bearing"][..., 1]
     assert np.abs(mine[..., 1] - 0.8 * side).mean() < 0.15
-    # The statistics are those of what the expert saw.
+    # The statistics are those of the expert's observations.
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     np.testing.assert_allclose(normaliser.mean, statistics.mean, rtol=1e-5, atol=1e-6)
 

@@ -1,4 +1,4 @@
-"""Input statistics, and when a rollout sees them."""
+"""Input statistics, and their use during a rollout."""
 
 from __future__ import annotations
 

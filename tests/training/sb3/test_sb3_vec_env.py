@@ -28,7 +28,7 @@ def make(
 
 
 def move(env: TeamVecEnv, actions: Any) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
-    """Step, with types that a test can do without."""
+    """Step, without type checks of the result."""
     return env.step(actions)
 
 
@@ -98,7 +98,7 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
     for e in ends:
         begin = (e + 1) * HORIZON // 4
         assert ends[e] == list(range(begin, 4 * HORIZON + 1, HORIZON))
-    # A reset begins the spreading anew.
+    # A reset spreads the episodes again.
     env.reset()
     for _ in range(HORIZON // 4):
         _, _, dones, _ = move(env, draw(env, generator))
@@ -245,7 +245,7 @@ def test_saved_worlds_go_on_as_they_would_have() -> None:
 
 
 class _Recorder(BaseCallback):
-    """Keeps what the environment returned, before the learner adds to it."""
+    """Keeps the environment's results before the learner modifies them."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The faster parts of PPO agree with the libraries' own."""
+"""The faster parts of PPO agree with those of the libraries."""
 
 from __future__ import annotations
 

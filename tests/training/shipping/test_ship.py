@@ -1,4 +1,4 @@
-"""Shipping: the best of several training seeds, with all of them on record."""
+"""Shipping: the best of several training seeds, with the scores of all seeds."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(
     path = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
     shipped = LearnedPolicy.from_file(path)
     assert shipped.name == "learned-trial"
-    # What the scores should be, worked out apart.
+    # The expected scores, computed separately.
     scores = [
         sum(
             evaluate(

@@ -1,4 +1,4 @@
-"""The batch under TorchRL: same numbers, TorchRL's names, parts of it reset at a time."""
+"""The batch in TorchRL: same numbers, TorchRL's names, partial resets."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_rows_of_a_target_that_is_an_agent_come_last() -> None:
 
 
 def test_what_was_returned_is_never_overwritten() -> None:
-    env = PosseEnv("constant", 300)  # large enough for the engine to use memory again
+    env = PosseEnv("constant", 300)  # large enough that the engine reuses memory
     carried = env.reset()
     kept, copies = [], []
     for actions in some_actions(env.batch.action_shape, 12):
@@ -201,7 +201,7 @@ def test_a_bad_action_is_refused_and_changes_nothing() -> None:
     np.testing.assert_array_equal(env.batch.worlds, before)
 
 
-# Importing TorchRL's collectors defines classes by an old interface of its own.
+# TorchRL's collectors define classes by a deprecated interface at import.
 @pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
 def test_a_collector_gathers_whole_batches() -> None:
     from torchrl.collectors import Collector

@@ -1,4 +1,4 @@
-"""PPO on TorchRL: the data is the engine's, the formulas are right, and it learns."""
+"""PPO on TorchRL: data of the engine, correct formulas, and learning."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SMALL = Settings(num_worlds=16, rollout_steps=10, updates=2, minibatches=2, hidd
 
 @pytest.fixture(autouse=True)
 def _one_thread() -> Iterator[None]:
-    """Such small networks gain nothing from threads, which wait for each other by spinning."""
+    """Small networks do not gain from threads, which wait for each other by spinning."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

@@ -64,7 +64,7 @@ STATES: Final = (
     "world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target",
 )  # fmt: skip
 
-"""What is read of the state of a world, frame by frame."""
+"""Names of the state arrays that are recorded in each frame."""
 
 States = dict[str, npt.NDArray[Any]]
 """By name, (T + 1, ...) each."""

@@ -1,4 +1,4 @@
-"""The observation: every field against an independent working, its bounds, its layout."""
+"""The observation: fields against an independent computation, bounds, layout."""
 
 from __future__ import annotations
 

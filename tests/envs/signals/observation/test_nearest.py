@@ -1,4 +1,4 @@
-"""Who is nearest: both ways of making the list give what sorting the exact distances gives."""
+"""Nearest team-mates: both algorithms agree with sorting by exact distances."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def listed(trackers: Teams, places: int, across: int) -> tuple[Numbers, Numbers]
     worlds, n = trackers.shape
     lists = np.full((worlds, n, places), -1, np.float32)
     certain = np.zeros((worlds, n), np.float32)
-    # What nobody has written must not count.
+    # Uninitialised memory must not have an effect.
     scratch = new_scratch(SCRATCH if across else SCRATCH_FOR_ONE)
     scratch.view(np.float32)[:] = np.nan
     config = config_record(posse.get_scenario("constant"))

@@ -70,7 +70,7 @@ for worlds, settings in (
 
 
 def test_the_largest_worlds_fit_their_memory() -> None:
-    """Compiled code does not look at the ends of arrays; plain Python does."""
+    """Compiled code does not check array bounds; plain Python does."""
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", LARGEST],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,

@@ -1,4 +1,4 @@
-"""Figures show the numbers that they are given, and a policy looks the same in all of them."""
+"""Figures show their data, and a policy has the same style in all of them."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_a_sweep_shows_every_point_and_marks_the_scenarios_own_value() -> None:
 
 
 def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
-    """Who never recovers counts among all, and nobody is counted after his episode may be over."""
+    """Teams that never recover count, and no team counts after the end of its episode."""
     taken = [1.0, 2.0, np.nan, np.nan]
     figure = figures.recovery([plays_of("pursuit", "leader-loss", recovery_time=taken)])
     x, y = line(figure, "pursuit")

@@ -63,7 +63,7 @@ def test_panels_stand_side_by_side_on_the_same_world(tmp_path: Path) -> None:
     assert len(frames) == 21
     first, second, third = (frames[:, :, k : k + 200] for k in (0, 202, 404))
     np.testing.assert_array_equal(first, third)
-    # Below the labels, the beginning is one and the same; what follows is not.
+    # Below the labels, the first frames are equal; later ones differ.
     assert (np.abs(first[0].astype(int) - second[0])[30:] <= 8).all()
     assert (first[-1] != second[-1]).any()
 
@@ -75,7 +75,7 @@ def test_frames_left_out_make_a_shorter_film_of_the_same_time(tmp_path: Path) ->
     part, longer = read(film(policies, "smart", path=tmp_path / "b.gif", every=5, **settings))
     assert (len(whole), times[0]) == (21, 100)
     assert (len(part), longer[0]) == (5, 500)
-    # What was not drawn was still followed: both end with the same picture.
+    # Frames that were not drawn were still simulated: both end with the same picture.
     assert (np.abs(whole[-1].astype(int) - part[-1]) <= 24).mean() > 0.99
 
 
