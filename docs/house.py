@@ -1,9 +1,9 @@
-"""Draws docs/media/house.svg: the rooms of the packages, what each is for and how large it is.
+"""Draws docs/media/house.svg: the rooms of the packages with purpose and size of each.
 
     python docs/house.py
 
-Names, purposes (the first line of a room's docstring) and sizes are read from the sources. A room
-imports only rooms below its own, which tests/test_imports.py holds.
+Purposes (the first paragraph of a room's docstring) and sizes are read from the sources. A room of
+``posse`` imports only rooms below it, which tests/test_imports.py checks.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 ROOT = Path(__file__).parents[1]
 SOURCES = {"posse_training": "training", "posse_baselines": "baselines", "posse": "envs"}
 COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "#fbe8cf"}
-# The picture from the top down.
+# Rooms from top to bottom.
 LINES = (
     ("posse_training.cli",),
-    ("posse_training.shipping",),
+    ("posse_training.commands", "posse_training.shipping"),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl"),
     ("posse_baselines.learned", "posse_baselines.policies"),
@@ -55,21 +55,28 @@ def modules() -> dict[str, Path]:
 
 
 def purpose_of(room: str) -> str:
-    """Return what a room says of itself: the first line of its docstring."""
+    """Return the first paragraph of a room's docstring."""
     package, _, name = room.partition(".")
     folder = ROOT / SOURCES[package] / package / name
     source = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
     if not source.exists():
         return ""
     docstring = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) or ""
-    return " ".join(docstring.split("\n\n")[0].split())
+    return " ".join(docstring.split("\n\n")[0].replace("``", "").split())
+
+
+def rooms_in(room: str) -> str:
+    """Return the names of the folders of a room that contain modules."""
+    package, _, name = room.partition(".")
+    folder = ROOT / SOURCES[package] / package / name
+    return ", ".join(path.parent.name for path in sorted(folder.glob("*/__init__.py")))
 
 
 def size_of(room: str) -> str:
-    """Return how many files and lines a room has."""
+    """Return the number of files and lines of a room."""
     paths = [path for module, path in modules().items() if room_of(module) == room]
     lines = sum(len(path.read_text(encoding="utf-8").splitlines()) for path in paths)
-    return f"{len(paths)} files, {lines:,} lines"
+    return f"{len(paths)} file{'s' * (len(paths) > 1)}, {lines:,} lines"
 
 
 def draw() -> None:
@@ -95,6 +102,11 @@ def draw() -> None:
                 ha="right", va="top", fontsize=7.5, color="#445566",
             )  # fmt: skip
             axes.text(x + 0.1, y + HEIGHT - 0.34, purpose, va="top", fontsize=8)
+            if inner := rooms_in(room):
+                axes.text(
+                    x + width - 0.1, y + 0.06, f"contains {inner}",
+                    ha="right", va="bottom", fontsize=7.5, color="#445566",
+                )  # fmt: skip
         if PACKAGE_BEGINS.get(row):
             axes.text(-0.15, y + HEIGHT, PACKAGE_BEGINS[row], ha="right", va="top", fontsize=11)
     bottom = -STEP * (len(LINES) - 1)

@@ -1,1 +1,1 @@
-"""Commands that are not reports: ``posse train``, ``posse watch`` and ``posse scenarios``."""
+"""The commands ``posse train``, ``posse watch`` and ``posse scenarios``."""

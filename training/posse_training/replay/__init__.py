@@ -1,4 +1,4 @@
-"""Replays: one HTML file in which teams play the same world side by side."""
+"""Replays: one or more teams on the same world, as one HTML file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evaluation, comparison, figures and films."""
+"""Evaluation and comparison of policies."""
 
 from __future__ import annotations
 
