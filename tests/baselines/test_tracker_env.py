@@ -79,7 +79,7 @@ def test_what_does_not_fit_is_named() -> None:
         TrackerEnv("constant", number=5)
     with pytest.raises(posse.ScenarioError, match="no team-mates"):
         TrackerEnv("constant", num_trackers=1)
-    with pytest.raises(posse.ScenarioError, match="no place in posse/Tracker-v0"):
+    with pytest.raises(posse.ScenarioError, match="not possible in posse/Tracker-v0"):
         TrackerEnv("constant", target_motion="agent")
     with pytest.raises(PolicyError, match="unknown policy 'pursiut'"):
         TrackerEnv("constant", teammates="pursiut")
