@@ -14,7 +14,7 @@ from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate
 
 BOUND: Final = "bound"
-"""Takes the place of a policy's name where a point is the bound."""
+"""Name used instead of a policy's for points of the bound."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,13 @@ def play_sweeps(
 ) -> list[Point]:
     """Play every sweep with every contender, each value on the same worlds.
 
-    The bound depends on where the target flees to, and so slightly on the team: it is that of the
-    last contender, which is the planner if there is one.
+    The bound depends on the path of the target, and therefore slightly on the team: it is that of
+    the last contender, which is the planner if present.
 
     Args:
-        contenders: Who plays.
+        contenders: Contenders to evaluate.
         attempt: Plays a contender at a value of a sweep; returns ``None`` if it cannot.
-        sweeps: Which to play.
+        sweeps: Sweeps to evaluate.
     """
     points = []
     for sweep in sweeps:

@@ -42,7 +42,7 @@ class Worker:
 
         Raises:
             TimeLimitError: The process was killed.
-            EOFError: The process ended by itself.
+            EOFError: The process ended unexpectedly.
             Exception: As raised by the function.
         """
         connection = self._start()

@@ -32,7 +32,7 @@ from posse_training.sb3.normalisation import RunningStatistics
 from posse_training.sb3.vec_env import TeamVecEnv
 
 _POINT: Final = ("steps", "seconds", "score", "low", "high")  # of the curve
-_STATISTICS_EVERY: Final = 8  # one step of a rollout in so many is added to the statistics
+_STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 
 
 class TrainingCallback(BaseCallback):

@@ -17,7 +17,7 @@ from posse_baselines.policy import Policy, begin
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.world_state import StateWriter
 
-_EVERY: Final = 5  # one control step in so many is kept, since successive steps are much alike
+_EVERY: Final = 5  # every fifth control step is kept, since successive steps are similar
 _SETTLED: Final = 3.0  # discounted horizons before the end from which returns are incomplete
 
 

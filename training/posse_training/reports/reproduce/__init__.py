@@ -1,6 +1,6 @@
-"""``posse reproduce``: the paper's section 4, figures 7 to 10, and what it announces beside them.
+"""``posse reproduce``: section 4 of the paper, its figures 7 to 10, and results that it announces.
 
-The paper gives neither scale, gains nor starts; docs/reproduction.md says what was chosen.
+The paper does not state scale, gains and starts; docs/reproduction.md lists those chosen here.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from posse_training.reports.reproduce.recording import (
 )
 
 HORIZON: Final = 250
-"""Control steps that are played, so that the slowest law settles."""
+"""Control steps of an episode, enough for the slowest law to settle."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """One model of the paper: its laws, ours, and what the paper says of it."""
+    """One model of the paper: its policies here, and the paper's figures."""
 
     name: str
     scenario: str
@@ -58,20 +58,20 @@ MEMBERS: Final = tuple(name for name in FAMILY if name != "ddcs-no-radio")
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``posse reproduce`` takes."""
+    """Arguments of ``posse reproduce``."""
 
     out: Path = Path("runs/paper")
     """Folder for figures (PNG and SVG) and numbers (JSON)."""
     starts: int = 200
-    """Drawn starts; the run of the median settling time is shown."""
+    """Number of drawn starts; figures show the run with the median settling time."""
     seed: int = 7
-    """Of the starts, on the test split."""
+    """Seed of the starts, in the test split."""
     tolerance: float = 0.1
-    """A position relative to the target within this of its last value has settled, m."""
+    """Distance of a relative position from its last value at which it counts as settled, m."""
 
 
 def play_member(policy: str, settings: Settings) -> Recording:
-    """Play a policy from the drawn starts; the models' scenarios differ in name alone."""
+    """Play a policy from the drawn starts; the models' scenarios differ only in name."""
     scenario = posse.get_scenario("paper-distributed", horizon=HORIZON)
     tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
     options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
@@ -131,10 +131,10 @@ def _write(folder: Path, name: str, figure: Figure) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Redo the paper's experiments and print the settling times beside the paper's."""
+    """Reproduce the paper's experiments and print the settling times with those of the paper."""
     settings = tyro.cli(Settings, prog="posse reproduce", args=arguments)
     rows = reproduce(settings)
-    table = Table(title=f"settling time, s: within {settings.tolerance:g} m and 0.1 m/s for good")
+    table = Table(title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s")
     for column in ("policy", "model", "paper", "median [quartiles]", "settled", "all in slots"):
         table.add_column(column)
     for row in rows:

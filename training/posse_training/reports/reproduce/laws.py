@@ -1,4 +1,4 @@
-"""What the paper announces and does not show: tracks for several K and c, and a leader's loss."""
+"""Results that the paper announces but does not show: several K and c, and the loss of a leader."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TASK_COLOURS: Final = ("#D9D9D9", "#E69F00", "#009E73", "#0072B2")
 
 
 def tracks(seed: int) -> Figure:
-    """Draw one tracker for three K with c = 0, and a team that has K and c of its own each."""
+    """Draw one tracker for three K with c = 0, and a team with different K and c."""
     figure, axes = plt.subplots(
         2, 3, figsize=(10, 5.2), layout="constrained", gridspec_kw={"height_ratios": (1.3, 1)}
     )
@@ -125,7 +125,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
         axis.axvline(broke, color=TARGET, lw=1.0)
         if np.isfinite(recovered):
             axis.axvline(recovered, color=TARGET, lw=1.0, ls=":")
-    axes[3].set_xlabel("time, s (line: the leader breaks; dotted: all places are held again)")
+    axes[3].set_xlabel("time, s (line: the leader breaks; dotted: all slots are held again)")
     handles: list[Artist] = [
         Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)
     ]

@@ -1,4 +1,4 @@
-"""Figures 7 to 10: formations with slots and trails, and curves, the paper's laws beside ours."""
+"""Figures 7 to 10: formations with slots and trails, and curves, for several policies."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LEAST: Final = 5.0  # s
 
 
 def look_of(number: int) -> dict[str, Any]:
-    """How a robot's line is drawn: told apart by colour and by line style."""
+    """Colour and line style of a robot."""
     return {"color": COLOURS[number % 5], "ls": LINES[number % 5]}
 
 

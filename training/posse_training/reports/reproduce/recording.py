@@ -1,4 +1,4 @@
-"""Runs of the paper's section 4: starts as in figure 7, what happened, and when it settled."""
+"""Runs of the paper's section 4: starts as in figure 7, recordings, and settling times."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ Floats = npt.NDArray[np.floating[Any]]
 TARGET_HEADING: Final = math.pi
 """In the paper's figure 7 the target is the leftmost robot: it heads towards -x."""
 DRAWN_AT_ONCE: Final = 2000
-"""Worlds drawn at a time, to take the starts from."""
+"""Number of worlds drawn at a time, from which starts are selected."""
 SPEED_TOLERANCE: Final = 0.1
 """m/s; a speed within this of its last value has settled."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What every robot of E worlds did, T + 1 instants.
+    """The motion of all robots of E worlds at T + 1 times.
 
     Attributes:
         time: (T + 1,) s.
         trackers: (T + 1, E, N, 3): x, y, θ.
         target: (T + 1, E, 3).
         speeds: (T + 1, E, N) m/s.
-        slots: (T + 1, E, N, 2): where the slots of the formation are; m.
-        leader: (T + 1, E, N): whom each tracker takes for the leader; -1: nobody.
+        slots: (T + 1, E, N, 2): positions of the slots, m.
+        leader: (T + 1, E, N): the leader assumed by each tracker; -1: none.
         task: (T + 1, E, N): position in ``posse_baselines.ddcs.TASKS``; -1: none.
         working: (T + 1, E, N).
-        radius: Of a robot, m.
+        radius: Radius of a robot, m.
     """
 
     time: Floats
@@ -52,7 +52,7 @@ class Recording:
 
     @property
     def relative(self) -> Floats:
-        """Positions of the trackers as seen from the target, (T + 1, E, N, 2)."""
+        """Positions of the trackers relative to the target, (T + 1, E, N, 2) m."""
         return self.trackers[..., :2] - self.target[:, :, None, :2]
 
     @property
@@ -65,8 +65,8 @@ class Recording:
 def draw_starts(scenario: posse.Scenario, starts: int, seed: int) -> tuple[Floats, Floats]:
     """Return starts as in figure 7, tracker poses (E, N, 3) and target poses (E, 3).
 
-    The target is the leftmost robot and heads towards -x: of the worlds that the scenario draws,
-    those in which every tracker stands behind it are taken, in order.
+    The target is the leftmost robot and heads towards -x: of the scenario's worlds, in order, those
+    with all trackers behind the target are selected.
     """
     trackers, targets = [], []
     for first in range(0, 1_000_000, DRAWN_AT_ONCE):
@@ -133,11 +133,11 @@ def _instant(
 
 
 def settling_times(recording: Recording, tolerance: float) -> Floats:
-    """Return when each world came to rest, (E,) s: the paper's "keep a certain value".
+    """Return the settling time of each world, (E,) s: the paper's "keep a certain value".
 
-    From then on every tracker's position relative to the target stays within ``tolerance`` of its
-    last value, and its speed within :data:`SPEED_TOLERANCE` of its last; ``nan`` where that holds
-    for less than the last second.
+    After it, every tracker's position relative to the target stays within ``tolerance`` of its
+    last value, and its speed within :data:`SPEED_TOLERANCE` of its last; ``nan`` if that holds
+    only for less than the last second.
     """
     relative, speeds = recording.relative, recording.speeds
     moved = np.linalg.norm(relative - relative[-1], axis=-1) > tolerance
