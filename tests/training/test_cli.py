@@ -32,6 +32,14 @@ def test_all_settings_of_a_scenario(capsys: pytest.CaptureFixture[str]) -> None:
     assert "radio_loss" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([name, "--help"])
+    assert ended.value.code == 0
+    assert f"usage: posse {name}" in capsys.readouterr().out
+
+
 def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0
     shown = capsys.readouterr().out

@@ -27,7 +27,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "compare": _Command("score policies on the same worlds", "reports.compare"),
     "watch": _Command("show a policy in a window, or film it", "commands.watch"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),
-    "ship": _Command("make the best of several runs a policy of the package", "runs.ship"),
+    "ship": _Command("make the best of several runs a policy of the package", "shipping.ship"),
     "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
 }
