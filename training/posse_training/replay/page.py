@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posse.rendering import style
+from posse_baselines.learned.policy_file import write_atomically
 from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
 from posse_training.runs.settings import SettingsError
@@ -44,7 +45,7 @@ _DATA: Final = re.compile(
 
 
 def write_replay(replay: Replay, path: str | Path) -> Path:
-    """Write a page that shows a replay; folders are created, an existing file is replaced.
+    """Write a page that shows a replay; folders are made, a file there is replaced as a whole.
 
     Args:
         replay: Result of :func:`posse_training.replay.record` or a
@@ -53,13 +54,14 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
 
     Raises:
         SettingsError: A path that does not end in ``.html``.
+        OSError: It could not be written; an old file is unchanged.
     """
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise SettingsError(f"path={str(path)!r} must end in .html: a replay is a web page")
     text = page(replay)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    write_atomically(path, text.encode())
     return path
 
 
@@ -77,7 +79,33 @@ def read_replay(path: str | Path) -> Replay:
     found = _DATA.search(text)
     if found is None:
         raise SettingsError(f"{path} is no replay: posse replay writes one")
-    return decode(found[1], base64.b64decode(found[2]))
+    try:
+        replay = decode(found[1], base64.b64decode(found[2], validate=True))
+    except ValueError as error:  # SettingsError is one
+        raise SettingsError(f"cannot read a replay from {path}: {error}") from error
+    _check_world(path, replay)
+    return replay
+
+
+def _check_world(path: Path, replay: Replay) -> None:
+    """Raise if a page lacks what every recorded replay has."""
+    world = replay.world
+    wanted = ("scenario", "settings", "obstacles", "seed", "split", "world", "episode", "fields")
+    missing = [name for name in wanted if name not in world]
+    fields = world.get("fields")
+    whole = (
+        not missing
+        and isinstance(world["scenario"], str)
+        and isinstance(world["settings"], dict)
+        and isinstance(fields, list)
+        and all(isinstance(f, dict) and isinstance(f.get("name"), str) for f in fields)
+        and all(player.columns for player in replay.players)
+    )
+    if not whole or not replay.players:
+        raise SettingsError(
+            f"cannot read a replay from {path}: its description of the world or its players is "
+            f"damaged{f': it lacks {missing}' if missing else ''}"
+        )
 
 
 def page(replay: Replay) -> str:
