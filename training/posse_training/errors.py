@@ -18,6 +18,10 @@ class CheckpointError(RuntimeError):
     """A checkpoint that cannot be written or read."""
 
 
+class DivergedError(RuntimeError):
+    """A training whose networks give numbers that are not finite."""
+
+
 class ComparisonError(RuntimeError):
     """A comparison that cannot be written to its folder; the message says why and what to do."""
 
@@ -35,8 +39,8 @@ class MissingExtraError(ImportError):
 
 
 OWN: Final = (
-    SettingsError, RunFolderError, CheckpointError, ComparisonError, TrainedSplitError,
-    TimeLimitError, MissingExtraError,
+    SettingsError, RunFolderError, CheckpointError, DivergedError, ComparisonError,
+    TrainedSplitError, TimeLimitError, MissingExtraError,
 )  # fmt: skip
 """All errors of this module."""
 

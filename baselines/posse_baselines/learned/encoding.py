@@ -129,7 +129,7 @@ class Encoding:
             kind, neighbours = str(values["kind"]), int(values["neighbours"])
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise PolicyError(
-                f"the description of the policy's inputs is damaged: {error}"
+                f"the description of the policy's inputs is damaged: {error!s:.200}"
             ) from error
         if (
             kind not in KINDS
@@ -160,7 +160,7 @@ class Encoding:
                 found = "no such field" if theirs is None else f"{theirs.size} x {theirs.unit!r}"
                 raise PolicyError(
                     f"the observations of scenario {layout.scenario.name!r} do not fit: the policy "
-                    f"reads {mine.name!r} as {mine.size} x {mine.unit!r}, the scenario has "
+                    f"reads {mine.name!r:.80} as {mine.size} x {mine.unit!r:.80}, the scenario has "
                     f"{found}; play it with the settings on its card"
                 )
         columns: list[int] = []

@@ -50,8 +50,8 @@ class Network(OwnArrays):
         """
         if self.activation not in ACTIVATIONS or self.output not in OUTPUTS:
             raise PolicyError(
-                f"unknown activation {self.activation!r} or output {self.output!r}: known are "
-                f"{', '.join(ACTIVATIONS)} and {', '.join(OUTPUTS)}"
+                f"unknown activation {self.activation!r:.80} or output {self.output!r:.80}: "
+                f"known are {', '.join(ACTIVATIONS)} and {', '.join(OUTPUTS)}"
             )
         if not self.weights or len(self.weights) != len(self.biases):
             raise PolicyError("a network needs as many biases as weights, at least one of each")

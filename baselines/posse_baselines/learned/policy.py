@@ -180,7 +180,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise PolicyError(f"{path} is damaged: {error!r}") from error
+            raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
 
     @classmethod
     def _from_parts(
@@ -188,8 +188,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     ) -> LearnedPolicy:
         if description["format"] != FORMAT:
             raise PolicyError(
-                f"its format is {description['format']!r}, this version reads {FORMAT}: install "
-                "the version that wrote it"
+                f"its format is {description['format']!r:.80}, this version reads {FORMAT}: "
+                "install the version that wrote it"
             )
         count = sum(name.endswith(".weight") for name in tensors)
         network = Network(
@@ -211,7 +211,7 @@ def _adviser(name: str | None) -> Adviser | None:
         return None
     if name not in SCRIPTED:
         raise PolicyError(
-            f"its adviser {name!r} is none of {', '.join(SCRIPTED)}: install the version that "
+            f"its adviser {name!r:.80} is none of {', '.join(SCRIPTED)}: install the version that "
             "wrote it"
         )
     return check_adviser(name, SCRIPTED[name]())

@@ -107,7 +107,9 @@ def read_policy_file(path: Path) -> tuple[dict[str, FloatArray], Any]:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
             metadata = file.metadata() or {}
     except (SafetensorError, OSError, TypeError, ValueError) as error:
-        raise PolicyError(f"{path} is damaged, truncated, or not a policy file: {error}") from error
+        raise PolicyError(
+            f"{path} is damaged, truncated, or not a policy file: {error!s:.200}"
+        ) from error
     text = metadata.get(_KEY)
     if text is None:
         raise PolicyError(f"{path} is a safetensors file, but holds no policy of posse")

@@ -59,6 +59,10 @@ FIELD = ["speed", 1, "m/s", 0.0, False]
         ({"limit": float("nan")}, "limit=nan"),
         ({"limit": 10**400}, "damaged"),
         ({"activation": []}, "unknown activation"),
+        ({"activation": "x" * 5000}, "unknown activation"),
+        ({"output": "x" * 5000}, "unknown activation"),
+        ({"format": "x" * 5000}, "its format is"),
+        ({"adviser": "x" * 5000}, "its adviser"),
         ({"adviser": "os:system"}, "its adviser 'os:system' is none of"),
         ({"adviser": "planner"}, "cannot be an adviser"),
         ({"adviser": ["pursuit"]}, "damaged"),
@@ -89,6 +93,17 @@ def test_descriptions_that_make_no_policy(
     with pytest.raises(PolicyError, match=message) as caught:
         LearnedPolicy.from_file(path)
     assert str(path) in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_fields_with_long_names_are_named_in_short(
+    tmp_path: Path, described: dict[str, Any]
+) -> None:
+    described["encoding"]["fields"][0][:3:2] = ["x" * 5000, "x" * 5000]
+    policy = LearnedPolicy.from_file(forged(tmp_path, described))
+    with pytest.raises(PolicyError, match="do not fit") as caught:
+        policy.begin(posse.batch("smart", 1).layout, 1)
+    assert len(str(caught.value)) < 1000
 
 
 @pytest.mark.parametrize("missing", ["format", "limit", "activation", "output", "encoding", "card"])

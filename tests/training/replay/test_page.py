@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
+import os
 import re
 import zlib
 from dataclasses import replace
@@ -179,3 +180,33 @@ def test_a_page_of_one_and_of_four_players() -> None:
     one = record(["idle"], "constant", seconds=1)
     four = replace(one, players=one.players * 4)
     assert len(page(four)) < 1.5 * len(page(one))
+
+
+def test_a_page_with_damaged_data_is_named(tmp_path: Path) -> None:
+    path = write_replay(short("constant"), tmp_path / "a.html")
+    whole = path.read_text()
+    for old, new in (
+        ('id="data">', 'id="data">=x='),
+        ('"settings":{', '"setting":{'),
+        ('"fields":[', '"fields":[3,'),
+    ):
+        assert old in whole
+        path.write_text(whole.replace(old, new, 1))
+        with pytest.raises(SettingsError, match=r"cannot read a replay from .*a\.html"):
+            read_replay(path)
+
+
+def test_a_full_disk_keeps_the_old_page_and_names_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_replay(short("constant"), tmp_path / "a.html")
+    before = path.read_bytes()
+
+    def full(file: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"No space left on device.*a\.html"):
+        write_replay(hostile(), path)
+    assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["a.html"]

@@ -80,6 +80,38 @@ def test_forged_arrays(run: Path, tmp_path: Path, change: str) -> None:
             resume(tmp_path, console=quiet())
 
 
+def optimiser_of(state: dict[str, Any]) -> dict[str, Any]:
+    """The optimiser's part of a state, as dictionaries."""
+    parts = dict(state["model"]["parts"]["items"])
+    return dict(parts["policy.optimizer"]["items"])
+
+
+@pytest.mark.parametrize("change", ["eps", "no eps", "no moment", "nan moment", "nan weight"])
+def test_forged_optimisers_and_weights(run: Path, tmp_path: Path, change: str) -> None:
+    """What torch would only find wrong in mid-training is found before it."""
+    arrays, state = read_checkpoint(run)
+    (tmp_path / "settings.json").write_bytes((run / "settings.json").read_bytes())
+    optimiser = optimiser_of(state)
+    group = optimiser["param_groups"]["list"][0]["items"]
+    moments = optimiser["state"]["items"][0][1]["items"]
+    place = next(k for k, (name, _) in enumerate(group) if name == "eps")
+    if change == "eps":
+        group[place][1] = {"value": "x"}
+    elif change == "no eps":
+        del group[place]
+    elif change == "no moment":
+        del moments[-1]
+    else:
+        weights = dict(dict(state["model"]["parts"]["items"])["policy"]["items"])
+        name = moments[-1][1]["tensor"] if change == "nan moment" else (
+            next(iter(weights.values()))["tensor"]
+        )  # fmt: skip
+        arrays[f"model/{name}"] = np.full_like(arrays[f"model/{name}"], np.nan)
+    write_checkpoint(tmp_path, arrays, state)
+    with pytest.raises(CheckpointError, match="does not fit its settings"):
+        resume(tmp_path, console=quiet(), steps=640)
+
+
 def test_state_nested_too_deeply(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     deep = "[" * 200_000 + "]" * 200_000
     with monkeypatch.context() as patched:

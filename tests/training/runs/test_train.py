@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from stable_baselines3 import PPO
 from tests.support.runs import ADVISED, ALGORITHMS, assert_equal, numbers, quiet, small
 
 from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
-from posse_training.errors import SettingsError
+from posse_training.errors import DivergedError, SettingsError
 from posse_training.reports import evaluate
 from posse_training.runs import callback as module
 from posse_training.runs.models import even_minibatch, make_env, make_model
@@ -94,3 +96,14 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(
 )
 def test_minibatches_are_even(rows: int, wanted: int, size: int) -> None:
     assert even_minibatch(rows, wanted) == size
+
+
+def test_a_training_that_diverges_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def diverge(self: PPO) -> None:
+        with torch.no_grad():
+            for parameter in self.policy.parameters():
+                parameter.fill_(float("nan"))
+
+    monkeypatch.setattr(PPO, "train", diverge)
+    with pytest.raises(DivergedError, match=r"diverged at \d+ steps.*Lower --learning-rate"):
+        train(small(tmp_path / "run"), console=quiet())

@@ -186,8 +186,8 @@ class TrainingCallback(BaseCallback):
             self._rollouts = int(state["rollouts"])
         except Exception as error:  # whatever a state of other settings, or a forged one, raises
             raise CheckpointError(
-                f"the checkpoint in {self.folder} does not fit its settings: {error}. Restore "
-                "settings.json, or start the training again in another --folder"
+                f"the checkpoint in {self.folder} does not fit its settings: {error!s:.300}. "
+                "Restore settings.json, or start the training again in another --folder"
             ) from error
 
     def finish(self) -> None:

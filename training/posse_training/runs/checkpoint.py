@@ -62,12 +62,13 @@ def read_checkpoint(folder: Path) -> tuple[Arrays, dict[str, Any]]:
         text = metadata["state"]
         if metadata["format"] != _FORMAT:
             raise CheckpointError(
-                f"the format of {path} is {metadata['format']!r}, this version reads {_FORMAT!r}"
+                f"the format of {path} is {metadata['format']!r:.80}, this version reads "
+                f"{_FORMAT!r}"
             )
         whole = metadata["digest"] == _digest(arrays, text)
         state = json.loads(text)
     except (SafetensorError, OSError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise _damaged(path, f"{error}") from error
+        raise _damaged(path, f"{error!s:.200}") from error
     if not whole:
         raise _damaged(path, "its digest does not match its contents")
     return arrays, state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import random
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -104,10 +105,21 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     ):
         if arrays[name].shape != shape:
             raise ValueError(f"{name} has the shape {arrays[name].shape}, wanted {shape}")
-    for name, values in unflatten_tensors(state["parts"], arrays).items():
-        _find(model, name).load_state_dict(values)
-        _check_optimiser(name, _find(model, name))
-    for name, values in unflatten_tensors(state["tensors"], arrays).items():
+    names, tensors = model._get_torch_save_params()
+    parts, loose = (unflatten_tensors(state[name], arrays) for name in ("parts", "tensors"))
+    for given, wanted in ((parts, names), (loose, tensors)):
+        if set(given) != set(wanted):
+            raise ValueError(f"it holds {sorted(given)!s:.200}, wanted {sorted(wanted)}")
+    for name, values in parts.items():
+        part = _find(model, name)
+        fresh = part.state_dict()
+        part.load_state_dict(values)
+        if isinstance(part, torch.optim.Optimizer):
+            _check_optimiser(name, part, fresh["param_groups"])
+        else:
+            _check_finite(name, *part.state_dict().values())
+    for name, values in loose.items():
+        _check_finite(name, values)
         _find(model, name).data.copy_(values)
     model.num_timesteps = int(state["num_timesteps"])
     model._episode_num = int(state["episode_num"])
@@ -126,16 +138,43 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
             getattr(buffer, name)[: buffer.size()] = arrays[f"replay.{name}"]
 
 
-def _check_optimiser(name: str, part: Any) -> None:
-    """Raise if an optimiser's moments are not of the shapes of their parameters."""
-    if isinstance(part, torch.optim.Optimizer):
-        for parameter, values in part.state.items():
-            for key, value in values.items():
-                if value.numel() != 1 if key == "step" else value.shape != parameter.shape:
-                    raise ValueError(
-                        f"{key} of {name} has the shape {tuple(value.shape)}, wanted "
-                        f"{tuple(parameter.shape)}"
-                    )
+_MOMENTS: Final = {"step", "exp_avg", "exp_avg_sq"}  # of Adam
+
+
+def _check_optimiser(name: str, part: torch.optim.Optimizer, fresh: list[dict[str, Any]]) -> None:
+    """Raise if an optimiser's settings or moments are not such as it would have itself."""
+    for group, wanted in zip(part.param_groups, fresh, strict=True):
+        for key, value in wanted.items():
+            if key != "params" and not _is_alike(group.get(key), value):
+                raise ValueError(f"{key} of {name} is {group.get(key)!r:.80}, wanted {value!r}")
+    for parameter, values in part.state.items():
+        if values and set(values) != _MOMENTS:
+            raise ValueError(f"{name} holds {sorted(values)!s:.200}, wanted {sorted(_MOMENTS)}")
+        for key, value in values.items():
+            if value.numel() != 1 if key == "step" else value.shape != parameter.shape:
+                raise ValueError(
+                    f"{key} of {name} has the shape {tuple(value.shape)}, wanted "
+                    f"{tuple(parameter.shape)}"
+                )
+            _check_finite(f"{key} of {name}", value)
+
+
+def _is_alike(value: Any, wanted: Any) -> bool:
+    """Return whether a value is a finite number where one is wanted, and else the wanted one."""
+    if isinstance(wanted, (list, tuple)):
+        return (
+            isinstance(value, (list, tuple))
+            and len(value) == len(wanted)
+            and all(map(_is_alike, value, wanted))
+        )
+    if isinstance(wanted, float):
+        return isinstance(value, float) and math.isfinite(value)
+    return type(value) is type(wanted) and bool(value == wanted)
+
+
+def _check_finite(name: str, *tensors: torch.Tensor) -> None:
+    if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors):
+        raise ValueError(f"{name} has numbers that are not finite")
 
 
 def _find(model: BaseAlgorithm, name: str) -> Any:

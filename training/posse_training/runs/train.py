@@ -9,8 +9,10 @@ from pathlib import Path
 
 import torch
 from rich.console import Console
+from stable_baselines3.common.base_class import BaseAlgorithm
 
-from posse_baselines import load
+from posse_baselines import PolicyError, load
+from posse_training.errors import DivergedError
 from posse_training.runs.callback import TrainingCallback
 from posse_training.runs.display import Display
 from posse_training.runs.folder import BEST, LAST, SETTINGS, locked_run, open_run
@@ -21,6 +23,8 @@ from posse_training.runs.settings import TrainSettings, read_settings
 from posse_training.runs.validation import first_statistics, score_beside
 from posse_training.sb3.imitation import imitate
 from posse_training.sb3.normalisation import RunningStatistics
+
+_NOT_FINITE = ("found invalid values", "must be finite", "can overflow", "means must lie within")
 
 
 def train(settings: TrainSettings, *, console: Console | None = None, resume: bool = False) -> Path:
@@ -36,6 +40,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
         PolicyError: An unknown policy, or one that cannot be an adviser.
         RunFolderError: The folder is in use, or already holds a run.
         CheckpointError: A checkpoint cannot be written or read.
+        DivergedError: The networks give numbers that are not finite.
     """
     check_before(settings)
     folder = settings.run_folder
@@ -64,11 +69,12 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
                 expert = load(settings.imitate)
                 imitate(model, settings, env.encoding, expert, statistics, copy_report(display))
         display.begin(model.num_timesteps, callback.curve)
-        model.learn(
-            settings.steps - model.num_timesteps,
-            callback=callback,
-            reset_num_timesteps=saved is None,
-        )
+        with _divergence(model):
+            model.learn(
+                settings.steps - model.num_timesteps,
+                callback=callback,
+                reset_num_timesteps=saved is None,
+            )
         callback.finish()
     return folder / (BEST if (folder / BEST).is_file() else LAST)
 
@@ -114,6 +120,20 @@ def steps_made(settings: TrainSettings, num_envs: int) -> int:
     """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
     at_once = num_envs * (settings.rollout if settings.on_policy else 1)
     return -(-settings.steps // at_once) * at_once
+
+
+@contextlib.contextmanager
+def _divergence(model: BaseAlgorithm) -> Iterator[None]:
+    """Name what torch's distributions, and policies that are exported, refuse."""
+    try:
+        yield
+    except (ValueError, PolicyError) as error:
+        if not any(text in str(error) for text in _NOT_FINITE):
+            raise
+        raise DivergedError(
+            f"the training diverged at {model.num_timesteps:,} steps: its networks give numbers "
+            "that are not finite. Lower --learning-rate, or --log-deviation, and train again"
+        ) from error
 
 
 @contextlib.contextmanager
