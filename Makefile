@@ -27,8 +27,8 @@ test: lint ## Run all checks: lint, types, tests, docs
 	$(BIN)/python -m pytest -n auto --dist worksteal
 	$(BIN)/mkdocs build --strict --quiet
 
-fuzz: $(FULL) ## Run randomised tests, MINUTES=1 per campaign
-	$(BIN)/python -m tests.fuzz --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0)
+fuzz: $(FULL) ## Run randomised tests in parallel, MINUTES=1 per campaign
+	$(BIN)/python -m tests.fuzz $(ONLY) --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0) $(if $(JOBS),--jobs $(JOBS))
 
 lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check

@@ -2,22 +2,82 @@
 
 from __future__ import annotations
 
+import json
+import random
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.fuzz import calls, processes, worlds
+from tests.fuzz import calls, forged, processes, threads, worlds
 from tests.fuzz.campaign import campaign
+from tests.fuzz.campaigns import CAMPAIGNS
+from tests.fuzz.commands import COMMANDS
+from tests.fuzz.page import BEGIN, END, with_figures
+
+import posse
+
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize(
     ("case", "cases"),
-    [(worlds.case, 40), (calls.case, 4), (processes.case, 24)],
-    ids=["worlds", "calls", "processes"],
-)
+    [
+        (worlds.case, 40), (calls.case, 4), (processes.case, 24), (threads.case, 3),
+        (forged.case, 50),
+    ],
+    ids=["worlds", "calls", "processes", "threads", "forged"],
+)  # fmt: skip
 def test_no_case_fails(case: Any, cases: int) -> None:
     tries, failures = campaign(case, seed=0, cases=cases)
     assert failures == []
     assert tries == cases
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["kills", "full_disk", "together"])
+def test_no_case_of_commands_fails(tmp_path: Path, name: str) -> None:
+    """A case for each command, by the command that runs campaigns."""
+    figures = tmp_path / "runs" / "figures.json"
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.fuzz", name, "--cases", str(len(COMMANDS)), "--minutes", "10",
+         "--figures", str(figures)],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    row = json.loads(figures.read_text())[name]
+    assert (row["tries"], row["failures"], row["seed"]) == (len(COMMANDS), 0, 0)
+    assert f"| {len(COMMANDS)} | 0 |" in with_figures(f"{BEGIN}{END}", {name: row})
+
+
+def test_every_campaign_has_a_module_that_plays_alone() -> None:
+    modules = {path.stem for path in (ROOT / "tests" / "fuzz").glob("*.py")}
+    assert set(CAMPAIGNS) <= modules
+
+
+def test_a_campaign_that_is_not_there_is_named() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.fuzz", "wrlds"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "no campaign 'wrlds'; there are: worlds, calls" in done.stderr
+
+
+def test_scenarios_are_drawn_over_every_setting() -> None:
+    rng, seen = random.Random(0), set()
+    for _ in range(600):
+        drawn = worlds.scenario(rng)
+        if drawn is not None:
+            base = posse.get_scenario(drawn.name).to_dict()
+            seen |= {name for name, value in drawn.to_dict().items() if value != base[name]}
+    several = {
+        name
+        for name, setting in posse.Scenario.settings().items()
+        if setting.choices is None or len(tuple(setting.choices())) > 1
+    }
+    assert seen >= several - {"name", "version", "extra_fields", "metrics"}
 
 
 def test_a_failure_is_told_with_the_case_that_plays_it_again() -> None:

@@ -4,8 +4,9 @@ Run it for as long as you like::
 
     python -m tests.fuzz.calls --minutes 30 --seed 1
 
-A refused call raises a documented error and leaves all that the environment holds as it was,
-compared field by field; a twin that never got the refused calls goes through the same worlds.
+A refused call raises a documented error and leaves everything that can be reached from the
+environment as it was, compared field by field; a twin that never got the refused calls goes through
+the same worlds.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 from tests.fuzz.campaign import main
 from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject, unchanged
+from tests.support.everything import everything
 
 SEEDS = st.integers(0, 2**63 - 1)
 EXAMPLES = 8
@@ -39,7 +41,7 @@ class Calls(RuleBasedStateMachine):
         self.first, self.started = first, False
 
     def refused(self, call: Any) -> None:
-        before = self.one.held()
+        before = self.one.held(), everything(self.one)
         try:
             call()
         except (ValueError, ResetNeeded) as error:
@@ -47,7 +49,7 @@ class Calls(RuleBasedStateMachine):
         else:
             raise AssertionError("not refused")
         assert 0 < len(message) <= 1000, message[:2000]
-        assert unchanged(before, self.one.held())
+        assert unchanged(before, (self.one.held(), everything(self.one)))
 
     @rule(seed=st.none() | SEEDS)
     def reset(self, seed: int | None) -> None:

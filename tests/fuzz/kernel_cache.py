@@ -130,6 +130,15 @@ def damage(cache: Path, seed: int, case: int) -> tuple[str, int]:
     return " and ".join(way.__name__ for way in ways), 2 - len(chosen)
 
 
+def answers_and_hits() -> tuple[list[float], int]:
+    """Call both kernels; return what they say, and how many were loaded."""
+    from fuzzed import kernels  # type: ignore[import-not-found]
+
+    answers = [kernels.total(101), kernels.doubled(2.5)]
+    hits = sum(sum(k.stats.cache_hits.values()) for k in (kernels.total, kernels.doubled))
+    return answers, hits
+
+
 def call_kernels() -> str:
     """Call both kernels; return how many were loaded, or what went wrong."""
     answer, error = os.pipe(), os.pipe()
@@ -138,11 +147,7 @@ def call_kernels() -> str:
         os.dup2(error[1], 2)
         status = 1
         try:
-            from fuzzed import kernels  # type: ignore[import-not-found]
-
-            answers = [kernels.total(101), kernels.doubled(2.5)]
-            hits = sum(sum(k.stats.cache_hits.values()) for k in (kernels.total, kernels.doubled))
-            os.write(answer[1], json.dumps([answers, hits]).encode())
+            os.write(answer[1], json.dumps(answers_and_hits()).encode())
             status = 0
         except BaseException:
             traceback.print_exc()

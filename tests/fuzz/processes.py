@@ -1,4 +1,4 @@
-"""Environments in mid-episode that are pickled, forked and sent to spawned processes.
+"""Environments in mid-episode that are pickled, forked, sent to spawned and forkserver processes.
 
 Run it for as long as you like::
 
@@ -69,15 +69,19 @@ def forked(subject: Subject, seed: int, steps: int) -> list[Any]:
 
 
 @functools.cache
-def _spawned() -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+def _worker(method: str) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context(method))
 
 
 def spawned(subject: Subject, seed: int, steps: int) -> list[Any]:
-    return _spawned().submit(go_on, subject, seed, steps).result(LIMIT_S)
+    return _worker("spawn").submit(go_on, subject, seed, steps).result(LIMIT_S)
 
 
-WAYS = (in_band, beside, forked, spawned)
+def of_a_server(subject: Subject, seed: int, steps: int) -> list[Any]:
+    return _worker("forkserver").submit(go_on, subject, seed, steps).result(LIMIT_S)
+
+
+WAYS = (in_band, beside, forked, spawned, of_a_server)
 
 
 def case(seed: int, number: int) -> None:

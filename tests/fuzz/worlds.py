@@ -5,19 +5,21 @@ Run it for as long as you like::
     python -m tests.fuzz.worlds --minutes 30 --seed 1
 
 A case is a scenario and a team. After each step no disc is inside another or a wall, no robot has
-moved faster than it can, every observation lies within its bounds and every number is finite. A
+moved or turned faster than it can, every observation lies within its bounds and every number is
+finite. A
 scenario that is not possible is refused by a ScenarioError.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import random
 from typing import Any
 
 import numpy as np
 from tests.fuzz.campaign import main
-from tests.support.crowding import TOLERANCE, Team, depth, points
+from tests.support.crowding import TOLERANCE, Team, depth, headings, points
 
 import posse
 from posse.scenarios import Setting
@@ -25,12 +27,20 @@ from posse.scenarios import Setting
 WORLDS, STEPS, DRAWS = 24, 60, 50
 ROUNDING = 1e-3
 """m that a robot may seem to have moved too far: float32 at up to 2,000 m."""
+NOT_DRAWN = ("name", "version", "extra_fields", "metrics", "reward_weights")
+"""Settings without a range: names, what a user's module declares, and one that is drawn apart."""
 BROADEN = 2.0
 """Numbers are drawn up to so many powers of two from their default."""
 
 
-def drawn(rng: random.Random, setting: Setting, default: Any) -> Any:
-    """Return a value of a setting, mostly one that is possible."""
+def drawn(rng: random.Random, setting: Setting, default: Any, trackers: int) -> Any:
+    """Return a value of a setting, mostly one that is possible in a team of so many."""
+    if setting.may_be_none and rng.random() < 0.2:
+        return None
+    if setting.per_tracker and rng.random() < 0.3:
+        each = dataclasses.replace(setting, per_tracker=False)
+        about = default[0] if isinstance(default, tuple) else default
+        return tuple(drawn(rng, each, about, trackers) for _ in range(trackers))
     if setting.choices is not None:
         return rng.choice(tuple(setting.choices()))
     if setting.kind == "flag":
@@ -57,11 +67,23 @@ def scenario(rng: random.Random) -> posse.Scenario | None:
     for _ in range(DRAWS):
         base = posse.get_scenario(rng.choice(posse.scenario_names()))
         share = rng.choice((0.1, 0.3))
+        declared = base.settings()
         changes = {
-            name: drawn(rng, setting, getattr(base, name))
-            for name, setting in base.settings().items()
-            if name not in ("name", "version") and rng.random() < share
+            name: drawn(rng, declared[name], getattr(base, name), base.num_trackers)
+            for name in declared
+            if name not in NOT_DRAWN and rng.random() < share
         }
+        trackers = changes.get("num_trackers", base.num_trackers)
+        for name in [name for name in changes if declared[name].per_tracker]:
+            changes[name] = drawn(rng, declared[name], getattr(base, name), trackers)
+        changes.pop("control_step", None)
+        if changes.pop("physics_step", None) is not None:
+            # Together: the one has to be a multiple of the other.
+            step = base.physics_step * 2 ** rng.uniform(-BROADEN, 1)
+            changes |= {"physics_step": step, "control_step": step * rng.randint(1, 4)}
+        if rng.random() < share:
+            terms = [term.name for term in posse.REWARD_TERMS if rng.random() < 0.5]
+            changes["reward_weights"] = {name: rng.uniform(-10, 10) for name in terms}
         try:
             return base.replace(**changes)
         except posse.ScenarioError:
@@ -83,8 +105,9 @@ def case(seed: int, number: int) -> None:
         leaves=rng.choice((0.0, 4.0)),
     )  # fmt: skip
     reach = np.array([*s.tracker_speeds, s.target_speed]) * s.control_step
+    turn = np.array([*s.tracker_turn_rates, s.target_turn_rate]) * s.control_step
     for _ in range(STEPS):
-        before = _robots(batch)
+        before, headed = _robots(batch), _headings(batch)
         observations, rewards = team.play()
         _judge_observations(observations, low, high)
         assert np.isfinite(rewards).all()
@@ -93,6 +116,9 @@ def case(seed: int, number: int) -> None:
         on = batch.state["world_step"] > 0
         moved = np.abs(_robots(batch) - before)[on]
         assert (moved <= reach + ROUNDING).all(), f"{(moved - reach).max()} m too far: {s}"
+        assert np.abs(np.abs(_headings(batch)) - 1).max() <= ROUNDING, "headings are no directions"
+        turned = np.abs(np.angle(_headings(batch) / headed))[on]
+        assert (turned <= turn + ROUNDING).all(), f"{(turned - turn).max()} rad too far: {s}"
     for name, array in batch.state.items():
         if array.dtype.kind == "f" and name.endswith(("_x", "_y")):
             assert np.isfinite(array).all(), name
@@ -100,6 +126,10 @@ def case(seed: int, number: int) -> None:
 
 def _robots(batch: posse.Batch) -> Any:
     return np.concatenate([points(batch, "tracker"), points(batch, "world")[:, None]], axis=1)
+
+
+def _headings(batch: posse.Batch) -> Any:
+    return np.concatenate([headings(batch, "tracker"), headings(batch, "world")[:, None]], axis=1)
 
 
 def _judge_observations(observations: Any, low: Any, high: Any) -> None:

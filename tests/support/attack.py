@@ -160,6 +160,6 @@ BAD_OPTIONS: tuple[Any, ...] = (
 )  # fmt: skip
 
 
-def unchanged(before: list[Any], after: list[Any]) -> bool:
+def unchanged(before: Any, after: Any) -> bool:
     """Return whether the state is unchanged."""
     return same(before, after)
