@@ -65,10 +65,7 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
         settings = shortened(scenario, max_episode_steps, overrides)
-        settings = settings.replace(
-            message_size=max(settings.message_size, self.teammates.message_size)
-        )
-        _check(settings, number)
+        settings = fitting(settings, self.teammates, number)
         self.number = number
         self._open(
             settings, render_mode=render_mode, seed=seed, split=split, first_world=first_world
@@ -91,7 +88,13 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         """
         self._observations = self._begin(seed, options)[None]
         self._memory = begin(self.teammates, self._world.batch)
-        return self._own(self._observations), {}
+        info = {
+            "score": 0.0,
+            "reward_terms": self._world.no_terms,
+            "metrics": self._world.no_metrics.copy(),
+            "working": bool(self._world.working()[self.number]),
+        }
+        return self._own(self._observations), info
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -114,6 +117,7 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         info: dict[str, Any] = {
             "score": world.score,
             "reward_terms": world.name_terms(*world.terms[self.number].tolist()),
+            "metrics": world.no_metrics.copy(),
             "working": bool(world.working()[self.number]),
         }
         terminated, truncated = self._end(over, info)
@@ -125,7 +129,13 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         return own
 
 
-def _check(scenario: Scenario, number: int) -> None:
+def fitting(scenario: Scenario, teammates: Policy, number: int) -> Scenario:
+    """Return the scenario with messages as long as the team-mates need.
+
+    Raises:
+        ScenarioError: Its target is an agent, or the team has one tracker.
+        ValueError: ``number`` is not in the team.
+    """
     if scenario.target_motion == "agent":
         raise ScenarioError(
             "target_motion='agent' is not possible in posse/Tracker-v0, whose agent is a tracker: "
@@ -139,9 +149,14 @@ def _check(scenario: Scenario, number: int) -> None:
         raise ValueError(
             f"number={number!r} is not in the team: trackers are 0 to {scenario.num_trackers - 1}"
         )
+    return scenario.replace(message_size=max(scenario.message_size, teammates.message_size))
 
 
 def register() -> None:
     """Register ``posse/Tracker-v0`` with Gymnasium; repeated calls have no effect."""
     if "posse/Tracker-v0" not in gymnasium.registry:
-        gymnasium.register("posse/Tracker-v0", entry_point="posse_baselines.tracker_env:TrackerEnv")
+        gymnasium.register(
+            "posse/Tracker-v0",
+            entry_point="posse_baselines.tracker_env:TrackerEnv",
+            vector_entry_point="posse_baselines.tracker_vector_env:TrackerVectorEnv",
+        )

@@ -13,7 +13,7 @@ from posse.adapters.spaces import box
 from posse.adapters.world_env import OneAgentEnv
 from posse.engine.arguments import options_of, real_numbers
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.shown import shown
 from posse.signals.observation.layout import ObservationLayout
 
@@ -31,9 +31,10 @@ class TeamEnv(OneAgentEnv):
 
     **Reward**: the mean over the trackers of the weighted sum of named terms.
 
-    **Info** of every step: ``"score"`` in [0, 1]; ``"reward_terms"``, each term by name, unscaled,
-    (N,); ``"working"`` (N,), if trackers may break; at the end ``"metrics"``, each
-    metric of the episode by name (``posse.METRICS``).
+    **Info**, with the same keys at every reset and step: ``"score"`` in [0, 1];
+    ``"reward_terms"``, each term by name, unscaled, (N,); ``"working"`` (N,), if trackers may
+    break; ``"metrics"``, each metric of the episode by name (``posse.METRICS``): 0 before the step
+    that ends the episode.
 
     **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
     world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
@@ -105,7 +106,18 @@ class TeamEnv(OneAgentEnv):
         Raises:
             ValueError: A bad seed or option; nothing is changed.
         """
-        return self._begin(seed, options), {}
+        observations = self._begin(seed, options)
+        info: dict[str, Any] = {
+            "score": 0.0,
+            "reward_terms": {
+                name: np.zeros(self.scenario.num_trackers, np.float32)
+                for name in self._world.batch.term_names
+            },
+            "metrics": self._world.no_metrics.copy(),
+        }
+        if self._breakable:
+            info["working"] = self._world.working()
+        return observations, info
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -124,6 +136,7 @@ class TeamEnv(OneAgentEnv):
             "score": world.score,
             # An array by rows already; name_terms(*rows) would take longer.
             "reward_terms": dict(zip(world.batch.term_names, world.terms.T.copy())),  # noqa: B905
+            "metrics": world.no_metrics.copy(),
         }
         if self._breakable:
             info["working"] = world.working()
@@ -150,12 +163,19 @@ class SoloEnv(TeamEnv):
         """Return the scenario with one tracker.
 
         Raises:
-            ScenarioError: It is invalid, or has more than one tracker.
+            ScenarioError: It is invalid, has more than one tracker, or one that breaks.
         """
         if not np.array_equal(overrides.get("num_trackers", 1), 1):
             raise ScenarioError(
                 f"num_trackers={shown(overrides['num_trackers'])} does not fit posse/Solo-v0, "
                 "which has one: use posse/Team-v0"
+            )
+        whole = get_scenario(scenario)
+        if whole.breaks > 0 and "breaks" not in overrides:
+            raise ScenarioError(
+                f"scenario {whole.name!r} does not fit posse/Solo-v0: in it breaks={whole.breaks} "
+                "of the trackers break down, and a team of one would be left with none. Pass "
+                "breaks=0, or use posse/Team-v0"
             )
         return _with_scripted_target(scenario, horizon, {**overrides, "num_trackers": 1})
 
@@ -172,6 +192,7 @@ class SoloEnv(TeamEnv):
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start an episode; see :class:`TeamEnv`."""
         observations, info = super().reset(seed=seed, options=solo_options(options))
+        info["reward_terms"] = self._world.no_terms
         return observations[0], info
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
@@ -184,6 +205,7 @@ class SoloEnv(TeamEnv):
         info: dict[str, Any] = {
             "score": world.score,
             "reward_terms": world.name_terms(*world.terms[0].tolist()),
+            "metrics": world.no_metrics.copy(),
         }
         terminated, truncated = self._end(over, info)
         return world.observations[0].copy(), world.rewards.item(), terminated, truncated, info

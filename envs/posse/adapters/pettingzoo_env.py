@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
@@ -41,9 +42,10 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     **Reward**: the weighted sum of named terms, ``scenario.reward_weights``; for ``target_0`` the
     negative of the team's score.
 
-    **Info**, for each agent, of every step: ``"score"`` of the team in [0, 1]; ``"reward_terms"``,
-    each term by name, unscaled; ``"working"``, if trackers may break; at the end
-    ``"metrics"``, each metric of the episode by name (``posse.METRICS``).
+    **Info**, for each agent, with the same keys at every reset and step: ``"score"`` of the team in
+    [0, 1]; ``"reward_terms"``, each term by name, unscaled; ``"working"``, if trackers may
+    break; ``"metrics"``, each metric of the episode by name (``posse.METRICS``): 0 before the step
+    that ends the episode.
 
     **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
     world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
@@ -103,6 +105,15 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         }
         self._none_ended = dict.fromkeys(self.possible_agents, False)
         self._state_space: spaces.Box | None = None
+        self._wrapper_seed = seed
+        self._np_random: np.random.Generator | None = None
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """Random numbers for wrappers that look for them here; no world draws from it."""
+        if self._np_random is None:
+            self._np_random = np.random.default_rng(self._wrapper_seed)
+        return self._np_random
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""
@@ -125,7 +136,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         """Start an episode; see the class for seeds and options.
 
         Returns:
-            Observations and (empty) infos by agent.
+            Observations and infos by agent.
 
         Raises:
             ValueError: A bad seed or option; nothing is changed.
@@ -135,9 +146,20 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             options = {key: value for key, value in options_of(options).items() if key != "options"}
         observations = self._world.reset(seed, options)
         self.agents = self.possible_agents.copy()
+        if seed is not None:
+            self._wrapper_seed, self._np_random = int(seed), None
         if self.render_mode == "human":
             self.render()
-        infos: _Infos = {agent: {} for agent in self.agents}
+        infos: _Infos = {
+            agent: {
+                "score": 0.0,
+                "reward_terms": self._world.no_terms,
+                "metrics": self._world.no_metrics.copy(),
+            }
+            for agent in self.agents
+        }
+        if self._breakable:
+            self._report_working(infos)
         return dict(zip(self.agents, observations, strict=True)), infos
 
     def step(
@@ -161,9 +183,9 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             world.check_running()
         world.actions.by_agent(actions)
         over = world.advance()
-        score, name_terms = world.score, world.name_terms
+        score, name_terms, metrics = world.score, world.name_terms, world.no_metrics.copy()
         infos: _Infos = {
-            agent: {"score": score, "reward_terms": name_terms(*values)}
+            agent: {"score": score, "reward_terms": name_terms(*values), "metrics": metrics}
             # No strict=True: equal lengths, in the hot path.
             for agent, values in zip(agents, world.terms.tolist())  # noqa: B905
         }

@@ -44,6 +44,8 @@ class SingleWorld:
             episode, after which :meth:`end` must be called.
         observations: (rows, F) of the last step; the next one overwrites them.
         rewards: (rows,) of the last step, likewise.
+        no_metrics: Every metric by name, all 0: those of a step that does not end the episode.
+            Set by the first reset; to be copied.
         terms: (rows, K) reward terms of the last step, likewise.
 
     Raises:
@@ -73,6 +75,7 @@ class SingleWorld:
         )
         self.render_mode = render_mode
         self.running = False
+        self.no_metrics: dict[str, float] = {}
         self._discrete = discrete_actions
         self._seeded = seed is not None
         self._started = False
@@ -115,6 +118,11 @@ class SingleWorld:
         self._prepare()
 
     @property
+    def no_terms(self) -> dict[str, float]:
+        """Reward terms by name, all 0: those of a reset."""
+        return dict.fromkeys(self.batch.term_names, 0.0)
+
+    @property
     def score(self) -> float:
         """Score of the current step."""
         score: float = self._score.item()
@@ -145,6 +153,8 @@ class SingleWorld:
             seed = secrets.randbits(32)
         observations = self.batch.reset(seed=seed, options=options)
         self._make_ready()
+        if not self._started:
+            self.no_metrics = dict.fromkeys(self.batch.metrics(), 0.0)
         self.running = self._seeded = self._started = True
         first: FloatArray = observations[0]
         return first

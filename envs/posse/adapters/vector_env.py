@@ -19,7 +19,7 @@ from posse.adapters.single_world import (
     frames_per_second,
     new_renderer,
 )
-from posse.engine.arguments import as_array
+from posse.engine.arguments import as_array, options_of
 from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
@@ -41,7 +41,8 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     As :class:`posse.adapters.gymnasium_env.TeamEnv`, with a leading axis E.
     World i is world ``first_world + i`` of the seed, so ``reset(seed=s)`` gives E different worlds.
     Infos have the form of ``gymnasium.vector.SyncVectorEnv``: for each entry an array over the
-    worlds, and under ``"_" + name`` a mask of the worlds that have it.
+    worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as in
+    :class:`TeamEnv`.
 
     Args:
         scenario: Name of a scenario, or a scenario.
@@ -91,10 +92,8 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     ) -> None:
         check_render_mode(render_mode)
         self.autoreset_mode = _check_mode(autoreset_mode)
-        self.scenario = self.single_env.fitting_scenario(scenario, max_episode_steps, overrides)
-        self.single_observation_space, self.single_action_space = self.single_env.spaces_of(
-            self.scenario, discrete_actions
-        )
+        self.scenario = self._fitting(scenario, max_episode_steps, overrides)
+        self.single_observation_space, self.single_action_space = self._spaces(discrete_actions)
         self.batch = Batch(
             self.scenario,
             num_envs,
@@ -150,9 +149,14 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         observations = self.batch.reset(seed=fresh, options=self._options(options))
         self._seeded = True
         super().reset(seed=None if seed is None else int(seed))
+        self._no_metrics = dict.fromkeys(self.batch.metrics(), 0.0)
         if self.render_mode == "human":
             self.render()
-        return self._observed(observations), {}
+        given = options_of(options).get("reset_mask")
+        mask = np.ones(self.num_envs, np.bool_) if given is None else np.array(given, np.bool_)
+        infos = _masked(_zeroed(self._entries(observations), mask), mask)
+        self._keep(observations)
+        return self._observed(observations), infos
 
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
         """Advance every world by one control step.
@@ -172,6 +176,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             self._motions(actions)
         )
         infos = self._infos(observations, terminated | truncated, batch_infos)
+        self._keep(observations)
         if self.render_mode == "human":
             self.render()
         return self._observed(observations), self._rewarded(rewards), terminated, truncated, infos
@@ -182,7 +187,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         if array.shape != self.action_space.shape:
             raise ValueError(f"actions have shape {array.shape}, wanted {self.action_space.shape}")
         if not self._discrete:
-            return array.reshape(self.batch.action_shape)
+            return array.reshape(self._shape_of_motions())
         if array.dtype.kind not in "iu":
             raise ValueError(f"actions must be whole numbers, got an array of {array.dtype}")
         outside = (array < 0) | (array >= len(MOTIONS))
@@ -191,34 +196,75 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             raise ValueError(
                 f"actions{list(where)} = {array[where]} lies outside 0 to {len(MOTIONS) - 1}"
             )
-        motions: FloatArray = MOTIONS[array].reshape(self.batch.action_shape)
+        motions: FloatArray = MOTIONS[array].reshape(self._shape_of_motions())
         return motions
 
     def _infos(self, observations: FloatArray, ended: BoolArray, found: _Info) -> _Info:
         """Bring the batch's infos to the form of Gymnasium's own vector environments."""
-        last = found.get("final_obs", observations)
-        entries: _Info = {
-            "score": found["score"].astype(np.float64),
-            "reward_terms": {k: self._of_agents(v) for k, v in found["reward_terms"].items()},
-        }
-        if self.scenario.breaks:
-            entries["working"] = last[:, :, self._works_at] != 0
-        if self.autoreset_mode != AutoresetMode.SAME_STEP or "final_obs" not in found:
-            # Worlds that have just been reset have no info.
-            infos = _masked(entries, self.batch.worlds["step"] > 0)
-            if "metrics" in found:
-                infos.update(_masked({"metrics": found["metrics"]}, ended))
-            return infos
-        infos = _masked(entries, ~ended) if not ended.all() else {}
-        final = _masked({**entries, "metrics": found["metrics"]}, ended)
-        kept = np.full(self.num_envs, None, dtype=object)
-        for e in np.flatnonzero(ended):
-            kept[e] = self._observed(last[e : e + 1])[0]
-        infos["final_obs"], infos["_final_obs"] = kept, ended.copy()
-        infos["final_info"], infos["_final_info"] = final, ended.copy()
+        same_step = self.autoreset_mode == AutoresetMode.SAME_STEP
+        everywhere = np.ones(self.num_envs, np.bool_)
+        # Worlds that have just been reset have the info of a reset.
+        stepped = ~ended if same_step else self.batch.worlds["step"] > 0
+        entries = self._entries(observations, found)
+        infos = _zeroed(entries, stepped)
+        if self.tells_working:
+            infos["working"] = entries["working"]
+        if "metrics" in found and not same_step:
+            infos["metrics"] = _zeroed(found["metrics"], ended)
+        infos = _masked(infos, everywhere)
+        if same_step and "final_obs" in found:
+            last = found["final_obs"]
+            final = {**self._entries(last, found), "metrics": found["metrics"]}
+            kept = np.full(self.num_envs, None, dtype=object)
+            for e in np.flatnonzero(ended):
+                kept[e] = self._observed(last[e : e + 1])[0]
+            infos["final_obs"], infos["_final_obs"] = kept, ended.copy()
+            infos["final_info"] = _masked(_zeroed(final, ended), ended)
+            infos["_final_info"] = ended.copy()
         return infos
 
+    def _entries(self, observations: FloatArray, found: _Info | None = None) -> _Info:
+        """Return the infos of a step that ends no episode, or without ``found`` of a reset."""
+        worlds = self.num_envs
+        if found is None:
+            rows = (worlds, self.scenario.num_agents)
+            score = np.zeros(worlds)
+            terms = {name: np.zeros(rows, np.float32) for name in self.batch.term_names}
+        else:
+            score = found["score"].astype(np.float64)
+            terms = found["reward_terms"]
+        entries: _Info = {
+            "score": score,
+            "reward_terms": {k: self._of_agents(v) for k, v in terms.items()},
+            "metrics": {name: np.zeros(worlds) for name in self._no_metrics},
+        }
+        if self.tells_working:
+            entries["working"] = self._working(observations[:, :, self._works_at] != 0)
+        return entries
+
     # Overridden for a single tracker.
+
+    def _fitting(
+        self, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
+    ) -> Scenario:
+        return self.single_env.fitting_scenario(scenario, horizon, overrides)
+
+    def _spaces(self, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:
+        return self.single_env.spaces_of(self.scenario, discrete_actions)
+
+    def _shape_of_motions(self) -> tuple[int, ...]:
+        return self.batch.action_shape
+
+    def _keep(self, observations: FloatArray) -> None:
+        """Take note of the observations (E, N, F) that the next actions answer."""
+
+    @property
+    def tells_working(self) -> bool:
+        """Whether infos say which trackers work: where some may break."""
+        return self.scenario.breaks > 0
+
+    def _working(self, working: BoolArray) -> BoolArray:
+        return working
 
     def _options(self, options: dict[str, Any] | None) -> dict[str, Any] | None:
         return options
@@ -269,18 +315,25 @@ class SoloVectorEnv(TeamVectorEnv):
         return values[:, 0].astype(np.float64)
 
 
-def _masked(entries: _Info, mask: BoolArray) -> _Info:
-    """Return entries, nested or not, each with its mask; zeros where the mask is false."""
-    infos: _Info = {}
-    everywhere = bool(mask.all())
+def _zeroed(entries: _Info, mask: BoolArray) -> _Info:
+    """Return entries, nested or not, with zeros where the mask is false."""
+    if mask.all():
+        return entries
+    zeroed: _Info = {}
     for name, value in entries.items():
         if isinstance(value, dict):
-            infos[name] = _masked(value, mask)
-        elif everywhere:
-            infos[name] = value
+            zeroed[name] = _zeroed(value, mask)
         else:
             wide = mask.reshape(-1, *[1] * (value.ndim - 1))
-            infos[name] = np.where(wide, value, np.zeros((), value.dtype))
+            zeroed[name] = np.where(wide, value, np.zeros((), value.dtype))
+    return zeroed
+
+
+def _masked(entries: _Info, mask: BoolArray) -> _Info:
+    """Return entries, nested or not, each with its mask."""
+    infos: _Info = {}
+    for name, value in entries.items():
+        infos[name] = _masked(value, mask) if isinstance(value, dict) else value
         infos[f"_{name}"] = mask.copy()
     return infos
 

@@ -28,6 +28,7 @@ from posse.scenarios.limits import (
 from posse.scenarios.setting import (
     ScenarioError,
     Setting,
+    UnknownSettingError,
     check,
     declare,
     fail,
@@ -339,9 +340,9 @@ class Scenario:
         names = [field.name for field in dataclasses.fields(self)]
         for key in overrides:
             if key not in names:
-                raise ScenarioError(
-                    f"unknown setting {shown(key)} of a scenario{near(key, names)}; "
-                    f"settings are: {', '.join(names)}"
+                raise UnknownSettingError(
+                    f"unknown setting {shown(key)} of a scenario{near(key, names)}: unexpected "
+                    f"keyword argument {shown(key)}; settings are: {', '.join(names)}"
                 )
         return dataclasses.replace(self, **overrides)
 

@@ -22,6 +22,14 @@ class ScenarioError(ValueError):
     """Invalid setting. The message names the field, its valid range and the fix."""
 
 
+class UnknownSettingError(ScenarioError, TypeError):
+    """A keyword that no scenario has.
+
+    Libraries that offer a keyword of their own to every environment, and then go on without it,
+    look for a TypeError about an unexpected keyword argument, which the message says.
+    """
+
+
 @dataclass(frozen=True)
 class Setting:
     """Declaration of one field of a scenario.

@@ -139,12 +139,15 @@ def field(
 
 
 def setting(unit: str, value: Callable[[Scenario], float]) -> Callable[[Function], Function]:
-    """Declare a function (c) as a field that holds a setting; -1 stands for an unlimited one."""
+    """Declare a function (c) as a field that holds a setting; -1 stands for an unlimited one.
+
+    Its range holds the value, 0 and 1: wrappers of other libraries pad observations with 0 and 1.
+    """
 
     def low(s: Scenario) -> float:
-        return -1.0 if math.isinf(value(s)) else value(s) / SLACK
+        return -1.0 if math.isinf(value(s)) else 0.0
 
     def high(s: Scenario) -> float:
-        return -1.0 if math.isinf(value(s)) else value(s) * SLACK
+        return 1.0 if math.isinf(value(s)) else max(1.0, value(s) * SLACK)
 
     return field(unit, low, high)

@@ -98,7 +98,7 @@ def number(c: Record, v: View) -> Lanes:
     return v.number
 
 
-@field("1", lambda s: s.num_trackers, lambda s: s.num_trackers)
+@field("1", 0, lambda s: s.num_trackers)
 def team_size(c: Record) -> np.float32:
     """N, number of trackers in the team."""
     return np.float32(c.num_trackers)
@@ -128,13 +128,13 @@ def max_turn_rate(c: Record, v: View) -> Lanes:
     return v.max_turn_rate
 
 
-@field("s", 0, lambda s: max(s.tracker_speeds) / s.tracker_acceleration * SLACK)
+@field("s", 0, lambda s: max(1, max(s.tracker_speeds) / s.tracker_acceleration * SLACK))
 def acceleration_time(c: Record, v: View) -> Lanes:
     """Time from rest to full speed; 0: no acceleration limit."""
     return v.acceleration_time
 
 
-@field("s", 0, lambda s: max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK)
+@field("s", 0, lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK))
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
     """Time from turn rate 0 to the greatest turn rate; 0: no acceleration limit."""
     return v.turn_acceleration_time
