@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from posse_baselines.function_policy import from_function
 from posse_baselines.playing import Played, play, rollout, split_agents, stack_agents
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin
@@ -20,6 +21,7 @@ __all__ = [
     "StateReader",
     "Tunable",
     "begin",
+    "from_function",
     "load",
     "play",
     "policy_names",

@@ -19,7 +19,7 @@ from posse.adapters.spaces import box
 from posse.adapters.world_env import WorldEnv
 from posse.engine.arguments import options_of
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import Scenario
 from posse.shown import shown
 
 _Infos = dict[str, dict[str, Any]]
@@ -91,7 +91,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         **overrides: Any,
     ) -> None:
         self._open(
-            shortened(scenario, max_cycles, target_overrides(target, overrides)),
+            shortened(scenario, max_cycles, {**overrides, "target": target}),
             render_mode=render_mode, discrete_actions=discrete_actions, seed=seed, split=split,
             first_world=first_world,
         )  # fmt: skip
@@ -221,23 +221,6 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             ValueError: Of a wrong type or shape, not finite, or out of its space.
         """
         self._world.actions.one(agent, action)
-
-
-def target_overrides(target: str | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the overrides with ``target="agent"`` resolved."""
-    if target is None:
-        return dict(overrides)
-    if target != "agent":
-        raise ScenarioError(
-            f"target={shown(target)} is not possible: the one choice is 'agent'; "
-            "target_motion= chooses among the scripted ones"
-        )
-    if overrides.get("target_motion", "agent") != "agent":
-        raise ScenarioError(
-            f"target='agent' and target_motion={shown(overrides['target_motion'])} exclude each "
-            "other"
-        )
-    return {**overrides, "target_motion": "agent"}
 
 
 class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):

@@ -23,6 +23,7 @@ from posse.engine.arguments import as_array, options_of
 from posse.engine.batch import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
+from posse.scenarios.setting import is_one_of
 from posse.shown import shown
 from posse.signals.observation.layout import ObservationLayout
 
@@ -47,10 +48,12 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     Args:
         scenario: Name of a scenario, or a scenario.
         num_envs: E, at least 1.
-        autoreset_mode: Behaviour at the end of an episode, a ``gymnasium.vector.AutoresetMode`` or
-            its value. ``NEXT_STEP``: the next step starts a new one and ignores its action;
-            ``SAME_STEP``: a new one starts at once, the last observation is ``info["final_obs"]``;
-            ``DISABLED``: the caller resets, with ``options={"reset_mask": mask}``.
+        autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`. ``"next_step"``:
+            the next step starts a new one and ignores its action; ``"same_step"``: a new one starts
+            at once, the last observation is ``info["final_obs"]``; ``"disabled"``: the caller
+            resets, with ``options={"reset_mask": mask}``.
+        autoreset_mode: The same in Gymnasium's words, a ``gymnasium.vector.AutoresetMode`` or its
+            value; give one of the two.
         max_episode_steps: Length of an episode; alias of ``horizon``.
         discrete_actions: Whether actions are discrete.
         render_mode: ``"human"`` (a window with world 0), ``"rgb_array"`` or ``None``.
@@ -79,7 +82,8 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         scenario: str | Scenario = "constant",
         num_envs: int = 1,
         *,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        autoreset: str | None = None,
+        autoreset_mode: AutoresetMode | str | None = None,
         max_episode_steps: int | None = None,
         discrete_actions: bool = False,
         render_mode: str | None = None,
@@ -91,7 +95,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         **overrides: Any,
     ) -> None:
         check_render_mode(render_mode)
-        self.autoreset_mode = _check_mode(autoreset_mode)
+        self.autoreset_mode = _check_mode(autoreset, autoreset_mode)
         self.scenario = self._fitting(scenario, max_episode_steps, overrides)
         self.single_observation_space, self.single_action_space = self._spaces(discrete_actions)
         self.batch = Batch(
@@ -338,7 +342,22 @@ def _masked(entries: _Info, mask: BoolArray) -> _Info:
     return infos
 
 
-def _check_mode(mode: AutoresetMode | str) -> AutoresetMode:
+def _check_mode(autoreset: str | None, mode: AutoresetMode | str | None) -> AutoresetMode:
+    """Return Gymnasium's name of an autoreset mode that is given in either way.
+
+    Raises:
+        ValueError: There is no such mode, or both are given.
+    """
+    if autoreset is not None and mode is not None:
+        raise ValueError(
+            f"autoreset={shown(autoreset)} and autoreset_mode={shown(mode)} mean the same: give one"
+        )
+    if mode is None:
+        known = ", ".join(map(repr, _MODES.values()))
+        for found, name in _MODES.items():
+            if is_one_of((name,), "next_step" if autoreset is None else autoreset):
+                return found
+        raise ValueError(f"unknown autoreset mode {shown(autoreset)}; modes are: {known}")
     try:
         return AutoresetMode(mode)
     except ValueError:

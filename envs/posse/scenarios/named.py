@@ -108,13 +108,21 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(_named())
 
 
-def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
+def get_scenario(
+    scenario: str | Scenario, *, target: str | None = None, **overrides: Any
+) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden.
+
+    Args:
+        scenario: Its name, or a scenario.
+        target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
+        overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
         ScenarioError: An unknown name (the message suggests similar ones), an unknown or invalid
             setting.
     """
+    overrides = _with_target(target, overrides)
     if isinstance(scenario, Scenario):
         found = scenario
     elif is_one_of(_named(), scenario):
@@ -126,3 +134,20 @@ def get_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
             f"unknown scenario {shown(scenario)}{hint}; scenarios are: {', '.join(_named())}"
         )
     return found.replace(**overrides) if overrides else found
+
+
+def _with_target(target: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
+    """Return the overrides with ``target="agent"`` resolved."""
+    if target is None:
+        return overrides
+    if target != "agent":
+        raise ScenarioError(
+            f"target={shown(target)} is not possible: the one choice is 'agent'; "
+            "target_motion= chooses among the scripted ones"
+        )
+    if overrides.get("target_motion", "agent") != "agent":
+        raise ScenarioError(
+            f"target='agent' and target_motion={shown(overrides['target_motion'])} exclude each "
+            "other"
+        )
+    return {**overrides, "target_motion": "agent"}

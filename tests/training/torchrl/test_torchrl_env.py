@@ -14,6 +14,8 @@ from tests.support.cuda_cases import run_in_simulator
 from torchrl.envs.utils import check_env_specs
 
 import posse
+from posse.adapters.actions import MOTIONS
+from posse.signals.global_state import StateLayout
 from posse_training.torchrl.env import PosseEnv
 
 WORLDS = 6
@@ -41,6 +43,22 @@ def test_specs_hold_where_the_target_is_an_agent() -> None:
         "agents": ["tracker_0", "tracker_1", "tracker_2"],
         "target": ["target_0"],
     }
+
+
+def test_the_state_and_discrete_actions() -> None:
+    env = PosseEnv("field", WORLDS, seed=5, state=True, discrete_actions=True, **SHORT)
+    check_env_specs(env, seed=1)
+    batch = posse.batch("field", WORLDS, seed=5, autoreset="disabled", **SHORT)
+    layout = StateLayout(batch.scenario)
+    carried, _ = env.reset(seed=5), batch.reset(seed=5)
+    np.testing.assert_array_equal(carried["state"].numpy(), layout.vector(batch.arrays))
+    numbers = np.random.default_rng(1).integers(0, 15, (WORLDS, 5))
+    carried = env.step(carried.set(("agents", "action"), torch.from_numpy(numbers)))["next"]
+    observations, *_ = batch.step(MOTIONS[numbers])
+    np.testing.assert_array_equal(carried["agents", "observation"].numpy(), observations)
+    np.testing.assert_array_equal(carried["state"].numpy(), layout.vector(batch.arrays))
+    with pytest.raises(posse.ScenarioError, match="discrete_actions=True cannot encode messages"):
+        PosseEnv("field", WORLDS, discrete_actions=True, message_size=1)
 
 
 def test_the_action_spec_has_room_for_the_message() -> None:

@@ -135,7 +135,7 @@ class TrainSettings:
         found = []
         for name in self.scenario.split(","):
             for size in self.team_sizes or (None,):
-                team = {} if size is None else {"num_trackers": size}
+                team: dict[str, Any] = {} if size is None else {"num_trackers": size}
                 found.append(get_scenario(name.strip(), **overrides, **team))
         return tuple(found)
 

@@ -5,9 +5,10 @@ E = worlds, N = trackers, F = observation length, m = message size::
 
     TensorDict (E,)
         ("agents", "observation")       (E, N, F) float32
-        ("agents", "action")            (E, N, 2 + m) float32 in [-1, 1]
+        ("agents", "action")            (E, N, 2 + m) float32 in [-1, 1]; or (E, N) int64, 0 to 14
         ("agents", "reward")            (E, N, 1) float32
         "score"                         (E, 1) float32, of the latest step; 0 at the start
+        "state"                         (E, S) float32, if asked for
         "done", "terminated", "truncated"   (E, 1) bool
 
 If the target is an agent, it has its own group ``"target"``, with N = 1.
@@ -20,12 +21,13 @@ from typing import Any, Final
 import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
-from torchrl.data import Binary, Bounded, Composite, Unbounded
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 import posse
 from posse.adapters import check_seed, options_of
-from posse.adapters.actions import agent_names
+from posse.adapters.actions import MOTIONS, agent_names, single_action_space
+from posse.signals.global_state import StateLayout
 
 TRACKERS: Final = "agents"
 """Group of the trackers, named as in TorchRL's multi-agent examples."""
@@ -46,6 +48,10 @@ class PosseEnv(EnvBase):
         device: Device of the tensors. On ``"cuda"`` the worlds are stepped there as well, which
             needs the extra ``cuda``. For other devices the worlds are stepped on the CPU, and
             each step costs a copy each way.
+        state: Whether the full state of each world comes with the observations, under ``"state"``,
+            for centralized critics; on the CPU only.
+        discrete_actions: Whether actions are numbers of
+            :data:`posse.adapters.actions.MOTIONS`, as in the other environments.
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
             and any setting of the scenario, but not ``autoreset``.
 
@@ -55,6 +61,7 @@ class PosseEnv(EnvBase):
 
     Raises:
         TypeError: ``autoreset`` among the settings.
+        ScenarioError: ``discrete_actions`` with messages, which are not discrete.
         ValueError: As :func:`posse.batch`.
     """
 
@@ -64,6 +71,8 @@ class PosseEnv(EnvBase):
         num_worlds: int = 1,
         *,
         device: torch.device | str = "cpu",
+        state: bool = False,
+        discrete_actions: bool = False,
         **settings: Any,
     ) -> None:
         if "autoreset" in settings:
@@ -75,7 +84,12 @@ class PosseEnv(EnvBase):
         self.batch = posse.batch(
             scenario, num_worlds, autoreset="disabled", device=engine, **settings
         )
+        if state and engine == "cuda":
+            raise ValueError("state=True needs device='cpu': leave one of them out")
+        single_action_space(self.batch.scenario, discrete_actions)  # raises if impossible
         super().__init__(device=device, batch_size=(num_worlds,))
+        self._state_layout = StateLayout(self.batch.scenario) if state else None
+        self._motions = torch.from_numpy(MOTIONS).to(self.device) if discrete_actions else None
         trackers = self.batch.scenario.num_trackers
         names = agent_names(self.batch.scenario)
         self._rows = {TRACKERS: slice(0, trackers)}
@@ -99,14 +113,21 @@ class PosseEnv(EnvBase):
                 observation=Bounded(low[:, part], high[:, part], dtype=torch.float32),
                 shape=(worlds, count),
             )
-            action[group] = Composite(
-                action=Bounded(-1.0, 1.0, (worlds, count, width), dtype=torch.float32),
-                shape=(worlds, count),
+            each: Bounded | Categorical = (
+                Bounded(-1.0, 1.0, (worlds, count, width), dtype=torch.float32)
+                if self._motions is None
+                else Categorical(len(self._motions), (worlds, count), dtype=torch.int64)
             )
+            action[group] = Composite(action=each, shape=(worlds, count))
             reward[group] = Composite(
                 reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count)
             )
         observation["score"] = Bounded(0.0, 1.0, (worlds, 1), dtype=torch.float32)
+        if self._state_layout is not None:
+            least, greatest = (
+                torch.from_numpy(bound).expand(worlds, -1) for bound in self._state_layout.bounds()
+            )
+            observation["state"] = Bounded(least, greatest, dtype=torch.float32)
         flag = Binary(1, (worlds, 1), dtype=torch.bool)
         self.observation_spec = observation.to(self.device)
         self.action_spec = action.to(self.device)
@@ -147,6 +168,8 @@ class PosseEnv(EnvBase):
             )
         actions = [tensordict.get((group, "action")) for group in self._rows]
         together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
+        if self._motions is not None:
+            together = self._motions[together]
         observations, rewards, *_ = self.batch.step(self._array(together.detach()))
         packed = self._pack(observations)
         each = self._tensor(rewards).unsqueeze(-1)
@@ -164,6 +187,8 @@ class PosseEnv(EnvBase):
         terminated = self._tensor(self.batch.terminated).unsqueeze(-1)
         truncated = self._tensor(self.batch.truncated).unsqueeze(-1)
         packed.set("score", self._tensor(self.batch.score).unsqueeze(-1))
+        if self._state_layout is not None:
+            packed.set("state", self._tensor(self._state_layout.vector(self.batch.arrays)))
         packed.set("done", terminated | truncated)
         packed.set("terminated", terminated)
         packed.set("truncated", truncated)

@@ -1,0 +1,89 @@
+"""One name, and one default, for one thing in all environments."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import pytest
+from gymnasium.vector import AutoresetMode
+
+import posse
+from posse.adapters.gymnasium_env import SoloEnv, TeamEnv
+from posse.adapters.pettingzoo_env import TeamParallelEnv
+from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
+from posse_baselines.tracker_env import TrackerEnv
+from posse_baselines.tracker_vector_env import TrackerVectorEnv
+from posse_training.torchrl import PosseEnv
+
+SINGLE = (TeamEnv, SoloEnv, TeamParallelEnv, TrackerEnv)
+VECTORS = (TeamVectorEnv, SoloVectorEnv, TrackerVectorEnv, PosseEnv, posse.batch)
+OWN: dict[str, set[str]] = {
+    # The engine, where nothing is left to chance, and TorchRL's keys for all of an environment.
+    "seed": {"batch"},
+}
+"""Parameters whose default differs on purpose, and where."""
+
+
+def parameters(made: Any) -> dict[str, inspect.Parameter]:
+    found = dict(inspect.signature(made).parameters)
+    if made is PosseEnv:  # TorchRL's metaclass hides them
+        found = dict(list(inspect.signature(made.__init__).parameters.items())[1:])
+    if made is TrackerVectorEnv:  # the rest goes to its base as it is
+        found = {**inspect.signature(TeamVectorEnv).parameters, **found}
+    return found
+
+
+def test_a_parameter_has_one_default_everywhere() -> None:
+    defaults: dict[str, dict[Any, list[str]]] = {}
+    for made in (*SINGLE, *VECTORS):
+        for name, parameter in parameters(made).items():
+            if parameter.kind is not inspect.Parameter.VAR_KEYWORD and name not in (
+                "num_envs", "num_worlds", "self",
+            ):  # fmt: skip
+                if name == "autoreset" and parameter.default is None:
+                    continue  # next_step, which autoreset_mode may overrule
+                if made.__name__ in OWN.get(name, ()):
+                    continue
+                defaults.setdefault(name, {}).setdefault(parameter.default, []).append(
+                    made.__name__
+                )
+    differing = {name: found for name, found in defaults.items() if len(found) > 1}
+    assert not differing
+    assert {"scenario", "discrete_actions", "split", "first_world"} <= set(defaults)
+
+
+@pytest.mark.parametrize("made", [*SINGLE, *VECTORS], ids=lambda made: made.__name__)
+def test_every_environment_takes_a_scenario_and_its_settings(made: Any) -> None:
+    found = parameters(made)
+    assert next(iter(found)) == "scenario"
+    assert any(each.kind is inspect.Parameter.VAR_KEYWORD for each in found.values())
+    if made is not posse.batch:
+        assert "discrete_actions" in found
+
+
+def test_the_target_is_an_agent_by_one_name() -> None:
+    parallel = posse.parallel_env("smart", target="agent")
+    assert posse.batch("smart", target="agent").scenario == parallel.scenario
+    assert PosseEnv("smart", target="agent").batch.scenario == parallel.scenario
+    assert posse.get_scenario("smart", target="agent") == parallel.scenario
+    for made in (TeamEnv, SoloEnv, TrackerEnv, TeamVectorEnv):
+        with pytest.raises(posse.ScenarioError, match="target"):
+            made("smart", target="agent")
+    others: tuple[Any, ...] = (posse.batch, PosseEnv, posse.parallel_env)
+    for other in others:
+        with pytest.raises(posse.ScenarioError, match="the one choice is 'agent'"):
+            other("smart", target="evader")
+
+
+def test_autoreset_has_the_names_of_the_batch() -> None:
+    for name in ("next_step", "same_step", "disabled"):
+        env = TeamVectorEnv("constant", 2, autoreset=name)
+        assert env.batch.autoreset == name
+        assert TeamVectorEnv("constant", 2, autoreset_mode=env.autoreset_mode).batch.autoreset == (
+            name
+        )
+    with pytest.raises(ValueError, match=r"unknown autoreset mode 'never'.*'next_step'"):
+        TeamVectorEnv("constant", autoreset="never")
+    with pytest.raises(ValueError, match="give one"):
+        TeamVectorEnv("constant", autoreset="disabled", autoreset_mode=AutoresetMode.DISABLED)

@@ -1,0 +1,103 @@
+"""Functions and stable-baselines3 models play as policies, by the actions that they choose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from sb3_contrib import TQC
+from stable_baselines3 import DQN, PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+import posse
+from posse.adapters.actions import MOTIONS
+from posse_baselines import PolicyError, begin, from_function, load
+from posse_baselines.learned import Encoding
+from posse_training.sb3 import TeamVecEnv, from_sb3
+
+
+def acted(policy: Any, **settings: Any) -> tuple[Any, Any]:
+    """Return observations (E, N, F) and what a policy does on them."""
+    batch = posse.batch("constant", 2, seed=1, **settings)
+    observations = batch.reset()
+    actions, _ = policy.act(observations, begin(policy, batch))
+    batch.step(actions)
+    return observations, actions
+
+
+def test_one_observation_plays_each_tracker() -> None:
+    solo = posse.get_scenario("constant", num_trackers=1, num_neighbours=0)
+    model = PPO("MlpPolicy", gymnasium.make("posse/Solo-v0", scenario=solo), device="cpu")
+    observations, actions = acted(from_sb3(model), num_trackers=3, num_neighbours=0)
+    for e in range(2):
+        for i in range(3):
+            expected = model.predict(observations[e, i], deterministic=True)[0]
+            np.testing.assert_allclose(actions[e, i], expected, atol=1e-6)
+
+
+def test_a_model_of_the_team_plays_the_team() -> None:
+    model = PPO("MlpPolicy", gymnasium.make("posse/Team-v0"), device="cpu")
+    observations, actions = acted(from_sb3(model))
+    expected = [model.predict(each, deterministic=True)[0] for each in observations]
+    np.testing.assert_allclose(actions, expected, atol=1e-6)
+
+
+def test_discrete_actions_and_silence() -> None:
+    env = gymnasium.make("posse/Tracker-v0", discrete_actions=True)
+    model = DQN("MlpPolicy", env, device="cpu", buffer_size=10)
+    said = load("ddcs-distributed").message_size
+    observations, actions = acted(from_sb3(model, message_size=said), message_size=said)
+    chosen = model.predict(observations.reshape(10, -1), deterministic=True)[0].reshape(2, 5)
+    np.testing.assert_array_equal(actions[..., :2], MOTIONS[chosen])
+    assert not actions[..., 2:].any()
+
+
+def test_encoded_observations() -> None:
+    batch = posse.batch("constant", 2, autoreset="disabled")
+    encoding = Encoding.of(batch.layout, "slots", neighbours=2)
+    model = PPO("MlpPolicy", TeamVecEnv([batch], encoding), n_steps=8, batch_size=80, device="cpu")
+    _, actions = acted(from_sb3(model, encoding=encoding), num_trackers=4)
+    assert actions.shape == (2, 4, 2)
+    with pytest.raises(PolicyError, match="learned on observations"):
+        acted(from_sb3(model))
+
+
+def test_files(tmp_path: Path) -> None:
+    env = gymnasium.make("posse/Team-v0")
+    model = PPO("MlpPolicy", env, device="cpu")
+    model.save(tmp_path / "mine.zip")
+    loaded = from_sb3(tmp_path / "mine")
+    assert loaded.name == "mine"
+    np.testing.assert_array_equal(acted(loaded)[1], acted(from_sb3(model))[1])
+    TQC("MlpPolicy", env, device="cpu", buffer_size=10).save(tmp_path / "tqc.zip")
+    with pytest.raises(PolicyError, match="algorithm=TQC"):
+        from_sb3(tmp_path / "tqc.zip")
+    assert isinstance(from_sb3(tmp_path / "tqc.zip", algorithm=TQC).model, BaseAlgorithm)
+    (tmp_path / "bad.zip").write_bytes(b"PK nothing")
+    for bad, message in (("bad.zip", "is not a model"), ("none.zip", "there is no model file")):
+        with pytest.raises(PolicyError, match=message):
+            from_sb3(tmp_path / bad)
+
+
+def test_a_function_plays() -> None:
+    def ahead(observations: Any) -> Any:
+        return np.full((*observations.shape[:2], 2), 0.5)
+
+    policy = from_function(ahead)
+    assert policy.name == "ahead"
+    assert (acted(policy)[1] == 0.5).all()
+    spoken = acted(policy, message_size=2)[1]
+    assert spoken.shape == (2, 5, 4)
+    assert not spoken[..., 2:].any()
+    numbers = from_function(lambda o: np.full(o.shape[:2], 7), discrete_actions=True)
+    np.testing.assert_array_equal(acted(numbers)[1][0, 0], MOTIONS[7])
+
+
+@pytest.mark.parametrize("shape", [(2, 5), (2, 5, 3), (5, 2), (2, 4, 2)])
+def test_a_function_of_another_shape_is_named(shape: tuple[int, ...]) -> None:
+    policy = from_function(lambda observations: np.zeros(shape), name="wrong")
+    with pytest.raises(PolicyError, match="the function of policy 'wrong' returned actions"):
+        acted(policy)
