@@ -15,7 +15,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce clean
+.PHONY: help demo test fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce tune clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -61,6 +61,15 @@ results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 
 reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce
+
+# A run that was interrupted resumes; one that ended only writes its result again.
+TUNED := ddcs-distributed:smart ddcs-distributed:radio ddcs-distributed:leader-loss \
+	ddcs-distributed:search ddcs-distributed:obstacles ddcs-distributed:field \
+	pngl-l-phi:constant pngl-l-phi:accelerating pngl-l-phi:smart pngl-l-phi:leader-loss
+tune: $(FULL) ## Tune the scripted teams that ship again, MINUTES=10 each (long)
+	@set -e; for one in $(TUNED); do \
+		$(BIN)/posse tune $${one%%:*} --scenario $${one##*:} --minutes $(or $(MINUTES),10) --ship; \
+	done
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

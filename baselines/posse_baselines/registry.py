@@ -12,8 +12,12 @@ from typing import Any, Final, cast
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.tuned import from_file
 
-_FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file}
+_FILES: Final[dict[str, Callable[[Path], Policy]]] = {
+    ".safetensors": LearnedPolicy.from_file,
+    ".json": from_file,
+}
 """Readers of policy files, by suffix."""
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
@@ -31,8 +35,7 @@ def policy_names() -> tuple[str, ...]:
 
 def shipped() -> dict[str, Path]:
     """Return the files of the learned policies that come with the package, by name."""
-    found = (path for path in SHIPPED.glob(f"{LEARNED}*") if path.suffix in _FILES)
-    return {path.stem: path for path in sorted(found)}
+    return {path.stem: path for path in sorted(SHIPPED.glob(f"{LEARNED}*.safetensors"))}
 
 
 def load(policy: str | Path) -> Policy:

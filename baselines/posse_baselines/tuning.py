@@ -17,6 +17,7 @@ class Tunable:
         low: Least value.
         high: Greatest value.
         unit: Empty for a plain number.
+        above: Name of the setting that it must exceed; empty: none.
     """
 
     name: str
@@ -24,17 +25,29 @@ class Tunable:
     low: float
     high: float
     unit: str
+    above: str = ""
 
 
-def number(default: float, unit: str, low: float, high: float, *, tune: bool = False) -> Any:
-    """Declare a numeric field of a settings class, allowed in [low, high]."""
-    meta = {"unit": unit, "low": low, "high": high, "tunable": tune}
+def number(
+    default: float, unit: str, low: float, high: float, *, tune: bool = False, above: str = ""
+) -> Any:
+    """Declare a numeric field of a settings class, allowed in [low, high].
+
+    Args:
+        default: Its value.
+        unit: Empty for a plain number.
+        low: Least value.
+        high: Greatest value.
+        tune: Whether a search may change it.
+        above: Name of another field that it must exceed; empty: none.
+    """
+    meta = {"unit": unit, "low": low, "high": high, "tunable": tune, "above": above}
     return dataclasses.field(default=default, metadata=meta)
 
 
-def tuned(default: float, unit: str, low: float, high: float) -> Any:
+def tuned(default: float, unit: str, low: float, high: float, *, above: str = "") -> Any:
     """Declare a numeric field that a search may change."""
-    return number(default, unit, low, high, tune=True)
+    return number(default, unit, low, high, tune=True, above=above)
 
 
 def choice(default: str, choices: tuple[str, ...]) -> Any:
@@ -48,6 +61,7 @@ def tunables(settings: Any) -> tuple[Tunable, ...]:
         Tunable(
             field.name, getattr(settings, field.name),
             field.metadata["low"], field.metadata["high"], field.metadata["unit"],
+            field.metadata["above"],
         )
         for field in dataclasses.fields(settings)
         if field.metadata.get("tunable")

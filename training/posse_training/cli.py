@@ -1,4 +1,4 @@
-"""The command line: ``posse train | compare | watch | replay | ship | ...``.
+"""The command line: ``posse train | tune | compare | watch | replay | ship | ...``.
 
 Each command is imported when it is called: listing the scenarios does not import torch.
 """
@@ -24,6 +24,7 @@ class _Command:
 
 COMMANDS: Final[dict[str, _Command]] = {
     "train": _Command("train a team", "commands.train"),
+    "tune": _Command("tune the settings of a scripted team", "tuning.command"),
     "compare": _Command("score policies on the same worlds", "reports.compare"),
     "watch": _Command("show a policy in a window, or film it", "commands.watch"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse import ObservationLayout
+from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.rules import beam_directions, slot_records
 from posse.scenarios.formation import slot_offsets
@@ -38,6 +38,7 @@ class _Minds(OwnArrays):
     """The memory of a team in each of E worlds."""
 
     layout: ObservationLayout
+    settings: Records
     offsets: Records
     slots: Records
     beams: FloatArray
@@ -64,7 +65,18 @@ class DDCS(OwnArrays, BasePolicy):
     def __init__(self, settings: Settings | None = None, name: str | None = None) -> None:
         self.settings = settings or Settings()
         self.name = name or f"ddcs-{self.settings.model}"
-        self._record = settings_record(self.settings)
+
+    def settings_for(self, scenario: Scenario) -> Settings:
+        """Return the settings that are played on a scenario."""
+        return self.settings
+
+    def with_settings(self, **values: Any) -> DDCS:
+        """Return a policy with some settings changed.
+
+        Raises:
+            ValueError: A value out of its range.
+        """
+        return DDCS(self.settings.replace(**values), self.name)
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory of ``num_worlds`` teams at the start of an episode.
@@ -77,7 +89,8 @@ class DDCS(OwnArrays, BasePolicy):
         n = scenario.num_trackers
         limited = math.isfinite(scenario.sensing_range)
         memory = _Minds(
-            layout, offsets_of(layout), slot_records(scenario), beam_directions(scenario),
+            layout, settings_record(self.settings_for(scenario)), offsets_of(layout),
+            slot_records(scenario), beam_directions(scenario),
             max(math.hypot(x, y) for x, y in slot_offsets(scenario)),
             np.zeros((num_worlds, n), MIND), np.zeros((num_worlds, n, n), MATE),
             np.zeros((num_worlds, n, GRID * GRID if limited else 0), np.uint16),
@@ -111,7 +124,7 @@ class DDCS(OwnArrays, BasePolicy):
         over_worlds(
             decide_all,
             (
-                m.offsets, self._record, m.slots, m.outermost, m.minds, m.mates, m.seen,
+                m.offsets, m.settings, m.slots, m.outermost, m.minds, m.mates, m.seen,
                 observations, *work, actions,
             ),
             num_worlds,

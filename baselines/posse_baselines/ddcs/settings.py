@@ -100,11 +100,11 @@ class Settings:
     """Additional timeout of the leader compared with a team-mate."""
     near: float = tuned(1.0, "m", 0.02, 1.5)
     """Distance from its place at which converging ends and flocking begins."""
-    far: float = tuned(1.2, "m", 0.1, 4.0)
+    far: float = tuned(1.2, "m", 0.1, 4.0, above="near")
     """Distance from its place at which flocking ends and converging begins again."""
     range_near: float = tuned(0.15, "m", 0.02, 1.5)
     """The same under PNGL, by which the range exceeds the wanted one: the chase ends."""
-    range_far: float = tuned(0.8, "m", 0.1, 4.0)
+    range_far: float = tuned(0.8, "m", 0.1, 4.0, above="range_near")
     """The same under PNGL, by which the range exceeds the wanted one: the chase begins again."""
 
     # searching
@@ -207,10 +207,13 @@ class Settings:
                 raise ValueError(
                     f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}"
                 )
-        for near, far in (("near", "far"), ("range_near", "range_far")):
-            low, high = getattr(self, near), getattr(self, far)
-            if not low < high:
-                raise ValueError(f"{near}={low!r} must be below {far}={high!r}: a hysteresis")
+        for field in dataclasses.fields(self):
+            if near := field.metadata.get("above"):
+                low, high = getattr(self, near), getattr(self, field.name)
+                if not low < high:
+                    raise ValueError(
+                        f"{near}={low!r} must be below {field.name}={high!r}: a hysteresis"
+                    )
 
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""

@@ -6,41 +6,20 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from posse_baselines.ddcs import DDCS, Settings
-from posse_baselines.ddcs.settings import NO_EXCHANGE
+from posse_baselines.policies.family import FAMILY
 from posse_baselines.policies.planner import Planner
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random
 from posse_baselines.policy import Policy, PolicyError
+from posse_baselines.tuned import TUNED, TunedDDCS
 from posse_baselines.tuning import Tunable, tunables
-
-_PURSUIT: Final[dict[str, Any]] = {"guidance": "pngl", "turn_share": 1.0}
-_CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame": "slot-frame"}
-
-FAMILY: Final[dict[str, Settings]] = {
-    "pngl-l-phi": Settings(
-        model="centralized",
-        navigation_constant=1.1,
-        deviation="occupant",
-        follower_frame="slot-frame",
-        **_PURSUIT,
-    ),
-    "pngl": Settings(deviation="slot", spread=0.1, **_PURSUIT),
-    "deviated-pursuit": Settings(deviation="slot", **_PURSUIT),
-    "velocity-pursuit": Settings(deviation="none", **_PURSUIT),
-    "ddcs-centralized-pursuit": Settings(deviation="none", **_CENTRALIZED, **_PURSUIT),
-    "ddcs-distributed": Settings(),
-    "ddcs-centralized": Settings(**_CENTRALIZED),
-    "ddcs-centralized-l-l": Settings(follower_law="l-l", **_CENTRALIZED),
-    "ddcs-centralized-no-exchange": Settings(forbidden=NO_EXCHANGE, **_CENTRALIZED),
-    "ddcs-no-radio": Settings(radio=False),
-}
-"""The members of the DDCS family, the baseline first."""
 
 SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "random": Random,
     "idle": Idle,
     "pursuit": Pursuit,
     **{name: (lambda name=name: DDCS(FAMILY[name], name)) for name in FAMILY},  # type: ignore[misc]
+    **{name: (lambda name=name: TunedDDCS(name)) for name in TUNED},  # type: ignore[misc]
     "planner": Planner,
 }
 

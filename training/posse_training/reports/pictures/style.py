@@ -56,6 +56,8 @@ STYLES: Final[dict[str, Style]] = {
     "velocity-pursuit": Style(_PINK, "2", (0, (5, 1, 1, 1))),
     "ddcs-centralized-pursuit": Style(_SKY, "3", (0, (5, 1, 1, 1))),
     "ddcs-distributed": Style(_BLUE, "o"),
+    "ddcs-tuned": Style(_BLUE, "s"),
+    "pngl-l-phi-tuned": Style(_PINK, "p"),
     "ddcs-centralized": Style(_SKY, "s"),
     "ddcs-centralized-l-l": Style(_SKY, "8"),
     "ddcs-centralized-no-exchange": Style(_SKY, "p", (0, (3, 1.5))),

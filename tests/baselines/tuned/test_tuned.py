@@ -1,0 +1,161 @@
+"""Tuned policies play the settings of the scenario that they are given; their files are checked."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posse
+from posse_baselines import PolicyError, load, play, policy_names, settings_of, with_settings
+from posse_baselines.tuned import TUNED, read_tuned, tuned_files
+from posse_baselines.tuned.files import FORMAT, SHIPPED_TUNED
+from posse_training import evaluate
+
+FILES = [(name, path) for name in TUNED for path in tuned_files(name).values()]
+IDS = [f"{name}-{path.stem}" for name, path in FILES]
+TOLERANCE = 0.02
+"""How far the mean safe score of 32 worlds may move on a machine that rounds otherwise."""
+
+
+def scenario_of(path: Path, **overrides: Any) -> posse.Scenario:
+    return posse.get_scenario(path.stem, message_size=5, **overrides)
+
+
+def batch_of(name: str, **overrides: Any) -> posse.Batch:
+    return posse.batch(name, num_worlds=6, seed=5, message_size=5, horizon=150, **overrides)
+
+
+def test_what_ships() -> None:
+    assert set(TUNED) <= set(policy_names())
+    assert {path.parent.name for path in SHIPPED_TUNED.rglob("*.json")} <= set(TUNED)
+
+
+@pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
+def test_a_file_says_where_it_is_from(name: str, path: Path) -> None:
+    found = read_tuned(path)
+    card = found.card
+    assert found.policy == TUNED[name]
+    assert found.scenario == path.stem
+    assert card["scenario_version"] == posse.get_scenario(path.stem).version
+    assert card["command"].startswith(f"posse tune {found.policy} --scenario {path.stem} --gener")
+    assert card["commit"]
+    assert card["trained_splits"] == ["train"]
+    assert card["chosen_on"] == "validation"
+    assert set(card["settings"]) <= set(card["searched"])
+    points = {point["generation"]: point["score"] for point in card["curve"]}
+    assert points[card["generation"]] == max(points.values()) > points[0]
+    assert not re.search(r"(?<![\w.])/(tmp|home|root|work|Users)/", json.dumps(card))
+
+
+@pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
+def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None:
+    check = read_tuned(path).card["check"]
+    results = evaluate(
+        name, path.stem, check["worlds"], check["seed"], split=check["split"], progress=False
+    )
+    assert results["safe_score"].mean() == pytest.approx(check["safe_score"], abs=TOLERANCE)
+
+
+@pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
+def test_a_tuned_policy_plays_the_settings_of_its_scenario(name: str, path: Path) -> None:
+    values = json.loads(path.read_text())["settings"]
+    tuned = play(batch_of(path.stem), load(name))["score"]
+    by_hand = play(batch_of(path.stem), with_settings(TUNED[name], **values))["score"]
+    untuned = play(batch_of(path.stem), load(TUNED[name]))["score"]
+    from_file = play(batch_of(path.stem), load(path))["score"]
+    np.testing.assert_array_equal(tuned, by_hand)
+    np.testing.assert_array_equal(tuned, from_file)
+    assert np.any(tuned != untuned)
+
+
+@pytest.mark.parametrize("name", TUNED)
+def test_without_a_file_the_untuned_policy_is_played(name: str) -> None:
+    scenario = "paper-distributed"
+    assert scenario not in tuned_files(name)
+    np.testing.assert_array_equal(
+        play(batch_of(scenario), load(name))["score"],
+        play(batch_of(scenario), load(TUNED[name]))["score"],
+    )
+
+
+def test_one_object_plays_several_scenarios() -> None:
+    policy = load("ddcs-tuned")
+    apart = [play(batch_of(name), load("ddcs-tuned"))["score"] for name in ("smart", "radio")]
+    batches = [batch_of("smart"), batch_of("radio")]
+    memories = [policy.begin(batch.layout, batch.num_worlds) for batch in batches]
+    seen = [batch.reset() for batch in batches]
+    for _ in range(150):
+        for k, batch in enumerate(batches):
+            actions, memories[k] = policy.act(seen[k], memories[k])
+            seen[k], _, _, ended, infos = batch.step(actions)
+            if ended.all():
+                np.testing.assert_array_equal(infos["metrics"]["score"], apart[k])
+
+
+@pytest.mark.parametrize("name", TUNED)
+def test_worlds_that_it_was_tuned_on_are_refused(name: str) -> None:
+    with pytest.raises(ValueError, match="was trained on the split 'train'"):
+        evaluate(name, "constant", 1, split="train", progress=False)
+
+
+def write(path: Path, **changes: Any) -> Path:
+    card = {"format": FORMAT, "policy": "pngl", "scenario": "smart", "settings": {"near": 0.5}}
+    path.write_text(json.dumps({**card, **changes}))
+    return path
+
+
+def test_a_file_of_settings_is_a_policy(tmp_path: Path) -> None:
+    path = write(tmp_path / "mine.json")
+    policy = load(path)
+    assert policy.name == "pngl-tuned-smart"
+    assert read_tuned(path).settings == settings_of("pngl").replace(near=0.5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"format": "other"}, "holds no tuned settings: it must have format='posse-tuned-1'"),
+        ({"policy": "idle"}, "has settings of policy='idle'; policies with settings are: pngl-l"),
+        ({"policy": ["pngl"]}, "has settings of policy="),
+        ({"scenario": ""}, "has scenario='': it must be a text"),
+        ({"scenario": 3}, "has scenario=3: it must be a text"),
+        ({"settings": [1]}, r"has settings=\[1\]: they must map names to numbers"),
+        ({"settings": {"gian": 1.0}}, "has a setting 'gian' that is not a tunable one of pngl"),
+        ({"settings": {"spread": 0.1}}, "has a setting 'spread' that is not a tunable one"),
+        ({"settings": {"gain": 7.0}}, r"has gain=7.0: it must be a number in \[0.2, 6\] 1/s"),
+        ({"settings": {"gain": math.nan}}, "has gain=nan: it must be a number in"),
+        ({"settings": {"gain": math.inf}}, "has gain=inf: it must be a number in"),
+        ({"settings": {"gain": "1"}}, "has gain='1': it must be a number in"),
+        ({"settings": {"gain": True}}, "has gain=True: it must be a number in"),
+        ({"settings": {"gain": 10**400}}, "has gain=1000.*: it must be a number in"),
+        ({"settings": {"near": 1.4}}, "has impossible settings: near=1.4 must be below far=1.2"),
+    ],
+)
+def test_a_damaged_file_is_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        load(write(tmp_path / "x.json", **changes))
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[" * 100_000, b"\xff\xfe", b"[]", b"null"])
+def test_what_is_no_json_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.json"
+    path.write_bytes(content)
+    with pytest.raises(PolicyError, match=r"x\.json"):
+        load(path)
+    with pytest.raises(PolicyError, match="there is no policy file"):
+        load(tmp_path / "none.json")
+
+
+def test_a_damaged_shipped_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "ddcs-tuned").mkdir()
+    (tmp_path / "ddcs-tuned/smart.json").write_text("{}")
+    monkeypatch.setattr("posse_baselines.tuned.files.SHIPPED_TUNED", tmp_path)
+    batch = batch_of("smart")
+    with pytest.raises(PolicyError, match=r"smart\.json holds no tuned settings"):
+        load("ddcs-tuned").begin(batch.layout, 6)

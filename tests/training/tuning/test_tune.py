@@ -1,0 +1,173 @@
+"""``posse tune``: what it finds, how it resumes, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.support.tunable import BEST, POLICY, quiet, small
+
+from posse_baselines import PolicyError
+from posse_training.cli import main
+from posse_training.errors import CheckpointError, RunFolderError, SettingsError
+from posse_training.files import locked
+from posse_training.tuning import TuneSettings
+from posse_training.tuning import tune as tune_module
+from posse_training.tuning.tune import tune
+
+
+def card_of(settings: TuneSettings) -> dict[str, Any]:
+    card: dict[str, Any] = json.loads(tune(settings, console=quiet()).read_text())
+    return card
+
+
+def test_it_recovers_a_known_optimum(tmp_path: Path) -> None:
+    card = card_of(small(tmp_path / "run", generations=12, every=4))
+    assert card["searched"] == ["bias"]  # the other one changes nothing
+    assert card["settings"]["bias"] == pytest.approx(BEST, abs=0.1)
+    tuned, untuned = (card["scores"][k]["safe_score"]["value"] for k in ("tuned", "untuned"))
+    assert tuned > untuned + 0.1
+    assert card["curve"][0]["generation"] == 0
+    points = {point["generation"]: point["score"] for point in card["curve"]}
+    assert points[card["generation"]] == max(points.values())
+    assert card["command"].startswith(f"posse tune {POLICY} --scenario paper-distributed --gen")
+
+
+class Killed(BaseException):
+    """Ends a run as a signal does."""
+
+
+@pytest.mark.parametrize("after", [1, 3])
+def test_a_killed_run_resumes_to_the_same_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int
+) -> None:
+    whole = card_of(small(tmp_path / "whole"))
+    generation = tune_module._generation
+    made: list[int] = []
+
+    def kill(*arguments: Any) -> None:
+        if len(made) == after:
+            raise Killed
+        made.append(1)
+        generation(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(tune_module, "_generation", kill)
+        with pytest.raises(Killed):
+            tune(small(tmp_path / "killed"), console=quiet())
+    assert not (tmp_path / "killed/tuned.json").exists()
+    assert card_of(small(tmp_path / "killed")) == whole
+
+
+def test_a_run_that_ended_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
+    card_of(small(tmp_path / "run", generations=3))  # off the schedule of the validation
+    assert card_of(small(tmp_path / "run")) == card_of(small(tmp_path / "whole"))
+
+
+def test_threads_change_nothing(tmp_path: Path) -> None:
+    one = card_of(small(tmp_path / "one", threads=1, generations=2))
+    assert card_of(small(tmp_path / "two", threads=2, generations=2)) == one
+
+
+def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
+    card = card_of(small(tmp_path / "run", generations=None, minutes=0.001))
+    generations = int(card["command"].split("--generations ")[1].split()[0])
+    assert generations >= 1
+    assert card_of(small(tmp_path / "again", generations=generations)) == card
+
+
+def test_progress_is_lines_where_there_is_no_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = "--generations 2 --population 4 --worlds 2 --validation-worlds 3 --every 1"
+    assert main(["tune", POLICY, "--scenario", "paper-distributed", *words.split(), "--out",
+                 str(tmp_path / "run")]) == 0  # fmt: skip
+    out = capsys.readouterr().out
+    assert "searching 1 settings: bias" in out
+    assert "generation    2  safe score" in out
+    assert " tuned: safe score" in out
+    assert str(tmp_path / "run/tuned.json") in out.replace("\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["ddcs-distribute"], "did you mean 'ddcs-distributed'"),
+        (["idle"], "policy 'idle' has no tunable settings; those that have: pngl-l-phi, pngl"),
+        (["ddcs-tuned"], "policy 'ddcs-tuned' has no tunable settings"),
+        (["pngl", "--scenario", "smrt"], "unknown scenario 'smrt' (did you mean 'smart'"),
+        (["pngl", "--minutes", "0"], "minutes=0.0 is out of range: choose it from 0.001 to 10,000"),
+        (["pngl", "--minutes", "nan"], "minutes=nan is out of range"),
+        (["pngl", "--seed", "-1"], "seed=-1 is out of range"),
+        (["pngl", "--population", "3"], "population=3 is out of range"),
+        (["pngl", "--only", "gian"], "only='gian' is not a tunable setting of 'pngl'"),
+        (["pngl", "--ship"], "--ship needs a policy whose tuned version ships: ddcs-distributed"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    out = tmp_path / "run"
+    assert main(["tune", *arguments, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert message in " ".join(error.split())
+    assert "Traceback" not in error
+    assert not out.exists()
+
+
+def test_a_folder_that_is_not_its_own(tmp_path: Path) -> None:
+    (tmp_path / "diary.txt").write_text("mine")
+    with pytest.raises(RunFolderError, match=r"is not the folder of a tuning run.*diary.txt"):
+        tune(small(tmp_path), console=quiet())
+    assert [path.name for path in tmp_path.iterdir()] == ["diary.txt"]
+    with pytest.raises(RunFolderError, match=r"is a file\. Choose another"):
+        tune(small(tmp_path / "diary.txt"), console=quiet())
+
+
+def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    tune(small(run, generations=1), console=quiet())
+    with pytest.raises(RunFolderError, match="holds a tuning run with seed=3, not 4"):
+        tune(small(run, seed=4), console=quiet())
+    with locked(run), pytest.raises(RunFolderError, match="is in use by process"):
+        tune(small(run), console=quiet())
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text[: len(text) // 2],
+        lambda text: text.replace("0.", "1.", 1),
+        lambda text: "[" * 100_000,
+        lambda text: "{}",
+        lambda text: text.replace("posse-tune-1", "posse-tune-0"),
+        lambda text: "\udcff",
+    ],
+)
+def test_a_damaged_state_is_named(tmp_path: Path, damage: Any) -> None:
+    tune(small(tmp_path / "run", generations=1), console=quiet())
+    path = tmp_path / "run/state.json"
+    path.write_text(damage(path.read_text()), errors="surrogateescape")
+    with pytest.raises(CheckpointError, match=r"state\.json.*(is damaged|the format of)|format"):
+        tune(small(tmp_path / "run"), console=quiet())
+
+
+def test_only_names_the_searched_settings(tmp_path: Path) -> None:
+    card = card_of(
+        small(tmp_path / "run", policy="ddcs-distributed", only=("gain",), generations=1)
+    )
+    assert card["searched"] == ["gain"]
+    assert set(card["settings"]) <= {"gain"}
+    assert card["command"].endswith("--only gain")
+
+
+def test_nothing_has_an_effect(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
+        tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
+
+
+def test_code_that_is_no_policy(tmp_path: Path) -> None:
+    with pytest.raises(PolicyError, match="cannot import"):
+        tune(small(tmp_path / "run", policy="no_such_module:Team"), console=quiet())
