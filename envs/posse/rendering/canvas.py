@@ -39,17 +39,19 @@ class Canvas:
 
     Args:
         size: Width and height, px.
+        oversampled: Resolution of the drawing, as a multiple of the frame's; at least 1.
     """
 
-    def __init__(self, size: tuple[int, int]) -> None:
+    def __init__(self, size: tuple[int, int], oversampled: int = _OVERSAMPLED) -> None:
         self.size = size
         width, height = size
-        self._large = pygame.Surface((width * _OVERSAMPLED, height * _OVERSAMPLED), 0, 32)
+        self._k = oversampled
+        self._large = pygame.Surface((width * self._k, height * self._k), 0, 32)
         self._frame = pygame.Surface(size, 0, 32)
 
     def clip(self, box: tuple[int, int, int, int] | None) -> None:
         """Clip drawing to (left, top, width, height); ``None``: no clipping."""
-        self._large.set_clip(None if box is None else tuple(v * _OVERSAMPLED for v in box))
+        self._large.set_clip(None if box is None else tuple(v * self._k for v in box))
 
     def fill(self, colour: Colour) -> None:
         """Fill the clipped area."""
@@ -57,7 +59,7 @@ class Canvas:
 
     def box(self, left: float, top: float, width: float, height: float, colour: Colour) -> None:
         """Fill a rectangle."""
-        k = _OVERSAMPLED
+        k = self._k
         edges = [round(v * k) for v in (left, top, left + width, top + height)]
         rect = (edges[0], edges[1], edges[2] - edges[0], edges[3] - edges[1])
         pygame.draw.rect(self._large, colour, rect)
@@ -66,14 +68,14 @@ class Canvas:
         """Fill a disc."""
         place = self._place(centre)
         if self._in_reach(place, radius):
-            pygame.draw.circle(self._large, colour, place, round(radius * _OVERSAMPLED))
+            pygame.draw.circle(self._large, colour, place, round(radius * self._k))
 
     def ring(self, centre: Point, radius: float, width: float, colour: Colour) -> None:
         """Draw a circle whose line lies inside ``radius``."""
         place = self._place(centre)
         if self._in_reach(place, radius):
-            line = max(1, round(width * _OVERSAMPLED))
-            pygame.draw.circle(self._large, colour, place, round(radius * _OVERSAMPLED), line)
+            line = max(1, round(width * self._k))
+            pygame.draw.circle(self._large, colour, place, round(radius * self._k), line)
 
     def line(
         self, start: Point, end: Point, width: float, colour: Colour, opacity: float = 1.0
@@ -83,7 +85,7 @@ class Canvas:
         length = math.hypot(x1 - x0, y1 - y0)
         if length == 0 or not (self._is_near(x0, y0) and self._is_near(x1, y1)):
             return
-        half = max(width * _OVERSAMPLED, 1.0) / 2 / length
+        half = max(width * self._k, 1.0) / 2 / length
         dx, dy = (y1 - y0) * half, (x0 - x1) * half
         corners = [(x0 + dx, y0 + dy), (x1 + dx, y1 + dy), (x1 - dx, y1 - dy), (x0 - dx, y0 - dy)]
         if opacity >= 1:
@@ -103,7 +105,39 @@ class Canvas:
 
     def polygon(self, corners: Sequence[Point] | npt.NDArray[np.float64], colour: Colour) -> None:
         """Fill a polygon."""
-        pygame.draw.polygon(self._large, colour, [self._place(corner) for corner in corners])
+        pygame.draw.polygon(self._large, colour, self._places(corners))
+
+    def outline(
+        self, corners: npt.NDArray[np.float64], width: float, colour: Colour, closed: bool = True
+    ) -> None:
+        """Draw the outline of a polygon, or an open line through its corners."""
+        line = max(1, round(width * self._k))
+        pygame.draw.lines(self._large, colour, closed, self._places(corners), line)
+
+    def dashed_ring(
+        self, centre: Point, radius: float, width: float, dash: float, colour: Colour
+    ) -> None:
+        """Draw a circle of strokes and gaps of about the length ``dash``."""
+        strokes = max(4, round(math.pi * radius / dash))
+        for k in range(strokes):
+            angles = np.linspace(0, math.pi / strokes, 4) + 2 * math.pi * k / strokes
+            self.arc(centre, radius, angles, width, colour)
+
+    def arc(
+        self,
+        centre: Point,
+        radius: float,
+        angles: npt.NDArray[np.float64],
+        width: float,
+        colour: Colour,
+    ) -> None:
+        """Draw a part of a circle through given angles, rad, y up."""
+        rim = np.stack([np.cos(angles), -np.sin(angles)], axis=-1)
+        self.outline(np.asarray(centre, np.float64) + radius * rim, width, colour, closed=False)
+
+    def width_of(self, text: str, size: float) -> float:
+        """Return the width that a line of text will have, px."""
+        return _font(round(size * self._k)).size(text)[0] / self._k
 
     def text(
         self, text: str, place: tuple[float, float], size: float, colour: Colour, anchor: float = 0
@@ -113,11 +147,11 @@ class Canvas:
         ``place`` is the middle of its height at its left end (``anchor`` 0), its centre (0.5) or
         its right end (1).
         """
-        image = _font(round(size * _OVERSAMPLED)).render(text, True, colour)
+        image = _font(round(size * self._k)).render(text, True, colour)
         width, height = image.get_size()
         x, y = self._place(place)
         self._large.blit(image, (round(x - anchor * width), round(y - height / 2)))
-        return width / _OVERSAMPLED
+        return width / self._k
 
     def finish(self) -> pygame.Surface:
         """Return the frame; valid until the next call."""
@@ -125,7 +159,11 @@ class Canvas:
         return self._frame
 
     def _place(self, point: Point) -> tuple[float, float]:
-        return float(point[0]) * _OVERSAMPLED, float(point[1]) * _OVERSAMPLED
+        return float(point[0]) * self._k, float(point[1]) * self._k
+
+    def _places(self, corners: Sequence[Point] | npt.NDArray[np.float64]) -> list[list[float]]:
+        places = np.asarray(corners, np.float64) * self._k
+        return np.clip(places, -_FARTHEST, _FARTHEST).tolist()  # type: ignore[no-any-return]
 
     def _is_near(self, x: float, y: float) -> bool:
         """Return whether a point is within the range of pygame's 16-bit coordinates."""
@@ -133,7 +171,7 @@ class Canvas:
 
     def _in_reach(self, place: tuple[float, float], radius: float) -> bool:
         """Return whether a disc overlaps the canvas: far ones overflow pygame's integers."""
-        reach = radius * _OVERSAMPLED + 1
+        reach = radius * self._k + 1
         width, height = self._large.get_size()
         x, y = place
         return -reach < x < width + reach and -reach < y < height + reach

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -12,6 +12,7 @@ import numpy as np
 from posse.rendering.camera import Camera
 from posse.rendering.history import Flash, Mark
 from posse.rendering.scene import Floats, Scene
+from posse.rendering.sight import area_in_sight
 from posse.rendering.style import (
     BROKEN,
     CONTACT,
@@ -36,11 +37,15 @@ from posse.rendering.style import (
     mix,
     pale,
 )
+from posse.rendering.view import View
 
 if TYPE_CHECKING:
     from posse.rendering.canvas import Canvas
 
-_LEAST_ROBOT: Final = 5.0  # points; least radius of a drawn robot
+LEAST_RADIUS: Final = 4.0
+"""Least radius of a drawn robot, px, in however small a frame."""
+_NUMBERED: Final = 6.5  # px; least radius of a disc that bears a number
+_MOST_LINKED: Final = 12  # trackers; of a larger team, only the selected robot's links are drawn
 _VIEW_SHOWN: Final = 1.5  # m; drawn range of a field of view with unlimited range
 _GRID_STEP: Final = 2.0  # m
 
@@ -58,11 +63,19 @@ class Drawing:
     """Past positions, oldest first."""
     flashes: Sequence[Flash]
     """Recent contacts."""
+    view: View
 
     @property
     def radius(self) -> float:
         """Radius of a robot's disc, px."""
-        return max(self.scene.scenario.robot_radius * self.camera.scale, _LEAST_ROBOT * self.point)
+        least = max(self.view.least_robot * self.point, LEAST_RADIUS)
+        return max(self.scene.scenario.robot_radius * self.camera.scale, least)
+
+    @property
+    def selected(self) -> int | None:
+        """Number of the selected tracker; ``None``: there is none, or it is the target."""
+        chosen = self.view.selected
+        return chosen if chosen is not None and chosen < len(self.scene.position) else None
 
 
 def _floor(d: Drawing) -> tuple[Floats, Floats]:
@@ -114,35 +127,40 @@ def walls(d: Drawing) -> None:
         d.canvas.box(*box, WALL)
 
 
-def sensing(d: Drawing) -> None:
-    """Tint the area covered by target sensors of limited range or field of view."""
-    s = d.scene.scenario
+def covered(d: Drawing, tracker: int) -> Floats | None:
+    """Return the corners (K, 2) m of what a tracker's target sensor covers; ``None``: no limit."""
+    s, scene = d.scene.scenario, d.scene
     all_round = s.field_of_view >= 2 * math.pi - 1e-9
-    if math.isinf(s.sensing_range) and all_round:
+    unlimited = math.isinf(s.sensing_range) and all_round
+    if not scene.senses[tracker] or (unlimited and not s.num_obstacles):
+        return None
+    reach = s.sensing_range
+    if math.isinf(reach) and math.isinf(s.arena):
+        reach = _VIEW_SHOWN
+    return area_in_sight(
+        scene.position[tracker], scene.heading[tracker], reach, s.field_of_view, scene.obstacles,
+        s.arena,
+    )  # fmt: skip
+
+
+def sensing(d: Drawing) -> None:
+    """Tint the area in sight of the selected tracker, or of the team where sight is limited.
+
+    What lies behind an obstacle is not in sight.
+    """
+    s = d.scene.scenario
+    if not d.view.sensing or d.view.selected == len(d.scene.position):
         return
-    reach = s.sensing_range if math.isfinite(s.sensing_range) else _VIEW_SHOWN
-    places = d.camera.project(d.scene.position)
-    if math.isfinite(s.arena):
-        left, top = d.camera.project(np.array([-s.arena / 2, s.arena / 2]))
-        side = s.arena * d.camera.scale
-        d.canvas.clip((round(left), round(top), round(side), round(side)))
-    for grow, colour in ((0.0, SENSING_RIM), (-d.point, SENSING)):
-        for i in np.flatnonzero(d.scene.senses):
-            radius = reach * d.camera.scale + grow
-            if all_round:
-                d.canvas.disc(places[i], radius, colour)
-            else:
-                corners = _sector(places[i], radius, d.scene.heading[i], s.field_of_view)
-                d.canvas.polygon(corners, colour)
-    d.canvas.clip(d.camera.viewport)
-
-
-def _sector(centre: Floats, radius: float, heading: Floats, angle: float) -> Floats:
-    """Return the corners (K, 2) of a sector of a disc about a heading, px."""
-    middle = math.atan2(heading[1], heading[0])
-    angles = np.linspace(middle - angle / 2, middle + angle / 2, max(3, math.ceil(angle / 0.08)))
-    rim = centre + radius * np.stack([np.cos(angles), -np.sin(angles)], axis=-1)
-    return np.concatenate([centre[None], rim])
+    looking = range(len(d.scene.position)) if d.selected is None else (d.selected,)
+    all_round = s.field_of_view >= 2 * math.pi - 1e-9
+    if d.selected is None and math.isinf(s.sensing_range) and all_round:
+        return
+    areas = [covered(d, i) for i in looking]
+    corners = [d.camera.project(area) for area in areas if area is not None]
+    for area in corners:  # every fill hides the outlines inside it
+        d.canvas.outline(area, 2 * d.point, SENSING_RIM)
+    for area in corners:
+        d.canvas.polygon(area, SENSING)
 
 
 def obstacles(d: Drawing) -> None:
@@ -155,7 +173,7 @@ def obstacles(d: Drawing) -> None:
 
 def trails(d: Drawing) -> None:
     """Draw the trails, fading with age."""
-    if len(d.trail) < 2:
+    if len(d.trail) < 2 or not d.view.trails:
         return
     places = d.camera.project(np.stack([mark.position for mark in d.trail]))
     for k in range(1, len(d.trail)):
@@ -185,16 +203,26 @@ def slots(d: Drawing) -> None:
 
 
 def links(d: Drawing) -> None:
-    """Draw a line between trackers that hear each other, fading with the age of the message."""
-    strength = np.triu(d.scene.links)
+    """Draw a line between trackers that hear each other, fading with the age of the message.
+
+    Not where a robot is selected, whose links :mod:`posse.rendering.selected` draws, and not of a
+    large team, which has hundreds.
+    """
+    scene = d.scene
+    if not d.view.links or d.view.selected is not None or len(scene.position) > _MOST_LINKED:
+        return
+    strength = np.triu(scene.links)
     heard = np.argwhere(strength > 0)
     if not len(heard):
         return
-    # A large team has hundreds of links: limit their total weight to that of a small team.
     weight = 0.5 * max(0.2, min(1.0, 12 / len(heard)))
-    places = d.camera.project(d.scene.position)
+    places = d.camera.project(scene.position)
     for i, j in heard.tolist():
         d.canvas.line(places[i], places[j], d.point, LINK, weight * strength[i, j])
+
+
+_DARK_DISCS: Final = (TRACKER, *TASK_COLOURS[1:3])
+"""Colours of discs on which a number is white."""
 
 
 def trackers(d: Drawing) -> None:
@@ -207,7 +235,7 @@ def trackers(d: Drawing) -> None:
     for i in sorted(range(len(places)), key=lambda i: not scene.broken[i]):
         place, heading = places[i], scene.heading[i] * (1, -1)
         if scene.broken[i]:
-            _wafer(d, place, heading, BROKEN, TRACKER)
+            wafer(d, place, heading, BROKEN, TRACKER)
             arm = 0.7 * radius + point
             for sign in (1, -1):
                 step = np.array([arm, sign * arm])
@@ -218,12 +246,16 @@ def trackers(d: Drawing) -> None:
             colour = TASK_COLOURS[scene.task[i]]
         if scene.limited_sight and not scene.sees[i]:
             colour = pale(colour)
-        _wafer(d, place, heading, colour, TRACKER_RIM)
+        wafer(d, place, heading, colour, TRACKER_RIM)
+        if d.view.numbers and radius >= _NUMBERED:
+            dark = colour in _DARK_DISCS
+            canvas.text(str(i), (place[0], place[1]), 1.35 * radius, PAPER if dark else INK, 0.5)
         if scene.leads is not None and scene.leads[i]:
             leader_mark(canvas, place - (0, radius + 4 * point), 5 * point)
 
 
-def _wafer(d: Drawing, place: Floats, heading: Floats, colour: Colour, rim: Colour) -> None:
+def wafer(d: Drawing, place: Floats, heading: Floats, colour: Colour, rim: Colour) -> None:
+    """Draw a robot: a disc with a line towards its heading, (2,) px down."""
     radius, point = d.radius, d.point
     d.canvas.disc(place, radius, rim)
     d.canvas.disc(place, radius - 1.2 * point, colour)
@@ -257,9 +289,3 @@ def flashes(d: Drawing) -> None:
         place = d.camera.project(flash.position)
         radius = d.radius + (3 + 9 * flash.age) * d.point
         d.canvas.ring(place, radius, 2.2 * d.point, mix(CONTACT, GROUND, 1 - flash.age))
-
-
-LAYERS: Final[tuple[Callable[[Drawing], None], ...]] = (
-    ground, sensing, grid, frame, slots, obstacles, walls, trails, links, trackers, target, flashes,
-)  # fmt: skip
-"""Every layer, in the order in which they are drawn."""

@@ -1,7 +1,7 @@
 """Renderer of a world: frames as arrays, or a window.
 
 The style follows the paper's figures: trackers are grey discs with a line for the heading, and the
-target has its own colour. :mod:`posse.rendering.layers` lists the layers of a frame.
+target has its own colour. :mod:`posse.rendering.picture` lists the layers of a frame.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ import numpy.typing as npt
 
 from posse.rendering.camera import Camera
 from posse.rendering.history import History
-from posse.rendering.layers import LAYERS, Drawing
-from posse.rendering.legend import FOOTER, HEADER, footer, header
+from posse.rendering.picture import action_of, draw_picture, viewport_of
 from posse.rendering.scene import Scene, read_scene
-from posse.rendering.style import DESIGN_SIZE, PAPER
+from posse.rendering.style import DESIGN_SIZE
 from posse.scenarios import Scenario
 
 if TYPE_CHECKING:
@@ -69,10 +68,9 @@ class Renderer:
         self.size = (int(size[0]), int(size[1]))
         self.title = title
         self._point = min(self.size) / DESIGN_SIZE
-        top, bottom = round(HEADER * self._point), round(FOOTER * self._point)
-        self._viewport = (0, top, self.size[0], self.size[1] - top - bottom)
+        self._box = (0, 0, *self.size)
         self._canvas = Canvas(self.size)
-        self._camera = Camera(self._viewport, scenario.arena)
+        self._camera = Camera(viewport_of(self._box, self._point), scenario.arena)
         self._history = History()
         self._window: Window | None = None
         self._closed = False
@@ -163,20 +161,9 @@ class Renderer:
         time = self._history.note(scene)
         if time is None:
             self._camera.reset()
-        # Broken trackers stay behind: a view that included them would grow without bound.
-        working = scene.position[~scene.broken]
-        points = np.vstack([working, scene.target, scene.target + scene.frame])
-        self._camera.follow(points, time or 0.0)
+        self._camera.follow(action_of(scene), time or 0.0)
 
     def _compose(self, scene: Scene) -> None:
-        canvas, point = self._canvas, self._point
-        canvas.fill(PAPER)
-        canvas.clip(self._viewport)
-        drawing = Drawing(
-            scene, self._camera, canvas, point, self._history.trail(), self._history.flashes()
+        draw_picture(
+            self._canvas, self._box, self._camera, scene, self._history, self._point, self.title
         )
-        for layer in LAYERS:
-            layer(drawing)
-        canvas.clip(None)
-        header(canvas, scene, self.title, point)
-        footer(canvas, scene, self._camera.scale, point)

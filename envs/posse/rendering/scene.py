@@ -12,6 +12,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.numeric import BoolArray
+from posse.rendering.knowledge import Knowledge, read_knowledge
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario
 from posse.scenarios.formation import slot_offsets
@@ -67,7 +68,8 @@ class Scene:
     task: Integers | None
     """(N,) number of each tracker's task in :data:`posse.rendering.style.TASKS`, -1: none."""
     leads: BoolArray | None
-    """(N,) the tracker considers itself the leader."""
+    """(N,) the tracker considers itself the leader; ``None``: the team has no leader."""
+    knowledge: Knowledge
 
     @property
     def time(self) -> float:
@@ -87,7 +89,10 @@ class Scene:
 
 
 def read_scene(
-    batch: Batch, world: int = 0, annotations: Mapping[str, npt.ArrayLike] | None = None
+    batch: Batch,
+    world: int = 0,
+    annotations: Mapping[str, npt.ArrayLike] | None = None,
+    observations: npt.NDArray[Any] | None = None,
 ) -> Scene:
     """Return the scene of one world of a batch.
 
@@ -95,7 +100,9 @@ def read_scene(
         batch: A batch that has been reset.
         world: Its index in the batch.
         annotations: Internal values of a policy, (E, N) integers each: ``"task"``, and
-            ``"leader"``, the number of each tracker's leader (-1: none). Other names are ignored.
+            ``"leader"``, the number of each tracker's leader (-1: none); what
+            :func:`posse.rendering.knowledge.read_knowledge` reads. Other names are ignored.
+        observations: (E, rows, F) of the present state, for the sonar.
 
     Raises:
         ValueError: No such world, or annotations of a wrong shape.
@@ -143,6 +150,7 @@ def read_scene(
         links=_links(of["heard_step"], step - scenario.radio_delay, scenario.num_trackers),
         task=told["task"][world] if "task" in told else None,
         leads=leads,
+        knowledge=read_knowledge(batch, world, annotations, observations),
     )
 
 
