@@ -135,17 +135,18 @@ class DDCS(OwnArrays, BasePolicy):
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).
 
-        ``task`` (its index in ``TASKS``), ``leader`` (-1: none), ``term``, ``slot`` (-1: none),
-        ``exchanges`` (number of leader changes), ``estimate`` (x, y, θ of the target, common
-        frame), ``estimate_age`` (s; -1: there is no estimate).
+        ``task`` (its index in ``TASKS``), ``slot`` (-1: none), ``estimate`` (x, y, θ of the target,
+        common frame), ``estimate_age`` (s; -1: there is no estimate). Of the centralized model also
+        ``leader`` (-1: none yet), ``term`` and ``exchanges`` (number of leader changes).
         """
         minds = memory.minds
         estimate = np.empty((*minds.shape, 3), np.float32)
         for k, name in enumerate(("now_x", "now_y", "now_theta")):
             estimate[..., k] = minds[name]
-        notes: Annotations = {
-            name: minds[name].copy() for name in ("task", "leader", "term", "slot", "exchanges")
-        }
+        names = ["task", "slot"]
+        if self.settings.model == "centralized":
+            names += ["leader", "term", "exchanges"]
+        notes: Annotations = {name: minds[name].copy() for name in names}
         notes["estimate"] = estimate
         notes["estimate_age"] = np.where(minds["known"] != 0, minds["age"], np.float32(-1.0))
         return notes
