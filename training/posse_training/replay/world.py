@@ -69,7 +69,7 @@ def _settings(scenario: Scenario) -> dict[str, Any]:
 def _describe(field: Field) -> dict[str, Any]:
     return {
         "name": field.name,
-        "block": _block(field),
+        "block": block_of(field),
         "size": field.size,
         "unit": field.unit,
         "low": float(field.low),
@@ -79,7 +79,7 @@ def _describe(field: Field) -> dict[str, Any]:
     }
 
 
-def _block(field: Field) -> str:
+def block_of(field: Field) -> str:
     """Return the heading in the panel under which a field is listed."""
     if field.of_neighbour:
         return _BLOCKS[4]

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import tyro
 from rich.console import Console
@@ -132,7 +132,7 @@ class _Run:
         return self.attempt(contender, scenario, episodes, scenario)
 
     def attempt(
-        self, contender: Contender, scenario: str, episodes: int, what: str, **overrides: float
+        self, contender: Contender, scenario: str, episodes: int, what: str, **overrides: Any
     ) -> Plays | None:
         """Play; return ``None`` and note why if the contender cannot or fails."""
         s = self.settings

@@ -34,7 +34,7 @@ class Sweep:
 
     def at(self, value: float) -> Scenario:
         """Return the scenario with another value of the setting."""
-        return get_scenario(self.scenario, **{self.setting: value})
+        return get_scenario(self.scenario).replace(**{self.setting: value})
 
 
 SWEEPS: Final = (

@@ -65,7 +65,9 @@ def check_scenarios(check: Mapping[str, Any]) -> list[Scenario]:
     return [
         get_scenario(
             play["scenario"],
-            **{k: tuple(v) if isinstance(v, list) else v for k, v in play["settings"].items()},
+            **dict[str, Any](
+                (k, tuple(v) if isinstance(v, list) else v) for k, v in play["settings"].items()
+            ),
         )
         for play in check["plays"]
     ]

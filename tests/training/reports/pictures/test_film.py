@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from PIL import Image
 
 import posse
 from posse.rendering.renderer import Renderer
-from posse.rendering.style import TARGET
+from posse.rendering.style import TARGET, TASK_COLOURS
 from posse_baselines import load
+from posse_training.errors import MissingExtraError
 from posse_training.reports.pictures.film import film
 from posse_training.reports.pictures.gif import write_gif
 
@@ -87,15 +89,105 @@ def test_a_film_ends_with_the_episode(tmp_path: Path) -> None:
     assert len(read(path)[0]) == 6
 
 
+def test_a_film_may_begin_later(tmp_path: Path) -> None:
+    policies = [("a", load("pursuit"))]
+    settings: dict[str, Any] = {"seed": 3, "size": 200, "speed": 1.0}
+    whole, _ = read(film(policies, "smart", path=tmp_path / "a.gif", seconds=3.0, **settings))
+    later, _ = read(
+        film(policies, "smart", path=tmp_path / "b.gif", start=2.0, seconds=1.0, **settings)
+    )
+    assert (len(whole), len(later)) == (31, 11)
+    for k in (0, 5, 10):  # each has a palette of its own
+        assert (np.abs(whole[20 + k].astype(int) - later[k]) <= 24).mean() > 0.99
+
+
+def test_the_speed_is_written_in_the_film(tmp_path: Path) -> None:
+    settings: dict[str, Any] = {"seed": 3, "seconds": 0.3, "size": 560}
+    policies = [("a", load("idle"))]
+    made = []
+    for speed in (1.0, 4.0):
+        path = film(policies, "smart", path=tmp_path / f"{speed}.gif", speed=speed, **settings)
+        made.append(read(path)[0][0].astype(int))
+    differs = np.abs(made[0] - made[1]).max(axis=-1) > 40
+    rows, columns = np.nonzero(differs)
+    inside = (rows > 35) & (rows < 60) & (columns < 40)  # below the header, on the left
+    assert inside.sum() > 10
+    assert inside.mean() > 0.9  # each film has a palette of its own
+
+
+def test_one_camera_shows_every_panel_on_one_scale(tmp_path: Path) -> None:
+    # The grid lies at the same pixels of both panels, though the teams are elsewhere.
+    policies = [("one", load("pursuit")), ("two", load("idle"))]
+    path = film(policies, "smart", path=tmp_path / "a.gif", seed=3, seconds=4.0, size=(702, 350))
+    last = read(path)[0][-1]
+    assert last.shape == (350, 702, 3)
+    left, right = last[40:320, :350].astype(int), last[40:320, 352:].astype(int)
+    assert (np.abs(left - right).max(axis=-1) <= 8).mean() > 0.95
+    assert (np.abs(left - right).max(axis=-1) > 60).sum() > 50
+
+
+@pytest.mark.parametrize(("policy", "leads"), [("ddcs-distributed", 0), ("ddcs-centralized", 1)])
+def test_only_a_team_with_a_leader_has_one_in_its_film(
+    policy: str, leads: int, tmp_path: Path
+) -> None:
+    path = film([("a", load(policy))], "smart", path=tmp_path / "a.gif", seconds=0.3, size=560)
+    footer = read(path)[0][-1][-26:].astype(int)
+    exchange = np.abs(footer - TASK_COLOURS[3]).max(axis=-1) <= 6
+    assert (exchange.sum() > 20) == leads
+    searching = np.abs(footer - TASK_COLOURS[0]).max(axis=-1) <= 6
+    assert searching.sum() > 20
+
+
+def test_an_mp4_holds_the_same_pictures(tmp_path: Path) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    policies = [("a", load("pursuit"))]
+    settings: dict[str, Any] = {"seed": 3, "seconds": 2.0, "size": 301, "speed": 1.5}
+    gif, _ = read(film(policies, "smart", path=tmp_path / "a.gif", **settings))
+    path = film(policies, "smart", path=tmp_path / "a.mp4", **settings)
+    reader = imageio_ffmpeg.read_frames(str(path))
+    about = next(reader)
+    width, height = about["size"]
+    assert (width, height) == (302, 302)  # H.264 wants even sides
+    assert about["fps"] == pytest.approx(15.0)
+    frames = [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in reader]
+    assert len(frames) == len(gif) == 21
+    for k in (0, 10, 20):
+        off = np.abs(frames[k][:301, :301].astype(int) - gif[k]).max(axis=-1)
+        assert (off < 40).mean() > 0.98
+
+
+def test_an_mp4_of_slow_motion_repeats_its_frames(tmp_path: Path) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    path = film(
+        [("a", load("idle"))], "smart", path=tmp_path / "a.mp4", seconds=1.0, speed=0.25, size=200
+    )
+    about = next(imageio_ffmpeg.read_frames(str(path)))
+    assert about["fps"] == pytest.approx(10.0)
+    assert about["duration"] == pytest.approx(11 * 0.4, abs=0.11)
+
+
+def test_an_mp4_without_its_extra_says_how_to_install_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'posse\[video\]'"):
+        film([("a", load("idle"))], "smart", path=tmp_path / "a.mp4", seconds=1.0)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         ({"policies": []}, "No policies given"),
-        ({"path": "film.mp4"}, r"must end in \.gif"),
+        ({"path": "film.avi"}, r"must end in \.gif or \.mp4"),
         ({"seconds": 0.0}, "seconds=0.0 must be"),
         ({"speed": float("nan")}, "speed=nan must be"),
         ({"every": 0}, "every=0 must be a whole number"),
         ({"size": 20}, "size=20 must be at least 200"),
+        ({"size": (400, 100)}, r"size=\(400, 100\) must be at least 200"),
+        ({"size": 5000}, "size=5000 makes a film of more than 4096 px"),
+        ({"start": -1.0}, r"start=-1.0 \(--from\) must be a finite number, at least 0"),
+        ({"start": 60.0}, r"start=60.0 \(--from\) must be below 60 s"),
         ({"scenario": "smrt"}, "unknown scenario 'smrt'"),
         ({"target_motion": "agent"}, "the target of 'smart' is an agent"),
     ],

@@ -14,7 +14,7 @@ from posse.rendering.style import PALETTE
 
 Frame = npt.NDArray[np.uint8]
 
-_BLENDS: Final = 40  # colours for fading and anti-aliased edges
+_BLENDS: Final = 64  # colours for fading and anti-aliased edges
 _TRANSPARENT: Final = 255
 _SAMPLED: Final = 12  # frames that the palette is made from
 _LAST_SHOWN: Final = 1.5  # s, before the film repeats
