@@ -59,7 +59,13 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         (["watch", "pursuit", "--seed", "-1"], "seed=-1"),
         (["watch", "pursuit", "--world", "-1"], "world=-1"),
         (["watch", "pursuit", "--split", "tests"], "unknown split 'tests'"),
-        (["watch", "pursuit", "--gif", "film.mp4"], "must end in .gif"),
+        (["watch"], "No policies given"),
+        (["watch", "pursuit", "--film", "film.avi"], "must end in .gif or .mp4"),
+        (["watch", "pursuit", "--film", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
+        (["watch", "pursuit", "--film", "film.gif", "--speed", "0"], "speed=0.0 must be"),
+        (["watch", "pursuit", "--film", "film.gif", "--size", "9", "9"], "at least 200 px"),
+        (["watch", "pursuit", "--speed", "2"], "--speed 2 is for films: add --film film.gif"),
+        (["watch", "pursuit", "--size", "9", "9"], "--size 9 9 must be 200 to 4096 px"),
         (["watch", "numpy:ndarray"], "cannot be created without arguments"),
         (["reproduce", "--seed", "-1"], "seed=-1"),
         (["compare"], "No policies given"),
@@ -106,7 +112,7 @@ def test_who_stops_a_training_is_told_how_to_go_on(
 
 def test_watch_writes_a_film(tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
-    options = ["--scenario", "paper-distributed", "--num-trackers", "2", "--gif", str(path)]
+    options = ["--scenario", "paper-distributed", "--num-trackers", "2", "--film", str(path)]
     assert main(["watch", "pursuit", *options]) == 0
     assert path.read_bytes()[:4] == b"GIF8"
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import tyro
 
 from posse_training.errors import SettingsError
 
+_SIZE: Final = (1280, 720)
+_LEAST, _MOST = 200, 4096
+
 
 @dataclass(frozen=True)
 class _Watch:
-    """Show a policy in one world, in a window or as a film."""
+    """Show policies in one world, in a window or as a film. Press H in the window for its keys."""
 
-    policy: Annotated[str, tyro.conf.Positional]
-    """Policy: a name, a file, or package.module:Class."""
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Policies: names, files, or package.module:Class. The window shows the first and
+    switches to the others (P); a film shows all side by side."""
     scenario: str = "smart"
     """Scenario to play."""
     seed: int = 7
@@ -28,43 +32,61 @@ class _Watch:
     """Split of the world: train, validation or test."""
     num_trackers: int | None = None
     """Trackers in the team; default: the scenario's."""
-    gif: Path | None = None
-    """Write a film to this file instead of opening a window."""
+    size: tuple[int, int] | None = None
+    """Width and height of window or film, px; default: 1280 720 for a window."""
+    film: Path | None = None
+    """Write a film to this file (.gif or .mp4) instead of opening a window."""
+    start: Annotated[float, tyro.conf.arg(name="from")] = 0.0
+    """Simulated time at which a film begins, s."""
+    seconds: float | None = None
+    """Simulated time that a film shows, s; default: to the end of the episode."""
+    speed: float | None = None
+    """Simulated seconds per second of a film; default: 1.5."""
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Show a policy in one world."""
+    """Show policies in one world."""
     which = tyro.cli(_Watch, prog="posse watch", args=arguments)
-    from posse import Batch, get_scenario
-    from posse.rendering.renderer import Renderer
-    from posse_baselines import begin, load
+    from posse import get_scenario
 
-    policy = load(which.policy)
+    if not which.policies:
+        raise SettingsError("No policies given. Pass at least one, such as ddcs-distributed.")
     overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
     scenario = get_scenario(which.scenario, **overrides)
-    if which.gif is not None:
+    if which.film is not None:
+        from posse_baselines import load
         from posse_training.reports.pictures.film import film
 
+        policies = [load(name) for name in which.policies]
         print(
             film(
-                [(policy.name, policy)], scenario, path=which.gif, seed=which.seed,
-                world=which.world, split=which.split, seconds=scenario.duration,
+                [(policy.name, policy) for policy in policies], scenario, path=which.film,
+                seed=which.seed, world=which.world, split=which.split, start=which.start,
+                seconds=scenario.duration if which.seconds is None else which.seconds,
+                speed=1.5 if which.speed is None else which.speed, size=which.size,
             )
         )  # fmt: skip
         return
-    longest = max(scenario.message_size, policy.message_size)
-    settings = scenario.replace(message_size=longest)
-    batch = Batch(settings, 1, seed=which.seed, split=which.split, first_world=which.world)
-    memory, observations = begin(policy, batch), batch.reset()
-    renderer = Renderer(settings, mode="human", title=policy.name)
-    for _ in range(settings.horizon):
-        actions, memory = policy.act(observations, memory)
-        observations, *_ = batch.step(actions)
-        try:
-            renderer.draw(batch, annotations=policy.annotations(memory))
-        except RuntimeError as error:  # no window can be opened
-            raise SettingsError(f"{error}; or write a film: --gif film.gif") from error
-        if renderer.closed:
-            break
-    renderer.close()
-    print(f"score {batch.metrics()['score'][0]:.3f} after {batch.worlds['step'][0]} steps")
+    given = {"--from": which.start or None, "--seconds": which.seconds, "--speed": which.speed}
+    for option, value in given.items():
+        if value is not None:
+            raise SettingsError(
+                f"{option} {value:g} is for films: add --film film.gif, or leave it out"
+            )
+    size = which.size or _SIZE
+    if not all(_LEAST <= side <= _MOST for side in size):
+        raise SettingsError(f"--size {size[0]} {size[1]} must be {_LEAST} to {_MOST} px each")
+    from posse_baselines import policy_names
+    from posse_training.viewer.viewer import Viewer
+    from posse_training.viewer.window import open_window, run
+
+    others = [name for name in policy_names() if name not in which.policies]
+    names = [*which.policies, *(others if len(which.policies) == 1 else [])]
+    viewer = Viewer(
+        names, scenario, seed=which.seed, world=which.world, split=which.split, size=size
+    )
+    command = f"posse watch {' '.join(which.policies)} --scenario {which.scenario}"
+    open_window(size, f"posse: {scenario.name}", f"write a film: {command} --film film.gif")
+    run(viewer)
+    moment = viewer.moment
+    print(f"{viewer.tape.name}: score {moment.scene.score:.3f} after {moment.scene.time:.1f} s")
