@@ -27,6 +27,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "tune": _Command("tune the settings of a scripted team", "tuning.command"),
     "compare": _Command("score policies on the same worlds", "reports.compare"),
     "watch": _Command("show a policy in a window, or film it", "commands.watch"),
+    "play": _Command("drive the target, or a tracker, in a window", "commands.play"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),
     "ship": _Command("make the best of several runs a policy of the package", "shipping.ship"),
     "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),

@@ -1,1 +1,1 @@
-"""The commands ``posse train``, ``posse watch`` and ``posse scenarios``."""
+"""The commands ``train``, ``watch``, ``play`` and ``scenarios``."""
