@@ -1,0 +1,88 @@
+"""Tables of what the code declares: settings, observation fields, metrics, reward terms."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+
+import posse
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a Markdown table."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(map(_cell, line)) + " |" for line in lines) + "\n"
+
+
+def _cell(value: object) -> str:
+    return str(value).replace("|", "\\|").replace("\n", " ")
+
+
+def code(text: object) -> str:
+    """Return a text as code, or nothing for an empty one."""
+    return f"`{text}`" if str(text) else ""
+
+
+def all_settings() -> str:
+    """Return every setting of a scenario with default, unit, range and meaning."""
+    defaults = {field.name: field.default for field in dataclasses.fields(posse.Scenario)}
+    rows = []
+    for name, setting in posse.Scenario.settings().items():
+        default = defaults[name]
+        shown = "" if default is dataclasses.MISSING else code(value(default))
+        meaning = setting.meaning + (f" (paper, {setting.source})" if setting.source else "")
+        rows.append((code(name), shown, setting.unit, setting.range, meaning))
+    return table(("setting", "default", "unit", "range", "meaning"), rows)
+
+
+def settings(scenario: str) -> str:
+    """Return the settings of a named scenario that differ from the defaults."""
+    own = posse.get_scenario(scenario)
+    rows = []
+    for field in dataclasses.fields(own):
+        given = getattr(own, field.name)
+        if field.name == "name" or given == field.default:
+            continue
+        setting = own.settings()[field.name]
+        rows.append(
+            (code(field.name), code(value(given)), code(value(field.default)), setting.unit,
+             setting.meaning)
+        )  # fmt: skip
+    if not rows:
+        return "All settings have their defaults.\n"
+    return table(("setting", "here", "default", "unit", "meaning"), rows)
+
+
+def value(given: object) -> str:
+    """Return a value as a user writes it."""
+    if isinstance(given, float) and math.isclose(given, 2 * math.pi):
+        return "2π"
+    if isinstance(given, tuple) and given and isinstance(given[0], tuple):
+        return str(dict(given))
+    return f"{given:g}" if isinstance(given, float) else repr(given)
+
+
+def observation_fields(scenario: str) -> str:
+    """Return the fields of a scenario's observation."""
+    rows = [
+        (
+            code(field.name) + (" (of each team-mate)" if field.of_neighbour else ""),
+            field.size, field.unit, f"[{field.low:.4g}, {field.high:.4g}]",
+            "" if field.unknown is None else f"{field.unknown:g}", field.meaning,
+        )
+        for field in posse.observation_fields(scenario)
+    ]  # fmt: skip
+    return table(("field", "numbers", "unit", "range", "unknown", "meaning"), rows)
+
+
+def metrics() -> str:
+    """Return the metrics of an episode."""
+    rows = [(code(metric.name), metric.unit, metric.meaning) for metric in posse.METRICS]
+    return table(("metric", "unit", "meaning"), rows)
+
+
+def reward_terms() -> str:
+    """Return the terms of the reward."""
+    rows = [(code(term.name), term.unit, term.meaning) for term in posse.REWARD_TERMS]
+    return table(("term", "unit", "meaning"), rows)

@@ -1,0 +1,112 @@
+"""The manual: it documents every public name, finds them, and loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import importlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import posse
+
+ROOT = Path(__file__).parents[2]
+MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay")
+LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install posse[docs]")
+    folder = tmp_path_factory.mktemp("manual") / "site"
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", folder],
+        cwd=ROOT, capture_output=True, text=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+class _Loaded(HTMLParser):
+    """Gathers the addresses of what a page loads by itself, unlike what its links lead to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        named = dict(attrs)
+        address = named.get(LOADED.get(tag, ""))
+        if address and not (tag == "link" and named.get("rel") == "canonical"):
+            self.found.append(address)
+
+
+def pages(site: Path) -> list[Path]:
+    found = sorted(site.rglob("*.html"))
+    assert len(found) > 15
+    return found
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_every_public_name_is_in_the_reference(site: Path, module: str) -> None:
+    package = module.partition(".")[0]
+    page = (site / "reference" / package / "index.html").read_text(encoding="utf-8")
+    names = importlib.import_module(module).__all__
+    assert [name for name in names if f'id="{module}.{name}"' not in page] == []
+
+
+def test_every_setting_is_in_the_table(site: Path) -> None:
+    page = (site / "settings" / "index.html").read_text(encoding="utf-8")
+    rows = [re.findall(r"<td.*?>(.*?)</td>", row) for row in re.findall(r"(?s)<tr>.*?</tr>", page)]
+    plain = [[html.unescape(re.sub("<.*?>", "", cell)) for cell in row] for row in rows]
+    shown = {row[0]: row for row in reversed(plain) if row}  # of a name, the first
+    for name, setting in posse.Scenario.settings().items():
+        assert shown[name][2] == setting.unit
+        assert shown[name][3] == setting.range
+        assert setting.meaning in shown[name][4]
+    for field in dataclasses.fields(posse.Scenario):
+        if isinstance(field.default, int) and not isinstance(field.default, bool):
+            assert shown[field.name][1] == str(field.default)
+
+
+def test_the_search_index_has_names_of_settings_and_errors(site: Path) -> None:
+    index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
+    separator = re.compile(index["config"]["separator"])
+    words: dict[str, set[str]] = {}
+    for entry in index["docs"]:
+        plain = html.unescape(re.sub(r"<.*?>", " ", entry["title"] + " " + entry["text"]))
+        for word in separator.split(plain):
+            words.setdefault(word, set()).add(entry["location"].partition("#")[0])
+    assert "settings/" in words["sonar_range"]
+    assert {"settings/", "reference/posse/"} <= words["ScenarioError"]
+
+
+def test_no_page_loads_anything_from_another_host(site: Path) -> None:
+    for page in pages(site):
+        loaded = _Loaded()
+        loaded.feed(page.read_text(encoding="utf-8"))
+        assert [a for a in loaded.found if re.match(r"(https?:)?//", a)] == [], page
+    for style in site.rglob("*.css"):
+        text = style.read_text(encoding="utf-8")
+        assert re.findall(r"(?:url\(|@import)\s*[\"']?(?:https?:)?//", text) == [], style
+
+
+def test_equations_are_typeset(site: Path) -> None:
+    for page in pages(site):
+        assert 'class="arithmatex"' not in page.read_text(encoding="utf-8"), page
+
+
+def test_the_repository_has_one_address() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    found = re.search(r"^repo_url: (\S+)", settings, re.MULTILINE)
+    assert found
+    assert found[1] == project["urls"]["Repository"]

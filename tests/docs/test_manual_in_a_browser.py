@@ -1,0 +1,72 @@
+"""Pages of the manual in a browser: search, two colour schemes, a phone's width, no other host."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from tests.docs.test_manual import pages, site
+from tests.support.browser import chromium, until
+
+__all__ = ["site"]
+PHONE = 390
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+        pass
+
+
+@pytest.fixture
+def address(site: Path) -> Iterator[str]:
+    handler = functools.partial(_Quiet, directory=str(site))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
+
+
+def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> None:
+    with chromium() as browser:
+        page = browser.new_page(viewport={"width": PHONE, "height": 844})
+        asked: list[str] = []
+        failed: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("pageerror", lambda error: failed.append(str(error)))
+        page.on("response", lambda got: failed.append(got.url) if got.status >= 400 else None)
+        wide = []
+        for path in pages(site):
+            if path.name == "index.html":
+                where = path.parent.relative_to(site).as_posix()
+                page.goto(address + ("" if where == "." else where + "/"))
+                if page.evaluate("document.documentElement.scrollWidth") > PHONE:
+                    wide.append(where)
+        own = (address, "data:", "blob:")
+        assert [url for url in asked if not url.startswith(own)] == []
+        assert failed == []
+        assert wide == []
+
+
+@pytest.mark.parametrize("name", ["sonar_range", "ScenarioError"])
+def test_search_finds(address: str, name: str) -> None:
+    with chromium() as browser:
+        page = browser.new_page()
+        page.goto(address)
+        page.fill("input.md-search__input", name)
+        until(page, "document.querySelectorAll('.md-search-result__link').length > 0")
+        found = page.inner_text(".md-search-result__list")
+        assert name in found
+
+
+def test_light_and_dark(address: str) -> None:
+    with chromium() as browser:
+        for wanted, scheme in (("light", "default"), ("dark", "slate")):
+            context = browser.new_context(color_scheme="dark" if wanted == "dark" else "light")
+            page = context.new_page()
+            page.goto(address)
+            until(page, f"document.body.getAttribute('data-md-color-scheme') === '{scheme}'")
+            context.close()
