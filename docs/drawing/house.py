@@ -1,6 +1,6 @@
 """Draws docs/media/house.svg: the rooms of the packages with purpose and size of each.
 
-    python docs/house.py
+    python docs/drawing/house.py
 
 Purposes (the first paragraph of a room's docstring) and sizes are read from the sources. A room of
 ``posse`` imports only rooms below it, which tests/test_imports.py checks.
@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SOURCES = {"posse_training": "training", "posse_baselines": "baselines", "posse": "envs"}
 COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "#fbe8cf"}
 # Rooms from top to bottom.
