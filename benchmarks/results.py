@@ -1,6 +1,6 @@
 """Part of ``make results``: evaluates the scripted teams on every scenario, 1,000 test worlds each.
 
-Writes docs/results.md, with seed and commit, and its data. Nothing was tuned on these worlds.
+Writes docs/results.md, with seed and commit, its data, and the result files of the leaderboard. Nothing was tuned on these worlds.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import numpy as np
 import tyro
 
 import posse
+from leaderboard import keep
+from posse_baselines import load
 from posse_training.provenance import commit
 from posse_training.reports.evaluation import Results, evaluate
 from posse_training.reports.statistics import Estimate, mean, share
@@ -56,6 +58,7 @@ def main() -> None:
     for scenario, policy in sorted(plays, key=lambda play: SCENARIOS.index(play[0])):
         result = evaluate(policy, scenario, settings.episodes, settings.seed, split=settings.split)
         result.write(settings.rows / f"{scenario}-{policy}.csv")
+        keep(policy, load(policy), result)
         results[scenario, policy] = result
         print(f"{scenario:12s} {policy:30s} {mean(result['safe_score'])}", flush=True)
     straight = {

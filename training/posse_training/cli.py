@@ -30,6 +30,8 @@ COMMANDS: Final[dict[str, _Command]] = {
     "play": _Command("drive the target, or a tracker, in a window", "commands.play"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),
     "ship": _Command("make the best of several runs a policy of the package", "shipping.ship"),
+    "submit": _Command("write a result file for the leaderboard", "leaderboard.submit"),
+    "verify": _Command("play a result file again and check it", "leaderboard.verify"),
     "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
 }

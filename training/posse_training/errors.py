@@ -34,13 +34,17 @@ class TimeLimitError(RuntimeError):
     """An evaluation that exceeded its time limit."""
 
 
+class ResultFileError(ValueError):
+    """A result file of the leaderboard that is damaged, forged, or cannot be checked."""
+
+
 class MissingExtraError(ImportError):
     """A package that only an extra installs; the message says which."""
 
 
 OWN: Final = (
     SettingsError, RunFolderError, CheckpointError, DivergedError, ComparisonError,
-    TrainedSplitError, TimeLimitError, MissingExtraError,
+    TrainedSplitError, TimeLimitError, ResultFileError, MissingExtraError,
 )  # fmt: skip
 """All errors of this module."""
 
