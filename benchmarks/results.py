@@ -1,6 +1,7 @@
 """Part of ``make results``: evaluates the scripted teams on every scenario, 1,000 test worlds each.
 
-Writes docs/results.md, with seed and commit, its data, and the result files of the leaderboard. Nothing was tuned on these worlds.
+Writes docs/results.md, with seed and commit, its data, and the result files of the leaderboard.
+Nothing was tuned on these worlds.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from leaderboard import keep
 
 import posse
-from leaderboard import keep
 from posse_baselines import load
 from posse_training.provenance import commit
 from posse_training.reports.evaluation import Results, evaluate

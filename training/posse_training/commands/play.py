@@ -54,8 +54,9 @@ def main(arguments: Sequence[str]) -> None:
     from posse_training.replay import write_replay
     from posse_training.viewer.window import open_window, run
 
-    overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
-    scenario = get_scenario(which.scenario, **overrides)
+    scenario = get_scenario(which.scenario)
+    if which.num_trackers is not None:
+        scenario = scenario.replace(num_trackers=which.num_trackers)
     robot = robot_of(which.robot, scenario.num_trackers)
     game = Game(
         load(which.against), scenario, robot, seed=which.seed, world=which.world,

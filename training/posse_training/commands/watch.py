@@ -51,8 +51,9 @@ def main(arguments: Sequence[str]) -> None:
 
     if not which.policies:
         raise SettingsError("No policies given. Pass at least one, such as ddcs-distributed.")
-    overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
-    scenario = get_scenario(which.scenario, **overrides)
+    scenario = get_scenario(which.scenario)
+    if which.num_trackers is not None:
+        scenario = scenario.replace(num_trackers=which.num_trackers)
     if which.film is not None:
         from posse_baselines import load
         from posse_training.reports.pictures.film import film

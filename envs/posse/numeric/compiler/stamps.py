@@ -22,8 +22,11 @@ import numpy as np
 _POSSE: Final = Path(__file__).resolve().parents[2]
 _NO_KERNELS: Final = {
     "posse": ("adapters", "rendering"),
-    "posse_training": ("commands", "replay", "reports", "runs", "shipping"),
-}
+    "posse_training": (
+        "commands", "leaderboard", "play", "replay", "reports", "runs", "shipping", "tuning",
+        "viewer",
+    ),
+}  # fmt: skip
 """Rooms without compiled code, by package; kernels do not depend on them."""
 
 _STAMPED_BY_VERSION: Final = ("numba", "llvmlite", "numpy")
