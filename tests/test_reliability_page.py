@@ -6,6 +6,9 @@ import ast
 import re
 from pathlib import Path
 
+from tests.fuzz.campaigns import CAMPAIGNS
+from tests.fuzz.page import BEGIN, END
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -17,3 +20,10 @@ def test_every_promise_names_tests_that_exist() -> None:
         tree = ast.parse((ROOT / path).read_text())
         found = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
         assert name in found, f"{path}::{name}"
+
+
+def test_the_page_says_what_each_campaign_plays() -> None:
+    page = (ROOT / "docs" / "reliability.md").read_text()
+    for name, campaign in CAMPAIGNS.items():
+        assert f"| `{name}` | {campaign.one_try} |" in page
+    assert 0 < page.index(BEGIN) < page.index(END)
