@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tests.fuzz.elsewhere import CALLS, run, timed
+from tests.fuzz.kernel_cache import KERNELS
 from tests.support.runs import numbers, small
 
 from posse_baselines.learned import LearnedPolicy
@@ -216,7 +217,17 @@ def _sound_policy(folder: Path) -> None:
 
 
 def _kernels(folder: Path) -> list[str]:
-    return ["compile-kernels", str(folder / "cache")]
+    return ["compile-kernels", str(folder / "cache"), str(_code())]
+
+
+@functools.cache
+def _code() -> Path:
+    """Write the kernels elsewhere than their cache, whose disk may be full."""
+    folder = Path(_kept().name) / "code"
+    (folder / "fuzzed").mkdir(parents=True)
+    (folder / "fuzzed" / "__init__.py").touch()
+    (folder / "fuzzed" / "kernels.py").write_text(KERNELS)
+    return folder
 
 
 COMMANDS: Final[dict[str, Command]] = {

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posse_training.errors import ComparisonError, SettingsError
-from posse_training.files import locked
+from posse_training.files import LOCK, locked
+from posse_training.reports import comparison_folder
 from posse_training.reports.compare import Settings, compare
 from posse_training.reports.comparison_folder import MARKER, FileNames, replaced
 from posse_training.reports.results import Results
@@ -79,6 +82,26 @@ def test_a_full_disk_is_named_and_the_old_one_is_kept(
     with pytest.raises(ComparisonError, match=r"No space left.*earlier comparison.*unchanged"):
         compare(given)
     assert contents(out) == before
+    only(out)
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    write(out, "a.csv")
+
+    @contextlib.contextmanager
+    def full(folder: Path) -> Iterator[None]:
+        folder.mkdir()
+        (folder / LOCK).touch()
+        raise OSError(28, "No space left on device")
+        yield
+
+    monkeypatch.setattr(comparison_folder, "locked", full)
+    with pytest.raises(ComparisonError, match=r"out: No space left.*unchanged"):
+        write(out, "b.csv")
+    assert set(contents(out)) == {"a.csv", MARKER}
     only(out)
 
 

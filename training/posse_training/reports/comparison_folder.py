@@ -66,6 +66,7 @@ def replaced(out: Path) -> Iterator[Path]:
                 "or choose another --out"
             ) from error
         except OSError as error:
+            _drop_unused(partial)
             raise _cannot_write(out, error) from error
         try:
             yield partial
@@ -127,6 +128,13 @@ def _empty(folder: Path) -> None:
             shutil.rmtree(path)
         elif path.name != LOCK:
             path.unlink()
+
+
+def _drop_unused(folder: Path) -> None:
+    """Remove a temporary folder that a full disk left with nothing in it but an empty lock."""
+    with contextlib.suppress(OSError):
+        if all(path.name == LOCK and not path.stat().st_size for path in folder.iterdir()):
+            shutil.rmtree(folder)
 
 
 def _recover(out: Path, previous: Path) -> None:
