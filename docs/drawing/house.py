@@ -22,6 +22,7 @@ COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "
 LINES = (
     ("posse_training.cli",),
     ("posse_training.commands", "posse_training.shipping"),
+    ("posse_training.viewer", "posse_training.play"),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl"),
     ("posse_baselines.learned", "posse_baselines.policies"),
@@ -34,7 +35,7 @@ LINES = (
     ("posse.scenarios",),
     ("posse.numeric",),
 )
-PACKAGE_BEGINS = {0: "posse_training", 4: "posse_baselines", 7: "posse"}
+PACKAGE_BEGINS = {0: "posse_training", 5: "posse_baselines", 8: "posse"}
 WIDTH, HEIGHT, STEP, GAP = 8.0, 0.78, 0.95, 0.16
 
 
@@ -82,7 +83,7 @@ def size_of(room: str) -> str:
 def draw() -> None:
     """Draw the picture."""
     plt.rcParams["svg.hashsalt"] = "posse"  # the same sources give the same file
-    figure, axes = plt.subplots(figsize=(10, 10.5))
+    figure, axes = plt.subplots(figsize=(10, 11.2))
     for row, rooms in enumerate(LINES):
         width = (WIDTH - GAP * (len(rooms) - 1)) / len(rooms)
         for column, room in enumerate(rooms):

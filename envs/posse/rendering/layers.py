@@ -259,7 +259,9 @@ def wafer(d: Drawing, place: Floats, heading: Floats, colour: Colour, rim: Colou
     radius, point = d.radius, d.point
     d.canvas.disc(place, radius, rim)
     d.canvas.disc(place, radius - 1.2 * point, colour)
-    d.canvas.line(place, place + heading * (radius + 3.5 * point), 1.8 * point, rim)
+    start = 0.75 * radius if d.view.numbers and radius >= _NUMBERED else 0.0
+    end = place + heading * (radius + 3.5 * point)
+    d.canvas.line(place + heading * start, end, 1.8 * point, rim)
 
 
 def leader_mark(canvas: Canvas, tip: Floats, size: float) -> None:

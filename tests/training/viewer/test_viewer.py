@@ -297,8 +297,9 @@ def test_the_panel_says_what_the_robot_observed() -> None:
         assert "leader" not in lines
         blocks = [line.name for line in lines_of(moment, layout, robot) if line.is_heading]
         assert blocks[:4] == [
-            "action and reward", "observed: own motion", "observed: task", "observed: target",
+            "action and reward", "observed: own motion", "observed: target", "observed: sonar",
         ]  # fmt: skip
+        assert blocks[-1] == "observed: task"
     target = {line.name: line.value for line in lines_of(moment, layout, 5)}
     assert target["slots occupied"] == f"{int(moment.scene.occupied.sum())} of 5"
 

@@ -1,4 +1,4 @@
-"""The windows of ``posse watch``: one world, played by policies, looked at closely."""
+"""The window of ``posse watch``: one world played by policies; state, time and drawing apart."""
 
 import os
 

@@ -103,18 +103,20 @@ def _action(moment: Moment, scenario: Scenario, i: int) -> list[Line]:
 
 
 def _observation(moment: Moment, layout: ObservationLayout, i: int) -> list[Line]:
+    """Return the observation by block; last the task, most of which never changes."""
     views = layout.views(moment.observations[i])
-    lines: list[Line] = []
-    block = ""
+    blocks: dict[str, list[Line]] = {}
     for field in layout.fields:
         if field.of_neighbour:
             continue
-        if block_of(field) != block:
-            block = block_of(field)
-            lines.append(Line(f"observed: {block}"))
+        block = blocks.setdefault(block_of(field), [])
         value = np.atleast_1d(views[field.name])
         known = _is_known(field, value, bool(views["target_known"]))
-        lines.append(_field_line(field, field.name, value, known))
+        block.append(_field_line(field, field.name, value, known))
+    task = blocks.pop("task", [])
+    lines: list[Line] = []
+    for name, block in blocks.items():
+        lines += [Line(f"observed: {name}"), *block]
     mates = [field for field in layout.fields if field.of_neighbour]
     for place in range(layout.neighbours if mates else 0):
         number = int(views["neighbour_number"][place])
@@ -126,7 +128,7 @@ def _observation(moment: Moment, layout: ObservationLayout, i: int) -> list[Line
             name = field.name.removeprefix("neighbour_")
             value = np.atleast_1d(views[field.name][place])
             lines.append(_field_line(field, name, value, _is_known(field, value, True)))
-    return lines
+    return [*lines, Line("observed: task"), *task] if task else lines
 
 
 def _is_known(field: Field, value: npt.NDArray[Any], block_known: bool) -> bool:

@@ -98,6 +98,7 @@ class Viewer:
     def resize(self, size: tuple[int, int]) -> None:
         """Fit the viewer to a window of a size (width, height), px."""
         self._size = size
+        self._drawn: tuple[object, pygame.Surface] | None = None
         width, height = self.layout.size
         self._canvas = Canvas((width, height), 3 if width * height <= _FINE else 2)
         self._place_camera()
@@ -175,7 +176,14 @@ class Viewer:
         )  # fmt: skip
 
     def draw(self) -> pygame.Surface:
-        """Return a picture of the window."""
+        """Return a picture of the window; valid until the next call."""
+        state = replace(self.state, step=float(int(self.state.step)))
+        shown = (state, self._noted, self._tape.last, self.message)
+        if self._drawn is None or self._drawn[0] != shown:  # else nothing has changed
+            self._drawn = (shown, self._draw())
+        return self._drawn[1]
+
+    def _draw(self) -> pygame.Surface:
         layout, canvas, state = self.layout, self._canvas, self.state
         canvas.clip(None)
         scene = self.moment.scene

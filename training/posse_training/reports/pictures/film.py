@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ from posse_training.reports.pictures.mp4 import check_mp4, write_mp4
 FORMATS: Final = (".gif", ".mp4")
 LARGEST: Final = 4096
 """Greatest width and height of a film, px."""
+_MOST_BYTES: Final = 2 << 30  # of the frames of a GIF, which are all in memory at once
 _SEAM: Final = 2  # px between panels
 
 
@@ -97,14 +99,24 @@ def film(
     ]
     if path.suffix.lower() == ".mp4":
         check_mp4()
-    frames = list(_frames(panels, first, last, every, f"{speed:g}× speed"))
-    if not frames:
+    frames = _frames(panels, first, last, every, f"{speed:g}× speed")
+    try:
+        opening = next(frames)
+    except StopIteration:
         raise SettingsError(
             f"start={start!r} (--from) lies behind the end of every episode: start earlier"
-        )
+        ) from None
     path.parent.mkdir(parents=True, exist_ok=True)
-    write = write_gif if path.suffix.lower() == ".gif" else write_mp4
-    write(path, frames, every * dt / speed)
+    frame_time = every * dt / speed
+    if path.suffix.lower() == ".mp4":
+        write_mp4(path, itertools.chain([opening], frames), frame_time)
+        return path
+    if opening.nbytes * ((last - first) // every + 2) > _MOST_BYTES:
+        raise SettingsError(
+            f"a GIF of {(last - first) * dt:g} s at {opening.shape[1]} x {opening.shape[0]} px is "
+            "too large: make it shorter (--seconds) or smaller (--size), or write an .mp4"
+        )
+    write_gif(path, [opening, *frames], frame_time)
     return path
 
 
