@@ -1,6 +1,6 @@
 """Part of ``make results``: evaluates the scripted teams on every scenario, 1,000 test worlds each.
 
-Writes docs/results.md, with seed and commit, its data, and the result files of the leaderboard.
+Writes docs/results.md, with seed and commit, its data, and result files for the leaderboard.
 Nothing was tuned on these worlds.
 """
 

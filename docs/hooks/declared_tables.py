@@ -38,15 +38,15 @@ def all_settings() -> str:
 
 def settings(scenario: str) -> str:
     """Return the settings of a named scenario that differ from the defaults."""
-    own = posse.get_scenario(scenario)
+    own, plain = posse.get_scenario(scenario), posse.Scenario(name="plain")
     rows = []
     for field in dataclasses.fields(own):
-        given = getattr(own, field.name)
-        if field.name == "name" or given == field.default:
+        given, default = getattr(own, field.name), getattr(plain, field.name)
+        if field.name == "name" or given == default:
             continue
         setting = own.settings()[field.name]
         rows.append(
-            (code(field.name), code(value(given)), code(value(field.default)), setting.unit,
+            (code(field.name), code(value(given)), code(value(default)), setting.unit,
              setting.meaning)
         )  # fmt: skip
     if not rows:

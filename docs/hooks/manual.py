@@ -11,8 +11,11 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from mkdocs.exceptions import PluginError
+from mkdocs.structure.pages import Page
+from mkdocs.utils import get_relative_url
 
 import declared_tables
+import standings
 from equations import typeset
 
 PARTS: Final[dict[str, Callable[..., str]]] = {
@@ -21,13 +24,18 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "observation_fields": declared_tables.observation_fields,
     "metrics": declared_tables.metrics,
     "reward_terms": declared_tables.reward_terms,
+    "replay": standings.replay,
+    "gallery": standings.gallery,
+    "scores": standings.scores,
+    "leaderboard": standings.leaderboard,
 }
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Fill in the parts of a page."""
-    return _PART.sub(_made, markdown)
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """Fill in the parts of a page; ``site:`` in them is the way to the manual's root."""
+    root = get_relative_url(".", page.url).rstrip("/") + "/"
+    return _PART.sub(lambda found: _made(found).replace("site:", root), markdown)
 
 
 def on_page_content(html: str, **_: Any) -> str:

@@ -19,7 +19,10 @@ import pytest
 import posse
 
 ROOT = Path(__file__).parents[2]
-MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay")
+MODULES = (
+    "posse", "posse_baselines", "posse_training", "posse_training.replay",
+    "posse_training.leaderboard",
+)  # fmt: skip
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
 
 

@@ -1,0 +1,99 @@
+"""Makes what the pages of the scenarios show: a replay and a picture of each.
+
+    python docs/drawing/gallery.py [--scenarios smart field]
+
+Writes docs/media/replays/NAME.html, docs/media/scenarios/NAME.png of the last team in it, and
+docs/media/replays/NAME-others.html of further teams in the same world, for the leaderboard.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import tyro
+from PIL import Image
+
+import posse
+from posse.rendering.renderer import Renderer
+from posse_baselines import begin, load
+from posse_training.replay import record, write_replay
+
+MEDIA: Final = Path(__file__).parents[1] / "media"
+SEED: Final = 7
+OTHERS: Final = ("pursuit", "ddcs-centralized", "learned-generalist", "planner")
+SIDE: Final = 440  # px of a picture
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Who plays in a scenario's replay, in which world, and which instant is the picture, s."""
+
+    teams: tuple[str, ...]
+    world: int = 0
+    seconds: float = 40.0
+    picture: float = 14.0
+
+
+GALLERY: Final = {
+    "constant": Shown(("pngl-l-phi", "ddcs-distributed"), seconds=30.0),
+    "accelerating": Shown(("pngl-l-phi", "ddcs-distributed"), seconds=30.0),
+    "smart": Shown(("ddcs-distributed", "learned-smart"), picture=18.0),
+    "search": Shown(("pngl-l-phi", "ddcs-distributed"), picture=24.0),
+    "obstacles": Shown(("ddcs-distributed", "learned-obstacles")),
+    "radio": Shown(("ddcs-distributed", "learned-radio"), picture=10.0),
+    "leader-loss": Shown(
+        ("ddcs-centralized-no-exchange", "pngl-l-phi"), seconds=30.0, picture=20.0
+    ),
+    "field": Shown(("ddcs-distributed", "learned-field"), picture=26.0),
+    "paper-centralized": Shown(("pngl-l-phi", "ddcs-centralized"), seconds=8.0, picture=4.0),
+    "paper-distributed": Shown(("pngl", "ddcs-distributed"), seconds=8.0, picture=4.0),
+}
+
+
+@dataclass(frozen=True)
+class _Arguments:
+    scenarios: tuple[str, ...] = tuple(GALLERY)
+
+
+def picture(scenario: str, shown: Shown) -> Image.Image:
+    """Return a picture of the last team of a scenario's replay."""
+    policy = load(shown.teams[-1])
+    settings = posse.get_scenario(scenario)
+    settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
+    batch = posse.Batch(settings, 1, seed=SEED, split="test", first_world=shown.world)
+    renderer = Renderer(settings, size=(SIDE, SIDE), title="")
+    memory, observations = begin(policy, batch), batch.reset()
+    for _ in range(round(shown.picture / settings.control_step)):
+        actions, memory = policy.act(observations, memory)
+        frame = renderer.draw(batch, annotations=policy.annotations(memory))
+        observations, *_ = batch.step(actions)
+    assert frame is not None
+    return Image.fromarray(frame).quantize(64)
+
+
+def write(file: str, teams: tuple[str, ...], shown: Shown) -> Path:
+    """Write a replay of teams in a scenario's world."""
+    replay = record(
+        list(teams), file.removesuffix("-others"), seed=SEED, world=shown.world,
+        seconds=shown.seconds, observations=False,
+    )  # fmt: skip
+    return write_replay(replay, MEDIA / "replays" / f"{file}.html")
+
+
+def main() -> None:
+    """Make all of it."""
+    (MEDIA / "scenarios").mkdir(exist_ok=True)
+    for name in tyro.cli(_Arguments).scenarios:
+        shown = GALLERY[name]
+        path = write(name, shown.teams, shown)
+        if not name.startswith("paper"):
+            write(f"{name}-others", OTHERS, shown)
+        file = MEDIA / "scenarios" / f"{name}.png"
+        picture(name, shown).save(file, optimize=True)
+        print(f"{name:18s} {path.stat().st_size:8,} {file.stat().st_size:8,} bytes", flush=True)
+
+
+if __name__ == "__main__":
+    main()
