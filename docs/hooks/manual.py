@@ -15,6 +15,7 @@ from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
 
 import declared_tables
+import notebook_page
 import standings
 from equations import typeset
 
@@ -28,6 +29,7 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "gallery": standings.gallery,
     "scores": standings.scores,
     "leaderboard": standings.leaderboard,
+    "notebook": notebook_page.notebook,
 }
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)
 
