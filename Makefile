@@ -58,6 +58,7 @@ bench-peers: $(FULL) ## Compare throughput with other simulators
 results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 	$(BIN)/python benchmarks/results.py
 	$(BIN)/python benchmarks/leaderboard.py
+	$(BIN)/python docs/drawing/readme_table.py
 	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
 
 reproduce: $(FULL) ## Reproduce the paper's experiments

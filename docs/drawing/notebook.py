@@ -47,9 +47,9 @@ def run(notebook: Any) -> None:
 
 def main() -> None:
     """Run the notebook."""
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    notebook = nbformat.read(NOTEBOOK, as_version=4)  # type: ignore[no-untyped-call]
     run(notebook)
-    nbformat.write(notebook, tyro.cli(_Arguments).out)
+    nbformat.write(notebook, tyro.cli(_Arguments).out)  # type: ignore[no-untyped-call]
 
 
 if __name__ == "__main__":

@@ -80,7 +80,7 @@ def test_teams_are_ranked_by_the_safe_score(standings: ModuleType, tmp_path: Pat
 def free_of(label: str) -> list[float]:
     rng = np.random.default_rng(len(label))
     rng.normal(0.5, 0.05, WORLDS)
-    return (rng.uniform(size=WORLDS) < 0.75).astype(float).tolist()
+    return [float(value < 0.75) for value in rng.uniform(size=WORLDS)]
 
 
 def test_other_worlds_and_versions_are_not_listed(standings: ModuleType, tmp_path: Path) -> None:

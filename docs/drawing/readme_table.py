@@ -1,0 +1,55 @@
+"""Writes the table of results into README.md, from the result files of the leaderboard.
+
+python docs/drawing/readme_table.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Final
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "hooks"))
+
+import standings
+from posse_training.leaderboard import ResultFile
+
+README: Final = Path(__file__).parents[2] / "README.md"
+BEGIN: Final = "<!-- made by docs/drawing/readme_table.py -->\n"
+END: Final = "<!-- end -->\n"
+BASELINE: Final = "pngl-l-phi"
+
+
+def table() -> str:
+    """Return the table: baseline, best scripted and best learned team, and the planner."""
+    lines = [
+        f"| scenario | baseline, `{BASELINE}` | best scripted team | best learned team | planner |",
+        "|---|---|---|---|---|",
+    ]
+    for scenario in standings.SCENARIOS:
+        found = {r.policy: r for r in standings.of_scenario(scenario)}  # the best first
+        teams = {name: r for name, r in found.items() if not r.reads_state}
+        learned = [name for name in teams if name.startswith("learned-")]
+        scripted = [name for name in teams if not name.startswith("learned-")]
+        cells = [_cell(found, BASELINE, named=False)]
+        cells += [_cell(found, next(iter(names), ""), named=True) for names in (scripted, learned)]
+        cells += [_cell(found, "planner", named=False)]
+        lines.append(f"| `{scenario}` | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(found: dict[str, ResultFile], policy: str, *, named: bool) -> str:
+    if policy not in found:
+        return ""
+    score = f"{found[policy].column('safe_score').mean():.3f}"
+    return f"{score} `{policy}`" if named else score
+
+
+def with_table(text: str) -> str:
+    """Return the README with the table as it is now."""
+    before, rest = text.split(BEGIN)
+    return before + BEGIN + table() + END + rest.split(END)[1]
+
+
+if __name__ == "__main__":
+    README.write_text(with_table(README.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,43 @@
+"""The README: its table is the leaderboard's, and its links work away from the repository."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def readme_table(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install posse[docs]")
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "drawing"))
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "hooks"))
+    yield importlib.import_module("readme_table")
+    for name in ("readme_table", "standings", "declared_tables"):
+        sys.modules.pop(name, None)
+
+
+def test_the_table_is_made_from_the_result_files(readme_table: ModuleType) -> None:
+    assert readme_table.with_table(README) == README
+
+
+def test_links_are_absolute_and_lead_to_files_of_the_repository() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    home = project["urls"]["Repository"]
+    raw = home.replace("github.com", "raw.githubusercontent.com")
+    links = re.findall(r"\]\(([^)]+)\)", README)
+    assert all(link.startswith("https://") for link in links)
+    own = [link for link in links if "posse" in link]
+    assert len(own) >= 5
+    for link in own:
+        path = link.removeprefix(f"{home}/blob/main/").removeprefix(f"{raw}/main/")
+        assert (ROOT / path).is_file(), link
