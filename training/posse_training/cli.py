@@ -32,6 +32,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "ship": _Command("make the best of several runs a policy of the package", "shipping.ship"),
     "submit": _Command("write a result file for the leaderboard", "leaderboard.submit"),
     "verify": _Command("play a result file again and check it", "leaderboard.verify"),
+    "record": _Command("record episodes as a data set for offline learning", "datasets.command"),
     "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
 }

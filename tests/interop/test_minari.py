@@ -1,0 +1,81 @@
+"""Data sets recorded for Minari reload, recover their environment, and replay what they hold."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import minari
+import numpy as np
+import pytest
+from minari.data_collector.data_collector import _check_infos_same_shape
+
+import posse
+from posse_baselines import PolicyError
+from posse_training.cli import main
+from posse_training.datasets import load_dataset, record_dataset
+from posse_training.errors import SettingsError
+
+SHORT: dict[str, Any] = {"horizon": 12, "settle_time": 0.5}
+
+
+def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) -> None:
+    record_dataset(["pursuit", "random"], "radio", 5, out=tmp_path, seed=3, **SHORT)
+    data = load_dataset(tmp_path, "posse/radio/pursuit-and-random-v0")
+    assert (data.total_episodes, data.total_steps) == (5, 60)
+    found = data.recover_environment()
+    about = json.loads(data.storage.metadata["posse"])
+    assert json.loads(json.dumps(found.unwrapped.scenario.to_dict())) == about["scenario"]
+    assert (about["seed"], about["split"], about["version"]) == (3, "train", posse.__version__)
+    who = []
+    for episode, told in zip(data, data.storage.get_episode_metadata(range(5)), strict=True):
+        who.append(told["policy"])
+        spec = found.spec
+        assert spec is not None
+        env = gymnasium.make(spec, first_world=int(told["world"]))
+        observation, _ = env.reset(seed=3)
+        np.testing.assert_array_equal(observation, episode.observations[0])
+        for t, action in enumerate(episode.actions):
+            observation, reward, terminated, truncated, info = env.step(action)
+            np.testing.assert_array_equal(observation, episode.observations[t + 1])
+            assert reward == pytest.approx(episode.rewards[t])
+            assert (terminated, truncated) == (episode.terminations[t], episode.truncations[t])
+            assert info["score"] == pytest.approx(episode.infos["score"][t + 1])
+            for name, term in info["reward_terms"].items():
+                np.testing.assert_array_equal(term, episode.infos["reward_terms"][name][t + 1])
+        assert truncated
+        assert told["score"] == pytest.approx(info["metrics"]["score"])
+    assert who == ["pursuit", "random"] * 2 + ["pursuit"]
+
+
+def test_more_episodes_than_fit_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posse_training.datasets.record.AT_ONCE", 2)
+    data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
+    assert [episode.id for episode in data] == list(range(5))
+
+
+def test_minaris_own_collector_records_every_kind_of_info() -> None:
+    for name in ("posse/Team-v0", "posse/Solo-v0"):
+        env = gymnasium.make(name, **SHORT)
+        _, info = env.reset(seed=1)
+        following = env.step(env.action_space.sample())[-1]
+        assert _check_infos_same_shape(info, following)
+
+
+def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
+    record_dataset("idle", "constant", 1, out=tmp_path, **SHORT)
+    with pytest.raises(SettingsError, match="exists: remove it"):
+        record_dataset("idle", "constant", 1, out=tmp_path, **SHORT)
+    with pytest.raises(SettingsError, match="episodes=1 must be at least 2"):
+        record_dataset(["idle", "random"], "constant", 1, out=tmp_path)
+    with pytest.raises(PolicyError, match="no policies given"):
+        record_dataset([], "constant", 1, out=tmp_path)
+
+
+def test_the_command_says_how_to_load(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    settings = ["record", "idle", "--scenario", "constant", "--episodes", "1"]
+    assert main([*settings, "--out", str(tmp_path)]) == 0
+    assert "minari.load_dataset('posse/constant/idle-v0')" in capsys.readouterr().out
+    assert isinstance(load_dataset(tmp_path, "posse/constant/idle-v0"), minari.MinariDataset)

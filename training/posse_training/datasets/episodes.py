@@ -1,0 +1,73 @@
+"""Plays episodes and keeps them as Minari's buffers, one for each world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from minari.data_collector import EpisodeBuffer
+
+from posse import Batch
+from posse_baselines import Policy, begin
+
+Metrics = dict[str, float]
+
+
+def play_episodes(
+    batch: Batch, policy: Policy, first: int
+) -> Iterator[tuple[EpisodeBuffer, Metrics]]:
+    """Play one episode in every world; yield its buffer and its metrics.
+
+    Observations are (T + 1, N, F), actions (T, N, 2 + m), rewards (T,), the mean of the team's.
+    Infos are ``score`` (T + 1,) and ``reward_terms``, each (T + 1, N); those of the reset are 0.
+
+    Args:
+        batch: The worlds, made with ``autoreset="same_step"``.
+        policy: Who plays.
+        first: Number of the first episode in the data set.
+    """
+    worlds, trackers = batch.num_worlds, batch.scenario.num_trackers
+    memory, seen = begin(policy, batch), batch.reset()
+    observations: list[npt.NDArray[Any]] = [seen]
+    zeros = {name: np.zeros((worlds, trackers), np.float32) for name in batch.term_names}
+    actions: list[npt.NDArray[Any]] = []
+    rewards: list[npt.NDArray[Any]] = []
+    scores, terms = [np.zeros(worlds)], [zeros]
+    lengths = np.zeros(worlds, np.int64)
+    terminations = np.zeros(worlds, np.bool_)
+    metrics: list[Metrics] = [{} for _ in range(worlds)]
+    while (lengths == 0).any():
+        acted, memory = policy.act(seen, memory)
+        seen, gained, terminated, truncated, infos = batch.step(acted)
+        ended = terminated | truncated
+        observations.append(infos["final_obs"] if ended.any() else seen)
+        actions.append(np.array(acted, np.float32))
+        rewards.append(gained.mean(axis=1, dtype=np.float64))
+        scores.append(infos["score"].astype(np.float64))
+        terms.append({name: np.array(infos["reward_terms"][name]) for name in batch.term_names})
+        for e in np.flatnonzero(ended & (lengths == 0)).tolist():
+            lengths[e], terminations[e] = len(actions), terminated[e]
+            metrics[e] = {name: float(column[e]) for name, column in infos["metrics"].items()}
+        if ended.any():
+            memory = policy.restart(memory, ended)
+    for e, length in enumerate(lengths.tolist()):
+        last = np.arange(length) == length - 1
+        buffer = EpisodeBuffer(
+            id=first + e,
+            seed=batch.seed,
+            observations=np.stack([step[e] for step in observations[: length + 1]]),
+            actions=np.stack([step[e] for step in actions[:length]]),
+            rewards=[float(step[e]) for step in rewards[:length]],
+            terminations=(last & terminations[e]).tolist(),
+            truncations=(last & ~terminations[e]).tolist(),
+            infos={
+                "score": np.stack([step[e] for step in scores[: length + 1]]),
+                "reward_terms": {
+                    name: np.stack([step[name][e] for step in terms[: length + 1]])
+                    for name in batch.term_names
+                },
+            },
+        )
+        yield buffer, metrics[e]
