@@ -11,11 +11,15 @@ BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
+# BenchMARL and RLlib need other versions. Their virtual environment holds these alone, and takes
+# everything else, torch above all, from ours.
+RECIPES := .venv-recipes
+
 # Suppresses a notice about later versions of mkdocs, which pyproject.toml excludes.
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce tune clean
+.PHONY: help demo test recipes fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce tune clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,6 +30,8 @@ demo: $(BASE) ## Show teams in action; installs only the base packages, without 
 test: lint ## Run all checks: lint, types, tests, docs
 	$(BIN)/python -m pytest -n auto --dist worksteal
 	$(BIN)/mkdocs build --strict --quiet
+
+recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
 
 fuzz: $(FULL) ## Run randomised tests in parallel, MINUTES=1 per campaign
 	$(BIN)/python -m tests.fuzz $(ONLY) --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0) $(if $(JOBS),--jobs $(JOBS))
@@ -74,7 +80,7 @@ tune: $(FULL) ## Tune the scripted teams that ship again, MINUTES=10 each (long)
 	done
 
 clean: ## Remove everything that these commands created, including .venv
-	rm -rf $(VENV) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find envs baselines training tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Checked first, so that an old Python gives a clear message and not a syntax error.
@@ -92,3 +98,13 @@ $(BASE): $(PINS) | $(BIN)/python
 $(FULL): $(PINS) | $(BIN)/python
 	$(PIP_INSTALL) --editable '.[training,dev,docs]'
 	@touch $(BASE) $@
+
+$(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
+	rm -rf $(RECIPES)
+	$(BIN)/python -m venv $(RECIPES)
+	echo "import site; site.addsitedir('$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" \
+		> "$$($(RECIPES)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/posse_base.pth"
+	grep -viE '^(gymnasium|tensordict|torchrl)==' constraints.txt > $(RECIPES)/constraints.txt
+	$(RECIPES)/bin/python -m pip install --quiet --disable-pip-version-check \
+		--constraint $(RECIPES)/constraints.txt --constraint constraints-recipes.txt 'ray[rllib]' benchmarl
+	@touch $@

@@ -108,9 +108,7 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(_named())
 
 
-def get_scenario(
-    scenario: str | Scenario, *, target: str | None = None, **overrides: Any
-) -> Scenario:
+def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden.
 
     Args:
@@ -136,7 +134,7 @@ def get_scenario(
     return found.replace(**overrides) if overrides else found
 
 
-def _with_target(target: str | None, overrides: dict[str, Any]) -> dict[str, Any]:
+def _with_target(target: Any, overrides: dict[str, Any]) -> dict[str, Any]:
     """Return the overrides with ``target="agent"`` resolved."""
     if target is None:
         return overrides

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import tyro
 from rich.console import Console
@@ -19,6 +19,7 @@ from posse_training.reports.comparison import Comparison, summary, table, write_
 from posse_training.reports.comparison_folder import FileNames, replaced
 from posse_training.reports.contenders import Contender, read_contenders
 from posse_training.reports.evaluation import refuse_trained_split
+from posse_training.reports.marl_eval import write_marl_eval
 from posse_training.reports.players import PlayError, Players
 from posse_training.reports.plays import Plays
 from posse_training.reports.sweeps import LEADER_LOSS, SWEEPS, play_sweeps, write_points
@@ -27,6 +28,7 @@ PLANNER: Final = "planner"
 """The reference that is shown with every team."""
 SUMMARY: Final = "summary.json"
 POINTS: Final = "sweeps.csv"
+MARL_EVAL: Final = "marl-eval.json"
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,9 @@ class Settings:
     0.4 s of processor time per world. If named among the policies, it plays all worlds."""
     sweep_episodes: int = 200
     """Worlds at each point of the figures that vary a setting; 0: omit these figures."""
+    export: tuple[Literal["marl-eval"], ...] = ()
+    """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval
+    and rliable read."""
     time_limit: float = 1800.0
     """Time limit of a policy on one scenario, for each training seed, s; a policy that exceeds it
     is stopped and skipped on the remaining scenarios."""
@@ -89,6 +94,8 @@ def compare(settings: Settings) -> Comparison:
                 run.play_scenario(scenario)
             if settings.figures:
                 run.draw()
+            if "marl-eval" in settings.export:
+                write_marl_eval(run.found, folder / MARL_EVAL)
             write_summary(run.found, folder / SUMMARY, settings)
     return run.found
 
@@ -126,7 +133,7 @@ class _Run:
         self.folder = folder
         self.found = Comparison(contenders[0].label)
         self._players = players
-        self._names = FileNames(SUMMARY, POINTS)
+        self._names = FileNames(SUMMARY, POINTS, MARL_EVAL)
 
     def _play(self, contender: Contender, scenario: str, episodes: int) -> Plays | None:
         return self.attempt(contender, scenario, episodes, scenario)

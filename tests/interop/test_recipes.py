@@ -1,0 +1,52 @@
+"""Every recipe of *Use it with* runs as it stands."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RECIPES = ROOT / "docs" / "recipes"
+OWN_ENVIRONMENT = {"benchmarl_mappo", "rllib_shared"}
+"""Recipes with libraries that pin other versions than ours: ``make recipes`` installs those."""
+ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
+LONGEST = 15
+
+
+def run(name: str, folder: Path, python: Path | str = sys.executable) -> str:
+    paths = [str(RECIPES), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
+    done = subprocess.run(
+        [str(python), "-W", "ignore", str(RECIPES / f"{name}.py")],
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+def names() -> list[str]:
+    return sorted(path.stem for path in RECIPES.glob("*.py"))
+
+
+@pytest.mark.parametrize("name", [name for name in names() if name not in OWN_ENVIRONMENT])
+def test_it_runs(name: str, tmp_path: Path) -> None:
+    run(name, tmp_path)
+
+
+@pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
+def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
+    if not ELSEWHERE.exists():
+        pytest.skip("needs .venv-recipes: make recipes")
+    run(name, tmp_path, ELSEWHERE)
+
+
+@pytest.mark.parametrize("name", names())
+def test_it_is_short_and_on_the_page(name: str) -> None:
+    lines = (RECIPES / f"{name}.py").read_text(encoding="utf-8").splitlines()
+    assert len([line for line in lines if line.strip()]) < LONGEST
+    page = (ROOT / "docs" / "use_with.md").read_text(encoding="utf-8")
+    assert f'--8<-- "docs/recipes/{name}.py"' in page
