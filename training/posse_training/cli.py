@@ -5,6 +5,7 @@ Each command is imported when it is called: listing the scenarios does not impor
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import sys
 from collections.abc import Callable, Sequence
@@ -35,6 +36,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "record": _Command("record episodes as a data set for offline learning", "datasets.command"),
     "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
+    "completion": _Command("print what a shell needs to complete commands", "commands.completion"),
 }
 
 
@@ -53,7 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     name, rest = given[0], given[1:]
     if name not in COMMANDS:
-        print(f"posse: unknown command {name!r:.80}\n\n{_usage()}", file=sys.stderr)
+        near = difflib.get_close_matches(name[:80], COMMANDS, n=1)
+        hint = f": did you mean {near[0]!r}?" if near else ""
+        print(f"posse: unknown command {name!r:.80}{hint}\n\n{_usage()}", file=sys.stderr)
         return 2
     try:
         module = importlib.import_module(f"posse_training.{COMMANDS[name].module}")
