@@ -10,11 +10,11 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
 from posse import Scenario
+from posse.adapters import real_numbers
 from posse.adapters.actions import single_action_space
 from posse.adapters.single_world import shortened
 from posse.adapters.spaces import box
 from posse.adapters.vector_env import TeamVectorEnv
-from posse.engine.arguments import real_numbers
 from posse.numeric import BoolArray, FloatArray
 from posse.signals.observation.layout import ObservationLayout
 from posse_baselines.policy import Policy, begin
