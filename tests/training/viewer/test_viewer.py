@@ -14,6 +14,7 @@ import posse
 from posse.rendering.canvas import pixels
 from posse.rendering.style import INK, TARGET
 from posse_baselines import PolicyError, load
+from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.viewer import tape as tape_module
 from posse_training.viewer.layout import contains, lay_out
@@ -368,3 +369,19 @@ def test_without_a_display_the_error_says_what_to_do(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
     with pytest.raises(SettingsError, match="No window can be opened"):
         open_window((640, 480), "test", "")
+
+
+def test_the_command_shows_the_policies_given(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+
+    def at_the_keys(shown: Viewer) -> None:
+        play(shown, 5)
+        press(shown, pygame.K_p)
+        play(shown, 20)
+        pygame.display.quit()
+
+    monkeypatch.setattr("posse_training.viewer.window.run", at_the_keys)
+    assert main(["watch", "pursuit", "idle", "--scenario", "constant"]) == 0
+    assert capsys.readouterr().out == "idle: score 0.000 after 2.0 s\n"
