@@ -21,7 +21,7 @@ class _Play:
 
     scenario: str = "smart"
     """Scenario to play."""
-    against: str = "ddcs-distributed"
+    against: str = "ddcs-tuned"
     """Policy of the trackers: a name, a file, or package.module:Class."""
     robot: Annotated[str, tyro.conf.arg(name="as")] = "target"
     """What you drive: target, or one of the trackers, such as tracker_2."""
