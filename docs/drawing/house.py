@@ -21,8 +21,8 @@ COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "
 # Rooms from top to bottom.
 LINES = (
     ("posse_training.cli",),
-    ("posse_training.commands", "posse_training.shipping"),
-    ("posse_training.viewer", "posse_training.play"),
+    ("posse_training.commands", "posse_training.shipping", "posse_training.leaderboard"),
+    ("posse_training.viewer", "posse_training.play", "posse_training.datasets"),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl"),
     ("posse_baselines.learned", "posse_baselines.policies"),

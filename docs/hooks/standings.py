@@ -130,7 +130,11 @@ def leaderboard() -> str:
 
 def _name(result: ResultFile) -> str:
     name = html.escape(result.label).replace("|", "&#124;").replace("`", "&#96;")
-    shown = code(name) if result.label == result.policy else f"<span>{name}</span>"
+    shown = (
+        f'<code class="team">{name}</code>'
+        if result.label == result.policy
+        else f"<span>{name}</span>"
+    )
     return shown + (" (reference)" if result.reads_state else "")
 
 
