@@ -1,0 +1,111 @@
+"""The wheel and the sdist are complete, and work where nothing else of posse is.
+
+They take minutes and the package index, so that they run where POSSE_TEST_PACKAGE is set: in
+continuous integration.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("envs/posse", "baselines/posse_baselines", "training/posse_training")
+pytestmark = pytest.mark.skipif(
+    "POSSE_TEST_PACKAGE" not in os.environ, reason="takes minutes: set POSSE_TEST_PACKAGE=1"
+)
+
+
+def run(*command: str | Path, cwd: Path, **environment: str) -> str:
+    kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    done = subprocess.run(
+        [str(part) for part in command], cwd=cwd, capture_output=True, text=True, timeout=900,
+        check=False, env={**kept, **environment},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the sdist, and the wheel that was built from it."""
+    folder = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--outdir", folder, ROOT, cwd=ROOT)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the programs of an environment with nothing but the wheel and what it requires."""
+    folder = tmp_path_factory.mktemp("empty")
+    run(sys.executable, "-m", "venv", folder / "venv", cwd=folder)
+    programs = folder / "venv" / "bin"
+    wheel = next(built.glob("*.whl"))
+    run(
+        programs / "python", "-m", "pip", "install", "--quiet", "-c", ROOT / "constraints.txt",
+        wheel, cwd=folder,
+    )  # fmt: skip
+    return programs
+
+
+def tracked(*folders: str) -> set[str]:
+    """Return the files of the repository under some folders, or those of the tree without git."""
+    found = subprocess.run(
+        ["git", "ls-files", "--", *folders], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return {line for line in found.stdout.splitlines() if (ROOT / line).exists()}
+
+
+def test_the_index_would_take_them(built: Path) -> None:
+    run(sys.executable, "-m", "twine", "check", "--strict", *built.iterdir(), cwd=built)
+
+
+def test_the_wheel_has_every_file_of_the_packages(built: Path) -> None:
+    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
+        names = set(wheel.namelist())
+    assert {path.partition("/")[2] for path in tracked(*PACKAGES)} <= names
+
+
+def test_the_tests_of_the_sdist_run_from_its_own_tree(built: Path, tmp_path: Path) -> None:
+    with tarfile.open(next(built.glob("*.tar.gz"))) as sdist:
+        sdist.extractall(tmp_path, filter="data")
+    tree = next(tmp_path.iterdir())
+    roots = ("envs", "baselines", "training", "tests", "docs", "benchmarks")
+    inside = {str(p.relative_to(tree)) for p in tree.rglob("*") if p.is_file()}
+    assert tracked(*roots) <= inside
+    path = os.pathsep.join(str(tree / root) for root in ("envs", "baselines", "training"))
+    pytest_ = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    run(*pytest_, "--collect-only", cwd=tree, PYTHONPATH=path)
+    quick = ("tests/test_imports.py", "tests/package/test_public_interface.py")
+    run(*pytest_, *quick, cwd=tree, PYTHONPATH=path)
+
+
+def readme(kind: str) -> list[str]:
+    """Return the code blocks of a kind in the README."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return re.findall(rf"^```{kind}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_the_python_of_the_readme_runs(installed: Path, tmp_path: Path) -> None:
+    blocks = readme("python")
+    assert blocks
+    script = tmp_path / "readme.py"
+    script.write_text("\n".join(blocks), encoding="utf-8")
+    run(installed / "python", script, cwd=tmp_path)
+
+
+def test_the_commands_of_the_readme_are_there(installed: Path, tmp_path: Path) -> None:
+    commands = set(re.findall(r"^\$ (?:\S*/)?posse (\w+)", "\n".join(readme("console")), re.M))
+    assert commands
+    for command in sorted(commands):
+        run(installed / "posse", command, "--help", cwd=tmp_path)
+    assert "smart" in run(installed / "posse", "scenarios", cwd=tmp_path)
+    run(installed / "posse", "replay", "idle", "--seconds", "1", cwd=tmp_path)
+    assert (tmp_path / "replay.html").stat().st_size > 10_000
