@@ -3,7 +3,6 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-DEMO := posse_training.demo
 
 # The installed packages depend only on these two files; each stamp marks one installed set.
 PINS := pyproject.toml constraints.txt
@@ -25,7 +24,7 @@ help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(BASE) ## Show teams in action; installs only the base packages, without torch
-	$(BIN)/python -m $(DEMO)
+	$(BIN)/posse demo
 
 test: lint ## Run all checks: lint, types, tests, docs
 	$(BIN)/python -m pytest -n auto --dist worksteal

@@ -1,4 +1,4 @@
-"""The README: its table is the leaderboard's, and its links work away from the repository."""
+"""The README: its table is the leaderboard's, and its links work, also on the package index."""
 
 from __future__ import annotations
 
@@ -30,14 +30,24 @@ def test_the_table_is_made_from_the_result_files(readme_table: ModuleType) -> No
     assert readme_table.with_table(README) == README
 
 
-def test_links_are_absolute_and_lead_to_files_of_the_repository() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    home = project["urls"]["Repository"]
-    raw = home.replace("github.com", "raw.githubusercontent.com")
+def test_links_lead_to_files_of_the_repository() -> None:
     links = re.findall(r"\]\(([^)]+)\)", README)
-    assert all(link.startswith("https://") for link in links)
-    own = [link for link in links if "posse" in link]
+    own = [link for link in links if not link.startswith("https://")]
     assert len(own) >= 5
     for link in own:
-        path = link.removeprefix(f"{home}/blob/main/").removeprefix(f"{raw}/main/")
-        assert (ROOT / path).is_file(), link
+        assert (ROOT / link).is_file(), link
+
+
+def test_the_package_index_gets_absolute_links() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    home = settings["project"]["urls"]["Repository"]
+    raw = home.replace("github.com", "raw.githubusercontent.com")
+    text = README
+    for each in settings["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"][
+        "substitutions"
+    ]:
+        text = re.sub(each["pattern"], each["replacement"], text)
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    assert all(link.startswith("https://") for link in links)
+    assert [link for link in links if link.startswith(f"{raw}/main/docs/media/")]
+    assert [link for link in links if link.startswith(f"{home}/blob/main/docs/")]

@@ -13,6 +13,7 @@ from PIL import Image
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training import demo
+from posse_training.replay.page import read_replay
 
 
 def ship(folder: Path) -> None:
@@ -44,6 +45,8 @@ def test_it_ends_with_scripted_beside_learned_where_one_is_shipped(
     demo.main(episodes=2, seconds=0.5)
     shown = capsys.readouterr().out
     assert (demo.LEARNED in shown) == learned
+    page = read_replay(tmp_path / "replay.html")
+    assert [player.name for player in page.players][1:] == ([demo.LEARNED] if learned else [])
     joined = "".join(shown.split())  # a table may wrap a long folder
     assert joined.index("constant.gif") < joined.index("smart.gif")
     with Image.open(tmp_path / "constant.gif") as film:

@@ -24,6 +24,7 @@ class _Command:
 
 
 COMMANDS: Final[dict[str, _Command]] = {
+    "demo": _Command("a table of scores, films and a replay page", "commands.demo"),
     "train": _Command("train a team", "commands.train"),
     "tune": _Command("tune the settings of a scripted team", "tuning.command"),
     "compare": _Command("score policies on the same worlds", "reports.compare"),

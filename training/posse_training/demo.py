@@ -1,4 +1,4 @@
-"""``make demo``: a table of scores, and a film of the best team for each target motion."""
+"""A table of scores, a film of the best team for each target motion, and a replay page."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from rich.table import Table
 
 from posse import ObservationLayout, get_scenario
 from posse_baselines import Policy, load, policy_names
+from posse_training.replay import record, write_replay
 from posse_training.reports import Results, evaluate
 from posse_training.reports.evaluation import progress_bar
 from posse_training.reports.pictures.film import film
@@ -35,7 +36,7 @@ FOLDER: Final = Path("runs/demo")
 
 
 def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
-    """Play every policy in every scenario, print the table, and film the best.
+    """Play every policy in every scenario, print the table, film the best and write a replay page.
 
     A second process compiles the policies while this one compiles the worlds; then it renders the
     films while this one plays.
@@ -74,9 +75,14 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
                 )  # fmt: skip
         bar.update(task, description="filming")
         paths = {title: made.result() for title, made in films.items()}
+        bar.update(task, description="writing the replay page")
+        names = shown(SCENARIOS[-1], results)
+        replay = record([policies[name] for name in names], SCENARIOS[-1], seed=SEED, split="test")
+        page = write_replay(replay, FOLDER / "replay.html")
     console.print(table(results))
     for title, path in paths.items():
         console.print(f"{title}: {path}")
+    console.print(f"{' beside '.join(names)} on {SCENARIOS[-1]}, to open in a browser: {page}")
     console.print(f"total time: {time.perf_counter() - started:.0f} s")
 
 
@@ -95,7 +101,7 @@ def compile_policies(policies: Sequence[Policy]) -> None:
 
 def shown(scenario: str, results: Mapping[tuple[str, str], Results]) -> list[str]:
     """Return the policies to film: the best scripted one, and the learned one if it played."""
-    best = max(POLICIES, key=lambda name: results[scenario, name]["score"].mean())
+    best = max(POLICIES, key=lambda name: results[scenario, name]["safe_score"].mean())
     return [best, LEARNED] if (scenario, LEARNED) in results else [best]
 
 
@@ -110,7 +116,7 @@ def table(results: dict[tuple[str, str], Results]) -> Table:
     )
     made.add_column("target", no_wrap=True)
     made.add_column("policy", no_wrap=True)
-    for column in ("score", "tracking error, m", "settled", "settling time, s"):
+    for column in ("safe score", "tracking error, m", "settled", "settling time, s"):
         made.add_column(column)
     made.add_column("worlds with a contact")
     keys = list(results)
@@ -123,7 +129,7 @@ def table(results: dict[tuple[str, str], Results]) -> Table:
             *(
                 _cell(estimate)
                 for estimate in (
-                    mean(result["score"]),
+                    mean(result["safe_score"]),
                     mean(result["tracking_error"]),
                     share(result.settled),
                     mean(result["settling_time"]),
@@ -139,7 +145,3 @@ def _cell(estimate: Estimate) -> str:
     if estimate.count == 0:
         return "never"
     return f"{estimate.value:.2f}\n[{estimate.low:.2f}, {estimate.high:.2f}]"
-
-
-if __name__ == "__main__":
-    main()
