@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import Blocks, FloatArray, Record, Records, compiled, kernel, worlds_of
+from posse_baselines.ddcs.detour import way_past
 from posse_baselines.ddcs.leadership import settle_lead
-from posse_baselines.ddcs.memory import SEARCHING
+from posse_baselines.ddcs.memory import FLOCKING, SEARCHING
 from posse_baselines.ddcs.messages import write_message
 from posse_baselines.ddcs.monitoring import hear_mates, watch_target
 from posse_baselines.ddcs.searching import begin_search, look_around, wander
@@ -86,8 +87,13 @@ def decide(
         vx, vy, speed, omega = wanted_motion(f, s, d, mates, slots, own, x, y, body)
     # Actuation
     count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, discs)
+    past = False
+    if s.detour > 0.0 and d.task != FLOCKING:
+        wanted_x, wanted_y = vx, vy
+        vx, vy = way_past(f, s, d, discs, count, vx, vy)
+        past = vx != wanted_x or vy != wanted_y
     vx, vy, changed = safe_velocity(body, discs, count, vx, vy, plays)
-    if changed:
+    if changed or past:
         speed, omega = regulate(body, vx, vy, 0.0)
     write_motion(action, speed, omega, body.max_speed, body.max_omega)
     write_message(d, action)

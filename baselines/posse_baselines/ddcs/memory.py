@@ -45,6 +45,7 @@ MIND: Final = _record(
     ("error", _F),  # distance from its place (PNGL: excess of the range), m; -1: it has none
     ("pursues", _I),  # 1: under PNGL
     ("closing", _I),  # 1: the law itself, not the safeguard, keeps the range to the target
+    ("side", _I), ("side_step", _I),  # of the last detour: 1 left, -1 right; when
     # leadership
     ("leader", _I),  # -1: none yet
     ("term", _I),  # how often the lead has passed, modulo 256; the higher claim wins

@@ -78,7 +78,7 @@ def wander(
 ) -> tuple[float, float]:
     """Return the velocity (m/s) of a tracker that searches from (x, y)."""
     dx, dy = d.goal_x - x, d.goal_y - y
-    near = 0.5 * min(f.sight, 4.0)
+    near = s.goal_reached * min(f.sight, 4.0)
     time = (d.step - d.goal_step) * f.dt
     arrived = dx * dx + dy * dy < near * near and time > s.look_time
     if d.goal_step < 0 or arrived or time > s.goal_time:
@@ -88,6 +88,32 @@ def wander(
     if distance < 1e-6:
         return 0.0, 0.0
     return max_speed * dx / distance, max_speed * dy / distance
+
+
+@compiled
+def age_of(
+    f: Record, s: Record, d: Record, seen: npt.NDArray[np.uint16], i: int, j: int, lost: bool
+) -> float:
+    """Return the time (s) since a cell (i, j) was last covered, at most ``stale_after``.
+
+    With ``lost``, a cell not covered since the target was lost counts as never covered.
+    """
+    looked = seen[i * GRID + j] - 1 if len(seen) > 0 else -1
+    if looked < 0 or (lost and looked < d.lost_step):
+        return float(s.stale_after)
+    return min(float((d.step - looked) * f.dt), float(s.stale_after))
+
+
+@compiled
+def age_around(
+    f: Record, s: Record, d: Record, seen: npt.NDArray[np.uint16], i: int, j: int, reach: int
+) -> float:
+    """Return the mean age (s) of the cells in a square around a cell; outside, age is 0."""
+    total = 0.0
+    for k in range(max(0, i - reach), min(GRID, i + reach + 1)):
+        for m in range(max(0, j - reach), min(GRID, j + reach + 1)):
+            total += age_of(f, s, d, seen, k, m, False)
+    return total / (2 * reach + 1) ** 2
 
 
 @compiled
@@ -114,26 +140,25 @@ def choose_goal(
         if m != own and is_there(f, s, d, mates[m], len(mates)):
             heard += 1
     deaf = 1.0 - heard / max(1.0, min(f.neighbours, len(mates) - 1.0))
+    around = max(1, round(0.7 * f.sight / cell))
     for i in range(GRID):
         for j in range(GRID):
             cx = d.area_x + min(max((i + 0.5) * cell - f.area, -inner), inner)
             cy = d.area_y + min(max((j + 0.5) * cell - f.area, -inner), inner)
-            looked = seen[i * GRID + j] - 1 if len(seen) > 0 else -1
-            age = (d.step - looked) * f.dt if looked >= 0 else s.stale_after
-            bonus = 0.0
+            bonus, lost = 0.0, False
             if d.fix_step >= 0:
                 # Near the last known position.
                 away = length(cx - d.now_x, cy - d.now_y)
                 if away < reach:
-                    bonus = s.lost_worth
-                    if looked < d.lost_step:
-                        age = s.stale_after
-                    bonus -= s.lost_slope * away
+                    bonus, lost = s.lost_worth - s.lost_slope * away, True
+            age = age_of(f, s, d, seen, i, j, lost)
+            if s.swath > 0.0:
+                age += s.swath * (age_around(f, s, d, seen, i, j, around) - age)
             # A tracker that hears few others stays near the middle, where a report is likely heard.
             bonus -= s.middle_weight * deaf * length(cx - d.area_x, cy - d.area_y)
             way = length(cx - x, cy - y)
             turn = 1.0 - ((cx - x) * heading_c + (cy - y) * heading_s) / max(way, 1e-6)
-            value = s.age_weight * min(age, s.stale_after) + bonus - way - s.turn_weight * turn
+            value = s.age_weight * age + bonus - way - s.turn_weight * turn
             if value <= best:
                 continue  # team-mates can only reduce it
             for m in range(len(mates)):

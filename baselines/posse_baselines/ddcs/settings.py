@@ -112,10 +112,15 @@ class Settings:
     """Time between two updates of the map of covered areas; least time between two goals."""
     goal_time: float = tuned(4.0, "s", 0.5, 20.0)
     """A goal is reconsidered at least this often."""
+    goal_reached: float = tuned(0.5, "", 0.1, 1.5)
+    """Share of the sensing range, counted up to 4 m, at which a goal is reached."""
     stale_after: float = tuned(30.0, "s", 5.0, 60.0)
     """A cell not covered for this long counts as never covered."""
     age_weight: float = tuned(0.35, "m/s", 0.0, 2.0)
     """Distance equivalent to a second since a cell was last covered."""
+    swath: float = tuned(0.0, "", 0.0, 1.0)
+    """Weight of the mean age of all cells in sight of a goal, the rest being that of the goal's own
+    cell: 0 heads for the nearest edge of what is not covered, 1 for its middle."""
     turn_weight: float = tuned(0.8, "m", 0.0, 5.0)
     """Distance equivalent to a turn by a right angle."""
     lost_drift: float = tuned(0.35, "m/s", 0.0, 1.0)
@@ -158,6 +163,9 @@ class Settings:
     on every scenario by hand: a weaving target's rate has changed before the robot has turned."""
     aim_ahead: float = tuned(0.0, "m", -0.2, 0.3)
     """Offset ahead of a slot's centre, along the slot frame, at which the slot law aims."""
+    detour: float = tuned(0.0, "m", 0.0, 1.0)
+    """Clearance of ways past obstacles on the way to a slot or in the search; 0: no detours, the
+    safeguard alone avoids them."""
     clearance: float = tuned(0.75, "m", 0.3, 2.0)
     """Distance at which the path to a slot leads around the target."""
     bearing_gain: float = tuned(0.0, "", 0.0, 4.0)

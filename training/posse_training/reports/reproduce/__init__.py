@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-from posse_baselines.policies.family import FAMILY
+from posse_baselines.ddcs.family import FAMILY
 from posse_training.reports.pictures.style import RC
 from posse_training.reports.reproduce.laws import leader_loss, tracks
 from posse_training.reports.reproduce.motion import curves, frames
