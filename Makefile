@@ -69,14 +69,8 @@ results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce
 
-# A run that was interrupted resumes; one that ended only writes its result again.
-TUNED := ddcs-distributed:smart ddcs-distributed:radio ddcs-distributed:leader-loss \
-	ddcs-distributed:search ddcs-distributed:obstacles ddcs-distributed:field \
-	pngl-l-phi:constant pngl-l-phi:accelerating pngl-l-phi:smart pngl-l-phi:leader-loss
-tune: $(FULL) ## Tune the scripted teams that ship again, MINUTES=10 each (long)
-	@set -e; for one in $(TUNED); do \
-		$(BIN)/posse tune $${one%%:*} --scenario $${one##*:} --minutes $(or $(MINUTES),10) --ship; \
-	done
+tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted, it resumes
+	$(BIN)/python -m posse_training.tuning.again
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

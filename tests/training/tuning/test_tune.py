@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from posse_training.errors import CheckpointError, RunFolderError, SettingsError
 from posse_training.files import locked
 from posse_training.tuning import TuneSettings
 from posse_training.tuning import tune as tune_module
+from posse_training.tuning.again import repeat_all
 from posse_training.tuning.tune import tune
 
 
@@ -161,11 +163,27 @@ def test_only_names_the_searched_settings(tmp_path: Path) -> None:
     assert card["searched"] == ["gain"]
     assert set(card["settings"]) <= {"gain"}
     assert card["command"].endswith("--only gain")
+    assert "--only bias" in card_of(small(tmp_path / "all", generations=1))["command"]
 
 
 def test_nothing_has_an_effect(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
         tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
+
+
+def test_shipped_runs_are_repeated_by_their_own_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for module in ("posse_baselines.tuned.files", "posse_training.tuning.tune"):
+        monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")
+    settings = small(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1)
+    card = json.loads(tune(replace(settings, ship=True), console=quiet()).read_text())
+    shipped = tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json"
+    assert json.loads(shipped.read_text()) == card
+    shipped.write_text(json.dumps({**card, "settings": {}}))
+    (result,) = repeat_all(quiet())
+    assert json.loads(result.read_text()) == json.loads(shipped.read_text()) == card
 
 
 def test_code_that_is_no_policy(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def make_card(
         "scenario": scorer.scenario.name,
         "scenario_version": scorer.scenario.version,
         "settings": values,
-        "command": settings.command(len(state.generations)),
+        "command": settings.command(len(state.generations), state.names),
         "seed": settings.seed,
         "commit": state.commits[-1] if state.commits else None,
         "searched": state.names,

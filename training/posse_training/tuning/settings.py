@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -88,12 +89,15 @@ class TuneSettings:
             "only": list(self.only),
         }
 
-    def command(self, generations: int) -> str:
-        """Return the command that repeats the run up to a generation."""
+    def command(self, generations: int, names: Sequence[str]) -> str:
+        """Return the command that repeats the run up to a generation.
+
+        It names the settings that were searched: a later version may have more.
+        """
         words = ["posse", "tune", self.policy, "--scenario", self.scenario]
         words += ["--generations", str(generations), "--seed", str(self.seed)]
         for name in ("population", "worlds", "validation_worlds", "every"):
             value = getattr(self, name)
             if value != getattr(type(self), name):
                 words += [f"--{name.replace('_', '-')}", str(value)]
-        return " ".join([*words, *(("--only", *self.only) if self.only else ())])
+        return " ".join([*words, "--only", *names])
