@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 from tests.support.tunable import BEST, POLICY, quiet, small
 
 from posse_baselines import PolicyError
@@ -189,3 +191,12 @@ def test_shipped_runs_are_repeated_by_their_own_commands(
 def test_code_that_is_no_policy(tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match="cannot import"):
         tune(small(tmp_path / "run", policy="no_such_module:Team"), console=quiet())
+
+
+def test_a_terminal_shows_progress_and_what_changed_most(tmp_path: Path) -> None:
+    shown = StringIO()
+    tune(small(tmp_path / "run"), console=Console(file=shown, force_terminal=True, width=90))
+    text = shown.getvalue()
+    assert "tuning tests.support.tunable:Biased on paper-distributed, seed 3" in text
+    assert "validation score" in text
+    assert "(was 0.8)" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Final
 
@@ -13,6 +14,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from posse_baselines import Tunable
 from posse_training.runs.display import sparkline
 from posse_training.tuning.settings import TuneSettings
 from posse_training.tuning.state import State
@@ -35,6 +37,8 @@ class Display:
         self._started = time.monotonic()
         self._episodes = 0
         self._candidate = 0
+        self._spent = 0.0  # seconds, before this process began
+        self._tunables: dict[str, Tunable] = {}
         self._state: State | None = None
         self._note = ""
         self._live: Live | None = None
@@ -62,9 +66,12 @@ class Display:
         if self._live is None:
             self._console.print(text, markup=False)
 
-    def begin(self, state: State) -> None:
-        """Show the state that the run begins with, or resumes from."""
+    def begin(self, state: State, tunables: Sequence[Tunable]) -> None:
+        """Show the state that the run begins with, or resumes from, and what is searched."""
         self._state, self._note = state, ""
+        self._tunables = {t.name: t for t in tunables}
+        self._spent = state.seconds
+        self._started = time.monotonic()
         if self._live is None:
             names = ", ".join(state.names)
             self._console.print(f"searching {len(state.names)} settings: {names}", markup=False)
@@ -103,7 +110,17 @@ class Display:
         s, within = self._settings, self._candidate / self._settings.population
         if s.generations is not None:
             return min(1.0, (len(state.generations) + within) / s.generations)
-        return min(1.0, (state.seconds + (time.monotonic() - self._started)) / (60.0 * s.minutes))
+        spent = self._spent + time.monotonic() - self._started
+        return min(1.0, spent / (60.0 * s.minutes))
+
+    def _most_changed(self, values: dict[str, float]) -> list[tuple[str, float]]:
+        """Return the settings that changed most, as shares of their ranges."""
+
+        def change(item: tuple[str, float]) -> float:
+            t = self._tunables[item[0]]
+            return abs(item[1] - t.default) / (t.high - t.low)
+
+        return sorted(values.items(), key=change, reverse=True)[:_SHOWN]
 
     def _render(self) -> RenderableType:
         s, state = self._settings, self._state
@@ -133,11 +150,10 @@ class Display:
                 "", Text(sparkline([p["score"] for p in state.curve[-_WIDTH:]]), style="cyan")
             )
             table.add_row("untuned", f"{state.curve[0]['score']:.3f}")
-            shown = list(last["settings"].items())[:_SHOWN]
-            for name, value in shown:
-                table.add_row(Text(name, style="dim"), f"{value:g}")
-            if len(last["settings"]) > len(shown):
-                table.add_row("", f"and {len(last['settings']) - len(shown)} more settings")
+            for name, value in self._most_changed(last["settings"]):
+                t = self._tunables[name]
+                unit = f" {t.unit}" if t.unit else ""
+                table.add_row(Text(name, style="dim"), f"{value:.3g}{unit} (was {t.default:.3g})")
         if self._note:
             table.add_row("", Text(self._note))
         title = f"tuning {s.policy} on {s.scenario}, seed {s.seed}"

@@ -79,7 +79,7 @@ def _run(
     """Search until the time is over; return the card."""
     search = Search(space.start, settings.population, settings.seed, state.generations)
     since = time.monotonic() - state.seconds
-    display.begin(state)
+    display.begin(state, space.tunables)
 
     def keep() -> None:
         state.seconds = time.monotonic() - since
