@@ -20,6 +20,7 @@ from tests.fuzz.elsewhere import CALLS, run, timed
 from tests.fuzz.kernel_cache import KERNELS
 from tests.support.runs import numbers, small
 
+from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.replay import read_replay
 from posse_training.runs.checkpoint import read_checkpoint
@@ -169,6 +170,29 @@ def _sound_run(folder: Path) -> None:
         json.loads(path.read_text())
 
 
+# tune
+
+
+def _tuning(folder: Path) -> list[str]:
+    return [
+        "tune", "pngl-l-phi", "--scenario", "constant", "--generations", "3", "--population", "4",
+        "--worlds", "2", "--validation-worlds", "4", "--every", "1",
+        "--only", "navigation_constant", "gain", "--out", str(folder / "run"),
+    ]  # fmt: skip
+
+
+def _left_by_tuning(folder: Path) -> bytes:
+    return (folder / "run" / "tuned.json").read_bytes()
+
+
+def _sound_tuning(folder: Path) -> None:
+    tuned = folder / "run" / "tuned.json"
+    if tuned.exists():
+        load(str(tuned))
+    if (folder / "run" / "state.json").exists():
+        json.loads((folder / "run" / "state.json").read_text())
+
+
 # compare
 
 
@@ -233,6 +257,7 @@ def _code() -> Path:
 COMMANDS: Final[dict[str, Command]] = {
     "train ppo": Command(_training("ppo"), _resumed("ppo"), _left_by_training, _sound_run),
     "train sac": Command(_training("sac"), _resumed("sac"), _left_by_training, _sound_run),
+    "tune": Command(_tuning, _tuning, _left_by_tuning, _sound_tuning),
     "compare": Command(
         _comparison("pursuit idle"), _comparison("pursuit idle"), _left_by_comparison,
         old=_comparison("idle"),
