@@ -37,15 +37,17 @@ def locked(folder: Path) -> Iterator[None]:
 
     Raises:
         InUseError: Another process holds it.
-        OSError: The folder cannot be written to.
+        OSError: The folder cannot be written to; it names the file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / LOCK).open("a+", encoding="utf-8") as file:
         _hold(file, folder)
-        file.seek(0)
-        file.truncate()
-        file.write(f"{os.getpid()}\n")
-        file.flush()
+        try:
+            # Unbuffered, so that closing the file does not fail again on a full disk.
+            os.truncate(file.fileno(), 0)
+            os.write(file.fileno(), f"{os.getpid()}\n".encode())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(folder / LOCK)) from error
         yield
 
 
