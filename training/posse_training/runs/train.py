@@ -24,7 +24,10 @@ from posse_training.runs.validation import first_statistics, score_beside
 from posse_training.sb3.imitation import imitate
 from posse_training.sb3.normalisation import RunningStatistics
 
-_NOT_FINITE = ("found invalid values", "must be finite", "can overflow", "means must lie within")
+_NOT_FINITE = (
+    "found invalid values", "= nan is not a number", "must be finite", "can overflow",
+    "means must lie within",
+)  # fmt: skip
 
 
 def train(settings: TrainSettings, *, console: Console | None = None, resume: bool = False) -> Path:
