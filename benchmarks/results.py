@@ -44,7 +44,7 @@ class Settings:
     """Command-line arguments."""
 
     episodes: int = 1000
-    planner_episodes: int = 200
+    planner_episodes: int = 100
     """Worlds of the planner, the first of the others'; it takes 0.3 s and more per world."""
     seed: int = 2026
     split: str = "test"
