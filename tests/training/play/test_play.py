@@ -16,7 +16,7 @@ from posse_baselines import PolicyError, load
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.play.game import Game, robot_of
-from posse_training.play.rounds import (
+from posse_training.play.session import (
     COUNTDOWN,
     OVER,
     PAUSED,

@@ -16,7 +16,7 @@ from posse.rendering.view import View
 from posse_baselines import Policy, PolicyError
 from posse_training.errors import SettingsError
 from posse_training.play.round import Round
-from posse_training.play.rounds import (
+from posse_training.play.session import (
     COUNTDOWN,
     OVER,
     PAUSED,

@@ -10,7 +10,7 @@ from posse import Batch, Scenario
 from posse.rendering.history import History
 from posse.rendering.scene import Scene, read_scene
 from posse_baselines import Policy, begin
-from posse_training.play.rounds import points_of
+from posse_training.play.session import points_of
 from posse_training.play.steering import Wheel
 from posse_training.replay import Recorder, Replay
 

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
 from typing import Final
 
 from rich.console import Console, Group, RenderableType
-from rich.live import Live
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from posse_training.live_display import LiveDisplay
 from posse_training.runs.settings import TrainSettings
 
 _BARS: Final = "▁▂▃▄▅▆▇█"
 _WIDTH: Final = 40
 
 
-class Display:
+class Display(LiveDisplay):
     """Shows progress, time left, and scores on the validation worlds.
 
     Args:
@@ -28,39 +27,14 @@ class Display:
     """
 
     def __init__(self, settings: TrainSettings, console: Console) -> None:
+        super().__init__(console)
         self._settings = settings
-        self._console = console
         self._started = time.monotonic()
         self._from_steps = 0
         self._steps = 0
         self._training_score: float | None = None
         self._curve: list[dict[str, float]] = []
         self._beside: float | None = None
-        self._note = ""
-        self._live: Live | None = None
-
-    def __enter__(self) -> Display:
-        if self._console.is_terminal:
-            self._live = Live(
-                get_renderable=self._render, console=self._console, refresh_per_second=4
-            )
-            self._live.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._live is not None:
-            self._live.stop()
-
-    def note(self, text: str) -> None:
-        """Show what the run is doing."""
-        self._note = text
-        if self._live is None:
-            self._console.print(text, markup=False)
 
     def begin(self, steps: int, curve: list[dict[str, float]]) -> None:
         """Start the clock: training begins, or resumes after ``steps`` steps."""

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Final
 
 from rich.console import Console, Group, RenderableType
-from rich.live import Live
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
 from posse_baselines import Tunable
+from posse_training.live_display import LiveDisplay
 from posse_training.runs.display import sparkline
 from posse_training.tuning.settings import TuneSettings
 from posse_training.tuning.state import State
@@ -23,7 +22,7 @@ _WIDTH: Final = 40
 _SHOWN: Final = 8  # settings
 
 
-class Display:
+class Display(LiveDisplay):
     """Shows progress, scores, and the settings that changed most.
 
     Args:
@@ -32,39 +31,14 @@ class Display:
     """
 
     def __init__(self, settings: TuneSettings, console: Console) -> None:
+        super().__init__(console)
         self._settings = settings
-        self._console = console
         self._started = time.monotonic()
         self._episodes = 0
         self._candidate = 0
         self._spent = 0.0  # seconds, before this process began
         self._tunables: dict[str, Tunable] = {}
         self._state: State | None = None
-        self._note = ""
-        self._live: Live | None = None
-
-    def __enter__(self) -> Display:
-        if self._console.is_terminal:
-            self._live = Live(
-                get_renderable=self._render, console=self._console, refresh_per_second=4
-            )
-            self._live.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._live is not None:
-            self._live.stop()
-
-    def note(self, text: str) -> None:
-        """Show what the run is doing."""
-        self._note = text
-        if self._live is None:
-            self._console.print(text, markup=False)
 
     def begin(self, state: State, tunables: Sequence[Tunable]) -> None:
         """Show the state that the run begins with, or resumes from, and what is searched."""

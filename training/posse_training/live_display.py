@@ -1,0 +1,50 @@
+"""A live display on a terminal, and lines elsewhere."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console, RenderableType
+from rich.live import Live
+
+
+class LiveDisplay(ABC):
+    """Shows what :meth:`_render` returns while the context is open, if there is a terminal.
+
+    Args:
+        console: Where to show it.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._note = ""
+        self._live: Live | None = None
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._live = Live(
+                get_renderable=self._render, console=self._console, refresh_per_second=4
+            )
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def note(self, text: str) -> None:
+        """Show what the run is doing."""
+        self._note = text
+        if self._live is None:
+            self._console.print(text, markup=False)
+
+    @abstractmethod
+    def _render(self) -> RenderableType:
+        """Return the display of the present state."""
