@@ -59,8 +59,8 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
     ),
     "calls": Campaign(
         "8 sequences of up to 30 calls to one kind of environment each (`Batch`, PettingZoo's two, "
-        "Gymnasium's two, their vectors, TorchRL), good and bad; beside it a twin that gets the "
-        "good ones alone; all that is held is compared, field by field",
+        "Gymnasium's two, their vectors, TorchRL), valid and invalid; a second environment gets "
+        "the valid ones only; their states are compared field by field",
         _of_cases("calls"),
     ),
     "threads": Campaign(
@@ -83,8 +83,8 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
         _of_cases("forged"),
     ),
     "kills": Campaign(
-        "a training (PPO or SAC), comparison, replay page, policy file or kernel cache is written "
-        "by a process that is killed (`kill -9`) up to three times, resumed or repeated, and "
+        "a training (PPO or SAC), tuning, comparison, replay page, policy file or kernel cache is "
+        "written by a process that is killed (`kill -9`) up to three times, resumed or repeated, and "
         "compared bit for bit with an undisturbed one",
         _of_cases("kills"),
     ),
