@@ -84,8 +84,8 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
     ),
     "kills": Campaign(
         "a training (PPO or SAC), tuning, comparison, replay page, policy file or kernel cache is "
-        "written by a process that is killed (`kill -9`) up to three times, resumed or repeated, and "
-        "compared bit for bit with an undisturbed one",
+        "written by a process that is killed (`kill -9`) up to three times, resumed or repeated, "
+        "and compared bit for bit with an undisturbed one",
         _of_cases("kills"),
     ),
     "full_disk": Campaign(
