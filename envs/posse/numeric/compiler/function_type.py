@@ -22,3 +22,9 @@ register_model(FunctionType)(models.OpaqueModel)
 @lower_constant(FunctionType)
 def _lower_function(context: Any, builder: Any, kind: Any, function: Any) -> Any:
     return context.get_dummy_value()
+
+
+def widest(kind: Any) -> Any:
+    """Return the type that a function is compiled for, given an argument's type."""
+    plain = types.unliteral(kind)
+    return types.int64 if plain in (types.int32, types.uint8) else plain

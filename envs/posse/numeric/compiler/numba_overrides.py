@@ -25,15 +25,14 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from numba.core import types
 from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
-from posse.numeric.compiler import kernel_files
-from posse.numeric.compiler.function_type import FunctionType
+from posse.numeric.compiler import collector, kernel_files
+from posse.numeric.compiler.function_type import FunctionType, widest
 from posse.numeric.compiler.llvm_hints import forbid_runtime_unrolling, keep_out_of_line
 from posse.numeric.compiler.stamps import Stamp
 
@@ -94,6 +93,9 @@ class KernelCompiler(_Compiler):
         super().__init__(*arguments)
         self.state.flags.noalias = True
 
+    # numba's many live objects would be traversed again and again.
+    compile_extra = collector.paused()(CompilerBase.compile_extra)
+
 
 class CompiledFunction(CPUDispatcher):
     """A function in two compiled forms: one for calls from Python, one to link into kernels."""
@@ -110,13 +112,8 @@ class CompiledFunction(CPUDispatcher):
 
 class _InnerDispatcher(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        widest = {name: _widest(kind) for name, kind in kws.items()}
-        return super().get_call_template(tuple(map(_widest, args)), widest)
-
-
-def _widest(kind: Any) -> Any:
-    plain = types.unliteral(kind)
-    return types.int64 if plain in (types.int32, types.uint8) else plain
+        named = {name: widest(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(widest, args)), named)
 
 
 class KernelCache(NullCache):
