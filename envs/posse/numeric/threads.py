@@ -58,8 +58,7 @@ def divide(num_worlds: int, threads: int) -> Blocks:
 def blocks_of(thread: int, blocks: Blocks) -> Iterator[tuple[int, int]]:
     """Claim and yield blocks while there are any: first world, world after the last.
 
-    A thread claims its own blocks first, which its core has cached in the previous step, then those
-    of other threads.
+    First the thread's own, which its core has cached in the previous step, then those of others.
     """
     if blocks[0, SIZE] == 0:
         yield 0, blocks[0, END]
@@ -197,6 +196,5 @@ def _end(workers: list[_Worker]) -> None:
 _idle: Final[list[_Worker]] = []
 _alive: Final[weakref.WeakSet[_Worker]] = weakref.WeakSet()
 atexit.register(_end, _idle)
-if hasattr(os, "register_at_fork"):  # a forked process has none of these threads
-    os.register_at_fork(after_in_child=_idle.clear)
-    os.register_at_fork(after_in_child=_alive.clear)
+for _threads in (_idle, _alive) if hasattr(os, "register_at_fork") else ():
+    os.register_at_fork(after_in_child=_threads.clear)  # a forked process has none of them
