@@ -255,7 +255,10 @@ def _code() -> Path:
 
 
 COMMANDS: Final[dict[str, Command]] = {
-    "train ppo": Command(_training("ppo"), _resumed("ppo"), _left_by_training, _sound_run),
+    "train ppo": Command(
+        _training("ppo", tensorboard=True), _resumed("ppo", tensorboard=True),
+        _left_by_training, _sound_run,
+    ),
     "train sac": Command(_training("sac"), _resumed("sac"), _left_by_training, _sound_run),
     "tune": Command(_tuning, _tuning, _left_by_tuning, _sound_tuning),
     "compare": Command(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from stable_baselines3.common.logger import Logger, configure
+from stable_baselines3.common.logger import KVWriter, Logger, TensorBoardOutputFormat
 
 from posse_training.errors import SettingsError
 from posse_training.runs.settings import TrainSettings
@@ -25,10 +27,11 @@ def check_wandb(settings: TrainSettings) -> None:
         )
 
 
-def make_logger(folder: Path, settings: TrainSettings) -> Logger:
+def make_logger(folder: Path, settings: TrainSettings, note: Callable[[str], None]) -> Logger:
     """Return stable-baselines3's logger, which writes TensorBoard files if it is installed.
 
-    Weights & Biases copies these files.
+    Weights & Biases copies these files. Where they cannot be written, as on a full disk, ``note``
+    is called with a line that says so, and the training goes on without them.
     """
     if settings.wandb is not None:
         wandb: Any = importlib.import_module("wandb")
@@ -37,4 +40,51 @@ def make_logger(folder: Path, settings: TrainSettings) -> Logger:
             sync_tensorboard=True, resume="allow",
         )  # fmt: skip
     installed = importlib.util.find_spec("tensorboard") is not None
-    return configure(str(folder), ["tensorboard"] if settings.tensorboard and installed else [])
+    wanted = settings.tensorboard and installed
+    return Logger(str(folder), [_TensorBoard(folder, note)] if wanted else [])
+
+
+class _TensorBoard(KVWriter):
+    """TensorBoard files, until they cannot be written."""
+
+    def __init__(self, folder: Path, note: Callable[[str], None]) -> None:
+        self._folder, self._note = folder, note
+        self._files: TensorBoardOutputFormat | None = None
+        before = set(threading.enumerate())
+        try:
+            self._files = TensorBoardOutputFormat(str(folder))
+        except OSError as error:
+            self._stop(error)
+        _silence(set(threading.enumerate()) - before)
+
+    def write(self, *arguments: Any, **named: Any) -> None:
+        """Write the values of one step."""
+        if self._files is not None:
+            try:
+                self._files.write(*arguments, **named)
+            except OSError as error:
+                self._stop(error)
+
+    def close(self) -> None:
+        """Close the files."""
+        if self._files is not None:
+            try:
+                self._files.close()
+            except OSError as error:
+                self._stop(error)
+
+    def _stop(self, error: OSError) -> None:
+        self._files = None
+        reason = error.strerror or error
+        self._note(f"no more TensorBoard logs, {self._folder} cannot be written: {reason}")
+
+
+def _silence(threads: set[threading.Thread]) -> None:
+    """Print no traceback of threads that write files; the next write raises their error."""
+    others = threading.excepthook
+
+    def hook(arguments: threading.ExceptHookArgs) -> None:
+        if arguments.thread not in threads or not isinstance(arguments.exc_value, OSError):
+            others(arguments)
+
+    threading.excepthook = hook

@@ -55,7 +55,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
         saved = open_run(folder, settings, resume)
         env = make_env(settings)
         model = make_model(settings, env)
-        model.set_logger(make_logger(folder, settings))
+        model.set_logger(make_logger(folder, settings, display.note))
         steps = steps_made(settings, env.num_envs)
         if steps != settings.steps:
             display.note(f"rollouts are completed: {steps:,} steps in all")
