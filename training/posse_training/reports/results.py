@@ -40,7 +40,7 @@ class Results:
     @property
     def episodes(self) -> int:
         """Number of episodes."""
-        return len(self.columns["score"])
+        return len(next(iter(self.columns.values())))
 
     def __getitem__(self, metric: str) -> Column:
         """Return one metric's column."""

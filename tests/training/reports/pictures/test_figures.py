@@ -1,4 +1,4 @@
-"""Figures show their data, and a policy has the same style in all of them."""
+"""Figures show their data, and say what was played."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ import pytest
 from matplotlib.figure import Figure
 
 import posse
-from posse_baselines import policy_names
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_training.reports.contenders import Contender
 from posse_training.reports.pictures import figures
-from posse_training.reports.pictures.style import STYLES, style_of
+from posse_training.reports.pictures.learning import curves_of, learning
+from posse_training.reports.pictures.style import STYLES, looks_of
 from posse_training.reports.plays import Plays
 from posse_training.reports.results import Results
 from posse_training.reports.statistics import Estimate
 from posse_training.reports.sweeps import BOUND, SWEEPS, Point
+
+LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
 
 
 def plays_of(label: str, scenario: str, **columns: list[float] | list[list[float]]) -> Plays:
@@ -35,7 +39,7 @@ def plays_of(label: str, scenario: str, **columns: list[float] | list[list[float
 
 def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
     """The longest line that is drawn in a policy's colour and kind of line."""
-    style = style_of(policy)
+    style = LOOKS[policy]
     found = [
         drawn
         for axis in figure.axes
@@ -50,11 +54,12 @@ def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
 def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
     scores = [0.2, 0.4, 0.4, 0.9]
     figure = figures.profile(
-        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}
+        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)},
+        LOOKS,
     )
     x, y = line(figure, "pursuit")
     at = dict(zip(np.round(x, 4), y, strict=True))
-    for score, expected in ((0.0, 1), (0.2, 1), (0.2025, 0.75), (0.4, 0.75), (0.5, 0.25), (1, 0)):
+    for score, expected in ((0.0, 1), (0.2, 1), (0.205, 0.75), (0.4, 0.75), (0.5, 0.25), (1, 0)):
         assert at[score] == expected
     _, bound = line(figure, BOUND)
     assert set(bound) == {1.0}
@@ -66,10 +71,11 @@ def test_scores_and_bounds_stand_where_they_should() -> None:
             (name, policy): plays_of(policy, name, safe_score=[low, low + 0.2], bound=[0.9, 0.8])
             for name, low in (("smart", 0.3), ("radio", 0.5))
             for policy in ("planner", "pursuit")
-        }
+        },
+        LOOKS,
     )
     (axis,) = figure.axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == ["smart", "radio"]
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["smart v1", "radio v1"]
     points = [
         (
             round(float(np.ravel(drawn.get_xdata())[0]), 6),
@@ -92,19 +98,21 @@ def test_a_sweep_shows_every_point_and_marks_the_scenarios_own_value() -> None:
         for value in reversed(sweep.values)  # in whatever order
         for score in [base + value / 1000]
     ]
-    figure = figures.sweep_figure(sweep, points)
+    figure = figures.sweep_figure(sweep, points, LOOKS, "9 worlds at each point")
     x, y = line(figure, "pursuit")
     assert x == list(sweep.values)
     assert y == pytest.approx([0.1 + value / 1000 for value in sweep.values])
     (axis,) = figure.axes
     own = [d for d in axis.lines if list(np.atleast_1d(d.get_xdata())) == [sweep.own] * 2]
     assert len(own) == 1
+    assert said(figure) == ["9 worlds at each point"]
+    assert axis.get_ylabel() == "mean safe score on smart v1"
 
 
 def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
     """Teams that never recover count, and no team counts after the end of its episode."""
     taken = [1.0, 2.0, np.nan, np.nan]
-    figure = figures.recovery([plays_of("pursuit", "leader-loss", recovery_time=taken)])
+    figure = figures.recovery([plays_of("pursuit", "leader-loss", recovery_time=taken)], LOOKS)
     x, y = line(figure, "pursuit")
     at = dict(zip(np.round(x, 6), y, strict=True))
     assert (at[0.9], at[1.0], at[1.9], at[2.0]) == (0, 0.25, 0.25, 0.5)
@@ -116,21 +124,66 @@ def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
     assert (band.value, band.low, band.high) == (0.75, 0.5, 1.0)
 
 
-def test_a_policy_looks_the_same_whoever_else_is_there() -> None:
-    assert {name for name in policy_names() if not name.startswith("learned-")} <= set(STYLES)
-    looks = {(style.colour, style.marker, str(style.line)) for style in STYLES.values()}
-    assert len(looks) == len(STYLES)
-    assert style_of("mine") == style_of("mine")
-    assert style_of("mine") not in STYLES.values()
+def said(figure: Figure) -> list[str]:
+    """What a figure's note says, line by line."""
+    return str(figure.get_supxlabel()).splitlines()
+
+
+def test_figures_say_what_was_played() -> None:
+    plays = {
+        ("field", "idle"): plays_of("idle", "field", safe_score=[0.1] * 3, bound=[1.0] * 3),
+        ("field", "mine"): plays_of("mine", "field", safe_score=[0.1] * 3, bound=[1.0] * 3),
+        ("field", "planner"): plays_of("planner", "field", safe_score=[0.1], bound=[1.0]),
+    }
+    wanted = ["3 worlds (planner 1), test split, seed 7"]
+    for draw in (figures.profile, figures.scores):
+        assert said(draw(plays, LOOKS)) == wanted
+    losses = [plays_of("idle", "leader-loss", recovery_time=[1.0, 2.0], score=[0.0, 0.0])]
+    assert said(figures.recovery(losses, LOOKS)) == ["leader-loss v1: 2 worlds, test split, seed 7"]
+
+
+def learned(curve: object) -> Contender:
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "plain")
+    network = Network(
+        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
+        (np.zeros((2, encoding.size), np.float32),), (np.zeros(2, np.float32),), "tanh", "clip",
+    )  # fmt: skip
+    card = {
+        "name": "mine", "curve": curve, "seed": 3, "settings": {"evaluate_worlds": 64},
+        "scenarios": [posse.get_scenario("smart").to_dict()],
+    }  # fmt: skip
+    return Contender("mine", (LearnedPolicy(network, encoding, card),))
+
+
+def test_learning_curves_are_those_of_the_cards() -> None:
+    points = [
+        {"steps": 1e6 * k, "score": 0.2 * k, "low": 0.1 * k, "high": 0.3 * k, "seconds": 1.0}
+        for k in (1, 2, 3)
+    ]
+    figure = learning(curves_of([learned(points), Contender("idle", ("idle",))]), LOOKS)
+    x, y = line(figure, "mine")
+    assert x == [1, 2, 3]
+    assert y == pytest.approx([0.2, 0.4, 0.6])
+    assert said(figure) == ["mine: smart v1, training seed 3, 64 worlds of the validation split"]
+    damaged: tuple[object, ...] = (
+        [],
+        points[:1],
+        "none",
+        [{"steps": 1}],
+        [{**points[0], "score": float("nan")}] * 2,
+    )
+    for curve in damaged:
+        assert curves_of([learned(curve)]) == []
 
 
 def test_the_same_figure_is_the_same_file(tmp_path: Path) -> None:
     plays = {("smart", "idle"): plays_of("idle", "smart", safe_score=[0.1, 0.3], bound=[1.0, 1.0])}
     for name in "ab":
         (tmp_path / name).mkdir()
-        files = figures.draw(tmp_path / name, plays, [], [])
+        files = figures.draw(tmp_path / name, plays)
         assert [path.name for path in files] == [
-            "profile.png", "profile.svg", "scenarios.png", "scenarios.svg",
+            "scenarios.png", "scenarios.svg", "profile.png", "profile.svg",
         ]  # fmt: skip
     for path in files:
         assert path.read_bytes() == (tmp_path / "a" / path.name).read_bytes()
+    assert ">smart v1</text>" in files[1].read_text(), "text is text"

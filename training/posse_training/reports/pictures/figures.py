@@ -1,4 +1,7 @@
-"""The figures of ``posse compare``, as PNG and SVG."""
+"""The figures of ``posse compare``, as PNG and SVG.
+
+Each states what was played: number of worlds, split, seed and the scenario's version.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,25 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from posse_training.reports.pictures.parts import legend, names_of, panels, steps
+from posse import get_scenario
+from posse_training.reports.pictures.learning import Curve, learning
+from posse_training.reports.pictures.palette import BAND, NOTE, OWN
+from posse_training.reports.pictures.parts import (
+    facts_of,
+    legend,
+    names_of,
+    note,
+    panels,
+    steps,
+    versions_of,
+)
 from posse_training.reports.pictures.style import (
-    BLACK,
     RC,
-    STYLES,
+    Looks,
     in_order,
+    looks_of,
     marker_of,
     reference_of,
-    style_of,
 )
 from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate, share
@@ -28,8 +41,11 @@ from posse_training.reports.sweeps import BOUND, SWEEPS, Point, Sweep
 def draw(
     folder: Path,
     plays: Mapping[tuple[str, str], Plays],
-    points: Sequence[Point],
-    losses: Sequence[Plays],
+    points: Sequence[Point] = (),
+    losses: Sequence[Plays] = (),
+    curves: Sequence[Curve] = (),
+    *,
+    sweep_facts: str = "",
 ) -> list[Path]:
     """Draw every figure that there is data for; return the files.
 
@@ -38,18 +54,28 @@ def draw(
         plays: Results by scenario and policy.
         points: Points of the sweeps.
         losses: Results in the scenario in which the leader breaks.
+        curves: Learning curves.
+        sweep_facts: Number of worlds at each point, split and seed.
     """
+    looks = looks_of(
+        {policy for _, policy in plays}
+        | {point.policy for point in points if point.policy != BOUND}
+        | {found.label for found in losses}
+        | {curve.policy for curve in curves}
+    )
     with mpl.rc_context(RC):
         drawn: dict[str, Figure] = {}
         if plays:
-            drawn["profile"] = profile(plays)
-            drawn["scenarios"] = scores(plays)
+            drawn["scenarios"] = scores(plays, looks)
+            drawn["profile"] = profile(plays, looks)
+        if curves:
+            drawn["learning"] = learning(curves, looks)
         for sweep in SWEEPS:
             mine = [point for point in points if point.sweep == sweep.name]
             if mine:
-                drawn[sweep.name] = sweep_figure(sweep, mine)
+                drawn[sweep.name] = sweep_figure(sweep, mine, looks, sweep_facts)
         if losses:
-            drawn["recovery"] = recovery(losses)
+            drawn["recovery"] = recovery(losses, looks)
         files = []
         for name, figure in drawn.items():
             for suffix in (".png", ".svg"):
@@ -60,22 +86,24 @@ def draw(
         return files
 
 
-def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
+def profile(plays: Mapping[tuple[str, str], Plays], looks: Looks) -> Figure:
     """Draw the share of worlds that reach a safe score (a performance profile) on each scenario."""
     names, policies = names_of(plays)
+    versions = versions_of(plays)
     columns = 4 if len(names) > 6 else min(3, len(names))
     rows = -(-len(names) // columns)
-    figure, axes = panels(rows, columns, 0.75 + 1.6 * rows)
-    scores = np.linspace(0, 1, 401)
+    figure, axes = panels(rows, columns, 1.1 + 1.6 * rows)
+    scores = np.linspace(0, 1, 201)
     for axis, name in zip(axes, names, strict=False):
-        axis.set_title(name, fontweight="bold")
+        axis.set_title(versions[name], fontweight="bold")
         for k, policy in enumerate(policies):
             if (name, policy) not in plays:
                 continue
             mine = plays[name, policy]["safe_score"]
-            steps(axis, scores, _at_least(mine, scores), policy, (k + 0.5) / len(policies))
+            phase = (k + 0.5) / len(policies)
+            steps(axis, scores, _at_least(mine, scores), policy, looks, phase)
             if policy == reference_of(policies):
-                steps(axis, scores, _at_least(plays[name, policy]["bound"], scores), BOUND)
+                steps(axis, scores, _at_least(plays[name, policy]["bound"], scores), BOUND, looks)
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
         axis.set_xticks((0, 0.5, 1), ("0", "0.5", "1"))
         axis.set_yticks((0, 0.5, 1), ("0", "0.5", "1"))
@@ -84,9 +112,10 @@ def profile(plays: Mapping[tuple[str, str], Plays]) -> Figure:
         axis.label_outer()
         if k < len(names) and k + columns >= len(names):
             axis.tick_params(labelbottom=True)
-    figure.supxlabel("safe score τ", fontsize=9)
+            axis.set_xlabel("safe score τ")
     figure.supylabel("share of worlds with τ or more", fontsize=9)
-    legend(figure, [*policies, BOUND])
+    note(figure, facts_of(list(plays.values())))
+    legend(figure, [*policies, BOUND], looks)
     return figure
 
 
@@ -96,44 +125,47 @@ def _at_least(values: Any, scores: Any) -> Any:
     return 1 - np.searchsorted(ordered, scores, side="left") / len(ordered)
 
 
-def scores(plays: Mapping[tuple[str, str], Plays]) -> Figure:
+def scores(plays: Mapping[tuple[str, str], Plays], looks: Looks) -> Figure:
     """Draw the mean safe score of every policy on every scenario, with its interval."""
     names, policies = names_of(plays)
-    figure, (axis,) = panels(1, 1, 0.9 + len(names) * (0.2 + 0.11 * len(policies)))
+    versions = versions_of(plays)
+    figure, (axis,) = panels(1, 1, 1.3 + len(names) * (0.2 + 0.11 * len(policies)))
     apart = 0.8 / max(len(policies), 1)
     for row, name in enumerate(names):
         if row % 2:
-            axis.axhspan(row - 0.5, row + 0.5, color="0.965", zorder=0, linewidth=0)
+            axis.axhspan(row - 0.5, row + 0.5, color=BAND, zorder=0, linewidth=0)
         for k, policy in enumerate(policies):
             if (name, policy) not in plays:
                 continue
-            found, style = plays[name, policy], style_of(policy)
+            found, style = plays[name, policy], looks[policy]
             score = found.mean("safe_score")
             y = row + (k - (len(policies) - 1) / 2) * apart
             axis.plot([score.low, score.high], [y, y], color=style.colour, linewidth=1.4)
-            axis.plot(score.value, y, **marker_of(policy))
+            axis.plot(score.value, y, **marker_of(policy, style))
             if policy == reference_of(policies):
                 bound = found.mean("bound").value
                 axis.plot(
-                    [bound, bound], [row - 0.42, row + 0.42], color=BLACK,
-                    linestyle=STYLES[BOUND].line, linewidth=1.6,
+                    [bound, bound], [row - 0.42, row + 0.42], color=looks[BOUND].colour,
+                    linestyle=looks[BOUND].line, linewidth=1.6,
                 )  # fmt: skip
-    axis.set_yticks(range(len(names)), names)
+    axis.set_yticks(range(len(names)), [versions[name] for name in names])
     axis.tick_params(axis="y", length=0)
     axis.grid(visible=False, axis="y")
     axis.set(ylim=(len(names) - 0.5, -0.5), xlim=(0, 1), xlabel="mean safe score, 95 % interval")
-    legend(figure, [*policies, BOUND], lines=False)
+    note(figure, facts_of(list(plays.values())))
+    legend(figure, [*policies, BOUND], looks, lines=False)
     return figure
 
 
-def sweep_figure(sweep: Sweep, points: Sequence[Point]) -> Figure:
+def sweep_figure(sweep: Sweep, points: Sequence[Point], looks: Looks, facts: str = "") -> Figure:
     """Draw the mean safe score of every policy against a setting, with its interval."""
-    figure, (axis,) = panels(1, 1, 3.6)
+    figure, (axis,) = panels(1, 1, 3.8)
     policies = in_order({point.policy for point in points})
-    axis.axvline(sweep.own, color="0.75", linewidth=5, zorder=0)
+    scenario = get_scenario(sweep.scenario)
+    axis.axvline(sweep.own, color=OWN, linewidth=5, zorder=0)
     for policy in policies:
         mine = sorted((p for p in points if p.policy == policy), key=lambda p: p.value)
-        style = style_of(policy)
+        style = looks[policy]
         x = [p.value for p in mine]
         axis.plot(
             x, [p.score.value for p in mine], color=style.colour, linestyle=style.line,
@@ -145,22 +177,24 @@ def sweep_figure(sweep: Sweep, points: Sequence[Point]) -> Figure:
             x, [p.score.low for p in mine], [p.score.high for p in mine],
             color=style.colour, linewidth=1.4,
         )  # fmt: skip
-        axis.plot(x, [p.score.value for p in mine], **{**marker_of(policy), "linestyle": ""})
+        look = marker_of(policy, style) | {"linestyle": ""}
+        axis.plot(x, [p.score.value for p in mine], **look)
     axis.set(
         ylim=(0, 1), xticks=sweep.values, xlabel=sweep.label,
-        ylabel=f"mean safe score on {sweep.scenario}",
+        ylabel=f"mean safe score on {scenario.name} v{scenario.version}",
     )  # fmt: skip
     axis.annotate(
         f"as in {sweep.scenario}", (sweep.own, 1), (0, 3), textcoords="offset points",
-        color="0.45", fontsize=8, ha="center",
+        color=NOTE, fontsize=8, ha="center",
     )  # fmt: skip
-    legend(figure, policies)
+    note(figure, facts)
+    legend(figure, policies, looks)
     return figure
 
 
-def recovery(losses: Sequence[Plays]) -> Figure:
+def recovery(losses: Sequence[Plays], looks: Looks) -> Figure:
     """Draw the share of teams that have settled again by a time after their leader broke."""
-    figure, (axis,) = panels(1, 1, 3.4)
+    figure, (axis,) = panels(1, 1, 3.6)
     scenario = losses[0].scenario
     # After this time, an episode may end before a recovery counts.
     latest = scenario.duration * (1 - scenario.break_window[1]) - scenario.settle_time
@@ -168,18 +202,19 @@ def recovery(losses: Sequence[Plays]) -> Figure:
     policies = in_order({plays.label for plays in losses})
     for plays in sorted(losses, key=lambda plays: policies.index(plays.label)):
         bands = [_recovered(plays, time) for time in times]
-        style = style_of(plays.label)
+        style = looks[plays.label]
         axis.fill_between(
             times, [b.low for b in bands], [b.high for b in bands], step="post",
             color=style.colour, alpha=0.15, linewidth=0,
         )  # fmt: skip
         phase = (policies.index(plays.label) + 0.5) / len(policies)
-        steps(axis, times, [b.value for b in bands], plays.label, phase)
+        steps(axis, times, [b.value for b in bands], plays.label, looks, phase)
     axis.set(
         xlim=(0, latest), ylim=(-0.02, 1.02), xlabel="time since the loss, s",
         ylabel="share of teams settled again",
     )  # fmt: skip
-    legend(figure, policies)
+    note(figure, f"{scenario.name} v{scenario.version}: {facts_of(losses)}")
+    legend(figure, policies, looks)
     return figure
 
 

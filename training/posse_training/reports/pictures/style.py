@@ -1,17 +1,31 @@
-"""The colours and markers of policies in figures.
+"""The colours, markers and lines of policies in figures.
 
-A policy looks the same in every figure, whichever others are in it. The colours are those of Okabe
-and Ito, which are distinct for all kinds of colour vision; markers distinguish policies without
+A policy that ships looks the same in every figure, and any other one in every figure of a
+comparison. No two policies of a figure have the same marker, so that they can be told apart without
 colour.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from posse_training.reports.pictures.palette import (
+    BLUE,
+    GREEN,
+    GREY,
+    GRID,
+    INK,
+    NOTE,
+    ORANGE,
+    PAPER,
+    PINK,
+    PURPLE,
+    RED,
+    SKY,
+)
 from posse_training.reports.sweeps import BOUND
 
 WIDTH: Final = 7.2
@@ -21,17 +35,30 @@ RC: Final[Any] = {
     "axes.titlesize": 9,
     "axes.labelsize": 9,
     "legend.fontsize": 8.5,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.edgecolor": "0.4",
+    "axes.edgecolor": NOTE,
+    "axes.facecolor": PAPER,
+    "figure.facecolor": PAPER,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "grid.color": "0.9",
+    "grid.color": GRID,
     "grid.linewidth": 0.7,
     "lines.linewidth": 1.6,
     "lines.markersize": 5.5,
+    "svg.fonttype": "none",  # text stays text
     "svg.hashsalt": "posse",  # equal figures give equal files
 }
+_SOLID, _DASHED, _DOTTED = "-", (0, (5, 2)), (0, (1, 1.5))
+_SHORT, _DASH_DOT = (0, (3, 1.5)), (0, (5, 1, 1, 1))
+_OPEN: Final = frozenset([*"1234x_+|", (6, 2, 0)])
+"""Markers that are strokes without an area."""
+_SMALL: Final = frozenset("odDshHp8")
+"""Markers that fill their square."""
 
 
 @dataclass(frozen=True)
@@ -39,51 +66,68 @@ class Style:
     """Colour, marker and line of a policy."""
 
     colour: str
-    marker: str
-    line: Any = "-"
+    marker: str | tuple[int, int, int]
+    line: Any = _SOLID
 
-
-BLACK, _GREY = "#1A1A1A", "#8C8C8C"
-_BLUE, _SKY, _GREEN = "#0072B2", "#56B4E9", "#009E73"
-_RED, _ORANGE, _PINK, _YELLOW = "#D55E00", "#E69F00", "#CC79A7", "#C9B800"
 
 STYLES: Final[dict[str, Style]] = {
-    BOUND: Style(BLACK, "", (0, (1, 1.5))),
-    "planner": Style(BLACK, "D", (0, (5, 2))),
-    "pngl-l-phi": Style(_PINK, "D"),
-    "pngl": Style(_PINK, "d", (0, (3, 1.5))),
-    "deviated-pursuit": Style(_PINK, "1", (0, (1, 1))),
-    "velocity-pursuit": Style(_PINK, "2", (0, (5, 1, 1, 1))),
-    "ddcs-centralized-pursuit": Style(_SKY, "3", (0, (5, 1, 1, 1))),
-    "ddcs-distributed": Style(_BLUE, "o"),
-    "ddcs-tuned": Style(_BLUE, "s"),
-    "pngl-l-phi-tuned": Style(_PINK, "p"),
-    "ddcs-centralized": Style(_SKY, "s"),
-    "ddcs-centralized-l-l": Style(_SKY, "8"),
-    "ddcs-centralized-no-exchange": Style(_SKY, "p", (0, (3, 1.5))),
-    "ddcs-no-radio": Style(_BLUE, "h", (0, (3, 1.5))),
-    "pursuit": Style(_GREY, "v"),
-    "idle": Style(_GREY, "_"),
-    "random": Style(_GREY, "x"),
-    "learned-smart": Style(_RED, "^"),
-    "learned-radio": Style(_ORANGE, "P"),
-    "learned-obstacles": Style(_GREEN, "X"),
-    "learned-field": Style(_PINK, "<"),
-    "learned-generalist": Style(_YELLOW, "*"),
+    BOUND: Style(INK, "", _DOTTED),
+    "planner": Style(INK, "D", _DASHED),
+    "pngl-l-phi": Style(PINK, "d"),
+    "pngl-l-phi-tuned": Style(PINK, "8", _DASHED),
+    "pngl": Style(PINK, "1", _SHORT),
+    "deviated-pursuit": Style(PINK, "2", _DOTTED),
+    "velocity-pursuit": Style(PINK, "3", _DASH_DOT),
+    "ddcs-distributed": Style(BLUE, "o"),
+    "ddcs-tuned": Style(BLUE, "s", _DASHED),
+    "ddcs-no-radio": Style(BLUE, "h", _SHORT),
+    "ddcs-centralized": Style(SKY, "H"),
+    "ddcs-centralized-l-l": Style(SKY, "4", _DASHED),
+    "ddcs-centralized-no-exchange": Style(SKY, "p", _SHORT),
+    "ddcs-centralized-pursuit": Style(SKY, "+", _DASH_DOT),
+    "pursuit": Style(GREY, "v"),
+    "idle": Style(GREY, "_", _DASHED),
+    "random": Style(GREY, "x", _DOTTED),
+    "learned-smart": Style(RED, "^"),
+    "learned-radio": Style(ORANGE, "P"),
+    "learned-obstacles": Style(GREEN, "X"),
+    "learned-field": Style(PURPLE, "<"),
+    "learned-generalist": Style(RED, "*", _DASHED),
 }
 _OTHERS: Final = tuple(
-    Style(colour, marker)
-    for marker in ("H", ">", "8")
-    for colour in (_RED, _GREEN, _ORANGE, _PINK, _YELLOW)
-)
-"""Styles of all other policies, chosen by a hash of the name."""
+    Style(colour, marker, line)
+    for marker, line in (
+        (">", _SOLID), ((4, 1, 0), _DASHED), ((6, 2, 0), _SHORT), ((8, 1, 0), _DASH_DOT),
+        ("|", _SOLID), ((5, 0, 180), _DASHED), ((4, 1, 45), _SHORT), (".", _DOTTED),
+    )
+    for colour in (RED, GREEN, ORANGE, PURPLE)
+)  # fmt: skip
+"""Styles of all other policies."""
+
+Looks = Mapping[str, Style]
 
 
-def style_of(policy: str) -> Style:
-    """Return the style of a policy, which depends on its name only."""
-    if policy in STYLES:
-        return STYLES[policy]
-    return _OTHERS[zlib.crc32(policy.encode()) % len(_OTHERS)]
+def looks_of(policies: Iterable[str]) -> Looks:
+    """Return the style of each policy of a comparison, by name.
+
+    Policies that do not ship get one that depends on their name, unless another has its marker.
+    With more than eight of them, markers repeat, in another colour.
+    """
+    looks = {BOUND: STYLES[BOUND]}
+    for policy in sorted(set(policies)):
+        looks[policy] = STYLES[policy] if policy in STYLES else _free(policy, looks.values())
+    return looks
+
+
+def _free(policy: str, taken: Collection[Style]) -> Style:
+    """Return a style for a policy whose marker no other has; if there is none, a free style."""
+    first = zlib.crc32(policy.encode()) % len(_OTHERS)
+    candidates = [*_OTHERS[first:], *_OTHERS[:first]]
+    markers = {style.marker for style in taken}
+    for style in candidates:
+        if style.marker not in markers:
+            return style
+    return next((style for style in candidates if style not in taken), candidates[0])
 
 
 def in_order(policies: set[str]) -> list[str]:
@@ -105,15 +149,15 @@ def reference_of(policies: Sequence[str]) -> str:
     return "planner" if "planner" in policies else policies[0]
 
 
-def marker_of(policy: str) -> dict[str, Any]:
+def marker_of(policy: str, style: Style) -> dict[str, Any]:
     """Return the look of a point; the planner's is hollow, since it reads the state."""
-    style = style_of(policy)
+    hollow, stroked = policy == "planner", style.marker in _OPEN
     return {
         "marker": style.marker,
         "color": style.colour,
-        "markerfacecolor": "white" if policy == "planner" else style.colour,
-        "markeredgecolor": style.colour if policy == "planner" or style.marker in "x_" else "white",
-        "markeredgewidth": 1.2 if policy == "planner" or style.marker in "x_" else 0.5,
-        "markersize": 7 if style.marker in "*PX^v<>" else 5.5,
+        "markerfacecolor": PAPER if hollow else style.colour,
+        "markeredgecolor": style.colour if hollow or stroked else PAPER,
+        "markeredgewidth": 1.4 if hollow or stroked else 0.5,
+        "markersize": 5.5 if style.marker in _SMALL else 7,
         "linestyle": style.line,
     }
