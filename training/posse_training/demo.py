@@ -81,8 +81,11 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
         page = write_replay(replay, FOLDER / "replay.html")
     console.print(table(results))
     for title, path in paths.items():
-        console.print(f"{title}: {path}")
-    console.print(f"{' beside '.join(names)} on {SCENARIOS[-1]}, to open in a browser: {page}")
+        console.print(f"{title}: {path}", markup=False, soft_wrap=True)
+    console.print(
+        f"{' beside '.join(names)} on {SCENARIOS[-1]}, to open in a browser: {page}",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip
     console.print(f"total time: {time.perf_counter() - started:.0f} s")
 
 

@@ -15,18 +15,21 @@ class LiveDisplay(ABC):
 
     Args:
         console: Where to show it.
+        transient: Whether to remove it at the end.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, *, transient: bool = False) -> None:
         self._console = console
+        self._transient = transient
         self._note = ""
         self._live: Live | None = None
 
     def __enter__(self) -> Self:
         if self._console.is_terminal:
             self._live = Live(
-                get_renderable=self._render, console=self._console, refresh_per_second=4
-            )
+                get_renderable=self._render, console=self._console, refresh_per_second=4,
+                transient=self._transient,
+            )  # fmt: skip
             self._live.start()
         return self
 
@@ -48,3 +51,12 @@ class LiveDisplay(ABC):
     @abstractmethod
     def _render(self) -> RenderableType:
         """Return the display of the present state."""
+
+
+def clock(seconds: float) -> str:
+    """Return a duration as hours, minutes and seconds."""
+    if seconds == float("inf"):
+        return "unknown time"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

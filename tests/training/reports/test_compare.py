@@ -11,7 +11,7 @@ from posse.scenarios.named import _named
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
-from posse_training.reports.compare import Settings, compare
+from posse_training.reports.compare import Settings, asked_sweeps, compare
 from posse_training.reports.comparison import table
 from posse_training.reports.contenders import read_contenders
 from posse_training.reports.statistics import difference
@@ -55,7 +55,7 @@ def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
         share = safe[row["policy"]][:3].mean() / safe["planner"].mean()
         assert row["of_planner"] == pytest.approx(share)
         assert row["contact_free"].value in np.arange(5) / 4 or row["policy"] == "planner"
-    shown = list(table(found, settings).columns[1].cells)
+    shown = list(table(found, settings, 240).columns[1].cells)
     ranked = sorted(safe, key=lambda policy: -safe[policy].mean())
     assert [str(cell) for cell in shown] == ranked
     assert ranked[0] == "planner"
@@ -193,11 +193,39 @@ def test_figures_are_drawn_with_the_planner_beside(
 ) -> None:
     few = tuple(replace(sweep, values=sweep.values[:1]) for sweep in SWEEPS)
     monkeypatch.setattr("posse_training.reports.compare.SWEEPS", few)
-    options = ["--scenarios", "constant", "--episodes", "3", "--sweep-episodes", "2"]
+    options = ["--scenarios", "constant", "leader-loss", "--episodes", "3"]
+    options += ["--sweeps", "team-size", "radio-loss", "--sweep-episodes", "2"]
     assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
-    names = {"profile", "scenarios", "team-size", "radio-loss", "target-speed", "recovery"}
+    names = {"profile", "scenarios", "team-size", "radio-loss", "recovery"}
     assert {path.stem for path in tmp_path.glob("*.png")} == names
     assert {path.stem for path in tmp_path.glob("*.svg")} == names
     assert "planner" in capsys.readouterr().out
     with (tmp_path / "sweeps.csv").open(newline="") as file:
         assert {row["policy"] for row in csv.DictReader(file)} == {"pursuit", "planner", BOUND}
+
+
+def test_a_scenario_alone_is_played_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--scenarios", "constant", "--episodes", "2", "--planner-episodes", "0"]
+    assert main(["compare", "idle", *options, "--out", str(tmp_path / "out")]) == 0
+    files = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {name for name in files if name.endswith(".csv")} == {"constant-idle.csv"}
+    assert {name for name in files if name.endswith(".png")} == {"scenarios.png", "profile.png"}
+    for asked, message in (("team-sise", "did you mean 'team-size'"), ("9", "or 'all', or 'none'")):
+        assert main(["compare", "idle", *options, "--sweeps", asked]) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_sweeps_are_played_when_asked_or_with_all_scenarios() -> None:
+    everything = tuple(sweep.name for sweep in SWEEPS)
+    for given, wanted in (
+        (Settings(("idle",)), everything),
+        (Settings(("idle",), figures=False), ()),
+        (Settings(("idle",), sweeps=("none",)), ()),
+        (Settings(("idle",), sweep_episodes=0), ()),
+        (Settings(("idle",), ("smart",)), ()),
+        (Settings(("idle",), ("smart",), sweeps=("all",)), everything),
+        (Settings(("idle",), ("smart",), sweeps=("radio-loss",)), ("radio-loss",)),
+    ):
+        assert tuple(sweep.name for sweep in asked_sweeps(given)) == wanted

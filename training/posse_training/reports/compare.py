@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import tyro
 from rich.console import Console
 
 from posse import Batch, get_scenario, scenario_names
-from posse_baselines import PolicyError
 from posse_training.errors import SettingsError
-from posse_training.reports.comparison import Comparison, summary, table, write_summary
-from posse_training.reports.comparison_folder import FileNames, replaced
-from posse_training.reports.contenders import Contender, read_contenders
+from posse_training.reports.comparison import Comparison, table, write_summary
+from posse_training.reports.comparison_folder import replaced
+from posse_training.reports.comparison_run import MARL_EVAL, PLANNER, REPORT, SUMMARY, ComparisonRun
+from posse_training.reports.contenders import read_contenders
 from posse_training.reports.evaluation import refuse_trained_split
 from posse_training.reports.marl_eval import write_marl_eval
-from posse_training.reports.players import PlayError, Players
-from posse_training.reports.plays import Plays
-from posse_training.reports.sweeps import LEADER_LOSS, SWEEPS, play_sweeps, write_points
+from posse_training.reports.players import Players
+from posse_training.reports.progress import Progress
+from posse_training.reports.sweeps import SWEEPS, Sweep
 
-PLANNER: Final = "planner"
-"""The reference that is shown with every team."""
-SUMMARY: Final = "summary.json"
-POINTS: Final = "sweeps.csv"
-MARL_EVAL: Final = "marl-eval.json"
+_ALL: Final = ("all",)
+_PIPED: Final = 240
+"""Width of the table where lines have no end (a pipe, a file)."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +46,20 @@ class Settings:
     split: str = "test"
     """Split of the worlds: train, validation or test."""
     out: Path = Path("runs/compare")
-    """Folder for the rows (CSV), the summary (JSON) and the figures (PNG and SVG). It is replaced
-    as a whole at the end, and refused if it contains files that no comparison wrote."""
+    """Folder for the report (HTML), the rows (CSV), the summary (JSON) and the figures (PNG and
+    SVG). It is replaced as a whole at the end, and refused if it contains files that no comparison
+    wrote."""
     figures: bool = True
-    """Draw figures."""
+    """Draw figures, and write the report."""
+    replays: int = 3
+    """Largest wins, and as many largest losses, of all policies against the first one that the
+    report replays; 0: none."""
     planner_episodes: int = 100
     """Largest number of the worlds that the planner plays as a reference; 0: none. It takes about
     0.4 s of processor time per world. If named among the policies, it plays all worlds."""
+    sweeps: tuple[str, ...] = ()
+    """Settings to vary beyond what was trained with: team-size, radio-loss, target-speed, or "all",
+    or "none"; default: all if all scenarios are played, else none."""
     sweep_episodes: int = 200
     """Worlds at each point of the figures that vary a setting; 0: omit these figures."""
     export: tuple[Literal["marl-eval"], ...] = ()
@@ -64,20 +70,24 @@ class Settings:
     is stopped and skipped on the remaining scenarios."""
 
 
-def compare(settings: Settings) -> Comparison:
-    """Evaluate all policies; write rows, summary and figures.
+def compare(settings: Settings, *, console: Console | None = None) -> Comparison:
+    """Evaluate all policies; write rows, summary, figures and report.
 
     A policy that is incompatible with a scenario is omitted there; one that fails is listed under
     ``failed``. The other policies are not affected.
 
+    Args:
+        settings: What to play, and where to write.
+        console: Where to show progress; default: the standard error output.
+
     Raises:
-        SettingsError: No episodes to play, or an invalid time limit.
+        SettingsError: No episodes to play, an unknown sweep, or an invalid time limit.
         PolicyError: An unknown policy, or none; nothing is played.
         ScenarioError: An unknown scenario or split, an invalid seed; nothing is played.
         TrainedSplitError: A split that a policy was trained on; nothing is played.
         ComparisonError: The folder cannot be replaced; what it held is unchanged.
     """
-    scenarios = _check(settings)
+    scenarios, sweeps = _check(settings)
     contenders = read_contenders(settings.policies)
     if settings.planner_episodes > 0 and PLANNER not in settings.policies:
         contenders += read_contenders((PLANNER,))
@@ -89,146 +99,77 @@ def compare(settings: Settings) -> Comparison:
         for contender in contenders:
             players.check(contender)
         with replaced(settings.out) as folder:
-            run = _Run(settings, players, contenders, folder)
-            for scenario in scenarios:
-                run.play_scenario(scenario)
-            if settings.figures:
-                run.draw()
+            run = ComparisonRun(settings, players, contenders, scenarios, sweeps, folder)
+            with Progress(*run.planned(), console or Console(stderr=True)) as progress:
+                run.play(progress)
+                if settings.figures:
+                    run.report(progress)
             if "marl-eval" in settings.export:
                 write_marl_eval(run.found, folder / MARL_EVAL)
             write_summary(run.found, folder / SUMMARY, settings)
     return run.found
 
 
-def _check(settings: Settings) -> tuple[str, ...]:
-    """Return the names of the scenarios.
+def _check(settings: Settings) -> tuple[tuple[str, ...], tuple[Sweep, ...]]:
+    """Return the names of the scenarios, and the sweeps.
 
     Raises:
         SettingsError, ScenarioError: As :func:`compare`.
     """
-    for name, least in (("episodes", 1), ("sweep_episodes", 0), ("planner_episodes", 0)):
+    for name, least in (
+        ("episodes", 1), ("sweep_episodes", 0), ("planner_episodes", 0), ("replays", 0),
+    ):  # fmt: skip
         value = getattr(settings, name)
         if not least <= value <= 10**8:
             raise SettingsError(f"{name}={value:g} must be at least {least} and at most 10**8")
     if not (math.isfinite(settings.time_limit) and settings.time_limit > 0):
         raise SettingsError(f"time_limit={settings.time_limit!r} s must be finite and above 0")
-    named = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
+    sweeps = asked_sweeps(settings)
+    named = scenario_names() if settings.scenarios == _ALL else settings.scenarios
     for name in named:
         Batch(get_scenario(name), 1, seed=settings.seed, split=settings.split)
-    return tuple(dict.fromkeys(named))
+    return tuple(dict.fromkeys(named)), sweeps
 
 
-class _Run:
-    """One comparison while it is played and written."""
+def asked_sweeps(settings: Settings) -> tuple[Sweep, ...]:
+    """Return the sweeps that are asked for; by default all of them with all scenarios.
 
-    def __init__(
-        self,
-        settings: Settings,
-        players: Players,
-        contenders: Sequence[Contender],
-        folder: Path,
-    ) -> None:
-        self.settings = settings
-        self.contenders = contenders
-        self.folder = folder
-        self.found = Comparison(contenders[0].label)
-        self._players = players
-        self._names = FileNames(SUMMARY, POINTS, MARL_EVAL)
-
-    def _play(self, contender: Contender, scenario: str, episodes: int) -> Plays | None:
-        return self.attempt(contender, scenario, episodes, scenario)
-
-    def attempt(
-        self, contender: Contender, scenario: str, episodes: int, what: str, **overrides: Any
-    ) -> Plays | None:
-        """Play; return ``None`` and note why if the contender cannot or fails."""
-        s = self.settings
-        if contender.label == PLANNER and PLANNER not in s.policies:
-            episodes = min(episodes, s.planner_episodes)
-        try:
-            return self._players.play(
-                contender, get_scenario(scenario, **overrides), episodes, s.seed, s.split
+    Raises:
+        SettingsError: An unknown one.
+    """
+    known = {sweep.name: sweep for sweep in SWEEPS}
+    asked = settings.sweeps
+    if not asked:
+        asked = _ALL if settings.scenarios == _ALL and settings.figures else ("none",)
+    if asked in (_ALL, ("none",)):
+        asked = tuple(known) if asked == _ALL else ()
+    for name in asked:
+        if name not in known:
+            near = difflib.get_close_matches(name[:80], known, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise SettingsError(
+                f"sweeps={name!r:.80} is not known: {hint}name some of {', '.join(known)}, or "
+                "'all', or 'none'"
             )
-        except PolicyError as error:
-            self.found.left_out.append({"policy": contender.label, "what": what, "why": str(error)})
-        except PlayError as error:
-            self.found.failed.append({"policy": contender.label, "what": what, "why": str(error)})
-        return None
-
-    def play_scenario(self, scenario: str) -> None:
-        """Play one scenario with every contender, and write the rows."""
-        reference: Plays | None = None
-        for contender in self.contenders:
-            plays = self._play(contender, scenario, self.settings.episodes)
-            if plays is None:
-                continue
-            self.found.plays[scenario, contender.label] = plays
-            self.found.rows.append(
-                {
-                    "scenario": scenario,
-                    "policy": contender.label,
-                    **summary(plays, reference),
-                    "files": self._write(scenario, plays),
-                }
-            )
-            if contender is self.contenders[0]:
-                reference = plays
-        best = self.found.plays.get((scenario, PLANNER))
-        for row in self.found.rows:
-            if row["scenario"] == scenario and best is not None:
-                row["of_planner"] = self.found.plays[scenario, row["policy"]].ratio(best)
-
-    def _write(self, scenario: str, plays: Plays) -> list[str]:
-        """Write the rows of a contender, one file for each training seed; return their names."""
-        written = []
-        for k, results in enumerate(plays.results):
-            member = f"-{k + 1}" if len(plays.results) > 1 else ""
-            stem = self._names.stem(f"{scenario}-{plays.label}{member}", ".csv", ".json")
-            results.write(self.folder / f"{stem}.csv")
-            written.append(f"{stem}.csv")
-        return written
-
-    def draw(self) -> None:
-        """Evaluate the sweeps of the figures, and draw the figures."""
-        from posse_training.reports.pictures import (
-            figures,  # imports matplotlib, which is slow
-        )
-
-        found, settings = self.found, self.settings
-        losses = [plays for (name, _), plays in found.plays.items() if name == LEADER_LOSS]
-        if settings.sweep_episodes > 0:
-            episodes = settings.sweep_episodes
-            ordered = sorted(self.contenders, key=lambda contender: contender.label == PLANNER)
-            found.points = play_sweeps(
-                ordered,
-                lambda contender, sweep, value: self.attempt(
-                    contender, sweep.scenario, episodes, f"{sweep.name} {value:g}",
-                    **{sweep.setting: value},
-                ),
-                SWEEPS,
-            )  # fmt: skip
-            write_points(self.folder / POINTS, found.points)
-            if not losses:
-                played = [self._play(c, LEADER_LOSS, episodes) for c in self.contenders]
-                losses = [plays for plays in played if plays is not None]
-        drawn = figures.draw(self.folder, found.plays, found.points, losses)
-        found.figures = [settings.out / path.name for path in drawn]
+    return tuple(known[name] for name in dict.fromkeys(asked)) if settings.sweep_episodes else ()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare policies, print the table, and return 1 if a policy failed, else 0."""
     settings = tyro.cli(Settings, prog="posse compare", args=arguments)
     found = compare(settings)
-    # Where lines have no end (a pipe, a file) the table is as wide as it needs to be.
-    console = Console(width=None if sys.stdout.isatty() else 240)
-    console.print(table(found, settings))
+    console = Console(width=None if sys.stdout.isatty() else _PIPED)
+    console.print(table(found, settings, console.width))
     for row in found.left_out:
         line = f"left out: {row['policy']} on {row['what']}: {row['why']}"
         console.print(line, markup=False)
     for row in found.failed:
         console.print(f"failed: {row['policy']} on {row['what']}: {row['why']}", markup=False)
-    console.print(f"rows and summary: {settings.out}", markup=False)
+    console.print(f"rows and summary: {settings.out}", markup=False, soft_wrap=True)
     if found.figures:
         names = ", ".join(path.stem for path in found.figures if path.suffix == ".png")
         console.print(f"figures (PNG and SVG) beside them: {names}")
+    if settings.figures:
+        page = settings.out / REPORT
+        console.print(f"all of it, to open in a browser: {page}", markup=False, soft_wrap=True)
     return 1 if found.failed else 0

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
+from rich import box
 from rich.table import Table
 from rich.text import Text
 
@@ -83,35 +85,84 @@ def write_summary(found: Comparison, path: Path, worlds: _Worlds) -> None:
     path.write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
 
 
-def table(found: Comparison, worlds: _Worlds) -> Table:
-    """Return the estimates as a table, teams ranked by safe score on each scenario."""
-    shown = Table(
-        title=Text(
-            f"{worlds.episodes:,} worlds each, split {worlds.split}, seed {worlds.seed}; "
-            f"95 % intervals; differences of the safe score to {found.reference}, paired by world"
-        )
+_WIDE: Final = 200
+"""Columns of a terminal that the whole table needs."""
+_LONG: Final = ("safe_score", "of_planner", "score", "contact_free", "bound", "settled",
+                "difference", "improvement")  # fmt: skip
+_SHORT: Final = {
+    "safe_score": "safe score",
+    "of_planner": "of the\nplanner",
+    "contact_free": "contact-\nfree",
+    "difference": "difference",
+    "improvement": "better\nin",
+}
+"""Columns that fit into 80 characters, with their headers."""
+
+
+def table(found: Comparison, worlds: _Worlds, width: int) -> Table:
+    """Return the estimates as a table, teams ranked by safe score on each scenario.
+
+    Args:
+        found: The results.
+        worlds: Which worlds were played.
+        width: Columns of the terminal; with fewer than 200, the table has the most important
+            estimates only, and each interval stands below its value.
+    """
+    title = (
+        f"{worlds.episodes:,} worlds each, split {worlds.split}, seed {worlds.seed}; "
+        f"95 % intervals; differences of the safe score to {found.reference}, paired by world"
     )
-    columns = (
-        "safe_score", "of_planner", "score", "contact_free", "bound", "settled",
-        "difference", "improvement",
-    )  # fmt: skip
-    for column in ("scenario", "policy"):
-        shown.add_column(column, overflow="fold", min_width=len(column) + 2)
-    for column in columns:
-        shown.add_column(column.replace("_", " "))
     played = list(dict.fromkeys(row["scenario"] for row in found.rows))
     ranked = sorted(
         found.rows, key=lambda row: (played.index(row["scenario"]), -row["safe_score"].value)
     )
-    for row in ranked:
-        cells = [_cell(column, row[column]) for column in columns]
-        many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
-        shown.add_row(Text(row["scenario"]), Text(row["policy"] + many), *map(Text, cells))
+    return _long(ranked, title) if width >= _WIDE else _short(ranked, title)
+
+
+def _long(rows: Sequence[dict[str, Any]], title: str) -> Table:
+    shown = Table(title=Text(title))
+    for column in ("scenario", "policy"):
+        shown.add_column(column, overflow="fold", min_width=len(column) + 2)
+    for column in _LONG:
+        shown.add_column(column.replace("_", " "))
+    for row in rows:
+        cells = [_cell(column, row[column]) for column in _LONG]
+        shown.add_row(Text(row["scenario"]), Text(_team(row)), *map(Text, cells))
     return shown
 
 
+def _short(rows: Sequence[dict[str, Any]], title: str) -> Table:
+    shown = Table(title=Text(title), box=box.HORIZONTALS, pad_edge=False, collapse_padding=True)
+    shown.add_column("policy", overflow="fold")
+    for header in _SHORT.values():
+        shown.add_column(header, no_wrap=True)
+    before = None
+    for row in rows:
+        if row["scenario"] != before:
+            if before is not None:
+                shown.add_section()
+            shown.add_row(Text(row["scenario"], style="bold", overflow="fold"))
+        before = row["scenario"]
+        shown.add_row(Text(_team(row)), *(Text(_brief(row[column], column)) for column in _SHORT))
+    return shown
+
+
+def _team(row: dict[str, Any]) -> str:
+    many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
+    return f"{row['policy']}{many}"
+
+
+def _brief(value: Estimate | float | None, column: str) -> str:
+    """Return a cell of the short table; shares of worlds are shown without their interval."""
+    if isinstance(value, Estimate):
+        if column in ("contact_free", "improvement"):
+            return f"{100 * value.value:.1f} %"
+        return f"{value.value:.3f}\n[{value.low:.3f}, {value.high:.3f}]"
+    return "" if value is None else f"{value:.2f}"
+
+
 def _cell(column: str, value: Estimate | float | None) -> str:
-    """Return a table's cell; the bound is shown without its interval, to save space."""
+    """Return a cell of the long table; the bound is shown without its interval."""
     if column == "bound" and isinstance(value, Estimate):
         value = value.value
     if isinstance(value, float):

@@ -8,6 +8,7 @@ exceeds the time limit.
 from __future__ import annotations
 
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -19,7 +20,7 @@ from posse import Scenario
 from posse_baselines import PolicyError
 from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
 from posse_training.reports.contenders import Contender
-from posse_training.reports.evaluation import evaluate, progress_bar
+from posse_training.reports.evaluation import evaluate
 from posse_training.reports.plays import Plays
 from posse_training.reports.results import Results
 from posse_training.reports.worker import Worker
@@ -71,9 +72,17 @@ class Players:
                     raise PolicyError(f"{policy!r} cannot be loaded: {error}") from error
 
     def play(
-        self, contender: Contender, scenario: Scenario, episodes: int, seed: int, split: str
+        self,
+        contender: Contender,
+        scenario: Scenario,
+        episodes: int,
+        seed: int,
+        split: str,
+        advance: Callable[[int], object],
     ) -> Plays:
         """Play the same worlds with every policy of a contender.
+
+        ``advance`` is called with the number of control steps played, from time to time.
 
         Raises:
             PolicyError: A policy does not fit the scenario.
@@ -81,17 +90,19 @@ class Players:
         """
         if contender.label in self._ended:
             raise PlayError(self._ended[contender.label])
-        results = []
+        results: list[Results] = []
         for policy in contender.policies:
             try:
                 if isinstance(policy, str):
-                    results.append(self._elsewhere(policy, scenario, episodes, seed, split))
+                    given = (policy, scenario, episodes, seed, split, self._limit)
+                    results.append(self._worker.call(_evaluate, given, self._limit, advance))
                 else:
                     results.append(
                         evaluate(
-                            policy, scenario, episodes, seed, split=split, time_limit=self._limit
+                            policy, scenario, episodes, seed, split=split, progress=advance,
+                            time_limit=self._limit,
                         )
-                    )
+                    )  # fmt: skip
             except (PolicyError, SettingsError, TrainedSplitError):
                 raise
             except EOFError as error:
@@ -103,19 +114,6 @@ class Players:
             except Exception as error:
                 raise PlayError(describe(error)) from error
         return Plays(contender.label, tuple(results))
-
-    def _elsewhere(
-        self, policy: str, scenario: Scenario, episodes: int, seed: int, split: str
-    ) -> Results:
-        """Play a code policy in the worker's process."""
-        with progress_bar() as bar:
-            task = bar.add_task(f"{policy} on {scenario.name}", total=None)
-            found = self._worker.call(
-                _evaluate, (policy, scenario, episodes, seed, split, self._limit), self._limit,
-                lambda steps: bar.advance(task, steps),
-            )  # fmt: skip
-        assert isinstance(found, Results)
-        return found
 
 
 def _check(report: Any, policy: str) -> None:

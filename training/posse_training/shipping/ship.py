@@ -171,5 +171,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"[{score['low']:.3f}, {score['high']:.3f}] on {score['count']:,} validation worlds"
         )
     console.print(
-        f"{path} ({path.stat().st_size:,} bytes) holds training seed {policy.card['seed']}"
-    )
+        f"{path} ({path.stat().st_size:,} bytes) holds training seed {policy.card['seed']}",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip

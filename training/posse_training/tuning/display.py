@@ -130,5 +130,5 @@ class Display(LiveDisplay):
                 table.add_row(Text(name, style="dim"), f"{value:.3g}{unit} (was {t.default:.3g})")
         if self._note:
             table.add_row("", Text(self._note))
-        title = f"tuning {s.policy} on {s.scenario}, seed {s.seed}"
-        return Panel(Group(table), title=Text(title), expand=False)
+        title = Text(f"tuning {s.policy} on {s.scenario}, seed {s.seed}", overflow="fold")
+        return Panel(Group(title, table), expand=False)

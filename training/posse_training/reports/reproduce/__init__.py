@@ -16,6 +16,7 @@ import numpy as np
 import tyro
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -130,17 +131,19 @@ def _write(folder: Path, name: str, figure: Figure) -> None:
     plt.close(figure)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Reproduce the paper's experiments and print the settling times with those of the paper."""
-    settings = tyro.cli(Settings, prog="posse reproduce", args=arguments)
-    rows = reproduce(settings)
-    table = Table(title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s")
-    for column in ("policy", "model", "paper", "median [quartiles]", "settled", "all in slots"):
-        table.add_column(column)
+def table(rows: Sequence[dict[str, Any]], tolerance: float) -> Table:
+    """Return the settling times with those of the paper."""
+    shown = Table(
+        title=f"settling time, s: finally within {tolerance:g} m and 0.1 m/s", box=box.HORIZONTALS,
+        pad_edge=False, collapse_padding=True,
+    )  # fmt: skip
+    shown.add_column("policy", overflow="fold")
+    for column in ("model", "paper", "median [quartiles]", "settled", "all in\nslots"):
+        shown.add_column(column, no_wrap=True)
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
         paper = row["paper_settling_time"]
-        table.add_row(
+        shown.add_row(
             row["policy"],
             row["model"],
             "-" if paper is None else f"{paper:.1f}",
@@ -148,6 +151,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"{row['settled']} of {row['starts']}",
             f"{row['in_slots']} of {row['starts']}",
         )
+    return shown
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Reproduce the paper's experiments and print the settling times with those of the paper."""
+    settings = tyro.cli(Settings, prog="posse reproduce", args=arguments)
+    rows = reproduce(settings)
     console = Console()
-    console.print(table)
-    console.print(f"figures and numbers: {settings.out}")
+    console.print(table(rows, settings.tolerance))
+    console.print(f"figures and numbers: {settings.out}", markup=False, soft_wrap=True)

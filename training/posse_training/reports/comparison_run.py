@@ -1,0 +1,196 @@
+"""One comparison while it is played and written."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from posse import get_scenario
+from posse_baselines import PolicyError
+from posse_training.reports.comparison import Comparison, summary
+from posse_training.reports.comparison_folder import FileNames
+from posse_training.reports.contenders import Contender
+from posse_training.reports.evaluation import WORLDS_AT_ONCE
+from posse_training.reports.players import PlayError, Players
+from posse_training.reports.plays import Plays
+from posse_training.reports.progress import Progress
+from posse_training.reports.sweeps import LEADER_LOSS, Sweep, play_sweeps, write_points
+
+PLANNER: Final = "planner"
+"""The reference that is shown with every team."""
+SUMMARY: Final = "summary.json"
+REPORT: Final = "report.html"
+POINTS: Final = "sweeps.csv"
+MARL_EVAL: Final = "marl-eval.json"
+
+
+class _Settings(Protocol):
+    """What a run reads of the settings of ``posse compare``."""
+
+    @property
+    def policies(self) -> tuple[str, ...]: ...
+    @property
+    def episodes(self) -> int: ...
+    @property
+    def planner_episodes(self) -> int: ...
+    @property
+    def sweep_episodes(self) -> int: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def split(self) -> str: ...
+    @property
+    def out(self) -> Path: ...
+    @property
+    def replays(self) -> int: ...
+
+
+class ComparisonRun:
+    """One comparison while it is played and written.
+
+    Args:
+        settings: Of the comparison.
+        players: Plays the contenders.
+        contenders: The first is the baseline.
+        scenarios: Names of the scenarios.
+        sweeps: Settings to vary.
+        folder: Where to write.
+
+    Attributes:
+        found: The results so far.
+    """
+
+    def __init__(
+        self,
+        settings: _Settings,
+        players: Players,
+        contenders: Sequence[Contender],
+        scenarios: Sequence[str],
+        sweeps: Sequence[Sweep],
+        folder: Path,
+    ) -> None:
+        self.settings = settings
+        self.contenders = contenders
+        self.scenarios = scenarios
+        self.sweeps = sweeps
+        self.folder = folder
+        self.found = Comparison(contenders[0].label)
+        self._players = players
+        self._names = FileNames(SUMMARY, REPORT, POINTS, MARL_EVAL)
+
+    def planned(self) -> tuple[Counter[str], Counter[str]]:
+        """Return the evaluations to come, and their worlds, for each contender."""
+        evaluations: Counter[str] = Counter()
+        worlds: Counter[str] = Counter()
+        points = sum(len(sweep.values) for sweep in self.sweeps)
+        for contender in self.contenders:
+            label, seeds = contender.label, len(contender.policies)
+            for times, episodes in (
+                (len(self.scenarios), self.settings.episodes),
+                (points, self.settings.sweep_episodes),
+            ):
+                evaluations[label] += times
+                worlds[label] += times * seeds * self._worlds(contender, episodes)
+        return evaluations, worlds
+
+    def play(self, progress: Progress) -> None:
+        """Play the scenarios and the sweeps; write the rows and the points."""
+        for scenario in self.scenarios:
+            self._play_scenario(scenario, progress)
+        if self.sweeps:
+            ordered = sorted(self.contenders, key=lambda contender: contender.label == PLANNER)
+            self.found.points = play_sweeps(
+                ordered,
+                lambda contender, sweep, value: self._attempt(
+                    contender, sweep.scenario, self.settings.sweep_episodes,
+                    f"{sweep.name} {value:g}", progress, **{sweep.setting: value},
+                ),
+                self.sweeps,
+            )  # fmt: skip
+            write_points(self.folder / POINTS, self.found.points)
+
+    def _worlds(self, contender: Contender, episodes: int) -> int:
+        """Return the number of worlds that a contender plays."""
+        if contender.label == PLANNER and PLANNER not in self.settings.policies:
+            return min(episodes, self.settings.planner_episodes)
+        return episodes
+
+    def _attempt(
+        self,
+        contender: Contender,
+        name: str,
+        episodes: int,
+        what: str,
+        progress: Progress,
+        **overrides: Any,
+    ) -> Plays | None:
+        """Play; return ``None`` and note why if the contender cannot or fails."""
+        s, worlds, seeds = self.settings, self._worlds(contender, episodes), len(contender.policies)
+        scenario = get_scenario(name, **overrides)
+        steps = -(-worlds // WORLDS_AT_ONCE) * scenario.horizon
+        progress.begin(contender.label, what, worlds * seeds, steps * seeds)
+        try:
+            return self._players.play(
+                contender, scenario, worlds, s.seed, s.split, progress.advance
+            )
+        except PolicyError as error:
+            self.found.left_out.append({"policy": contender.label, "what": what, "why": str(error)})
+        except PlayError as error:
+            self.found.failed.append({"policy": contender.label, "what": what, "why": str(error)})
+        finally:
+            progress.end()
+        return None
+
+    def _play_scenario(self, scenario: str, progress: Progress) -> None:
+        """Play one scenario with every contender, and write the rows."""
+        reference: Plays | None = None
+        for contender in self.contenders:
+            plays = self._attempt(contender, scenario, self.settings.episodes, scenario, progress)
+            if plays is None:
+                continue
+            self.found.plays[scenario, contender.label] = plays
+            self.found.rows.append(
+                {
+                    "scenario": scenario,
+                    "policy": contender.label,
+                    **summary(plays, reference),
+                    "files": self._write(scenario, plays),
+                }
+            )
+            if contender is self.contenders[0]:
+                reference = plays
+        best = self.found.plays.get((scenario, PLANNER))
+        for row in self.found.rows:
+            if row["scenario"] == scenario and best is not None:
+                row["of_planner"] = self.found.plays[scenario, row["policy"]].ratio(best)
+
+    def _write(self, scenario: str, plays: Plays) -> list[str]:
+        """Write the rows of a contender, one file for each training seed; return their names."""
+        written = []
+        for k, results in enumerate(plays.results):
+            member = f"-{k + 1}" if len(plays.results) > 1 else ""
+            stem = self._names.stem(f"{scenario}-{plays.label}{member}", ".csv", ".json")
+            results.write(self.folder / f"{stem}.csv")
+            written.append(f"{stem}.csv")
+        return written
+
+    def report(self, progress: Progress) -> None:
+        """Draw the figures."""
+        from posse_training.reports.pictures import figures, learning  # matplotlib is slow
+
+        progress.note("drawing the figures")
+        found = self.found
+        losses = [plays for (name, _), plays in found.plays.items() if name == LEADER_LOSS]
+        curves = learning.curves_of(self.contenders)
+        drawn = figures.draw(
+            self.folder, found.plays, found.points, losses, curves, sweep_facts=self._sweep_facts()
+        )
+        found.figures = [self.settings.out / path.name for path in drawn]
+
+    def _sweep_facts(self) -> str:
+        s = self.settings
+        beside = self._worlds(self.contenders[-1], s.sweep_episodes)
+        other = f" (planner {beside:,})" if beside != s.sweep_episodes else ""
+        return f"{s.sweep_episodes:,} worlds at each point{other}, {s.split} split, seed {s.seed}"
