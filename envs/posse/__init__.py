@@ -7,6 +7,7 @@ from typing import Any
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
+from posse.engine.target_batch import TargetPolicy, batch_for, with_agent
 from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
@@ -34,23 +35,27 @@ def batch(
     num_threads: int | None = None,
     own_kernel: bool = False,
     device: str = "cpu",
+    target_policy: TargetPolicy | None = None,
     **overrides: Any,
 ) -> Batch:
     """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
 
     With ``device="cuda"`` the worlds are simulated on an NVIDIA GPU: see
     :class:`posse.engine.cuda.CudaBatch`, which requires the extra ``cuda``.
+
+    With ``target_policy`` that policy moves the target of every world, on the CPU; observations,
+    actions and rewards are those of the trackers.
     """
-    return _batch_class(device)(
-        get_scenario(scenario, **overrides),
-        num_worlds,
-        seed=seed,
-        split=split,
-        first_world=first_world,
-        autoreset=autoreset,
-        num_threads=num_threads,
-        own_kernel=own_kernel,
-    )
+    settings = with_agent(get_scenario(scenario, **overrides), target_policy)
+    arguments: dict[str, Any] = {
+        "seed": seed, "split": split, "first_world": first_world, "autoreset": autoreset,
+        "num_threads": num_threads, "own_kernel": own_kernel,
+    }  # fmt: skip
+    if target_policy is not None and device == "cpu":
+        return batch_for(settings, num_worlds, target_policy, **arguments)
+    if target_policy is not None:
+        raise ValueError(f"target_policy= needs device='cpu', not {shown(device)}")
+    return _batch_class(device)(settings, num_worlds, **arguments)
 
 
 def _batch_class(device: str) -> type[Batch]:
@@ -89,6 +94,7 @@ __all__ = [
     "Sensor",
     "Snapshot",
     "TargetMotion",
+    "TargetPolicy",
     "batch",
     "env",
     "field",

@@ -62,14 +62,17 @@ class ActionReader:
     Args:
         scenario: Scenario of the worlds.
         discrete: Whether each action is the number of one of :data:`MOTIONS`.
+        agents: Names of the agents that act; default: all.
 
     Attributes:
         read: The last actions, (1, rows, 2 + m) float32; always the same array.
     """
 
-    def __init__(self, scenario: Scenario, discrete: bool) -> None:
+    def __init__(
+        self, scenario: Scenario, discrete: bool, agents: Sequence[str] | None = None
+    ) -> None:
         self._scenario = scenario
-        self._agents = agent_names(scenario)
+        self._agents = agent_names(scenario) if agents is None else list(agents)
         self._discrete = discrete
         rows = len(self._agents)
         self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
@@ -82,7 +85,7 @@ class ActionReader:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Rebuilt, so that the rows are views of the new array.
-        return ActionReader, (self._scenario, self._discrete)
+        return ActionReader, (self._scenario, self._discrete, self._agents)
 
     def by_agent(self, actions: Mapping[str, Any]) -> None:
         """Read the actions of a dictionary by agent.

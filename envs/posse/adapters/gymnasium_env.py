@@ -12,6 +12,7 @@ from posse.adapters.single_world import shortened
 from posse.adapters.spaces import box
 from posse.adapters.world_env import OneAgentEnv
 from posse.engine.arguments import options_of, real_numbers
+from posse.engine.target_batch import TargetPolicy, with_agent
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.shown import shown
@@ -49,11 +50,13 @@ class TeamEnv(OneAgentEnv):
         seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the world within the seed.
+        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
         ScenarioError: An unknown scenario, or an unknown or invalid setting.
         ValueError: An unknown split or render mode, a negative seed.
+        TypeError: ``target_policy`` is not the policy of a target.
     """
 
     def __init__(
@@ -65,11 +68,13 @@ class TeamEnv(OneAgentEnv):
         seed: int | None = None,
         split: str = "train",
         first_world: int = 0,
+        target_policy: TargetPolicy | None = None,
         **overrides: Any,
     ) -> None:
+        fitting = with_agent(self.fitting_scenario(scenario, None, overrides), target_policy)
         self._open(
-            self.fitting_scenario(scenario, None, overrides), render_mode=render_mode,
-            discrete_actions=discrete_actions, seed=seed, split=split, first_world=first_world,
+            fitting, render_mode=render_mode, discrete_actions=discrete_actions,
+            seed=seed, split=split, first_world=first_world, target_policy=target_policy,
         )  # fmt: skip
         self.observation_space, self.action_space = self.spaces_of(self.scenario, discrete_actions)
 
@@ -234,5 +239,5 @@ def _with_scripted_target(
 
 _NO_PLACE = (
     "{} is not possible in an environment of one agent: use posse.parallel_env(..., "
-    "target='agent'), or a scripted target_motion"
+    "target='agent'), a scripted target_motion, or target_policy="
 )

@@ -39,8 +39,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     turn rate (1 is the maximum to the left), message. With ``discrete_actions=True``
     ``Discrete(15)``, the rows of :data:`posse.adapters.actions.MOTIONS`.
 
-    **Reward**: the weighted sum of named terms, ``scenario.reward_weights``; for ``target_0`` the
-    negative of the team's score.
+    **Reward**: the weighted sum of named terms, ``scenario.reward_weights``; for ``target_0``
+    ``scenario.target_reward_weights``, by default the negative of the team's score.
 
     **Info**, for each agent, with the same keys at every reset and step: ``"score"`` of the team in
     [0, 1]; ``"reward_terms"``, each term by name, unscaled; ``"working"``, if trackers may

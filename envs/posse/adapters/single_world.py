@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.adapters.actions import ActionReader
+from posse.adapters.actions import ActionReader, agent_names
 from posse.engine.arguments import options_of
 from posse.engine.batch import Batch
+from posse.engine.target_batch import TargetPolicy, batch_for
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario, get_scenario
@@ -36,6 +37,7 @@ class SingleWorld:
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the world within the seed.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
+        target_policy: Moves the target, where that is an agent; it then is none of the agents here.
 
     Attributes:
         running: Whether a step is possible: after a reset, and before the end.
@@ -61,12 +63,14 @@ class SingleWorld:
         split: str = "train",
         first_world: int = 0,
         render_mode: str | None = None,
+        target_policy: TargetPolicy | None = None,
     ) -> None:
         check_render_mode(render_mode)
         self.scenario = scenario
-        self.batch = Batch(
+        self.batch: Batch = batch_for(
             scenario,
             1,
+            target_policy,
             seed=0 if seed is None else seed,
             split=split,
             first_world=first_world,
@@ -87,8 +91,9 @@ class SingleWorld:
         # Created once: creating a view takes longer than reading it.
         self._score = self.batch.worlds["score"]
         self.name_terms = namer(self.batch.term_names)
-        self.actions = ActionReader(self.scenario, self._discrete)
-        rows = (1, self.scenario.num_agents)
+        rows = self.batch.observation_shape[:2]
+        acting = agent_names(self.scenario)[: rows[1]]
+        self.actions = ActionReader(self.scenario, self._discrete, acting)
         self._written: tuple[FloatArray, ...] = tuple(
             np.zeros(shape, np.float32)
             for shape in (self.batch.observation_shape, rows, (*rows, len(self.batch.term_names)))

@@ -20,7 +20,7 @@ from posse.adapters.single_world import (
     new_renderer,
 )
 from posse.engine.arguments import as_array, options_of
-from posse.engine.batch import Batch
+from posse.engine.target_batch import TargetPolicy, batch_for, with_agent
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
 from posse.scenarios.setting import is_one_of
@@ -63,6 +63,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         num_threads: Threads that step the worlds; never changes a result.
         own_kernel: Whether to compile a kernel for this scenario, about a third faster; never
             changes a result.
+        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
@@ -92,15 +93,19 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         first_world: int = 0,
         num_threads: int | None = None,
         own_kernel: bool = False,
+        target_policy: TargetPolicy | None = None,
         **overrides: Any,
     ) -> None:
         check_render_mode(render_mode)
         self.autoreset_mode = _check_mode(autoreset, autoreset_mode)
-        self.scenario = self._fitting(scenario, max_episode_steps, overrides)
+        self.scenario = with_agent(
+            self._fitting(scenario, max_episode_steps, overrides), target_policy
+        )
         self.single_observation_space, self.single_action_space = self._spaces(discrete_actions)
-        self.batch = Batch(
+        self.batch = batch_for(
             self.scenario,
             num_envs,
+            target_policy,
             seed=0 if seed is None else seed,
             split=split,
             first_world=first_world,
@@ -231,7 +236,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         """Return the infos of a step that ends no episode, or without ``found`` of a reset."""
         worlds = self.num_envs
         if found is None:
-            rows = (worlds, self.scenario.num_agents)
+            rows = (worlds, self.scenario.num_trackers)
             score = np.zeros(worlds)
             terms = {name: np.zeros(rows, np.float32) for name in self.batch.term_names}
         else:

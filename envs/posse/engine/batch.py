@@ -282,7 +282,12 @@ class Batch(Stepping):
                 changed.
         """
         self._check_running()
-        checked = self.check_actions(actions)
+        return self._step_checked(self.check_actions(actions))
+
+    def _step_checked(
+        self, checked: FloatArray
+    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+        """Advance every world by the actions of all agents (E, num_agents, 2 + m)."""
         results = self._new_results()
         over = self._run(self._orders, checked, results)
         observations, rewards, terms, (terminated, truncated) = results
@@ -327,6 +332,16 @@ class Batch(Stepping):
             ("terms", terms, (*rows, len(self.term_names))),
         ):
             check_array(name, array, shape)
+        return self._stepper(actions, observations, rewards, terms)
+
+    def _stepper(
+        self,
+        actions: FloatArray,
+        observations: FloatArray,
+        rewards: FloatArray,
+        terms: FloatArray,
+    ) -> Callable[[], int]:
+        """Return the function of :meth:`stepper`; the arrays have a row for every agent."""
         arguments = (
             self._tables, self._arrays, actions,
             Results(observations, rewards, terms, self._new_flags()), self._orders,

@@ -51,7 +51,7 @@ from posse.signals.observation.observing import (
     observe_together,
 )
 from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
-from posse.signals.reward import weights_for
+from posse.signals.reward import target_weights_for, weights_for
 from posse.signals.scratch import MOST_IN_TEAM
 
 _ZERO: Final = np.float32(0.0)
@@ -69,6 +69,8 @@ class Tables(NamedTuple):
     """(2, S) cosine and sine of the sonar's beams."""
     weights: FloatArray
     """(K,) weight of each reward term."""
+    target_weights: FloatArray
+    """(K,) the same for a target that is an agent."""
 
 
 class Results(NamedTuple):
@@ -123,20 +125,17 @@ def reward(
     c: Record,
     w: Record,
     trackers: Records,
-    weights: FloatArray,
+    tables: Tables,
     writers: Writers,
     rewards: FloatArray,
     terms: FloatArray,
 ) -> None:
-    """Write the reward of every agent (rows,) and its terms (rows, K).
-
-    A target agent gets the negative of the team's score.
-    """
+    """Write the reward of every agent (rows,) and its terms (rows, K)."""
     for i in range(c.num_trackers):
-        rewards[i] = writers.reward(c, w, trackers[i], weights, terms[i])
+        rewards[i] = writers.reward(c, w, trackers[i], tables.weights, terms[i])
     if c.target_agent != 0:
-        rewards[c.num_trackers] = -w.score
-        terms[c.num_trackers, :] = _ZERO
+        n = c.num_trackers
+        rewards[n] = writers.target_reward(c, w, tables.target_weights, terms[n])
 
 
 @compiled
@@ -238,7 +237,7 @@ def advance_worlds(
             occupy(c, w, trackers, tables.slots, scratch)
         if order == STEP:
             end_step(c, w, trackers, tables.slots, sums.add)
-            reward(c, w, trackers, tables.weights, writers, rewards, terms)
+            reward(c, w, trackers, tables, writers, rewards, terms)
         else:
             if order != LOOK:
                 w.held, w.score = 0, _ZERO
@@ -267,6 +266,7 @@ def tables_of(scenario: Scenario) -> Tables:
         slot_records(scenario),
         beam_directions(scenario),
         weights_for(scenario),
+        target_weights_for(scenario),
     )
 
 
@@ -275,10 +275,10 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
     Configuration, slots and beams of a given scenario become constants in the code.
     """
-    own_fields, mate, terms, empty, width, mate_width = writers_for(parts)
+    own_fields, mate, terms, target_terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
-    own_config, own_slots, own_beams, _ = own or (None, None, None, None)
+    own_config, own_slots, own_beams, *_ = own or (None, None, None)
 
     @kernel
     def advance(
@@ -296,9 +296,10 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             tables.slots if own_slots is None else own_slots,
             tables.beams if own_beams is None else own_beams,
             tables.weights,
+            tables.target_weights,
         )
         s = scratch[0]
-        writers = Writers(own_fields, mate, terms, empty, width, mate_width)
+        writers = Writers(own_fields, mate, terms, target_terms, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
         sums = Sums(clear_sums, add_to_sums)
         if s.prepared[0] == _ZERO:

@@ -39,7 +39,8 @@ class Stepping(WorldViews):
 
     def _prepare(self) -> None:
         """Set the derived attributes, which are not pickled."""
-        scenario, (num_worlds, rows, size) = self.scenario, self.observation_shape
+        scenario, (num_worlds, _, size) = self.scenario, self.observation_shape
+        rows = scenario.num_agents
         parts = parts_for(scenario)
         check_fields(parts, self._arrays)
         self._tables = tables_of(scenario)
@@ -115,7 +116,8 @@ class Stepping(WorldViews):
         """Start an episode in the chosen worlds; return every world's observations."""
         results = self._new_results()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
-        actions = np.empty(self.action_shape, np.float32)  # not read
+        rows, length = self.scenario.num_agents, self.action_shape[2]
+        actions = np.empty((self.num_worlds, rows, length), np.float32)  # not read
         try:
             self._run(orders, actions, results)
         except Exception:

@@ -138,7 +138,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     without a sweep. Gaps are read from ``s`` (:func:`posse.rules.discs.find_gaps`).
     """
     inner = c.half_arena - c.radius
-    smallest = w.least_gap
+    smallest, before = w.least_gap, w.contacts_target
     target_touching, target_near = _NO_BITS, False
     for i in range(c.num_trackers):
         t = trackers[i]
@@ -160,6 +160,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         elif meet_closely(c, w, t, obstacles, i, s):
             target_touching |= _BIT << np.uint64(i)
     w.touching = target_touching
+    w.onsets = w.contacts_target - before
     w.near = target_near
     if c.walled and not target_near:
         w.near = c.target_agent != 0 or target_near_surroundings(c, w, s)

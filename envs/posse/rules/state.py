@@ -84,6 +84,7 @@ _WORLD: Final = (
     ("frame_cos", _F), ("frame_sin", _F),  # the slot frame, ψ
     ("goal_cos", _F), ("goal_sin", _F),  # goal heading of a scripted target
     ("touching", _U),  # bit mask of the trackers that touch the target
+    ("onsets", _I),  # contacts of the target with trackers that began in the current step
     ("near", _I),  # 1: something may touch the target in the next step
     ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
     ("breaks_left", _I),

@@ -241,14 +241,26 @@ def _check_fields(s: Scenario) -> None:
 
 
 def _check_rewards(s: Scenario) -> None:
-    for name, weight in dict(s.reward_weights).items():
+    _check_weights("reward_weights", dict(s.reward_weights))
+    _check_weights("target_reward_weights", dict(s.target_reward_weights))
+    for name in dict(s.target_reward_weights):
+        if REWARD_TERMS[name].of_target is None:
+            known = [term for term in REWARD_TERMS if REWARD_TERMS[term].of_target is not None]
+            raise ScenarioError(
+                f"in target_reward_weights: {name!r} is a term of trackers only; a target has: "
+                f"{', '.join(known)}"
+            )
+
+
+def _check_weights(setting: str, weights: dict[str, float]) -> None:
+    for name, weight in weights.items():
         if name not in REWARD_TERMS:
-            raise ScenarioError(f"in reward_weights: {REWARD_TERMS.unknown(name)}")
+            raise ScenarioError(f"in {setting}: {REWARD_TERMS.unknown(name)}")
         if not is_number(weight) or not math.isfinite(weight):
-            fail(f"reward_weights[{shown(name)}]", weight, "a weight must be a finite number")
+            fail(f"{setting}[{shown(name)}]", weight, "a weight must be a finite number")
         if abs(weight) > MOST_WEIGHT:
             fail(
-                f"reward_weights[{shown(name)}]", weight,
+                f"{setting}[{shown(name)}]", weight,
                 f"a weight must lie in [-{MOST_WEIGHT:g}, {MOST_WEIGHT:g}]: scale all of them",
             )  # fmt: skip
 

@@ -227,10 +227,15 @@ class Scenario:
         (("slot", 1.0), ("progress", 0.5), ("contact", -0.2)),
         Setting("other", "1", "weight of each reward term by name (posse.REWARD_TERMS); others: 0"),
     )
+    target_reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
+        (("team", -1.0),),
+        Setting("other", "1", "the same for a target that is an agent: contact, effort, team"),
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "extra_fields", _names("extra_fields", self.extra_fields))
-        object.__setattr__(self, "reward_weights", _weights(self.reward_weights))
+        for name in ("reward_weights", "target_reward_weights"):
+            object.__setattr__(self, name, _weights(name, getattr(self, name)))
         further = tuple(dict.fromkeys(_names("metrics", self.metrics)))
         object.__setattr__(self, "metrics", further)
         for name, setting in self.settings().items():
@@ -350,6 +355,7 @@ class Scenario:
         """Return every field by name, as plain values (``inf`` stays a float)."""
         values = dataclasses.asdict(self)
         values["reward_weights"] = dict(self.reward_weights)
+        values["target_reward_weights"] = dict(self.target_reward_weights)
         return values
 
 
@@ -370,12 +376,12 @@ def _names(setting: str, given: object) -> tuple[str, ...]:
     return names
 
 
-def _weights(given: object) -> tuple[tuple[str, float], ...]:
+def _weights(name: str, given: object) -> tuple[tuple[str, float], ...]:
     """Return reward weights sorted by name, so that equal scenarios compare equal."""
     try:
         weights = dict(given)  # type: ignore[call-overload]
         return tuple(sorted(weights.items()))
     except (TypeError, ValueError):
         raise ScenarioError(
-            f"reward_weights={shown(given)} is not possible: it must map names of terms to numbers"
+            f"{name}={shown(given)} is not possible: it must map names of terms to numbers"
         ) from None

@@ -26,7 +26,7 @@ from posse.scenarios import Scenario
 from posse.signals.measuring import Metric, adding, clearing
 from posse.signals.observation.columns import empty_writer, row_writer, width_of
 from posse.signals.observation.fields import FieldDeclaration
-from posse.signals.reward import RewardTerm, reward_writer, terms_for
+from posse.signals.reward import RewardTerm, reward_writer, target_reward_writer, terms_for
 
 Declarations = tuple[FieldDeclaration, ...]
 
@@ -72,6 +72,8 @@ class Writers(NamedTuple):
     """(c, v, m, s, rows): writes the fields of a team-mate of each."""
     reward: Any
     """(c, w, t, weights, values) -> reward: writes the terms."""
+    target_reward: Any
+    """(c, w, weights, values) -> reward: writes the terms of a target that is an agent."""
     empty: Any
     """(o, k): writes an empty place of a team-mate."""
     width: int
@@ -141,6 +143,7 @@ def writers_for(parts: Parts) -> Writers:
         row_writer(parts.fields, ("c", "v")),
         row_writer(parts.mate_fields, ("c", "v", "m")),
         reward_writer(parts.reward_terms),
+        target_reward_writer(parts.reward_terms),
         empty_writer(parts.mate_fields),
         parts.width,
         parts.mate_width,

@@ -25,33 +25,57 @@ _ONE: Final = np.float32(1.0)
 
 @dataclass(frozen=True)
 class RewardTerm:
-    """One term: name, unit, meaning and formula."""
+    """One term: name, unit, meaning and formulas.
+
+    Attributes:
+        name: Its name.
+        unit: Its unit.
+        meaning: What it measures.
+        function: Its value for a tracker, of ``parameters``.
+        of_target: Its value for a target that is an agent, ``(c, w)``; ``None``: it has none.
+        parameters: ``("c", "w", "t")``, or ``("c", "w")`` for a value of the world.
+    """
 
     name: str
     unit: str
     meaning: str
     function: Function
+    of_target: Function | None = None
+    parameters: tuple[str, ...] = ("c", "w", "t")
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
         """The compiled functions of the term, and what each returns."""
-        return ((self.function, "number"),)
+        both = (self.function, self.of_target)
+        return tuple((function, "number") for function in dict.fromkeys(both) if function)
 
 
-def reward_term(unit: str) -> Callable[[Function], Function]:
+def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Function], Function]:
     """Declare a function as a reward term with its name; its docstring is the meaning.
 
     The function takes ``(c, w, t)``: the records of the scenario, the world and a tracker
-    (:mod:`posse.rules.state`) after the step. It returns a number.
+    (:mod:`posse.rules.state`) after the step; or ``(c, w)``, for a value of the world that is the
+    same for every tracker and for a target that is an agent. It returns a number.
+
+    Args:
+        unit: Unit of the term.
+        target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
+            ``(c, w, t)`` is for trackers only.
 
     Raises:
         DeclarationError: The name is taken, the docstring is missing, or the parameters differ.
     """
 
     def declare(function: Function) -> Function:
-        TERMS.check_parameters(function, ("c", "w", "t"))
+        TERMS.check_parameters(function, ("c", "w", "t"), 2)
+        parameters = tuple(inspect.signature(function).parameters)
         name, working = function.__name__, compiled(function)
-        TERMS.add(name, RewardTerm(name, unit, inspect.getdoc(function) or "", working), working)
+        of_target = working if len(parameters) == 2 else None
+        if target is not None:
+            TERMS.check_parameters(target, ("c", "w"))
+            of_target = compiled(target)
+        meaning = inspect.getdoc(function) or ""
+        TERMS.add(name, RewardTerm(name, unit, meaning, working, of_target, parameters), working)
         return working
 
     return declare
@@ -81,21 +105,30 @@ def sight(c: Record, w: Record, t: Record) -> np.float32:
     return _ONE if t.sees else _ZERO
 
 
-@reward_term("count")
+def _contact_of_target(c: Record, w: Record) -> np.float32:
+    return np.float32(w.onsets)
+
+
+@reward_term("count", target=_contact_of_target)
 def contact(c: Record, w: Record, t: Record) -> np.float32:
-    """Contacts of the tracker that began in this step."""
+    """Contacts that began in this step; of the target: those with trackers."""
     return np.float32(t.onsets)
 
 
-@reward_term("1")
+def _effort_of_target(c: Record, w: Record) -> np.float32:
+    v, turn = w.speed / c.target_speed, w.turn_rate / c.target_turn_rate
+    return np.float32(v * v + turn * turn)
+
+
+@reward_term("1", target=_effort_of_target)
 def effort(c: Record, w: Record, t: Record) -> np.float32:
-    """(V / V_max)² + (ω / ω_max)² of the tracker's actual motion."""
+    """(V / V_max)² + (ω / ω_max)² of the robot's actual motion."""
     v, turn = t.speed * t.per_speed, t.turn_rate * t.per_turn_rate
     return np.float32(v * v + turn * turn)
 
 
 @reward_term("1")
-def team(c: Record, w: Record, t: Record) -> np.float32:
+def team(c: Record, w: Record) -> np.float32:
     """The team's score of this step: occupied slots per working tracker, at most 1."""
     return np.float32(w.score)
 
@@ -106,27 +139,56 @@ REWARD_TERMS: Final[tuple[RewardTerm, ...]] = TERMS.built_in()
 
 def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
     """Return the terms of a scenario: the built-in ones, then others with a weight."""
-    return TERMS.with_added(*dict(scenario.reward_weights))
+    return TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
 
 
 def weights_for(scenario: Scenario) -> FloatArray:
     """Return the weights of a scenario's terms, (K,) float32."""
-    weights = dict(scenario.reward_weights)
+    return _in_order(scenario, dict(scenario.reward_weights))
+
+
+def target_weights_for(scenario: Scenario) -> FloatArray:
+    """Return the weights of a scenario's terms for a target that is an agent, (K,) float32."""
+    return _in_order(scenario, dict(scenario.target_reward_weights))
+
+
+def _in_order(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
     return np.array([weights.get(term.name, 0.0) for term in terms_for(scenario)], np.float32)
 
 
 def reward_writer(terms: Sequence[RewardTerm]) -> Any:
     """Return (c, w, t, weights (K,), values (K,)) -> reward, compiled; it fills ``values``."""
-    lines = [f"values[{k}] = term_{k}(c, w, t)" for k in range(len(terms))]
-    lines.append("reward = ZERO")
-    # From last to first: another order would round differently and change results.
-    lines.extend(
-        f"reward = float32(weights[{k}] * values[{k}] + reward)"
-        for k in range(len(terms) - 1, -1, -1)
-    )
+    lines = [
+        f"values[{k}] = term_{k}({', '.join(term.parameters)})" for k, term in enumerate(terms)
+    ]
     functions = {f"term_{k}": term.function for k, term in enumerate(terms)}
+    return _summing("reward", ("c", "w", "t", "weights", "values"), lines, functions)
+
+
+def target_reward_writer(terms: Sequence[RewardTerm]) -> Any:
+    """Return (c, w, weights (K,), values (K,)) -> reward of the target, as :func:`reward_writer`.
+
+    The value of a term that is for trackers only is 0.
+    """
+    functions = {f"term_{k}": term.of_target for k, term in enumerate(terms) if term.of_target}
+    lines = [
+        f"values[{k}] = " + (f"term_{k}(c, w)" if f"term_{k}" in functions else "ZERO")
+        for k in range(len(terms))
+    ]
+    return _summing("target_reward", ("c", "w", "weights", "values"), lines, functions)
+
+
+def _summing(
+    name: str, parameters: tuple[str, ...], lines: list[str], functions: Mapping[str, Function]
+) -> Any:
+    """Return a function that runs lines, which fill ``values``, and returns their weighted sum."""
+    # From last to first: another order would round differently and change results.
+    sums = [
+        f"reward = float32(weights[{k}] * values[{k}] + reward)"
+        for k in range(len(lines) - 1, -1, -1)
+    ]
     names = {"ZERO": _ZERO, "float32": np.float32, **functions}
-    return written("reward", ("c", "w", "t", "weights", "values"), [*lines, "return reward"], names)
+    return written(name, parameters, [*lines, "reward = ZERO", *sums, "return reward"], names)
 
 
 @functools.cache

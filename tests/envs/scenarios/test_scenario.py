@@ -133,6 +133,8 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"reward_weights": {"slot": "much"}}, "number"),
     ({"reward_weights": 3}, "terms"),
     ({"reward_weights": {1: 1.0, "slot": 1.0}}, "terms"),
+    ({"target_reward_weights": {"slot": 1.0}}, "trackers only"),
+    ({"target_reward_weights": {"teams": 1.0}}, "team"),
 ]
 
 

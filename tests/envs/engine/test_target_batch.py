@@ -1,0 +1,164 @@
+"""A batch in which a policy moves the target."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import posse
+
+WORLDS, HORIZON = 3, 12
+SHORT = posse.get_scenario("constant", num_trackers=2, horizon=HORIZON, settle_time=1.0)
+
+
+class Weaver:
+    """Turns by the time since the start of the episode, which its memory counts."""
+
+    def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
+        return np.zeros(num_worlds)
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        assert observations.shape == (len(memory), 1, observations.shape[2])
+        away = observations[:, 0, :1]  # its own heading
+        turn = np.sin(memory)[:, None]
+        return np.stack([0.5 * away, turn], axis=2).astype(np.float32), memory + 1
+
+    def restart(self, memory: Any, mask: Any) -> Any:
+        return np.where(mask, 0, memory)
+
+
+def actions_of(step: int, shape: tuple[int, ...] = (WORLDS, 2, 2)) -> Any:
+    return np.random.default_rng(step).uniform(-1, 1, shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+def test_it_plays_as_a_batch_whose_target_is_driven_from_outside(autoreset: str) -> None:
+    inside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target_policy=Weaver())
+    outside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target="agent")
+    mine, theirs = inside.reset(), outside.reset()
+    assert mine.shape == inside.observation_shape == (WORLDS, 2, inside.layout.size)
+    weaver, age = Weaver(), np.zeros(WORLDS)
+    for step in range(2 * HORIZON + 3):
+        np.testing.assert_array_equal(mine, theirs[:, :2])
+        over = outside.worlds["over"] != 0
+        if autoreset == "disabled" and over.any():
+            options = {"reset_mask": over}
+            mine, theirs = inside.reset(options=options), outside.reset(options=options)
+            age[over] = 0
+            continue
+        target, age = weaver.act(theirs[:, 2:], age)
+        if autoreset == "next_step":
+            age[over] = 0
+        whole = np.concatenate([actions_of(step), target], axis=1)
+        mine, rewards, _, truncated, infos = inside.step(actions_of(step))
+        theirs, *others, told = outside.step(whole)
+        np.testing.assert_array_equal(rewards, others[0][:, :2])
+        np.testing.assert_array_equal(truncated, others[2])
+        np.testing.assert_array_equal(
+            infos["reward_terms"]["slot"], told["reward_terms"]["slot"][:, :2]
+        )
+        if autoreset == "same_step" and truncated.any():
+            age[truncated] = 0
+            np.testing.assert_array_equal(infos["final_obs"], told["final_obs"][:, :2])
+
+
+def test_a_stepper_and_a_pickled_copy_go_on_as_the_batch_does() -> None:
+    batch = posse.batch(SHORT, WORLDS, target_policy=Weaver())
+    batch.reset()
+    batch.step(actions_of(0))
+    copy, other = deepcopy(batch), deepcopy(batch)  # by way of pickling
+    given, seen = (
+        np.zeros((WORLDS, 2, 2), np.float32),
+        np.zeros(batch.observation_shape, np.float32),
+    )
+    rewards = np.zeros((WORLDS, 2), np.float32)
+    terms = np.zeros((WORLDS, 2, len(batch.term_names)), np.float32)
+    advance = other.stepper(given, seen, rewards, terms)
+    for step in range(1, 5):
+        observations, gained, *_ = batch.step(actions_of(step))
+        again, *_ = copy.step(actions_of(step))
+        given[...] = actions_of(step)
+        assert advance() == 0
+        for found in (again, seen):
+            np.testing.assert_array_equal(found, observations)
+        np.testing.assert_array_equal(rewards, gained)
+    snapshot = batch.save()
+    np.testing.assert_array_equal(batch.restore(snapshot), batch.observe())
+
+
+@pytest.mark.parametrize("vector", [False, True])
+def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
+    batch = posse.batch(SHORT, 1, seed=5, target_policy=Weaver())
+    expected = batch.reset()
+    if vector:
+        env: Any = gym.make_vec(
+            "posse/Team-v0", 1, vectorization_mode="vector_entry_point", scenario=SHORT,
+            target_policy=Weaver(),
+        )  # fmt: skip
+    else:
+        env = gym.make("posse/Team-v0", scenario=SHORT, target_policy=Weaver())
+    assert env.action_space.shape[-2:] == (2, 2)
+    observation, _ = env.reset(seed=5)
+    for step in range(HORIZON):
+        np.testing.assert_array_equal(np.reshape(observation, expected.shape), expected)
+        action = actions_of(step, (1, 2, 2))
+        expected, rewards, *_ = batch.step(action)
+        observation, reward, *_ = env.step(action if vector else action[0])
+        assert np.asarray(reward).item() == pytest.approx(rewards.mean())
+    env.close()
+
+
+class Wrong(Weaver):
+    def __init__(self, actions: Any) -> None:
+        self.actions = actions
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        return self.actions, memory
+
+
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        (np.zeros((WORLDS, 2)), "shape"),
+        (np.full((WORLDS, 1, 2), np.nan), "nan"),
+        (np.full((WORLDS, 1, 2), 1.5), "1.5"),
+    ],
+)
+def test_invalid_actions_of_the_target_are_named(actions: Any, message: str) -> None:
+    batch = posse.batch(SHORT, WORLDS, target_policy=Wrong(actions))
+    batch.reset()
+    with pytest.raises(ValueError, match=f"target's policy.*{message}"):
+        batch.step(actions_of(0))
+
+
+def test_what_is_no_target_policy_is_refused() -> None:
+    with pytest.raises(TypeError, match="begin, act, restart"):
+        posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="cannot be copied"):
+        posse.batch(SHORT, 1, target_policy=Weaver()).copies(2)
+    with pytest.raises(posse.ScenarioError, match="target_policy="):
+        gym.make("posse/Team-v0", scenario=SHORT, target="agent")
+
+
+def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
+    """The target drives into a tracker that stands before it."""
+    weights = {"team": -1.0, "contact": -0.5, "effort": -0.25}
+    scenario = SHORT.replace(target_reward_weights=weights, target_motion="agent")
+    batch = posse.batch(scenario, 1, autoreset="disabled")
+    poses = {"tracker_pose": [[0.5, 0, 0], [-5, 0, 0]], "target_pose": [0, 0, 0]}
+    batch.reset(options=poses)
+    contacts = 0.0
+    for _ in range(HORIZON):
+        actions = np.array([[[-1, 0], [-1, 0], [1, 0]]], np.float32)
+        _, rewards, _, _, infos = batch.step(actions)
+        terms = {name: float(infos["reward_terms"][name][0, 2]) for name in batch.term_names}
+        expected = sum(weights.get(name, 0) * value for name, value in terms.items())
+        assert rewards[0, 2] == pytest.approx(expected)
+        assert terms["slot"] == terms["distance"] == 0, "terms of trackers"
+        contacts += terms["contact"]
+    assert contacts == 1 == batch.metrics()["target_contacts"][0]
+    assert scenario.to_dict()["target_reward_weights"] == weights
