@@ -18,9 +18,10 @@ import posse
 from posse_baselines import load
 from posse_baselines.registry import shipped
 from posse_training.provenance import commit
-from posse_training.reports.compare import PLANNER, compare
 from posse_training.reports.compare import Settings as CompareSettings
+from posse_training.reports.compare import compare
 from posse_training.reports.comparison import Comparison
+from posse_training.reports.comparison_run import PLANNER
 from posse_training.reports.contenders import play, read_contenders
 from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate
