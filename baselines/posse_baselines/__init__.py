@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from posse_baselines.function_policy import from_function
+from posse_baselines.match import Match, against
 from posse_baselines.playing import Played, play, rollout, split_agents, stack_agents
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin
 from posse_baselines.registry import load, policy_names
+from posse_baselines.targets import Target, load_target, target_names
 from posse_baselines.tracker_env import register
 from posse_baselines.tuning import Tunable
 
@@ -14,21 +16,26 @@ register()
 
 __all__ = [
     "BasePolicy",
+    "Match",
     "Memory",
     "Played",
     "Policy",
     "PolicyError",
     "StateReader",
+    "Target",
     "Tunable",
+    "against",
     "begin",
     "from_function",
     "load",
+    "load_target",
     "play",
     "policy_names",
     "rollout",
     "settings_of",
     "split_agents",
     "stack_agents",
+    "target_names",
     "tunable",
     "with_settings",
 ]

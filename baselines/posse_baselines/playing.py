@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch
+from posse import Batch, Scenario
 from posse.numeric import BoolArray, FloatArray
+from posse_baselines.match import Match
 from posse_baselines.policy import Memory, Policy, PolicyError, begin
 
 
@@ -30,18 +31,30 @@ class Played:
     """The policy's memory, before it acts on ``observations``."""
 
 
+def check_moves_all(policy: Policy, scenario: Scenario) -> None:
+    """Raise if the target of a scenario is an agent that the policy does not move.
+
+    Raises:
+        PolicyError: The message says how to pair the policy with one of a target.
+    """
+    if scenario.num_agents != scenario.num_trackers and not isinstance(policy, Match):
+        raise PolicyError(
+            f"the target of {scenario.name!r} is an agent, and policy {policy.name!r} drives "
+            "trackers only: give a target too, target=, or play it with posse play"
+        )
+
+
 def rollout(batch: Batch, policy: Policy, *, seed: int | None = None) -> Iterator[Played]:
     """Reset a batch and yield one :class:`Played` for each control step, without end.
 
     With autoreset disabled it ends when every world has ended; otherwise the caller stops.
 
     Raises:
-        PolicyError: The policy does not fit the batch, or the target is an agent.
+        PolicyError: The policy does not fit the batch, or the target is an agent that it does not
+            move.
     """
-    if batch.scenario.num_agents != batch.scenario.num_trackers:
-        raise PolicyError(
-            f"the target of {batch.scenario.name!r} is an agent, and a policy drives trackers only"
-        )
+    if batch.observation_shape[1] == batch.scenario.num_agents:
+        check_moves_all(policy, batch.scenario)
     memory = begin(policy, batch)
     observations = batch.reset(seed=seed)
     begins = np.zeros(batch.num_worlds, np.bool_)

@@ -134,18 +134,19 @@ def check_observations(
     observations: npt.ArrayLike,
     num_worlds: int,
     layout: ObservationLayout,
+    rows: int | None = None,
 ) -> FloatArray:
-    """Return the observations as kernels take them.
+    """Return the observations as kernels take them; ``rows``: by default one for each tracker.
 
     Raises:
         PolicyError: They are not (E, N, F) of the layout that the memory was made for.
     """
     array = np.ascontiguousarray(observations, np.float32)
-    wanted = (num_worlds, layout.scenario.num_trackers, layout.size)
+    wanted = (num_worlds, layout.scenario.num_trackers if rows is None else rows, layout.size)
     if array.shape != wanted:
         raise PolicyError(
             f"policy {policy.name!r} got observations of shape {array.shape}, wanted {wanted}: "
-            "(worlds, trackers, observation length) of the layout that begin() was given"
+            "(worlds, robots it moves, observation length) of the layout that begin() was given"
         )
     return array
 

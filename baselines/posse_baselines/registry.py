@@ -49,7 +49,21 @@ def load(policy: str | Path) -> Policy:
     Raises:
         PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged
             or of an unknown kind, a module or class that cannot be found or fails, or one that is
-            not a policy.
+            not a policy, or moves the target.
+    """
+    found = load_any(policy)
+    if getattr(found, "side", "trackers") == "target":
+        raise PolicyError(
+            f"{_short(str(policy))} is the policy of a target: give it as target=, or --target"
+        )
+    return found
+
+
+def load_any(policy: str | Path) -> Policy:
+    """Return a policy as :func:`load` does, also one that moves the target.
+
+    Raises:
+        PolicyError: As :func:`load`.
     """
     text = str(policy)
     if not 0 < len(text) <= _LONGEST or "\0" in text:
@@ -118,6 +132,30 @@ def _from_file(path: Path) -> Policy:
 
 
 def _from_module(text: str) -> Policy:
+    made = from_module(text)
+    try:
+        complete = isinstance(made, Policy)
+    except Exception as error:  # whatever an attribute raises
+        raise _cannot_be_created(text, error) from error
+    if not complete:
+        raise PolicyError(
+            f"{_short(text)} is not a policy: it must have name, message_size, reads_state, begin, "
+            "act, restart and annotations, as posse_baselines.Policy says"
+        )
+    if type(made.name) is not str or type(made.message_size) is not int or made.message_size < 0:
+        raise PolicyError(
+            f"{_short(text)} is not a policy: name={made.name!r:.80} must be a str, and "
+            f"message_size={made.message_size!r:.80} an int of at least 0"
+        )
+    return cast("Policy", made)
+
+
+def from_module(text: str) -> Any:
+    """Return what ``"package.module:Class"`` makes, or an attribute that is no class.
+
+    Raises:
+        PolicyError: The module or the attribute cannot be found, or fails.
+    """
     if not _MODULE.fullmatch(text):
         raise PolicyError(
             f"{_short(text)} names no class: write package.module:Class, for example "
@@ -137,23 +175,13 @@ def _from_module(text: str) -> Policy:
         raise PolicyError(f"module {module_name!r} has no {attribute!r}{hint}")
     found: Any = getattr(module, attribute)
     try:
-        made = found() if isinstance(found, type) else found
-        complete = isinstance(made, Policy)
+        return found() if isinstance(found, type) else found
     except Exception as error:  # whatever the class raises
-        raise PolicyError(
-            f"{_short(text)} cannot be created without arguments: {_describe(error)}"
-        ) from error
-    if not complete:
-        raise PolicyError(
-            f"{_short(text)} is not a policy: it must have name, message_size, reads_state, begin, "
-            "act, restart and annotations, as posse_baselines.Policy says"
-        )
-    if type(made.name) is not str or type(made.message_size) is not int or made.message_size < 0:
-        raise PolicyError(
-            f"{_short(text)} is not a policy: name={made.name!r:.80} must be a str, and "
-            f"message_size={made.message_size!r:.80} an int of at least 0"
-        )
-    return cast("Policy", made)
+        raise _cannot_be_created(text, error) from error
+
+
+def _cannot_be_created(text: str, error: Exception) -> PolicyError:
+    return PolicyError(f"{_short(text)} cannot be created without arguments: {_describe(error)}")
 
 
 def _describe(error: Exception) -> str:

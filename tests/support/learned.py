@@ -50,3 +50,10 @@ def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides:
     for _ in range(steps):
         observations, *_ = batch.step(generator.uniform(-1, 1, batch.action_shape))
     return batch, observations
+
+
+def target_for(scenario: posse.Scenario, name: str = "evading", seed: int = 0) -> LearnedPolicy:
+    """A policy of arbitrary weights that moves the target."""
+    encoding = Encoding.of(posse.ObservationLayout(scenario.replace(message_size=0)), "plain")
+    card = {"name": name, "side": "target"}
+    return LearnedPolicy(network_for(encoding.size, seed=seed), encoding, card)

@@ -10,6 +10,20 @@ from posse_baselines.policy import PolicyError
 
 LONGEST_NAME: Final = 100
 """Characters of a policy's name, at most."""
+SIDES: Final = ("trackers", "target")
+"""What a policy moves."""
+
+
+def side_of(card: Mapping[str, Any]) -> str:
+    """Return what the policy of a card moves, one of :data:`SIDES`; default: the trackers.
+
+    Raises:
+        PolicyError: Neither.
+    """
+    side = card.get("side", SIDES[0])
+    if side not in SIDES:
+        raise PolicyError(f"side={side!r:.80} on its card must be {' or '.join(SIDES)}")
+    return str(side)
 
 
 def check_card(card: Any) -> tuple[str, tuple[str, ...]]:

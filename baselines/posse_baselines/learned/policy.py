@@ -13,7 +13,7 @@ import numpy as np
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
 from posse_baselines.learned.advice import MOTION, Adviser, advised, check_adviser
-from posse_baselines.learned.card import check_card
+from posse_baselines.learned.card import check_card, side_of
 from posse_baselines.learned.encoder import Encoder
 from posse_baselines.learned.encoding import Encoding
 from posse_baselines.learned.features import SCRATCH
@@ -49,6 +49,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     Attributes:
         trained_splits: Splits whose worlds it was trained on; evaluations refuse them.
+        side: What it moves, ``"trackers"`` or ``"target"``.
 
     Raises:
         PolicyError: Network and encoding do not fit each other, or an invalid card.
@@ -87,6 +88,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     def _set_card(self, card: Mapping[str, Any]) -> None:
         self.name, self.trained_splits = check_card(card)
+        self.side = side_of(card)
         self.card = dict(card)
 
     def with_card(self, card: Mapping[str, Any]) -> LearnedPolicy:
@@ -111,9 +113,13 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         return layout, num_worlds, encoder, adviser_memory
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return the most likely actions (E, N, 2 + m) for observations (E, N, F)."""
+        """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
+
+        One that moves the target takes (E, 1, F).
+        """
         layout, num_worlds, encoder, adviser_memory = memory
-        observations = check_observations(self, observations, num_worlds, layout)
+        rows = 1 if self.side == "target" else None
+        observations = check_observations(self, observations, num_worlds, layout, rows)
         trackers = observations.shape[1]
         actions = np.empty((num_worlds, trackers, MOTION + message_size_of(layout)), np.float32)
         scratch = np.empty((MOST_THREADS, SCRATCH + 2 * max(self.network.sizes)), np.float32)

@@ -24,6 +24,9 @@ class _Watch:
     switches to the others (P); a film shows all side by side."""
     scenario: str = "smart"
     """Scenario to play."""
+    target: str | None = None
+    """Target: a motion, a learned target, a file or package.module:Class; default: the
+    scenario's own."""
     seed: int = 7
     """Seed of the world."""
     world: int = 0
@@ -54,14 +57,18 @@ def main(arguments: Sequence[str]) -> None:
     scenario = get_scenario(which.scenario)
     if which.num_trackers is not None:
         scenario = scenario.replace(num_trackers=which.num_trackers)
+    from posse_baselines import against, load, load_target
+
+    target = None if which.target is None else load_target(which.target)
+    if target is not None:
+        scenario = target.fit(scenario)
     if which.film is not None:
-        from posse_baselines import load
         from posse_training.reports.pictures.film import film
 
         policies = [load(name) for name in which.policies]
         print(
             film(
-                [(policy.name, policy) for policy in policies], scenario, path=which.film,
+                [(p.name, against(p, target)) for p in policies], scenario, path=which.film,
                 seed=which.seed, world=which.world, split=which.split, start=which.start,
                 seconds=scenario.duration if which.seconds is None else which.seconds,
                 speed=1.5 if which.speed is None else which.speed, size=which.size,
@@ -84,9 +91,11 @@ def main(arguments: Sequence[str]) -> None:
     others = [name for name in policy_names() if name not in which.policies]
     names = [*which.policies, *(others if len(which.policies) == 1 else [])]
     viewer = Viewer(
-        names, scenario, seed=which.seed, world=which.world, split=which.split, size=size
+        names, scenario, target, seed=which.seed, world=which.world, split=which.split, size=size
     )
     command = f"posse watch {' '.join(which.policies)} --scenario {which.scenario}"
+    if which.target is not None:
+        command += f" --target {which.target}"
     open_window(size, f"posse: {scenario.name}", f"write a film: {command} --film film.gif")
     run(viewer)
     moment = viewer.moment

@@ -24,6 +24,9 @@ class _Replay:
     whose players are included."""
     scenario: str = "smart"
     """Name of the scenario."""
+    target: str | None = None
+    """Target: a motion, a learned target, a file or package.module:Class; default: the
+    scenario's own."""
     world: int = 0
     """Index of the world within the seed."""
     seed: int = 7
@@ -51,7 +54,8 @@ def main(arguments: list[str]) -> None:
         overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
         replays.append(
             record(
-                [player], which.scenario, seed=which.seed, world=which.world, split=which.split,
+                [player], which.scenario, target=which.target,
+                seed=which.seed, world=which.world, split=which.split,
                 seconds=which.seconds, observations=which.observations, **overrides,
             )
         )  # fmt: skip

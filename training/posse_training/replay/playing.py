@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from posse import Batch, Scenario, get_scenario
-from posse_baselines import Policy, PolicyError, begin, load
+from posse_baselines import Policy, Target, against, begin, load, load_target
+from posse_baselines.playing import check_moves_all
 from posse_training.replay.episode import MOST_PLAYERS, Replay, join
 from posse_training.replay.recording import Recorder
 from posse_training.runs.settings import SettingsError
@@ -18,6 +19,7 @@ def record(
     policies: Sequence[str | Policy | tuple[str, Policy]],
     scenario: str | Scenario = "smart",
     *,
+    target: str | Target | None = None,
     seed: int = 7,
     world: int = 0,
     split: str = "test",
@@ -31,6 +33,8 @@ def record(
         policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs
             (label, policy).
         scenario: Scenario or its name; ``message_size`` is raised to that of each policy.
+        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
+            scenario's own motion.
         seed: Seed of the world.
         world: Index of the world within the seed.
         split: ``"train"``, ``"validation"`` or ``"test"``.
@@ -40,27 +44,26 @@ def record(
 
     Raises:
         SettingsError: No policy, more than four, ``seconds`` not above 0.
-        PolicyError: A policy that does not fit the scenario, or a target that is an agent.
+        PolicyError: A policy or target that is unknown or does not fit the scenario.
         ScenarioError: An unknown scenario or split, an invalid setting, seed or world.
     """
     settings = get_scenario(scenario, **overrides)
+    chased = None if target is None else load_target(target)
+    if chased is not None:
+        settings = chased.fit(settings)
     if not 1 <= len(policies) <= MOST_PLAYERS:
         raise SettingsError(
             f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies"
         )
     if seconds is not None and not seconds > 0:
         raise SettingsError(f"seconds={seconds!r} must be above 0")
-    if settings.num_agents != settings.num_trackers:
-        raise PolicyError(
-            f"the target of {settings.name!r} is an agent, and a policy drives trackers only: "
-            "record the episode with posse_training.replay.Recorder"
-        )
     steps = settings.horizon if seconds is None else round(seconds / settings.control_step)
     replays = []
     for given in policies:
         label, policy = given if isinstance(given, tuple) else (None, given)
         if isinstance(policy, str):
             policy = load(policy)
+        check_moves_all(against(policy, chased), settings)
         longest = max(settings.message_size, policy.message_size)
         batch = Batch(
             settings.replace(message_size=longest), 1,
@@ -69,6 +72,7 @@ def record(
         recorder = Recorder(
             batch, label or policy.name, observations=observations, about=_about(policy)
         )
+        policy = against(policy, chased)
         memory, seen = begin(policy, batch), recorder.reset()
         for _ in range(max(1, steps)):
             actions, memory = policy.act(seen, memory)

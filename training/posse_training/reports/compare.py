@@ -14,6 +14,7 @@ import tyro
 from rich.console import Console
 
 from posse import Batch, get_scenario, scenario_names
+from posse_baselines import load_target
 from posse_training.errors import SettingsError
 from posse_training.reports.comparison import Comparison, table, write_summary
 from posse_training.reports.comparison_folder import replaced
@@ -68,6 +69,9 @@ class Settings:
     time_limit: float = 1800.0
     """Time limit of a policy on one scenario, for each training seed, s; a policy that exceeds it
     is stopped and skipped on the remaining scenarios."""
+    target: str | None = None
+    """Target that all teams play against: a motion, a learned target, a file or
+    package.module:Class; default: the scenario's own."""
 
 
 def compare(settings: Settings, *, console: Console | None = None) -> Comparison:
@@ -82,7 +86,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
 
     Raises:
         SettingsError: No episodes to play, an unknown sweep, or an invalid time limit.
-        PolicyError: An unknown policy, or none; nothing is played.
+        PolicyError: An unknown policy or target, or no policy; nothing is played.
         ScenarioError: An unknown scenario or split, an invalid seed; nothing is played.
         TrainedSplitError: A split that a policy was trained on; nothing is played.
         ComparisonError: The folder cannot be replaced; what it held is unchanged.
@@ -95,7 +99,9 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
         for policy in contender.policies:
             if not isinstance(policy, str):
                 refuse_trained_split(policy, settings.split)
-    with Players(settings.time_limit) as players:
+    if settings.target is not None:
+        refuse_trained_split(load_target(settings.target), settings.split)
+    with Players(settings.time_limit, settings.target) as players:
         for contender in contenders:
             players.check(contender)
         with replaced(settings.out) as folder:

@@ -46,6 +46,8 @@ class _Worlds(Protocol):
     def split(self) -> str: ...
     @property
     def episodes(self) -> int: ...
+    @property
+    def target(self) -> str | None: ...
 
 
 def summary(plays: Plays, reference: Plays | None) -> dict[str, Estimate | int | float | None]:
@@ -78,6 +80,7 @@ def write_summary(found: Comparison, path: Path, worlds: _Worlds) -> None:
         "seed": worlds.seed,
         "split": worlds.split,
         "episodes": worlds.episodes,
+        "target": worlds.target,
         "comparison": rows,
         "left_out": found.left_out,
         "failed": found.failed,
@@ -109,7 +112,8 @@ def table(found: Comparison, worlds: _Worlds, width: int) -> Table:
             estimates only, and each interval stands below its value.
     """
     title = (
-        f"{worlds.episodes:,} worlds each, split {worlds.split}, seed {worlds.seed}; "
+        f"{worlds.episodes:,} worlds each, {_target(worlds)}split {worlds.split}, "
+        f"seed {worlds.seed}; "
         f"95 % intervals; differences of the safe score to {found.reference}, paired by world"
     )
     played = list(dict.fromkeys(row["scenario"] for row in found.rows))
@@ -150,6 +154,10 @@ def _short(rows: Sequence[dict[str, Any]], title: str) -> Table:
 def _team(row: dict[str, Any]) -> str:
     many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
     return f"{row['policy']}{many}"
+
+
+def _target(worlds: _Worlds) -> str:
+    return "" if worlds.target is None else f"target {worlds.target}, "
 
 
 def _brief(value: Estimate | float | None, column: str) -> str:

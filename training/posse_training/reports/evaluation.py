@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 import posse
 from posse import Scenario, get_scenario
-from posse_baselines import Policy, load, rollout
+from posse_baselines import Policy, Target, against, load, load_target, rollout
 from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
 from posse_training.reports.exchanges import ExchangeCounter, leaders_of
 from posse_training.reports.results import Column, Results
@@ -31,6 +31,7 @@ def evaluate(
     episodes: int = 1000,
     seed: int = 7,
     *,
+    target: str | Target | None = None,
     split: str = "test",
     progress: bool | Callable[[int], object] = True,
     num_threads: int | None = None,
@@ -44,6 +45,8 @@ def evaluate(
         scenario: A scenario or its name.
         episodes: Number of episodes; episode i is world i of the seed.
         seed: Seed of the worlds.
+        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
+            scenario's own motion.
         split: Split of the worlds; no training and no tuning uses ``"test"``.
         progress: Whether to show a bar; or a function that is called after each control step with
             the number of steps played, 1.
@@ -53,7 +56,8 @@ def evaluate(
 
     Raises:
         SettingsError: ``episodes`` below 1.
-        TrainedSplitError: A split that the policy was trained on.
+        PolicyError: An unknown policy or target, or one that does not fit.
+        TrainedSplitError: A split that the policy or the target was trained on.
         TimeLimitError: The time limit is exceeded.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
     """
@@ -61,8 +65,11 @@ def evaluate(
         policy = load(policy)
     if episodes < 1:
         raise SettingsError(f"episodes={episodes} must be at least 1")
-    refuse_trained_split(policy, split)
     settings = get_scenario(scenario, **overrides)
+    chased = None if target is None else load_target(target)
+    if chased is not None:
+        settings, policy = chased.fit(settings), against(policy, chased)
+    refuse_trained_split(policy, split)
     settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
     if callable(progress):
         advance = _limited(progress, time_limit)
@@ -77,7 +84,8 @@ def evaluate(
                 policy, settings, episodes, seed, split, num_threads,
                 _limited(lambda steps: bar.advance(task, steps), time_limit),
             )  # fmt: skip
-    return Results(policy.name, settings, seed, split, columns)
+    named = None if chased is None else chased.name
+    return Results(policy.name, settings, seed, split, columns, named)
 
 
 def progress_bar(*, disable: bool = False) -> Progress:
@@ -92,8 +100,8 @@ def progress_bar(*, disable: bool = False) -> Progress:
     )
 
 
-def refuse_trained_split(policy: Policy, split: str) -> None:
-    """Raise if a policy was trained on this split, by its own account."""
+def refuse_trained_split(policy: Policy | Target, split: str) -> None:
+    """Raise if a policy or a target was trained on this split, by its own account."""
     trained = tuple(getattr(policy, "trained_splits", ()))
     if split in trained:
         raise TrainedSplitError(

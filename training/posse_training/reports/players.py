@@ -40,10 +40,12 @@ class Players:
 
     Args:
         time_limit: Time for all episodes of one policy on one scenario, s.
+        target: What :func:`evaluate` takes; default: the scenarios' own.
     """
 
-    def __init__(self, time_limit: float) -> None:
+    def __init__(self, time_limit: float, target: str | None = None) -> None:
         self._limit = time_limit
+        self._target = target
         self._worker = Worker()
         self._ended: dict[str, str] = {}
 
@@ -94,13 +96,15 @@ class Players:
         for policy in contender.policies:
             try:
                 if isinstance(policy, str):
-                    given = (policy, scenario, episodes, seed, split, self._limit)
+                    given = (
+                        policy, scenario, episodes, seed, split, self._limit, self._target,
+                    )  # fmt: skip
                     results.append(self._worker.call(_evaluate, given, self._limit, advance))
                 else:
                     results.append(
                         evaluate(
-                            policy, scenario, episodes, seed, split=split, progress=advance,
-                            time_limit=self._limit,
+                            policy, scenario, episodes, seed, split=split, target=self._target,
+                            progress=advance, time_limit=self._limit,
                         )
                     )  # fmt: skip
             except (PolicyError, SettingsError, TrainedSplitError):
@@ -125,13 +129,21 @@ def _check(report: Any, policy: str) -> None:
 
 
 def _evaluate(
-    report: Any, policy: str, scenario: Scenario, episodes: int, seed: int, split: str, limit: float
+    report: Any,
+    policy: str,
+    scenario: Scenario,
+    episodes: int,
+    seed: int,
+    split: str,
+    limit: float,
+    target: str | None,
 ) -> Results:
     """Evaluate in the worker's process."""
     try:
         return evaluate(
-            policy, scenario, episodes, seed, split=split, progress=report, time_limit=limit
-        )
+            policy, scenario, episodes, seed, split=split, target=target, progress=report,
+            time_limit=limit,
+        )  # fmt: skip
     except TimeLimitError:
         raise
     except PolicyError as error:

@@ -29,6 +29,7 @@ class Results:
         seed: Seed of the worlds.
         split: Split of the worlds.
         columns: Every metric by name, (episodes,) float64; ``nan`` means "never".
+        target: Name of the target, where one was given; else the scenario's own motion was played.
     """
 
     policy: str
@@ -36,6 +37,7 @@ class Results:
     seed: int
     split: str
     columns: dict[str, Column] = field(repr=False)
+    target: str | None = None
 
     @property
     def episodes(self) -> int:
@@ -72,6 +74,7 @@ class Results:
                 "policy": self.policy,
                 "scenario": self.scenario.name,
                 "scenario_version": self.scenario.version,
+                **({} if self.target is None else {"target": self.target}),
                 "seed": self.seed,
                 "split": self.split,
                 "world": world,
@@ -95,6 +98,7 @@ class Results:
         write_atomically(path, text.getvalue().encode())
         settings = {
             "policy": self.policy,
+            **({} if self.target is None else {"target": self.target}),
             "seed": self.seed,
             "split": self.split,
             "scenario": self.scenario.to_dict(),

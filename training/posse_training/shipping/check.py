@@ -27,7 +27,9 @@ CHECK_SEED: Final = 2
 CHECK_WORLDS: Final = 32
 AGAIN_SEED: Final = 3
 AGAIN_WORLDS: Final = 100
-_NOT_PLAYED: Final = {"name", "version", "reward_weights", "message_size"}
+_NOT_PLAYED: Final = {
+    "name", "version", "reward_weights", "target_reward_weights", "message_size"
+}  # fmt: skip
 """Fields of a scenario that change no score, or that a check states separately."""
 
 

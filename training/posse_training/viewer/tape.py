@@ -12,7 +12,8 @@ from posse import Batch, Scenario
 from posse.numeric import FloatArray
 from posse.rendering.history import History
 from posse.rendering.scene import Scene, read_scene
-from posse_baselines import Policy, PolicyError, begin
+from posse_baselines import Policy, begin
+from posse_baselines.playing import check_moves_all
 
 _MOST_BYTES: Final = 256 << 20
 _LEAST_KEPT: Final = 600
@@ -61,11 +62,7 @@ class Tape:
     def __init__(
         self, policy: Policy, scenario: Scenario, seed: int, world: int, split: str
     ) -> None:
-        if scenario.num_agents != scenario.num_trackers:
-            raise PolicyError(
-                f"the target of {scenario.name!r} is an agent, and a policy drives trackers only: "
-                "use posse play"
-            )
+        check_moves_all(policy, scenario)
         longest = max(scenario.message_size, policy.message_size)
         self.scenario = scenario.replace(message_size=longest)
         self.name = policy.name
@@ -82,7 +79,7 @@ class Tape:
         self.contacts: list[int] = []
         each = self._batch.bytes_per_world + 4 * self._observations.size
         self._most = max(_LEAST_KEPT, _MOST_BYTES // each)
-        self._actions = self._decide(np.zeros(self.scenario.num_trackers))
+        self._actions = self._decide(np.zeros(self.scenario.num_agents))
 
     @property
     def over(self) -> bool:

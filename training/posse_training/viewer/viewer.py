@@ -16,7 +16,7 @@ from posse.rendering.history import History
 from posse.rendering.key import legend_of
 from posse.rendering.picture import action_of, draw_picture, viewport_of
 from posse.rendering.view import View
-from posse_baselines import Policy, PolicyError, load
+from posse_baselines import Policy, PolicyError, Target, against, load
 from posse_training.viewer.drawing import (
     draw_help,
     draw_message,
@@ -46,6 +46,7 @@ class Viewer:
         policies: To switch between: names, files, ``package.module:Class``, or policies. The first
             is shown.
         scenario: What to play.
+        target: Moves the scenario's target, where that is an agent.
         seed: Seed of the worlds.
         world: Index of the first world.
         split: ``"train"``, ``"validation"`` or ``"test"``.
@@ -64,6 +65,7 @@ class Viewer:
         self,
         policies: Sequence[str | Policy],
         scenario: Scenario,
+        target: Target | None = None,
         *,
         seed: int = 7,
         world: int = 0,
@@ -73,7 +75,7 @@ class Viewer:
         self.state = State(world=world)
         self.message = ""
         self._policies = list(policies)
-        self._scenario = scenario
+        self._scenario, self._target = scenario, target
         self._seed, self._split = seed, split
         self._tapes: dict[int, Tape] = {}
         self._tape = self._load(0, world)
@@ -234,7 +236,7 @@ class Viewer:
     def _load(self, policy: int, world: int) -> Tape:
         given = self._policies[policy]
         chosen = load(given) if isinstance(given, str) else given
-        return Tape(chosen, self._scenario, self._seed, world, self._split)
+        return Tape(against(chosen, self._target), self._scenario, self._seed, world, self._split)
 
     def _switch(self, state: State) -> None:
         """Show another policy or world: nothing is changed if that is not possible."""

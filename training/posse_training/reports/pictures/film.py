@@ -20,7 +20,8 @@ from posse.rendering.picture import Box, action_of, draw_picture, viewport_of
 from posse.rendering.renderer import LEAST_SIZE
 from posse.rendering.scene import Scene, read_scene
 from posse.rendering.style import DESIGN_SIZE, GRID
-from posse_baselines.policy import Annotations, Memory, Policy, PolicyError, begin
+from posse_baselines.playing import check_moves_all
+from posse_baselines.policy import Annotations, Memory, Policy, begin
 from posse_training.errors import SettingsError
 from posse_training.reports.pictures.gif import Frame, write_gif
 from posse_training.reports.pictures.mp4 import check_mp4, write_mp4
@@ -80,10 +81,8 @@ def film(
     path = Path(path)
     _check(policies, path, start, seconds, speed, every)
     settings = get_scenario(scenario, **overrides)
-    if settings.num_agents != settings.num_trackers:
-        raise PolicyError(
-            f"the target of {settings.name!r} is an agent, and a policy drives trackers only"
-        )
+    for _, policy in policies:
+        check_moves_all(policy, settings)
     dt = settings.control_step
     first = round(start / dt)
     if first >= settings.horizon:
