@@ -34,7 +34,7 @@ def test_a_comparison() -> None:
     rows = [{**row, "policy": policy} for policy in (LONG, "ddcs-centralized-no-exchange")]
 
     class Worlds:
-        seed, split, episodes = 7, "validation", 1_000_000
+        seed, split, episodes, target = 7, "validation", 1_000_000, "smart"
 
     text = on_a_terminal(
         table(Comparison("ddcs-centralized-no-exchange", rows=rows), Worlds, WIDTH)

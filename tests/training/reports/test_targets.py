@@ -17,8 +17,9 @@ from posse_training import evaluate
 from posse_training.commands import watch
 from posse_training.errors import TrainedSplitError
 from posse_training.replay import record
-from posse_training.reports.compare import SUMMARY, Settings, compare
+from posse_training.reports.compare import Settings, compare
 from posse_training.reports.compare import main as compare_main
+from posse_training.reports.comparison_run import SUMMARY
 from posse_training.viewer.viewer import Viewer
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
