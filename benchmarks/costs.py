@@ -49,7 +49,7 @@ class Settings:
     out: Path = Path("runs/bench/costs.json")
 
 
-OWN, MATE, REWARD, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
+OWN, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
 RULES = rules_for(built_in_parts())
 SUMS = sums_for(built_in_parts())
 
@@ -60,7 +60,7 @@ def one_part(  # type: ignore[no-untyped-def]
 ):
     """Execute one part of a step in every world."""
     scratch = memory[0]
-    writers = Writers(OWN, MATE, REWARD, EMPTY, WIDTH, MATE_WIDTH)
+    writers = Writers(OWN, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH)
     world.prepare(tables, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
@@ -81,7 +81,7 @@ def one_part(  # type: ignore[no-untyped-def]
             SUMS.add(c, w, t, tables.slots)
             score.settle(c, w)
         elif part == 6:
-            world.reward(c, w, t, tables.weights, writers, results.rewards[e], results.terms[e])
+            world.reward(c, w, t, tables, writers, results.rewards[e], results.terms[e])
         elif part == 7:
             observing.observe_sonar(c, t, scratch, observations[e], WIDTH)
             begun = e % observing.TOGETHER + 1

@@ -21,7 +21,8 @@ class Curve:
 
     Attributes:
         policy: Label of the contender.
-        what: Scenarios with their versions, and the training seed.
+        what: Measure (early versions recorded the score only), scenarios with their versions,
+            and the training seed.
         worlds: Validation worlds of each scenario; 0: not known.
         steps: Training steps at each point.
         scores: Score at each point.
@@ -54,8 +55,9 @@ def curves_of(contenders: Sequence[Contender]) -> list[Curve]:
 
 def _read(label: str, card: Mapping[str, Any]) -> Curve:
     steps, scores = [], []
+    measure = "safe_score" if all("safe_score" in point for point in card["curve"]) else "score"
     for point in card["curve"]:
-        value, low, high = (float(point[name]) for name in ("score", "low", "high"))
+        value, low, high = (float(point[name]) for name in (measure, "low", "high"))
         steps.append(float(point["steps"]))
         scores.append(Estimate(value, low, high, 0))
         if not all(math.isfinite(number) for number in (steps[-1], value, low, high)):
@@ -63,7 +65,7 @@ def _read(label: str, card: Mapping[str, Any]) -> Curve:
     names = [f"{scenario['name']} v{scenario['version']}" for scenario in card["scenarios"]]
     where = ", ".join(names) if len(names) <= 2 else f"{len(names)} scenarios"
     worlds = int(card["settings"]["evaluate_worlds"])
-    what = f"{where[:60]}, training seed {int(card['seed'])}"
+    what = f"{measure.replace('_', ' ')}, {where[:60]}, training seed {int(card['seed'])}"
     return Curve(label, what, worlds, tuple(steps), tuple(scores))
 
 
