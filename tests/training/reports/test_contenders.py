@@ -54,4 +54,4 @@ def test_brackets_and_dollars_are_shown_as_they_are(
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert [row["policy"] for row in summary["comparison"]] == [*labels, "planner"]
     drawn = (tmp_path / "out" / "scenarios.svg").read_text()
-    assert all(f"{label} -->" in drawn for label in labels if "$" not in label)
+    assert all(f"{label}</text>" in drawn for label in labels)

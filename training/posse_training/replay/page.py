@@ -110,29 +110,46 @@ def _check_world(path: Path, replay: Replay) -> None:
 
 def page(replay: Replay) -> str:
     """Return the page's HTML."""
+    before, *after = shell()
+    filled = (text + part for text, part in zip(contents(replay), after, strict=True))
+    return before + "".join(filled)
+
+
+def contents(replay: Replay) -> tuple[str, str, str]:
+    """Return what a replay puts into the :func:`shell`: title, header and data, as HTML."""
     header, data = encode(replay)
+    return html.escape(_title(replay)), as_data(header), in_letters(data)
+
+
+def shell() -> list[str]:
+    """Return the HTML that is the same for all replays: before, between and after the contents."""
     code, loader, sheet = code_of_page(), _file("loader.js"), _file("style.css")
     policy = {
         "default-src": "'none'",
-        "script-src": f"'{_digest(loader)}' '{_digest(code)}'",
-        "style-src": f"'{_digest(sheet)}'",
-        "img-src": "blob: data:",
-        "media-src": "blob:",
+        **content_policy(),
         "base-uri": "'none'",
         "form-action": "'none'",
     }
     values = {
-        "title": html.escape(_title(replay)),
         "policy": "; ".join(f"{name} {value}" for name, value in policy.items()),
         "style": sheet,
-        "colours": _as_data(json.dumps(colours(), separators=(",", ":"))),
-        "header": _as_data(header),
-        "data": _in_letters(data),
-        "code": _in_letters(zlib.compress(code.encode(), 9)),
+        "colours": as_data(json.dumps(colours(), separators=(",", ":"))),
+        "code": in_letters(zlib.compress(code.encode(), 9)),
         "loader": loader,
     }
+    parts = re.split(r"\{\{(?:title|header|data)\}\}", _file("index.html"))
     # In one pass, so that inserted text is not searched again.
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
+    return [re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], part) for part in parts]
+
+
+def content_policy() -> dict[str, str]:
+    """Return what a replay's Content-Security-Policy allows, by directive."""
+    return {
+        "script-src": f"'{digest(_file('loader.js'))}' '{digest(code_of_page())}'",
+        "style-src": f"'{digest(_file('style.css'))}'",
+        "img-src": "blob: data:",
+        "media-src": "blob:",
+    }
 
 
 def _title(replay: Replay) -> str:
@@ -148,7 +165,8 @@ def code_of_page() -> str:
     )
 
 
-def _in_letters(data: bytes) -> str:
+def in_letters(data: bytes) -> str:
+    """Return bytes as base64."""
     return base64.b64encode(data).decode()
 
 
@@ -174,14 +192,15 @@ def colours() -> dict[str, Any]:
     }
 
 
-def _as_data(text: str) -> str:
+def as_data(text: str) -> str:
     """Return equivalent JSON that cannot be parsed as markup in a page."""
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     return text
 
 
-def _digest(text: str) -> str:
+def digest(text: str) -> str:
+    """Return what a Content-Security-Policy names an inline script or style by."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 

@@ -9,10 +9,13 @@ from typing import Any, Final, Protocol
 
 from posse import get_scenario
 from posse_baselines import PolicyError
+from posse_training.errors import SettingsError
+from posse_training.replay import Replay, join
 from posse_training.reports.comparison import Comparison, summary
 from posse_training.reports.comparison_folder import FileNames
 from posse_training.reports.contenders import Contender
 from posse_training.reports.evaluation import WORLDS_AT_ONCE
+from posse_training.reports.extremes import Extreme, extremes
 from posse_training.reports.players import PlayError, Players
 from posse_training.reports.plays import Plays
 from posse_training.reports.progress import Progress
@@ -177,8 +180,9 @@ class ComparisonRun:
         return written
 
     def report(self, progress: Progress) -> None:
-        """Draw the figures."""
+        """Draw the figures, record the replays, and write the report of all of it."""
         from posse_training.reports.pictures import figures, learning  # matplotlib is slow
+        from posse_training.reports.report import Shown, report
 
         progress.note("drawing the figures")
         found = self.found
@@ -188,6 +192,40 @@ class ComparisonRun:
             self.folder, found.plays, found.points, losses, curves, sweep_facts=self._sweep_facts()
         )
         found.figures = [self.settings.out / path.name for path in drawn]
+        progress.note("recording the replays of the report")
+        best, worst = (
+            [Shown(one, *self._record(one)) for one in some]
+            for some in extremes(found, self.settings.replays)
+        )
+        shown = [path for path in drawn if path.suffix == ".svg"]
+        text = report(found, self._facts(), shown, best, worst)
+        (self.folder / REPORT).write_text(text, encoding="utf-8")
+
+    def _record(self, one: Extreme) -> tuple[Replay | None, str]:
+        """Return the replay of a world, the policy beside the baseline; or why there is none."""
+        s, by_label = self.settings, {each.label: each for each in self.contenders}
+        scenario = get_scenario(one.scenario)
+        try:
+            replays = [
+                self._players.record(by_label[label], seed, scenario, s.seed, one.world, s.split)
+                for label, seed in ((self.found.reference, 0), (one.policy, one.seed))
+            ]
+            return join(replays), ""
+        except (PlayError, SettingsError) as error:
+            return None, f"No replay: {error}"
+
+    def _facts(self) -> dict[str, str]:
+        """Return what was played, for the report."""
+        s, scenarios = self.settings, {name: get_scenario(name).version for name in self.scenarios}
+        beside = self._worlds(self.contenders[-1], s.episodes)
+        return {
+            "worlds": f"{s.episodes:,} each"
+            + (f", planner {beside:,}" if beside < s.episodes else ""),
+            "split": s.split,
+            "seed": str(s.seed),
+            "baseline": self.found.reference,
+            "versions": ", ".join(f"{name} v{version}" for name, version in scenarios.items()),
+        }
 
     def _sweep_facts(self) -> str:
         s = self.settings

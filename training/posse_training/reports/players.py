@@ -17,8 +17,9 @@ import posse
 import posse_baselines
 import posse_training
 from posse import Scenario
-from posse_baselines import PolicyError
+from posse_baselines import Policy, PolicyError
 from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
+from posse_training.replay import Replay, record
 from posse_training.reports.contenders import Contender
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.plays import Plays
@@ -119,6 +120,37 @@ class Players:
                 raise PlayError(describe(error)) from error
         return Plays(contender.label, tuple(results))
 
+    def record(
+        self,
+        contender: Contender,
+        member: int,
+        scenario: Scenario,
+        seed: int,
+        world: int,
+        split: str,
+    ) -> Replay:
+        """Play one world again and record it, without observations.
+
+        Args:
+            contender: Who plays.
+            member: Which of its policies.
+            scenario: The scenario.
+            seed: Seed of the world.
+            world: Index of the world.
+            split: Split of the world.
+
+        Raises:
+            PlayError: The policy failed.
+        """
+        given = (contender.label, contender.policies[member], scenario, seed, world, split)
+        try:
+            if isinstance(given[1], str):
+                found: Replay = self._worker.call(_record, given, self._limit)
+                return found
+            return _record(None, *given)
+        except Exception as error:
+            raise PlayError(describe(error)) from error
+
 
 def _check(report: Any, policy: str) -> None:
     """Load a policy in the worker's process."""
@@ -148,6 +180,25 @@ def _evaluate(
         raise
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
+    except Exception as error:
+        raise PlayError(describe(error)) from None
+
+
+def _record(
+    report: Any,
+    label: str,
+    policy: str | Policy,
+    scenario: Scenario,
+    seed: int,
+    world: int,
+    split: str,
+) -> Replay:
+    """Record, in this process or the worker's."""
+    try:
+        loaded = posse_baselines.load(policy) if isinstance(policy, str) else policy
+        return record(
+            [(label, loaded)], scenario, seed=seed, world=world, split=split, observations=False
+        )
     except Exception as error:
         raise PlayError(describe(error)) from None
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
@@ -36,6 +36,17 @@ from posse_training.reports.pictures.style import (
 from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate, share
 from posse_training.reports.sweeps import BOUND, SWEEPS, Point, Sweep
+
+CAPTIONS: Final = {
+    "scenarios": "Mean safe score of every team on every scenario.",
+    "profile": "Share of worlds with at least a safe score.",
+    "learning": "Score on validation worlds over the training of the learned teams.",
+    "team-size": "Safe score against the size of the team.",
+    "radio-loss": "Safe score against the share of messages lost.",
+    "target-speed": "Safe score against the speed of the target.",
+    "recovery": "Share of teams that have settled again, by time since their leader broke.",
+}
+"""What each figure shows, by the name of its file."""
 
 
 def draw(
