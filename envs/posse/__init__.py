@@ -7,7 +7,7 @@ from typing import Any
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
-from posse.engine.target_batch import TargetPolicy, batch_for, with_agent
+from posse.engine.paired_batch import PairedBatch, TargetPolicy, with_agent
 from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
@@ -36,6 +36,7 @@ def batch(
     own_kernel: bool = False,
     device: str = "cpu",
     target_policy: TargetPolicy | None = None,
+    team_policy: TargetPolicy | None = None,
     **overrides: Any,
 ) -> Batch:
     """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
@@ -43,18 +44,25 @@ def batch(
     With ``device="cuda"`` the worlds are simulated on an NVIDIA GPU: see
     :class:`posse.engine.cuda.CudaBatch`, which requires the extra ``cuda``.
 
-    With ``target_policy`` that policy moves the target of every world, on the CPU; observations,
-    actions and rewards are those of the trackers.
+    With ``target_policy`` that policy moves the target of every world; observations, actions and
+    rewards are those of the trackers. With ``team_policy`` a policy moves the trackers, and they
+    are those of the target, one row and actions of two numbers. Both are on the CPU only; see
+    :class:`posse.engine.paired_batch.PairedBatch`.
     """
-    settings = with_agent(get_scenario(scenario, **overrides), target_policy)
+    inside = team_policy if target_policy is None else target_policy
+    if team_policy is not None and target_policy is not None:
+        raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
+    side = "target" if team_policy is None else "team"
+    settings = with_agent(get_scenario(scenario, **overrides), inside, side)
     arguments: dict[str, Any] = {
         "seed": seed, "split": split, "first_world": first_world, "autoreset": autoreset,
         "num_threads": num_threads, "own_kernel": own_kernel,
     }  # fmt: skip
-    if target_policy is not None and device == "cpu":
-        return batch_for(settings, num_worlds, target_policy, **arguments)
-    if target_policy is not None:
-        raise ValueError(f"target_policy= needs device='cpu', not {shown(device)}")
+    if inside is not None and device == "cpu":
+        moves_target = team_policy is None
+        return PairedBatch(settings, num_worlds, inside, moves_target=moves_target, **arguments)
+    if inside is not None:
+        raise ValueError(f"{side}_policy= needs device='cpu', not {shown(device)}")
     return _batch_class(device)(settings, num_worlds, **arguments)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 from rich.console import Console
@@ -34,7 +35,8 @@ def test_a_comparison() -> None:
     rows = [{**row, "policy": policy} for policy in (LONG, "ddcs-centralized-no-exchange")]
 
     class Worlds:
-        seed, split, episodes, target = 7, "validation", 1_000_000, "smart"
+        seed, split, episodes = 7, "validation", 1_000_000
+        target: ClassVar[str | None] = None
 
     text = on_a_terminal(
         table(Comparison("ddcs-centralized-no-exchange", rows=rows), Worlds, WIDTH)

@@ -12,7 +12,7 @@ from posse.adapters.single_world import shortened
 from posse.adapters.spaces import box
 from posse.adapters.world_env import OneAgentEnv
 from posse.engine.arguments import options_of, real_numbers
-from posse.engine.target_batch import TargetPolicy, with_agent
+from posse.engine.paired_batch import TargetPolicy, with_agent
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 from posse.shown import shown

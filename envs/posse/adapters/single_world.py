@@ -14,7 +14,7 @@ from gymnasium.error import ResetNeeded
 from posse.adapters.actions import ActionReader, agent_names
 from posse.engine.arguments import options_of
 from posse.engine.batch import Batch
-from posse.engine.target_batch import TargetPolicy, batch_for
+from posse.engine.paired_batch import TargetPolicy, batch_for
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario, get_scenario

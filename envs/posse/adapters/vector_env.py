@@ -20,7 +20,7 @@ from posse.adapters.single_world import (
     new_renderer,
 )
 from posse.engine.arguments import as_array, options_of
-from posse.engine.target_batch import TargetPolicy, batch_for, with_agent
+from posse.engine.paired_batch import TargetPolicy, batch_for, with_agent
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
 from posse.scenarios.setting import is_one_of

@@ -116,8 +116,8 @@ class Stepping(WorldViews):
         """Start an episode in the chosen worlds; return every world's observations."""
         results = self._new_results()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
-        rows, length = self.scenario.num_agents, self.action_shape[2]
-        actions = np.empty((self.num_worlds, rows, length), np.float32)  # not read
+        agents, length = self.scenario.num_agents, 2 + self.scenario.message_size
+        actions = np.empty((self.num_worlds, agents, length), np.float32)  # not read
         try:
             self._run(orders, actions, results)
         except Exception:

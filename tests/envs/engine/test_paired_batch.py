@@ -162,3 +162,32 @@ def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
         contacts += terms["contact"]
     assert contacts == 1 == batch.metrics()["target_contacts"][0]
     assert scenario.to_dict()["target_reward_weights"] == weights
+
+
+class Crossing(Weaver):
+    """Moves two trackers, and says its age."""
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        assert observations.shape[1] == 2
+        said = np.tile(np.sin(memory)[:, None, None], (1, 2, 1))
+        moves = np.concatenate([observations[..., :2], said], axis=2)
+        return moves.astype(np.float32), memory + 1
+
+
+def test_trackers_inside_play_as_ones_driven_from_outside() -> None:
+    speaking = SHORT.replace(message_size=1)
+    inside = posse.batch(speaking, WORLDS, autoreset="disabled", team_policy=Crossing())
+    outside = posse.batch(speaking, WORLDS, autoreset="disabled", target="agent")
+    mine, theirs = inside.reset(), outside.reset()
+    crossing, age = Crossing(), np.zeros(WORLDS)
+    assert inside.action_shape == (WORLDS, 1, 2)
+    for step in range(HORIZON):
+        np.testing.assert_array_equal(mine, theirs[:, 2:])
+        action = actions_of(step, (WORLDS, 1, 2))
+        moves, age = crossing.act(theirs[:, :2], age)
+        whole = np.concatenate([moves, np.pad(action, ((0, 0), (0, 0), (0, 1)))], axis=1)
+        mine, rewards, *_ = inside.step(action)
+        theirs, gained, *_ = outside.step(whole)
+        np.testing.assert_array_equal(rewards, gained[:, 2:])
+    with pytest.raises(ValueError, match="exclude each other"):
+        posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())
