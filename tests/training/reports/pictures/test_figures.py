@@ -164,7 +164,9 @@ def test_learning_curves_are_those_of_the_cards() -> None:
     x, y = line(figure, "mine")
     assert x == [1, 2, 3]
     assert y == pytest.approx([0.2, 0.4, 0.6])
-    assert said(figure) == ["mine: score, smart v1, training seed 3, 64 worlds of the validation split"]
+    assert said(figure) == [
+        "mine: score, smart v1, training seed 3, 64 worlds of the validation split"
+    ]
     damaged: tuple[object, ...] = (
         [],
         points[:1],
