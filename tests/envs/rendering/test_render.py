@@ -1,68 +1,27 @@
-"""Frames show the state of the worlds, reproducibly, with a display and without."""
+"""Frames: what is drawn where, and that equal states give equal frames."""
 
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from gymnasium.error import ResetNeeded
+from tests.support.drawing import (
+    SIZE,
+    advance,
+    colour_at,
+    count,
+    like,
+    picture,
+    placed,
+    worlds,
+)
 
 import posse
 from posse.rendering.camera import Camera
 from posse.rendering.renderer import Renderer
 from posse.rendering.scene import read_scene
-from posse.rendering.style import CONTACT, INK, LINK, SLOT_FILLED, TARGET, TASK_COLOURS, TRACKER
-
-Frame = npt.NDArray[np.uint8]
-SIZE = (400, 360)
-
-
-def worlds(scenario: str = "constant", num_worlds: int = 1, **settings: Any) -> posse.Batch:
-    batch = posse.batch(scenario, num_worlds, seed=3, **settings)
-    batch.reset()
-    return batch
-
-
-def placed(
-    trackers: list[tuple[float, float, float]],
-    target: tuple[float, float, float] = (0, 0, 0),
-    scenario: str = "constant",
-    **settings: Any,
-) -> posse.Batch:
-    """One world that starts from given poses, (x, y, θ) each."""
-    batch = posse.batch(scenario, 1, seed=3, num_trackers=len(trackers), **settings)
-    batch.reset(options={"tracker_pose": trackers, "target_pose": target})
-    return batch
-
-
-def advance(batch: posse.Batch, steps: int = 1) -> None:
-    for _ in range(steps):
-        batch.step(np.full(batch.action_shape, 0.25, np.float32))
-
-
-def picture(renderer: Renderer, batch: posse.Batch, world: int = 0, **told: Any) -> Frame:
-    frame = renderer.draw(batch, world, **told)
-    assert frame is not None
-    return frame
-
-
-def colour_at(renderer: Renderer, frame: Frame, x: float, y: float) -> tuple[int, ...]:
-    column, row = renderer.project([x, y]).round().astype(int)
-    return tuple(frame[row, column].tolist())
-
-
-def like(shade: tuple[int, ...], colour: tuple[int, int, int]) -> bool:
-    """Whether a shade is the colour, to the rounding of averaging pixels."""
-    return bool(np.abs(np.subtract(shade, colour)).max() <= 3)
-
-
-def count(frame: Frame, colour: tuple[int, int, int]) -> int:
-    return int((np.abs(frame.astype(int) - colour).max(axis=-1) <= 3).sum())
+from posse.rendering.style import SLOT_FILLED, TARGET, TRACKER
 
 
 @pytest.mark.parametrize("scenario", posse.scenario_names())
@@ -173,9 +132,6 @@ def test_each_world_of_a_batch_is_its_own_picture() -> None:
     np.testing.assert_array_equal(of_many, picture(Renderer(alone.scenario, size=SIZE), alone))
     first = picture(Renderer(batch.scenario, size=SIZE), batch, world=0)
     assert (of_many != first).any()
-
-
-# --- positions -----------------------------------------------------------------------------------
 
 
 def test_robots_are_drawn_where_they_are() -> None:
@@ -295,204 +251,3 @@ def test_the_camera_moves_smoothly_and_settles() -> None:
     for wobble in (1.02, 0.98, 1.02):
         camera.follow(points / 2 * wobble, 0.1)
         assert camera.scale == pytest.approx(settled, rel=1e-6)
-
-
-# --- annotations ---------------------------------------------------------------------------------
-
-
-def test_links_are_drawn_between_trackers_that_hear_each_other() -> None:
-    poses = [(3.0, 0.0, 0.0), (5.0, 0.0, 0.0), (-9.0, 0.0, 0.0)]
-    limited: dict[str, Any] = {
-        "radio_range": 4.0,
-        "radio_delay": 0,
-        "radio_loss": 0.0,
-        "sensing_range": math.inf,
-    }
-    batch = placed(poses, scenario="radio", **limited)
-    scene = read_scene(batch)
-    np.testing.assert_array_equal(scene.links, [[0, 1, 0], [1, 0, 0], [0, 0, 0]])
-    renderer = Renderer(batch.scenario)
-    linked = np.array(colour_at(renderer, picture(renderer, batch), 4, 0))
-    assert np.abs(linked - LINK).sum() < np.abs(np.array((248, 249, 251)) - LINK).sum() - 100
-    perfect = placed(poses)
-    assert not read_scene(perfect).links.any()
-
-
-def test_links_fade_when_nothing_is_heard_any_more() -> None:
-    batch = placed(
-        [(3, 0, 0), (5, 0, math.pi / 2)], scenario="radio", radio_range=2.5, radio_loss=0.0
-    )
-    strength = []
-    for _ in range(30):
-        strength.append(read_scene(batch).links[0, 1])
-        batch.step(np.array([[[-1, 0], [1, 0]]], np.float32))
-    assert max(strength) == 1
-    falling = strength[strength.index(1) :]
-    assert falling == sorted(falling, reverse=True)
-    assert falling[-1] == 0
-    assert any(0 < value < 1 for value in falling)
-
-
-def test_tasks_colour_the_trackers_and_leaders_are_marked() -> None:
-    batch = placed([(3, 3, 0), (-3, 3, 0), (3, -3, 0), (-3, -3, 0)])
-    renderer = Renderer(batch.scenario)
-    plain = picture(renderer, batch)
-    told = {"task": [[0, 1, 2, 3]], "leader": [[2, 2, 2, 2]]}
-    frame = picture(renderer, batch, annotations=told)
-    for (x, y), colour in zip(((3, 3), (-3, 3), (3, -3), (-3, -3)), TASK_COLOURS, strict=True):
-        assert like(colour_at(renderer, frame, x, y - 0.07), colour)
-        assert like(colour_at(renderer, plain, x, y - 0.07), TRACKER)
-    # The mark is drawn over the leader only.
-    above = renderer.project([[3, 3], [-3, 3], [3, -3], [-3, -3]]) - (0, 20)
-    inked = [
-        like(tuple(frame[row, column].tolist()), INK) for column, row in above.round().astype(int)
-    ]
-    assert inked == [False, False, True, False]
-
-
-@pytest.mark.parametrize(
-    ("told", "wrong"),
-    [
-        ({"task": [0, 1]}, r"task.*shape \(2,\).*wanted integers of shape \(1, 2\)"),
-        ({"leader": [[0.5, 1.0]]}, "leader.*float64.*wanted integers"),
-    ],
-)
-def test_annotations_that_do_not_fit_are_named(told: dict[str, Any], wrong: str) -> None:
-    batch = placed([(3, 3, 0), (-3, 3, 0)])
-    with pytest.raises(ValueError, match=wrong):
-        Renderer(batch.scenario).draw(batch, annotations=told)
-
-
-def test_contacts_flash_and_the_flash_goes_out() -> None:
-    batch = placed([(3, 0, 0), (3.5, 0, math.pi)])
-    renderer = Renderer(batch.scenario)
-    reddest = []
-    for k in range(25):
-        frame = picture(renderer, batch)
-        reddest.append(int((np.abs(frame.astype(int) - CONTACT).sum(axis=-1) < 90).sum()))
-        # Into each other, then still.
-        batch.step(np.array([[[1, 0], [1, 0]]] if k < 5 else [[[-1, 0], [-1, 0]]], np.float32))
-    assert int(batch.state["world_contacts_tracker"][0]) > 0
-    assert reddest[0] == 0
-    assert max(reddest) > 20
-    assert reddest[-1] == 0
-
-
-def test_a_broken_tracker_is_crossed_out() -> None:
-    batch = worlds("leader-loss", break_window=(0.0, 0.01))
-    renderer = Renderer(batch.scenario)
-    advance(batch, 8)
-    scene = read_scene(batch)
-    assert scene.broken.sum() == 1
-    frame = picture(renderer, batch)
-    for k, broken in enumerate(scene.broken):
-        x, y = scene.position[k]
-        assert like(colour_at(renderer, frame, x, y), INK) == broken
-
-
-def test_a_tracker_without_the_target_in_sight_is_pale() -> None:
-    batch = placed([(3, 0, 0), (8, 0, 0)], scenario="radio", sensing_range=4.0)
-    renderer = Renderer(batch.scenario)
-    frame = picture(renderer, batch)
-    sees, blind = (colour_at(renderer, frame, x, -0.07) for x in (3, 8))
-    assert like(sees, TRACKER)
-    assert sum(blind) > sum(sees) + 100
-
-
-# --- opening and closing -------------------------------------------------------------------------
-
-
-def test_importing_the_package_does_not_load_pygame() -> None:
-    code = "import sys, posse, posse.rendering.renderer; print('pygame' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False"]
-
-
-def test_frames_need_no_display() -> None:
-    code = (
-        "import posse, pygame; from posse.rendering.renderer import Renderer;"
-        "b = posse.batch('smart'); b.reset();"
-        "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "(640, 640, 3) False"
-
-
-def test_a_window_shows_the_frame_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
-    import pygame
-
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    batch = worlds()
-    window, array = Renderer(batch.scenario, "human", SIZE), Renderer(batch.scenario, size=SIZE)
-    try:
-        assert window.draw(batch) is None
-        surface = pygame.display.get_surface()
-        assert surface is not None
-        shown = pygame.surfarray.array3d(surface).swapaxes(0, 1)
-        np.testing.assert_array_equal(shown, array.draw(batch))
-    finally:
-        window.close()
-    assert not pygame.display.get_init()
-    assert window.closed
-    window.close()
-
-
-@pytest.mark.parametrize("event", ["QUIT", "KEYDOWN"])
-def test_a_window_that_the_user_closes_stays_closed(
-    event: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import pygame
-
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    batch = worlds()
-    renderer = Renderer(batch.scenario, "human", SIZE)
-    renderer.draw(batch)
-    assert not renderer.closed
-    settings = {"key": pygame.K_ESCAPE} if event == "KEYDOWN" else {}
-    pygame.event.post(pygame.event.Event(getattr(pygame, event), settings))
-    renderer.draw(batch)
-    assert renderer.closed
-    assert not pygame.display.get_init()
-    assert renderer.draw(batch) is None
-    assert not pygame.display.get_init()
-
-
-def test_without_a_display_the_error_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
-    batch = worlds()
-    with pytest.raises(RuntimeError, match=r"no window can be opened.*render_mode='rgb_array'"):
-        Renderer(batch.scenario, "human").draw(batch)
-
-
-def test_a_closed_renderer_says_so() -> None:
-    batch = worlds()
-    renderer = Renderer(batch.scenario)
-    renderer.close()
-    with pytest.raises(ValueError, match="closed: make a new one"):
-        renderer.draw(batch)
-
-
-@pytest.mark.parametrize("mode", ["ansi", "", None])
-def test_an_unknown_mode_is_named(mode: Any) -> None:
-    with pytest.raises(ValueError, match=f"unknown render mode {mode!r}.*human, rgb_array"):
-        Renderer(posse.get_scenario("smart"), mode)
-
-
-@pytest.mark.parametrize("size", [(100, 400), (400,), (400.0, 400)])
-def test_an_impossible_size_is_named(size: Any) -> None:
-    with pytest.raises(ValueError, match=r"size=.*at least 200 px"):
-        Renderer(posse.get_scenario("smart"), size=size)
-
-
-def test_what_cannot_be_drawn_is_named() -> None:
-    batch = posse.batch("smart", 2)
-    renderer = Renderer(batch.scenario)
-    with pytest.raises(ResetNeeded, match="call reset"):
-        renderer.draw(batch)
-    batch.reset()
-    for world in (2, -1):
-        with pytest.raises(ValueError, match=f"world={world} is not in the batch.*0 to 1"):
-            renderer.draw(batch, world)
-    other = worlds("constant")
-    with pytest.raises(ValueError, match="'constant' does not fit a renderer of 'smart'"):
-        renderer.draw(other)
