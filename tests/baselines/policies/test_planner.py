@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.support.reference import snapshot
+from tests.support.reference.state import snapshot
 
 import posse
 from posse_baselines import PolicyError, begin, load, play, rollout, split_agents

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pytest
 from gymnasium.error import ResetNeeded
 from tests.support.adapters import out_of_band
-from tests.support.reference import snapshot
+from tests.support.reference.state import snapshot
 
 import posse
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
-from tests.support.reference import snapshot
+from tests.support.reference.state import snapshot
 
 import posse
 

@@ -10,13 +10,9 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.reference import (
-    Episode,
-    free_gaps,
-    one_world,
-    positions,
-    snapshot,
-)
+from tests.support.reference.motion import free_gaps
+from tests.support.reference.score import Episode
+from tests.support.reference.state import one_world, positions, snapshot
 
 import posse
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.support.reference import NEVER, snapshot
+from tests.support.reference.state import NEVER, snapshot
 
 import posse
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.reference import headings, on_arc, one_world, positions, snapshot
+from tests.support.reference.motion import on_arc
+from tests.support.reference.state import headings, one_world, positions, snapshot
 
 import posse
 from posse.rules.kinematics import approach, arc, turn_towards

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.reference import CASES, Senses, case_name, radio_alive, record
+from tests.support.reference.recordings import CASES, case_name, record
+from tests.support.reference.senses import Senses, radio_alive
 
 import posse
 

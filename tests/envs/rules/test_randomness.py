@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from scipy import stats
-from tests.support import reference
+from tests.support.reference import draws as reference
 
 import posse
 from posse.rules import randomness

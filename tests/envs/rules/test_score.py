@@ -7,16 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.reference import (
-    CASES,
-    Episode,
-    case_name,
-    one_world,
-    positions,
-    record,
-    slots,
-    snapshot,
-)
+from tests.support.reference.recordings import CASES, case_name, record
+from tests.support.reference.score import Episode, slots
+from tests.support.reference.state import one_world, positions, snapshot
 
 import posse
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.reference import can_see, one_world, positions, snapshot, sonar
+from tests.support.reference.senses import can_see, sonar
+from tests.support.reference.state import one_world, positions, snapshot
 
 import posse
 

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import stats
-from tests.support.reference import free_gaps, obstacles, one_world, positions, snapshot
+from tests.support.reference.motion import free_gaps
+from tests.support.reference.state import obstacles, one_world, positions, snapshot
 
 import posse
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.support.reference import snapshot
+from tests.support.reference.state import snapshot
 
 import posse
 

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.support.reference import one_world, slots, snapshot
+from tests.support.reference.score import slots
+from tests.support.reference.state import one_world, snapshot
 
 import posse
 from posse.scenarios.formation import FORMATIONS, slot_offsets

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.reference import CASES, Episode, case_name, record, working
+from tests.support.reference.recordings import CASES, case_name, record
+from tests.support.reference.score import Episode
+from tests.support.reference.state import working
 
 import posse
 
@@ -77,7 +79,9 @@ def test_a_target_that_is_an_agent_gets_the_opposite_of_the_score() -> None:
         _, rewards, _, _, infos = batch.step(np.full(batch.action_shape, -0.5))
         assert rewards.shape == (1, 3)
         assert rewards[0, 2] == -infos["score"][0]
-        assert all((term[0, 2] == 0).all() for term in infos["reward_terms"].values())
+        terms = {name: values[0, 2] for name, values in infos["reward_terms"].items()}
+        assert terms["team"] == infos["score"][0]
+        assert all(terms[name] == 0 for name in ("slot", "progress", "distance", "sight"))
 
 
 def test_the_start_of_an_episode_rewards_nothing() -> None:

@@ -10,18 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.support.reference import (
-    CASES,
-    Senses,
-    case_name,
-    headings,
-    observation,
-    one_world,
-    positions,
-    record,
-    snapshot,
-    sonar,
-)
+from tests.support.reference.observation import observation
+from tests.support.reference.recordings import CASES, case_name, record
+from tests.support.reference.senses import Senses, sonar
+from tests.support.reference.state import headings, one_world, positions, snapshot
 
 import posse
 

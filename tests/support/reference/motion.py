@@ -1,0 +1,100 @@
+"""Motion on arcs, and free widths along them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from tests.support.reference.state import (
+    Array,
+    Complexes,
+    State,
+    headings,
+    obstacles,
+    positions,
+    working,
+)
+
+import posse
+
+
+def on_arc(
+    place: complex, heading: complex, speed: float, turn_rate: float, time: float
+) -> tuple[complex, complex]:
+    """Return position and heading after a time on the circle of (V, ω)."""
+    turned = heading * np.exp(1j * turn_rate * time)
+    if turn_rate == 0.0:
+        return place + speed * time * heading, turned
+    # For a small turn the circle's centre is so far away that the difference of two points
+    # relative to it is dominated by rounding.
+    return place + heading * speed * np.expm1(1j * turn_rate * time) / (1j * turn_rate), turned
+
+
+def free_motion(
+    s: posse.Scenario, before: State, after: State, actions: npt.NDArray[Any]
+) -> tuple[Complexes, Complexes, Array]:
+    """Return all positions and headings after a step without contacts.
+
+    And the speed and turn rate of the trackers, (2, N). What a scripted target decided is read off
+    ``after``.
+    """
+    n, count = s.num_trackers, s.physics_steps
+    dt = s.control_step / count
+    place, heading = positions(before), headings(before)
+    speeds = np.append(before["tracker_speed"], after["world_speed"]).astype(np.float64)
+    turns = np.append(before["tracker_turn_rate"], after["world_turn_rate"]).astype(np.float64)
+    if s.target_motion == "agent":
+        speeds[n] = (float(actions[n, 0]) + 1) / 2 * s.target_speed
+        turns[n] = float(actions[n, 1]) * s.target_turn_rate
+    alive = working(after)
+    for _ in range(count):
+        for i in range(n + 1):
+            if i < n:
+                if not alive[i]:
+                    speeds[i] = turns[i] = 0.0
+                    continue
+                wanted = (float(actions[i, 0]) + 1) / 2 * s.tracker_speeds[i]
+                most = s.tracker_acceleration * dt
+                speeds[i] += max(-most, min(most, wanted - speeds[i]))
+                wanted = float(actions[i, 1]) * s.tracker_turn_rates[i]
+                most = s.tracker_turn_acceleration * dt
+                turns[i] += max(-most, min(most, wanted - turns[i]))
+            place[i], heading[i] = on_arc(place[i], heading[i], speeds[i], turns[i], dt)
+    return place, heading, np.stack([speeds[:n], turns[:n]])
+
+
+def free_gaps(s: posse.Scenario, state: State) -> Array:
+    """Return the clearance between every tracker and everything else, (N, N + 1 + M + 4), m.
+
+    The others: the trackers (its own place holds inf), the target, the obstacles, the walls.
+    """
+    p, n = positions(state), s.num_trackers
+    mates = np.abs(p[:n, None] - p[None, :]) - 2 * s.robot_radius
+    mates[np.arange(n), np.arange(n)] = np.inf
+    centres, radii = obstacles(state)
+    discs = np.abs(p[:n, None] - centres[None, :]) - radii - s.robot_radius
+    inner = s.arena / 2 - s.robot_radius
+    x, y = p[:n].real, p[:n].imag
+    walls = np.stack([inner - x, inner + x, inner - y, inner + y], axis=1)
+    return np.concatenate([mates, discs, walls], axis=1)
+
+
+def path_gaps(s: posse.Scenario, before: State, after: State, freely: Complexes) -> Array:
+    """Return a lower bound of every robot's clearance during a step, (N + 1,), m."""
+    n = s.num_trackers
+    start, end = positions(before), positions(after)
+    centres, radii = obstacles(before)
+    least = np.full(n + 1, np.inf)
+    way = np.maximum(np.abs(freely - start), np.abs(end - start))
+    for i in range(n + 1):
+        for j in range(n + 1):
+            if i != j:
+                gap = abs(start[i] - start[j]) - way[i] - way[j] - 2 * s.robot_radius
+                least[i] = min(least[i], gap)
+        if len(radii):
+            gaps = np.abs(start[i] - centres) - way[i] - radii - s.robot_radius
+            least[i] = min(least[i], float(gaps.min()))
+        inner = s.arena / 2 - s.robot_radius
+        least[i] = min(least[i], inner - max(abs(start[i].real), abs(start[i].imag)) - way[i])
+    return least

@@ -1,0 +1,187 @@
+"""Slots, score and metrics of an episode."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse.csgraph import connected_components
+from tests.support.reference.motion import free_gaps
+from tests.support.reference.senses import can_see, radio_alive
+from tests.support.reference.state import TOUCHING, Array, Complexes, State, positions, working
+
+import posse
+
+
+def slots(s: posse.Scenario) -> Complexes:
+    """Return the slots in the slot frame as x + iy, from their definition."""
+    n, d, apart = s.num_trackers, s.formation_distance, s.formation_spacing
+    if s.formation == "ring":
+        radius = max(d, apart / (2 * math.sin(math.pi / n)) if n > 1 else d)
+        return np.asarray(-radius * np.exp(2j * np.pi * np.arange(n) / n))
+    if s.formation == "rows":
+        wide = math.ceil(math.sqrt(n))
+        places = []
+        for k in range(n):
+            row, column = divmod(k, wide)
+            in_row = min(wide, n - row * wide)
+            places.append(complex(-d - apart * row, apart * (column - (in_row - 1) / 2)))
+        return np.array(places)
+    wing = [-d + 0j]
+    for k in range(1, n):
+        arm = (k + 1) // 2 * apart
+        wing.append(-d + arm * np.exp(1j * math.radians(135 if k % 2 else -135)))
+    return np.array(wing)
+
+
+@dataclass
+class Episode:
+    """Every metric of an episode, computed from its states."""
+
+    scenario: posse.Scenario
+    score: float = 0.0
+    occupied: dict[int, int] = field(default_factory=dict)
+    distance: Array = field(default_factory=lambda: np.zeros(0))
+    progress: Array = field(default_factory=lambda: np.zeros(0))
+    onsets: Array = field(default_factory=lambda: np.zeros(0))
+    contacts: dict[str, int] = field(
+        default_factory=lambda: {"tracker": 0, "obstacle": 0, "target": 0}
+    )
+    _start: Complexes | None = None
+    _arrived: npt.NDArray[np.bool_] | None = None
+    _touch: npt.NDArray[np.bool_] | None = None
+    _touched: bool = False
+    _lost_at: int | None = None
+    _working: int = 0
+    _held_from: int | None = None
+    _settled_at: int | None = None
+    _recovered_at: int | None = None
+    _detected_at: int | None = None
+    _least: float = math.inf
+    _steps: int = 0
+    _sums: dict[str, float] = field(default_factory=dict)
+
+    def follow(self, state: State) -> None:
+        """Process the state after the next step; the first one is the start of the episode."""
+        s, n = self.scenario, self.scenario.num_trackers
+        p, alive, step = positions(state), working(state), int(state["world_step"])
+        first = self._start is None
+        if self._start is None:
+            self._start, self._arrived = p[:n].copy(), np.zeros(n, np.bool_)
+            self._touch, self._working = np.zeros((n, n + 1 + s.num_obstacles + 4), np.bool_), n
+        gaps = free_gaps(s, state)
+        self._least = min(self._least, float(gaps.min()))
+        self._count_contacts(gaps <= TOUCHING)
+        frame = complex(state["world_frame_cos"], state["world_frame_sin"])
+        places = p[n] + slots(s) * frame
+        away = np.abs(p[:n, None] - places[None, :])
+        near = (away <= s.tolerance) & (alive & ~(gaps <= TOUCHING).any(axis=1))[:, None]
+        rows, columns = linear_sum_assignment(-near.astype(float))
+        taken = {int(c) for r, c in zip(rows, columns, strict=True) if near[r, c]}
+        self.occupied = {}
+        for i in range(n):
+            own = [c for c in range(n) if near[i, c] and c not in self.occupied.values()]
+            if own:
+                self.occupied[i] = own[0]
+        assert set(self.occupied.values()) == taken, "which slots are taken does not depend on who"
+        free = [c for c in range(n) if c not in taken]
+        distance = np.array(
+            [
+                away[i, self.occupied[i]] if i in self.occupied
+                else away[i, free].min() if free else away[i].min()
+                for i in range(n)
+            ]
+        )  # fmt: skip
+        self.progress = np.zeros(n) if first else self.distance - distance
+        self.distance = distance
+        sees = [can_see(s, state, i) for i in range(n)]
+        if any(sees) and self._detected_at is None:
+            self._detected_at = step
+        count = int(alive.sum())
+        if first:
+            return
+        self._steps += 1
+        if count < self._working:
+            self._working, self._held_from = count, None
+            if self._lost_at is None:
+                self._lost_at = step - 1
+        self.score = min(1.0, len(taken) / count)
+        if len(taken) < count:
+            self._held_from = None
+        elif self._held_from is None:
+            self._held_from = step
+        enough = max(1, round(s.settle_time / s.control_step))
+        if self._held_from is not None and step - self._held_from + 1 >= enough:
+            if self._settled_at is None:
+                self._settled_at = self._held_from
+            if self._lost_at is not None and self._recovered_at is None:
+                self._recovered_at = self._held_from
+        assert self._arrived is not None
+        reach = np.array(s.tracker_speeds)[:, None] * step * s.control_step + s.tolerance
+        could = (np.abs(self._start[:, None] - places[None, :]) <= reach).any(axis=1)
+        self._arrived |= could & alive
+        v = state["tracker_speed"].astype(np.float64) / s.tracker_speeds
+        turn = state["tracker_turn_rate"].astype(np.float64) / s.tracker_turn_rates
+        for name, value in (
+            ("score", self.score),
+            ("safe_score", 0.0 if self._touched else self.score),
+            ("bound", (self._arrived & alive).sum() / count),
+            ("error", distance[alive].sum()),
+            ("effort", (v**2 + turn**2)[alive].sum()),
+            ("sight", sum(sees)),
+            ("tracker_steps", count),
+            ("connected", self._connected(state)),
+        ):
+            self._sums[name] = self._sums.get(name, 0.0) + float(value)
+
+    def _count_contacts(self, touch: npt.NDArray[np.bool_]) -> None:
+        n = self.scenario.num_trackers
+        assert self._touch is not None
+        begun = touch & ~self._touch
+        self._touch, self._touched = touch, self._touched or bool(touch.any())
+        self.onsets = begun.sum(axis=1).astype(np.float64)
+        self.contacts["tracker"] += int(begun[:, :n].sum()) // 2
+        self.contacts["target"] += int(begun[:, n].sum())
+        self.contacts["obstacle"] += int(begun[:, n + 1 :].sum())
+
+    def _connected(self, state: State) -> bool:
+        s = self.scenario
+        members = np.flatnonzero(working(state))
+        if len(members) < 2:
+            return True
+        p = positions(state)[members]
+        can = np.array([radio_alive(s, state, i) for i in members.tolist()])
+        links = (np.abs(p[:, None] - p[None, :]) <= s.radio_range) & can[:, None] & can[None, :]
+        return bool(connected_components(links, directed=False)[0] == 1)
+
+    def metrics(self) -> dict[str, float]:
+        """Return every metric by name."""
+        s, sums = self.scenario, self._sums
+
+        def time(step: int | None) -> float:
+            return math.nan if step is None else step * s.control_step
+
+        recovery = math.nan
+        if self._recovered_at is not None and self._lost_at is not None:
+            recovery = (self._recovered_at - self._lost_at) * s.control_step
+        return {
+            "score": sums["score"] / self._steps,
+            "safe_score": sums["safe_score"] / self._steps,
+            "bound": sums["bound"] / self._steps,
+            "detection_time": time(self._detected_at),
+            "settling_time": time(self._settled_at),
+            "recovery_time": recovery,
+            "tracking_error": sums["error"] / sums["tracker_steps"],
+            "time_in_sight": sums["sight"] / sums["tracker_steps"],
+            "tracker_contacts": self.contacts["tracker"],
+            "obstacle_contacts": self.contacts["obstacle"],
+            "target_contacts": self.contacts["target"],
+            "contact_free": float(not self._touched),
+            "least_gap": self._least,
+            "control_effort": sums["effort"] / sums["tracker_steps"],
+            "time_connected": sums["connected"] / self._steps,
+            "duration": self._steps * s.control_step,
+        }

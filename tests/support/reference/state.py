@@ -1,0 +1,50 @@
+"""The state of one world, as complex numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import posse
+
+State = dict[str, npt.NDArray[Any]]
+"""Every state array by name: of a batch, or (without the first axis) of one world."""
+Array = npt.NDArray[np.float64]
+Complexes = npt.NDArray[np.complex128]
+
+NEVER = 2**30
+TOUCHING = 0.001  # m, of free width
+
+
+def snapshot(batch: posse.Batch) -> State:
+    """Return a copy of every state array of a batch."""
+    return {name: array.copy() for name, array in batch.state.items()}
+
+
+def one_world(state: State, e: int) -> State:
+    return {name: array[e] for name, array in state.items()}
+
+
+def positions(state: State) -> Complexes:
+    """Return x + iy of the trackers and, last, of the target, (N + 1,)."""
+    x = np.append(state["tracker_x"], state["world_x"]).astype(np.float64)
+    y = np.append(state["tracker_y"], state["world_y"]).astype(np.float64)
+    return x + 1j * y
+
+
+def headings(state: State) -> Complexes:
+    """Return cos θ + i sin θ of the trackers and, last, of the target, (N + 1,)."""
+    c = np.append(state["tracker_heading_cos"], state["world_heading_cos"]).astype(np.float64)
+    s = np.append(state["tracker_heading_sin"], state["world_heading_sin"]).astype(np.float64)
+    return c + 1j * s
+
+
+def obstacles(state: State) -> tuple[Complexes, Array]:
+    x, y = state["obstacle_x"].astype(np.float64), state["obstacle_y"].astype(np.float64)
+    return x + 1j * y, state["obstacle_radius"].astype(np.float64)
+
+
+def working(state: State) -> npt.NDArray[np.bool_]:
+    return np.asarray(state["tracker_broken_at"] == NEVER)
