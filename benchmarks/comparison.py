@@ -1,13 +1,13 @@
 """Part of ``make results``: compares the shipped learned teams with the scripted ones.
 
-Fills docs/comparison.md below its mark, and draws the figures into docs/media. Without
-shipped policies the page is not changed.
+Fills docs/comparison.md between its marks, and draws the figures into docs/media. Without shipped
+policies the page is not changed.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,26 +17,25 @@ import tyro
 import posse
 from posse_baselines import load
 from posse_baselines.registry import shipped
+from posse_baselines.tuned import TUNED
+from posse_baselines.tuned.files import tuned_files
 from posse_training.provenance import commit
 from posse_training.reports.compare import Settings as CompareSettings
 from posse_training.reports.compare import compare
 from posse_training.reports.comparison import Comparison
 from posse_training.reports.comparison_run import PLANNER
 from posse_training.reports.contenders import play, read_contenders
-from posse_training.reports.plays import Plays
+from posse_training.reports.pictures.figures import CAPTIONS
+from posse_training.reports.pivots import Pivot, pivots
 from posse_training.reports.statistics import Estimate
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
-SCRIPTED = ("ddcs-distributed", "ddcs-centralized")
+SCRIPTED = ("ddcs-tuned", "ddcs-distributed", "ddcs-centralized", "pngl-l-phi-tuned", "pngl-l-phi")
+"""The first is the baseline of the differences."""
 MARK = "<!-- `make results` writes what follows -->"
-FIGURES = {
-    "scenarios": "Mean safe score of every team on every scenario.",
-    "profile": "Share of worlds with at least a safe score.",
-    "team-size": "Safe score against the size of the team.",
-    "radio-loss": "Safe score against the share of messages lost.",
-    "target-speed": "Safe score against the speed of the target.",
-    "recovery": "Share of teams that have settled again, by time since their leader broke.",
-}
+END = "<!-- the end of what `make results` writes -->"
+FIRST = ("scenarios", "profile")
+"""Figures above the tables; the others stand below them."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,13 @@ THEIR_COMMANDS: Final = (
     "settings that have become defaults of a scenario since."
 )
 ANOTHER_TRAINING: Final = (
-    "The difference to the better DDCS model, with training seeds and worlds resampled. Only the "
-    "best seed of each policy is shipped: to repeat this section, train the others with the "
-    "commands above, and name all files in `SEEDS`."
+    f"The difference to `{SCRIPTED[0]}`, with training seeds and worlds resampled. Only the best "
+    "seed of each policy is shipped: to repeat this section, train the others with the commands "
+    "above, and name all files in `SEEDS`."
+)
+TABLES: Final = (
+    "Brackets are 95 % intervals. **Bold**: the best team that does not read the state. †: trained "
+    "on this scenario, or tuned for it."
 )
 
 
@@ -84,8 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found = compare(
         CompareSettings(
             (*SCRIPTED, *learned), settings.scenarios, settings.episodes, settings.seed,
-            settings.split, settings.rows, sweep_episodes=settings.sweep_episodes,
-            planner_episodes=settings.planner_episodes,
+            settings.split, settings.rows, sweeps=("all",), replays=0,
+            sweep_episodes=settings.sweep_episodes, planner_episodes=settings.planner_episodes,
         )
     )  # fmt: skip
     media = settings.page.parent / "media"
@@ -98,65 +101,82 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def fill(page: Path, block: str) -> None:
-    """Replace the part of a page below its mark."""
+    """Replace the part of a page between its marks."""
     text = page.read_text(encoding="utf-8")
-    if text.count(MARK) != 1:
-        raise ValueError(f"{page} must contain the line {MARK!r} exactly once")
-    page.write_text(f"{text.partition(MARK)[0]}{MARK}\n\n{block}", encoding="utf-8")
+    for mark in (MARK, END):
+        if text.count(mark) != 1:
+            raise ValueError(f"{page} must contain the line {mark!r} exactly once")
+    before, _, rest = text.partition(MARK)
+    _, _, after = rest.partition(END)
+    page.write_text(f"{before}{MARK}\n\n{block}\n{END}{after}", encoding="utf-8")
 
 
 def report(
     settings: Settings, found: Comparison, learned: Sequence[str], figures: Sequence[str]
 ) -> str:
-    """Return the part of the page below its mark."""
+    """Return the part of the page between its marks."""
     cards: dict[str, Mapping[str, Any]] = {name: load(name).card for name in learned}  # type: ignore[attr-defined]
-    worlds = f"{settings.episodes:,} worlds of the `{settings.split}` split for each row"
+    versions = ", ".join(f"`{n}` {posse.get_scenario(n).version}" for n in settings.scenarios)
+    made = (
+        f"Made by `make results` at commit `{commit()}`: {settings.episodes:,} worlds of the "
+        f"`{settings.split}` split for each policy and scenario (planner: "
+        f"{min(settings.planner_episodes, settings.episodes):,}), seed {settings.seed}. Versions "
+        f"of the scenarios: {versions}."
+    )
     lines = [
-        f"Made at commit `{commit()}`: {worlds}, seed {settings.seed}.",
+        made,
         "",
-        "## Learned teams and the better DDCS model",
+        "## Results",
         "",
-        row(
-            "scenario", "learned", "trained on it", "safe score", "of the planner's", "score",
-            "contact-free", "better DDCS model", "its safe score", "difference", "improvement",
-            "bound",
-        ),
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
-    for scenario in settings.scenarios:
-        best = better_ddcs(found, scenario)
-        for name in learned:
-            mine = found.plays.get((scenario, name))
-            if mine is None:
-                continue
-            trained = {part["name"] for part in cards[name]["scenarios"]}
-            lines.append(
-                row(
-                    scenario, f"`{name}`", "yes" if scenario in trained else "no",
-                    mine.mean("safe_score"), f"{mine.ratio(found.plays[scenario, PLANNER]):.2f}",
-                    mine.mean("score"),
-                    percent(mine.share([result["contact_free"] == 1 for result in mine.results])),
-                    f"`{best.label}`", best.mean("safe_score"),
-                    mine.difference(best), percent(mine.improvement(best)),
-                    f"{mine.mean('bound').value:.3f}",
-                )
-            )  # fmt: skip
+        *drawn(name for name in figures if name in FIRST),
+        TABLES,
+        "",
+    ]
+    trained = made_for(cards)
+    for pivot in pivots(found):
+        lines += [f"### {pivot.title}", "", pivot.meaning, "", *pivot_table(pivot, trained), ""]
     if found.left_out:
-        lines += ["", "Incompatible with the scenario:", ""]
+        lines += ["Incompatible with the scenario:", ""]
         lines += [f"- `{out['policy']}` on {out['what']}: {out['why']}" for out in found.left_out]
-    lines += ["", *training_seeds(cards)]
+        lines.append("")
+    lines += drawn(name for name in figures if name not in FIRST)
+    lines += training_seeds(cards)
     if settings.groups:
         lines += ["", *over_training_seeds(settings, found)]
-    lines += ["", "## Figures", ""]
-    for name in figures:
-        lines += [f"![{FIGURES[name]}](media/comparison-{name}.svg)", "", f"*{FIGURES[name]}*", ""]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-def better_ddcs(found: Comparison, scenario: str) -> Plays:
-    """Return the plays of the DDCS model with the higher mean safe score on the same worlds."""
-    plays = [found.plays[scenario, name] for name in SCRIPTED]
-    return max(plays, key=lambda play: play["safe_score"].mean())
+def drawn(figures: Iterable[str]) -> list[str]:
+    """Return figures with their captions."""
+    lines = []
+    for name in figures:
+        lines += [
+            f"![{CAPTIONS[name]}](media/comparison-{name}.svg)",
+            "",
+            f"*{CAPTIONS[name]}*",
+            "",
+        ]
+    return lines
+
+
+def made_for(cards: Mapping[str, Mapping[str, Any]]) -> set[tuple[str, str]]:
+    """Return the pairs of policy and scenario it was trained on or tuned for."""
+    pairs = {(name, part["name"]) for name, card in cards.items() for part in card["scenarios"]}
+    return pairs | {(name, scenario) for name in TUNED for scenario in tuned_files(name)}
+
+
+def pivot_table(pivot: Pivot, trained: Collection[tuple[str, str]]) -> list[str]:
+    """Return a table of policies by scenarios."""
+    lines = [row("", *(f"`{name}`" for name in pivot.scenarios))]
+    lines.append("|---" * (1 + len(pivot.scenarios)) + "|")
+    for policy, cells in pivot.rows:
+        shown = []
+        for scenario, cell in zip(pivot.scenarios, cells, strict=True):
+            value = f"**{cell.value}**" if cell.best else cell.value
+            mark = " †" if cell.value and (policy, scenario) in trained else ""
+            shown.append(f"{value}{mark}" + (f"<br>{cell.interval}" if cell.interval else ""))
+        lines.append(row(f"`{policy}`", *shown))
+    return lines
 
 
 def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -164,9 +184,9 @@ def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
     lines = [
         "## Training seeds",
         "",
-        "The seed of each policy with the best score on validation worlds is shipped.",
+        "The seed of each policy with the best validation score is shipped.",
         "",
-        "| policy | training seed | score on validation worlds | steps |",
+        "| policy | training seed | validation score | steps |",
         "|---|---|---|---|",
     ]
     for name, card in cards.items():
@@ -196,7 +216,7 @@ def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
         trained = {part["name"] for part in card["scenarios"]}
         for scenario in (name for name in settings.scenarios if name in trained):
             mine = play(group, scenario, settings.episodes, settings.seed, settings.split)
-            difference = mine.difference(better_ddcs(found, scenario))
+            difference = mine.difference(found.plays[scenario, SCRIPTED[0]])
             lines.append(row(scenario, f"`{group.label}`", str(len(mine.results)), difference))
     return lines
 
@@ -204,12 +224,6 @@ def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
 def row(*cells: str | Estimate) -> str:
     """Return a row of a table."""
     return f"| {' | '.join(map(str, cells))} |"
-
-
-def percent(estimate: Estimate) -> str:
-    """Return a share of worlds with its interval, in per cent."""
-    value, low, high = (100 * x for x in (estimate.value, estimate.low, estimate.high))
-    return f"{value:.0f} % [{low:.0f}, {high:.0f}]"
 
 
 if __name__ == "__main__":

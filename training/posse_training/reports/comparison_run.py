@@ -192,7 +192,8 @@ class ComparisonRun:
             self.folder, found.plays, found.points, losses, curves, sweep_facts=self._sweep_facts()
         )
         found.figures = [self.settings.out / path.name for path in drawn]
-        progress.note("recording the replays of the report")
+        if self.settings.replays:
+            progress.note("recording the replays of the report")
         best, worst = (
             [Shown(one, *self._record(one)) for one in some]
             for some in extremes(found, self.settings.replays)
