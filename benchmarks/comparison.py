@@ -23,7 +23,6 @@ from posse_training.provenance import commit
 from posse_training.reports.compare import Settings as CompareSettings
 from posse_training.reports.compare import compare
 from posse_training.reports.comparison import Comparison
-from posse_training.reports.comparison_run import PLANNER
 from posse_training.reports.contenders import play, read_contenders
 from posse_training.reports.pictures.figures import CAPTIONS
 from posse_training.reports.pivots import Pivot, pivots

@@ -40,7 +40,7 @@ from posse_training.reports.sweeps import BOUND, SWEEPS, Point, Sweep
 CAPTIONS: Final = {
     "scenarios": "Mean safe score of every team on every scenario.",
     "profile": "Share of worlds with at least a safe score.",
-    "learning": "Score on validation worlds over the training of the learned teams.",
+    "learning": "Validation score over the training of the learned teams.",
     "team-size": "Safe score against the size of the team.",
     "radio-loss": "Safe score against the share of messages lost.",
     "target-speed": "Safe score against the speed of the target.",
