@@ -25,7 +25,9 @@ from posse_training.reports.pictures.film import film
 from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")
-POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed")
+POLICIES: Final = (
+    "random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned",
+)  # fmt: skip
 LEARNED: Final = "learned-smart"
 """Plays the scenario that it was trained on, if it is shipped."""
 UNCOMPILED: Final = ("random", "idle")
