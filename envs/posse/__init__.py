@@ -96,6 +96,7 @@ __all__ = [
     "Memory",
     "Metric",
     "ObservationLayout",
+    "PairedBatch",
     "RewardTerm",
     "Scenario",
     "ScenarioError",

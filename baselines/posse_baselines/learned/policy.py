@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
@@ -155,6 +156,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             return memory
         *rest, adviser_memory = memory
         return (*rest, self.adviser.restart(adviser_memory, mask))
+
+    def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
+        """Return the adviser's memory as arrays by name."""
+        return {} if self.adviser is None else self.adviser.arrays(memory[-1])
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""

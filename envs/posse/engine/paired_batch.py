@@ -55,6 +55,10 @@ class PairedBatch(Batch):
         moves_target: Whether its side is the target, else the trackers.
         **settings: Further arguments of :class:`Batch`.
 
+    Attributes:
+        inside: The policy inside.
+        moves_target: Whether it moves the target.
+
     Raises:
         ScenarioError: As :class:`Batch`, or a target that is not an agent.
         TypeError: ``inside`` lacks a method.
@@ -85,7 +89,7 @@ class PairedBatch(Batch):
         rows = self._mine.stop - self._mine.start
         self.observation_shape = (num_worlds, rows, self.layout.size)
         self.action_shape = (num_worlds, rows, self._length if moves_target else 2)
-        self.inside = inside
+        self.inside, self.moves_target = inside, moves_target
         self._memory = inside.begin(self.layout, num_worlds)
         self._seen = np.zeros((num_worlds, n + 1 - rows, self.layout.size), np.float32)
 

@@ -23,6 +23,7 @@ class _Which:
 
     scenario: str = "smart"
     algorithm: str = "ppo"
+    side: str = "trackers"
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str]) -> None:
         TrainSettings,
         prog="posse train",
         description="Train a team. To resume a run: posse train --resume DIR",
-        default=default_settings(some.scenario, some.algorithm),
+        default=default_settings(some.scenario, some.algorithm, side=some.side),
         args=arguments,
     )
     require(*_NEEDED)

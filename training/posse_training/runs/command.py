@@ -14,9 +14,12 @@ def command_of(settings: TrainSettings) -> str:
     It also states the values of the scenario's own defaults: these are often recorded only after
     the training that found them, so the commit of the training may lack them.
     """
-    default = default_settings(settings.scenario, settings.algorithm).to_dict()
-    of_all = default_settings(settings.scenario, settings.algorithm, own=False).to_dict()
-    stated = ("scenario", "algorithm", "steps", "seed")
+    which, side = (settings.scenario, settings.algorithm), settings.side
+    default = default_settings(*which, side=side).to_dict()
+    of_all = default_settings(*which, own=False, side=side).to_dict()
+    stated = {"scenario", "algorithm", "steps", "seed"}
+    if side == "target":
+        stated |= {"side", "against"}
     words = ["posse", "train"]
     for name, value in settings.to_dict().items():
         usual = value == default[name] == of_all[name]

@@ -12,7 +12,7 @@ from posse_training.runs.settings import TrainSettings
 
 
 def default_settings(
-    scenario: str = "smart", algorithm: str = "ppo", *, own: bool = True
+    scenario: str = "smart", algorithm: str = "ppo", *, own: bool = True, side: str = "trackers"
 ) -> TrainSettings:
     """Return the default settings of a scenario.
 
@@ -23,6 +23,8 @@ def default_settings(
         scenario: A scenario's name, or several separated by commas.
         algorithm: One of the algorithms.
         own: Whether to apply the scenario's own file.
+        side: What learns; the defaults of a target are in ``target.toml``, instead of the
+            scenario's own.
 
     Raises:
         SettingsError: An unknown algorithm, or an invalid default.
@@ -32,9 +34,13 @@ def default_settings(
             f"unknown algorithm {algorithm!r:.80}; algorithms are: {', '.join(ALGORITHMS)}"
         )
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
+    if side == "target":  # its opponents are for the user to name
+        values |= {"side": side, "against": "ddcs-distributed"}
     folder = resources.files("posse_training") / "defaults"
     files = [folder / "all.toml"]
-    if "," in scenario:
+    if side == "target":
+        files.append(folder / "target.toml")
+    elif "," in scenario:
         files += [folder / "mixture.toml"] if own else []
     elif own and scenario in {file.name.removesuffix(".toml") for file in folder.iterdir()}:
         files.append(folder / f"{scenario}.toml")

@@ -96,9 +96,9 @@ def make_card(
 ) -> dict[str, Any]:
     """Return a policy's card: its training scenarios, settings, software and scores."""
     scenarios = settings.scenarios
-    kind = settings.scenario.replace(",", "+")
     return {
-        "name": f"{kind}-{settings.algorithm}-{settings.seed}",
+        "name": settings.name,
+        "side": settings.side,
         "scenarios": [scenario.to_dict() for scenario in scenarios],
         "trained_splits": ["train"],
         "chosen_on": "validation",

@@ -22,7 +22,8 @@ def memory_needed(s: TrainSettings) -> int:
     trackers = max(scenario.num_trackers for scenario in scenarios)
     layout = ObservationLayout(max(scenarios, key=lambda scenario: scenario.num_trackers))
     inputs = Encoding.of(layout, s.encoding, s.num_neighbours).size
-    slots = s.num_worlds * min(scenario.num_trackers for scenario in scenarios)
+    each = min(scenario.num_trackers for scenario in scenarios) if s.side == "trackers" else 1
+    slots = s.num_worlds * each
     rows = slots * s.rollout * (inputs + _OWN) if s.on_policy else s.replay * 2 * (inputs + _OWN)
     widths = (inputs, *s.hidden, 2 + s.message_size)
     weights = sum(a * b for a, b in itertools.pairwise(widths))

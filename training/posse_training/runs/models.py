@@ -10,11 +10,10 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise
 from torch import nn
 
-import posse
 from posse_baselines import load
-from posse_baselines.learned import Encoding
 from posse_baselines.learned.advice import Adviser, Advising, check_adviser
 from posse_training.runs.settings import TrainSettings
+from posse_training.runs.sides import encoding_of, make_batches
 from posse_training.sb3.centralized_critic import CentralizedCriticPolicy
 from posse_training.sb3.normalisation import Normaliser
 from posse_training.sb3.speedups import FlatRolloutBuffer, QuickTanh
@@ -27,16 +26,8 @@ _EXPLORATION: Final = 0.1  # standard deviation of the noise on td3's actions
 
 def make_env(settings: TrainSettings) -> TeamVecEnv:
     """Return the training worlds, of the split ``"train"``."""
-    scenarios = settings.scenarios
-    edges = [settings.num_worlds * k // len(scenarios) for k in range(len(scenarios) + 1)]
-    batches = [
-        posse.Batch(
-            scenario, last - first, seed=settings.seed, first_world=first, autoreset="disabled"
-        )
-        for scenario, first, last in zip(scenarios, edges[:-1], edges[1:], strict=True)
-    ]
-    largest = max(batches, key=lambda batch: batch.layout.neighbours)
-    encoding = Encoding.of(largest.layout, settings.encoding, settings.num_neighbours)
+    batches = make_batches(settings)
+    encoding = encoding_of(settings, batches)
     adviser = make_adviser(settings)
     return TeamVecEnv(
         batches,

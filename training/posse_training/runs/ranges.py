@@ -12,6 +12,7 @@ from posse_training.errors import SettingsError
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 _CHOICES: Final = {
     "algorithm": ALGORITHMS,
+    "side": ("trackers", "target"),
     "encoding": ("plain", "slots", "belief"),
     "correction": ("motion", "velocity"),
     "activation": ("tanh", "relu"),
@@ -44,7 +45,7 @@ _NUMBERS: Final = {
     "log_deviation": (-20, 5),
 }
 _LEAST_BOUND: Final = 0.001  # of the share of episodes with contact
-_TEXTS: Final = ("scenario", "imitate", "advise", "beside", "wandb")
+_TEXTS: Final = ("scenario", "against", "start", "imitate", "advise", "beside", "wandb")
 _LONGEST: Final = 4096
 _LAYERS: Final = 16
 _WIDEST: Final = 8192

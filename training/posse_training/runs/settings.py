@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from posse import Scenario, ScenarioError, get_scenario
-from posse_baselines import PolicyError, load
+from posse_baselines import PolicyError, load, target_names
 from posse_baselines.registry import ships_or_is_file
 from posse_training.errors import SettingsError
 from posse_training.runs.ranges import check_ranges
@@ -38,6 +39,16 @@ class TrainSettings:
     """Seed of the worlds, the networks and the exploration."""
     folder: Path | None = None
     """Run folder; default: runs/train/SCENARIO-ALGORITHM-SEED."""
+
+    # The sides
+    side: Literal["trackers", "target"] = "trackers"
+    """What learns: the trackers, or the target."""
+    against: str | None = None
+    """What it plays: targets where trackers learn, teams where the target learns; names, files or
+    package.module:Class, separated by commas. The worlds are divided evenly among them; a name
+    twice gets two shares. Default for trackers: the scenario's own target."""
+    start: str | None = None
+    """Run folder whose networks and input statistics the run begins with."""
 
     # The worlds
     num_worlds: int = 256
@@ -136,7 +147,8 @@ class TrainSettings:
         if self.advise is not None:
             overrides["message_size"] = load(self.advise).message_size
         if self.reward_weights:
-            overrides["reward_weights"] = self.reward_weights
+            weights = "target_reward_weights" if self.side == "target" else "reward_weights"
+            overrides[weights] = self.reward_weights
         found = []
         for name in self.scenario.split(","):
             for size in self.team_sizes or (None,):
@@ -152,8 +164,13 @@ class TrainSettings:
     @property
     def run_folder(self) -> Path:
         """The folder that the run is written to."""
-        name = f"{self.scenario.replace(',', '+')}-{self.algorithm}-{self.seed}"
-        return self.folder or Path("runs/train") / name
+        return self.folder or Path("runs/train") / self.name
+
+    @property
+    def name(self) -> str:
+        """The name of the run and of its policies."""
+        side = "-target" if self.side == "target" else ""
+        return f"{self.scenario.replace(',', '+')}{side}-{self.algorithm}-{self.seed}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as plain values."""
@@ -185,6 +202,11 @@ class TrainSettings:
         return cls(**fitted)
 
 
+def opponents_of(against: str | None) -> dict[str, int]:
+    """Return the opponents that the setting ``against`` names, and how often each."""
+    return dict(Counter(name.strip() for name in against.split(",")) if against else {})
+
+
 def _check_together(s: TrainSettings) -> None:
     """Raise if settings that are valid on their own exclude each other."""
     if s.contact_bound is not None and not s.on_policy:
@@ -205,6 +227,8 @@ def _check_together(s: TrainSettings) -> None:
             f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
             "its adviser, which sends the messages"
         )
+    if s.side == "target":
+        _check_target(s)
     for name, instead in _ELSEWHERE.items():
         if name in s.overrides and (name != "num_trackers" or s.team_sizes):
             raise SettingsError(f"overrides cannot set {name!r}: use {instead} instead")
@@ -220,10 +244,33 @@ def _check_together(s: TrainSettings) -> None:
         )
 
 
+def _check_target(s: TrainSettings) -> None:
+    """Raise if settings do not fit a target that learns."""
+    if s.against is None:
+        raise SettingsError(
+            "side='target' needs the teams that chase it: set against, for example to ddcs-tuned"
+        )
+    for name, wanted in (
+        ("imitate", None), ("advise", None), ("message_size", 0), ("encoding", "plain"),
+    ):  # fmt: skip
+        value = getattr(s, name)
+        if value != wanted:
+            raise SettingsError(
+                f"{name}={value!r} does not go with side='target', which needs {wanted!r}: a "
+                "target has no team, no slots and no messages"
+            )
+    if s.algorithm == "mappo":
+        raise SettingsError(
+            "algorithm='mappo' does not go with side='target', which observes everything: use ppo"
+        )
+
+
 _ELSEWHERE = {
     "name": "the setting scenario",
     "message_size": "the setting message_size",
     "reward_weights": "the setting reward_weights",
+    "target_reward_weights": "the setting reward_weights with side target",
+    "target_motion": "the setting against",
     "num_trackers": "the setting team_sizes",
 }
 
@@ -255,9 +302,13 @@ def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
 
 def _refuse_code(path: Path, values: Any) -> None:
     """Raise if a settings file names a policy that is neither shipped nor a policy file."""
-    for name in ("advise", "imitate", "beside"):
-        policy = values.get(name) if isinstance(values, Mapping) else None
-        if policy is not None and not ships_or_is_file(policy):
+    if not isinstance(values, Mapping):
+        return
+    named = [(name, values.get(name)) for name in ("advise", "imitate", "beside")]
+    against = values.get("against")
+    several = opponents_of(against) if isinstance(against, str) else {}
+    for name, policy in (*named, *(("against", each) for each in several)):
+        if policy is not None and not ships_or_is_file(policy) and policy not in target_names():
             raise SettingsError(
                 f"{path} names {policy!r:.80} as {name!r}, which is neither a shipped policy nor a "
                 "policy file. To load it would import code that a file asks for. If you trust the "

@@ -13,12 +13,15 @@ from rich.console import Console
 from posse_baselines import PolicyError, load
 from posse_training.errors import DivergedError
 from posse_training.runs.callback import TrainingCallback
+from posse_training.runs.checkpoint import read_checkpoint
 from posse_training.runs.display import Display
 from posse_training.runs.folder import BEST, LAST, SETTINGS, locked_run, open_run
 from posse_training.runs.logs import check_wandb, make_logger
 from posse_training.runs.memory import check_memory
 from posse_training.runs.models import make_adviser, make_env, make_model
 from posse_training.runs.settings import TrainSettings, read_settings
+from posse_training.runs.sides import check_opponents, load_own
+from posse_training.runs.start import start_from
 from posse_training.runs.validation import first_statistics, score_beside
 from posse_training.sb3.imitation import imitate
 from posse_training.sb3.normalisation import RunningStatistics
@@ -64,7 +67,10 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
         if saved is not None:
             callback.restore(*saved)
         else:
-            first_statistics(settings, env, statistics)
+            if settings.start is None:
+                first_statistics(settings, env, statistics)
+            else:
+                start_from(Path(settings.start), model, statistics, settings.log_deviation)
             statistics.apply(model.policy)
             if settings.imitate is not None:
                 display.note(f"copying {settings.imitate}")
@@ -113,9 +119,12 @@ def check_before(settings: TrainSettings) -> None:
     check_wandb(settings)
     check_memory(settings)
     make_adviser(settings)
+    check_opponents(settings)
     for policy in (settings.imitate, settings.beside):
         if policy is not None:
-            load(policy)
+            load_own(settings, policy)
+    if settings.start is not None:
+        read_checkpoint(Path(settings.start))
 
 
 def steps_made(settings: TrainSettings, num_envs: int) -> int:

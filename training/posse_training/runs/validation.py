@@ -7,13 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse_baselines import load
 from posse_baselines.policy import PolicyError
-from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import mean
 from posse_training.runs.display import Display
 from posse_training.runs.models import make_env
 from posse_training.runs.settings import TrainSettings
+from posse_training.runs.sides import load_own, pairings, play_all
 from posse_training.sb3.normalisation import RunningStatistics
 from posse_training.sb3.vec_env import TeamVecEnv
 
@@ -27,7 +26,7 @@ def first_statistics(
     settings: TrainSettings, env: TeamVecEnv, statistics: RunningStatistics
 ) -> None:
     """Gather input statistics from one episode of random actions in a few worlds."""
-    few = replace(settings, num_worlds=max(_WARM_WORLDS, len(settings.scenarios)))
+    few = replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings))))
     warm = make_env(few)
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
@@ -45,7 +44,7 @@ def score_beside(settings: TrainSettings, display: Display) -> float | None:
         return None
     display.note(f"evaluating {settings.beside} on the validation worlds")
     try:
-        return validate(settings, load(settings.beside))["safe_score"]
+        return validate(settings, load_own(settings, settings.beside))["safe_score"]
     except PolicyError as error:
         display.note(f"no score of {settings.beside}: {error}")
         return None
@@ -57,13 +56,7 @@ def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
     ``safe_score`` with its 95 % interval ``low``, ``high``; ``score``; and ``contact_free``, the
     share of episodes.
     """
-    results = [
-        evaluate(
-            policy, scenario, settings.evaluate_worlds, VALIDATION_SEED,
-            split="validation", progress=False,
-        )
-        for scenario in settings.scenarios
-    ]  # fmt: skip
+    results = play_all(settings, policy, VALIDATION_SEED, "validation")
     safe = mean(np.concatenate([r["safe_score"] for r in results]))
     return {
         "safe_score": safe.value,

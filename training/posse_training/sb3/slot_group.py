@@ -11,6 +11,7 @@ from posse import Batch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.advice import Advice, Advising
+from posse_training.sb3.opponents import arrays_inside, own_score
 from posse_training.sb3.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -43,7 +44,7 @@ class SlotGroup:
         first: int,
     ) -> None:
         self.batch = batch
-        worlds, trackers = batch.num_worlds, batch.scenario.num_trackers
+        worlds, trackers = batch.num_worlds, batch.action_shape[1]
         self.slots = slice(first, first + worlds * trackers)
         self._own_size = encoding.size
         self.private_size = encoding.size + (advising.inputs if advising else 0)
@@ -100,7 +101,7 @@ class SlotGroup:
         if self._advice is not None:
             self._advice.follow(raw)
         if ended.any():
-            dones[:] = np.repeat(ended, batch.scenario.num_trackers)
+            dones[:] = np.repeat(ended, batch.action_shape[1])
             self._report(raw, ended, terminated, over, infos)
             raw = batch.reset(options={"reset_mask": ended})
             if self._advice is not None:
@@ -152,7 +153,7 @@ class SlotGroup:
         infos: list[dict[str, Any]],
     ) -> None:
         """Fill the infos of worlds whose episodes ended; ``over``: not by shortening."""
-        trackers, horizon = self.batch.scenario.num_trackers, self.batch.scenario.horizon
+        trackers, horizon = self.batch.action_shape[1], self.batch.scenario.horizon
         worlds = np.flatnonzero(ended)
         final = np.empty((len(worlds) * trackers, self.size), np.float32)
         self._encode(raw, final, worlds)
@@ -173,7 +174,7 @@ class SlotGroup:
                     info["episode"] = {
                         "r": float(self._returns[e, i]),
                         "l": int(steps[e]),
-                        "score": summary["score"],
+                        "score": own_score(self.batch, summary["score"]),
                     }
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
@@ -187,7 +188,7 @@ class SlotGroup:
         }
         memory = self._advice.arrays() if self._advice is not None else {}
         advice = {f"advice.{name}": array for name, array in memory.items()}
-        return {**self.batch.arrays.by_name(), **advice, **own}
+        return {**self.batch.arrays.by_name(), **arrays_inside(self.batch), **advice, **own}
 
     def resume(self) -> None:
         """Have the batch take its arrays, which were written to, as running episodes."""

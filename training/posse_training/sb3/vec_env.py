@@ -257,9 +257,10 @@ def _check(batches: Sequence[Batch], advising: Advising | None) -> set[int]:
                 f"a batch with autoreset={batch.autoreset!r} hides the last observation of an "
                 'episode: make it with autoreset="disabled"'
             )
-        if batch.scenario.num_agents != batch.scenario.num_trackers:
+        both = batch.observation_shape[1] == batch.scenario.num_agents
+        if both and batch.scenario.target_motion == "agent":
             raise ValueError(
-                f"the target of {batch.scenario.name!r} is an agent; one policy drives trackers"
+                f"the target of {batch.scenario.name!r} is an agent; one policy drives one side"
             )
     lengths = {MOTION} if advising else {batch.action_shape[2] for batch in batches}
     if len(lengths) > 1:
