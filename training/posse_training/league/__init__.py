@@ -1,0 +1,1 @@
+"""Self-play: trackers and targets that are trained in turns against the other side's past."""
