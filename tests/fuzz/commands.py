@@ -193,6 +193,45 @@ def _sound_tuning(folder: Path) -> None:
         json.loads((folder / "run" / "state.json").read_text())
 
 
+# league
+
+
+def _league(folder: Path) -> list[str]:
+    return [
+        "league", "--scenario", "smart", "--generations", "1", "--teams", "idle",
+        "--target-steps", "160", "--team-steps", "320", "--response-steps", "160",
+        "--episodes", "2", "--responses", "none",
+        "--overrides", "horizon", "40", "settle_time", "1.0", "num_trackers", "2",
+        "--training", "num_worlds", "4", "rollout", "20", "minibatch", "32", "epochs", "1",
+        "evaluate_worlds", "2", "--folder", str(folder / "league"),
+    ]  # fmt: skip
+
+
+def _left_by_league(folder: Path) -> dict[str, Any]:
+    """Return the policies' numbers, and what the pairs scored."""
+    league = folder / "league"
+    found: dict[str, Any] = {}
+    for path in sorted(league.rglob("[a-z]*.safetensors")):
+        if path.name != "checkpoint.safetensors":
+            tensors = LearnedPolicy.from_file(path).network.tensors()
+            name = str(path.relative_to(league))
+            found[name] = {k: (a.shape, a.tobytes()) for k, a in tensors.items()}
+    for path in sorted(league.rglob("*.json")):
+        if path.parent.name == "cross-play":
+            found[path.name] = json.loads(path.read_text())
+    return found
+
+
+def _sound_league(folder: Path) -> None:
+    for path in sorted((folder / "league").rglob("[a-z]*.json")):
+        json.loads(path.read_text())
+    for path in sorted((folder / "league").rglob("[a-z]*.safetensors")):
+        if path.name == "checkpoint.safetensors":
+            read_checkpoint(path.parent)
+        else:
+            LearnedPolicy.from_file(path)
+
+
 # compare
 
 
@@ -260,6 +299,7 @@ COMMANDS: Final[dict[str, Command]] = {
         _left_by_training, _sound_run,
     ),
     "train sac": Command(_training("sac"), _resumed("sac"), _left_by_training, _sound_run),
+    "league": Command(_league, _league, _left_by_league, _sound_league),
     "tune": Command(_tuning, _tuning, _left_by_tuning, _sound_tuning),
     "compare": Command(
         _comparison("pursuit idle"), _comparison("pursuit idle"), _left_by_comparison,
