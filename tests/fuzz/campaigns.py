@@ -83,9 +83,9 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
         _of_cases("forged"),
     ),
     "kills": Campaign(
-        "a training (PPO or SAC), league, tuning, comparison, replay page, policy file or kernel cache is "
-        "written by a process that is killed (`kill -9`) up to three times, resumed or repeated, "
-        "and compared bit for bit with an undisturbed one",
+        "a training (PPO or SAC), league, tuning, comparison, replay page, policy file or kernel "
+        "cache is written by a process that is killed (`kill -9`) up to three times, resumed or "
+        "repeated, and compared bit for bit with an undisturbed one",
         _of_cases("kills"),
     ),
     "full_disk": Campaign(
