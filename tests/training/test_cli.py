@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -90,6 +91,14 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         f"--overrides horizon 40 settle_time 1.0 --folder {folder}"
     )
     assert main(arguments.split()) == 0
+    shown = capsys.readouterr().out
+    assert "1,280 steps" in shown, "all that were made, with the last rollout"
+    _, _, after = shown.partition("\nnext:\n")
+    watch, compare, replay = (shlex.split(line) for line in after.splitlines())
+    assert (watch[1], compare[1], replay[1]) == ("watch", "compare", "replay")
+    assert (folder / "best.safetensors") == Path(watch[2]) == Path(compare[3]) == Path(replay[3])
+    assert main([*replay[1:], "--seconds", "1", "--num-trackers", "2"]) == 0
+    assert (folder / "replay.html").is_file()
     settings = json.loads((folder / "settings.json").read_text())
     assert settings["steps"] == 1280
     assert settings["overrides"] == {"horizon": 40, "settle_time": 1.0}

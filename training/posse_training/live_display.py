@@ -46,7 +46,7 @@ class LiveDisplay(ABC):
         """Show what the run is doing."""
         self._note = text
         if self._live is None:
-            self._console.print(text, markup=False)
+            self._console.print(text, markup=False, soft_wrap=True)
 
     @abstractmethod
     def _render(self) -> RenderableType:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -46,7 +48,8 @@ def main(arguments: Sequence[str]) -> None:
         from posse_training.runs.train import resume
 
         with _how_to_resume(which.resume):
-            print(resume(which.resume, steps=which.steps, trust_code=which.trust_code))
+            path = resume(which.resume, steps=which.steps, trust_code=which.trust_code)
+        print(_what_next(path))
         return
     asked = [a for a in arguments if a not in ("-h", "--help")]
     some, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
@@ -61,7 +64,22 @@ def main(arguments: Sequence[str]) -> None:
     from posse_training.runs.train import train
 
     with _how_to_resume(settings.run_folder):
-        print(train(settings))
+        path = train(settings)
+    print(_what_next(path))
+
+
+def _what_next(path: Path) -> str:
+    """Return the file of the policy, and the commands that show what it does."""
+    run = json.loads((path.parent / "settings.json").read_text(encoding="utf-8"))
+    scenario, _, _ = run["scenario"].partition(",")
+    beside, policy = shlex.quote(run["beside"] or "ddcs-tuned"), shlex.quote(str(path))
+    page = shlex.quote(str(path.with_name("replay.html")))
+    return (
+        f"{path}\nnext:\n"
+        f"  posse watch {policy} --scenario {scenario}\n"
+        f"  posse compare {beside} {policy} --scenarios {scenario}\n"
+        f"  posse replay {beside} {policy} --scenario {scenario} --out {page}"
+    )
 
 
 @contextmanager

@@ -11,12 +11,12 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from posse_training.live_display import LiveDisplay
+from posse_training.live_display import LiveDisplay, clock
 from posse_training.runs.curve import Point
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.contact_bound import ContactBound
+from posse_training.sparkline import sparkline
 
-_BARS: Final = "▁▂▃▄▅▆▇█"
 _WIDTH: Final = 40
 
 
@@ -34,13 +34,32 @@ class Display(LiveDisplay):
         self._started = time.monotonic()
         self._from_steps = 0
         self._steps = 0
+        self._total = settings.steps
+        self._copied: tuple[int, float | None] | None = None
         self._training_score: float | None = None
         self._bound: ContactBound | None = None
         self._curve: list[Point] = []
         self._beside: float | None = None
 
-    def begin(self, steps: int, curve: list[Point]) -> None:
-        """Start the clock: training begins, or resumes after ``steps`` steps."""
+    def copying(self, done: int, error: float | None = None) -> None:
+        """Show the rounds of imitation that are done, and the mean squared error of the last."""
+        self._copied = (done, error)
+        if self._live is None:
+            self._console.print(self._copy_text(), markup=False)
+
+    def _copy_text(self) -> str:
+        s = self._settings
+        done, error = self._copied or (0, None)
+        said = "" if error is None else f", squared error {error:.4f}"
+        return f"copying {s.imitate}: {done} of {s.imitate_rounds} rounds{said}"
+
+    def begin(self, steps: int, total: int, curve: list[Point]) -> None:
+        """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps.
+
+        The total includes the rollout that is completed at the end.
+        """
+        self._copied = None
+        self._total = total
         self._started = time.monotonic()
         self._from_steps = self._steps = steps
         self._curve = list(curve)
@@ -59,10 +78,11 @@ class Display(LiveDisplay):
         self._bound = bound
 
     def evaluated(self, point: Point) -> None:
-        """Show results on validation worlds."""
+        """Show results on validation worlds, after as many steps as they say."""
         self._curve.append(point)
+        self._steps = max(self._steps, int(point["steps"]))
         if self._live is None:
-            self._console.print(self._line(point), markup=False)
+            self._console.print(self._line(point), markup=False, soft_wrap=True)
 
     def _line(self, point: Point) -> str:
         line = (
@@ -75,7 +95,7 @@ class Display(LiveDisplay):
         if self._bound is not None and self._bound.share is not None:
             line += f"  {_bound_text(self._bound)}"
         rate = self.rate
-        return line + (f"  {rate:,.0f} steps/s, {_clock(self.time_left)} left" if rate else "")
+        return line + (f"  {rate:,.0f} steps/s, {clock(self.time_left)} left" if rate else "")
 
     @property
     def rate(self) -> float:
@@ -86,7 +106,7 @@ class Display(LiveDisplay):
     @property
     def time_left(self) -> float:
         """Seconds until all steps are done, at the present rate."""
-        left = max(0, self._settings.steps - self._steps)
+        left = max(0, self._total - self._steps)
         return left / self.rate if self.rate else float("inf")
 
     def _render(self) -> RenderableType:
@@ -94,12 +114,13 @@ class Display(LiveDisplay):
         table = Table.grid(padding=(0, 2))
         table.add_column(style="bold")
         table.add_column()
-        table.add_row(
-            "steps",
-            f"{self._steps:,} of {s.steps:,}   {self.rate:,.0f} per second   "
-            f"{_clock(self.time_left)} left",
-        )
-        table.add_row("", ProgressBar(total=s.steps, completed=self._steps, width=_WIDTH))
+        if self._copied is not None:
+            rounds = ProgressBar(total=s.imitate_rounds, completed=self._copied[0], width=_WIDTH)
+            table.add_row("before", Text(self._copy_text(), overflow="fold"))
+            table.add_row("", rounds)
+        pace = f"   {self.rate:,.0f} per second   {clock(self.time_left)} left" if self.rate else ""
+        table.add_row("steps", f"{self._steps:,} of {self._total:,}{pace}")
+        table.add_row("", ProgressBar(total=self._total, completed=self._steps, width=_WIDTH))
         if self._training_score is not None:
             table.add_row("training score", f"{self._training_score:.3f}")
         if self._bound is not None and self._bound.share is not None:
@@ -112,20 +133,15 @@ class Display(LiveDisplay):
                 f"best {best:.3f}   on validation worlds",
             )
             table.add_row("score", f"{last['score']:.3f}   contact-free {last['contact_free']:.2f}")
-            scores = [p["safe_score"] for p in self._curve[-_WIDTH:]]
-            table.add_row("", Text(sparkline(scores, self._beside), style="cyan"))
+            scores = [p["safe_score"] for p in self._curve]
+            for row in sparkline(scores, self._beside, width=_WIDTH):
+                table.add_row("", Text(row, style="cyan", no_wrap=True))
         if s.beside is not None and self._beside is not None:
-            table.add_row(Text(s.beside, style="bold"), f"{self._beside:.3f}")
+            table.add_row("╌╌╌╌", Text(f"{s.beside} {self._beside:.3f}", overflow="fold"))
         if self._note:
-            table.add_row("", Text(self._note))
-        title = f"{s.algorithm} on {s.scenario}, seed {s.seed}"
-        return Panel(Group(table), title=title, expand=False)
-
-
-def sparkline(scores: list[float], beside: float | None = None) -> str:
-    """Return scores as a row of bars; full height is the best score, or ``beside`` if higher."""
-    top = max([*scores, beside or 0.0, 1e-9])
-    return "".join(_BARS[min(7, max(0, int(8 * score / top)))] for score in scores)
+            table.add_row("", Text(self._note, overflow="fold"))
+        title = Text(f"{s.algorithm} on {s.scenario}, seed {s.seed}", overflow="fold")
+        return Panel(Group(title, table), expand=False)
 
 
 def _bound_text(bound: ContactBound) -> str:
@@ -133,11 +149,3 @@ def _bound_text(bound: ContactBound) -> str:
         f"contact in {bound.share or 0.0:.1%} of episodes (bound {bound.bound:.1%}, "
         f"multiplier {bound.multiplier:.2f})"
     )
-
-
-def _clock(seconds: float) -> str:
-    if seconds == float("inf"):
-        return "unknown time"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -73,10 +73,10 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
                 start_from(Path(settings.start), model, statistics, settings.log_deviation)
             statistics.apply(model.policy)
             if settings.imitate is not None:
-                display.note(f"copying {settings.imitate}")
+                display.copying(0)
                 expert = load(settings.imitate)
                 imitate(model, settings, env.encoding, expert, statistics, copy_report(display))
-        display.begin(model.num_timesteps, callback.curve)
+        display.begin(model.num_timesteps, steps, callback.curve)
         with _divergence(callback):
             model.learn(
                 settings.steps - model.num_timesteps,
@@ -157,6 +157,4 @@ def torch_threads(count: int) -> Iterator[None]:
 
 def copy_report(display: Display) -> Callable[[int, int, float], None]:
     """Return a function that shows a round of imitation."""
-    return lambda done, rounds, error: display.note(
-        f"copying: round {done} of {rounds}, squared error {error:.4f}"
-    )
+    return lambda done, rounds, error: display.copying(done, error)

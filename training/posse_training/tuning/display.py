@@ -14,7 +14,7 @@ from rich.text import Text
 
 from posse_baselines import Tunable
 from posse_training.live_display import LiveDisplay
-from posse_training.runs.display import sparkline
+from posse_training.sparkline import sparkline
 from posse_training.tuning.settings import TuneSettings
 from posse_training.tuning.state import State
 
@@ -120,10 +120,10 @@ class Display(LiveDisplay):
                 "validation score",
                 f"{last['score']:.3f} [{last['low']:.3f}, {last['high']:.3f}]   best {best:.3f}",
             )
-            table.add_row(
-                "", Text(sparkline([p["score"] for p in state.curve[-_WIDTH:]]), style="cyan")
-            )
-            table.add_row("untuned", f"{state.curve[0]['score']:.3f}")
+            untuned = state.curve[0]["score"]
+            for row in sparkline([p["score"] for p in state.curve], untuned, width=_WIDTH):
+                table.add_row("", Text(row, style="cyan", no_wrap=True))
+            table.add_row("╌╌╌╌", f"untuned {untuned:.3f}")
             for name, value in self._most_changed(last["settings"]):
                 t = self._tunables[name]
                 unit = f" {t.unit}" if t.unit else ""
