@@ -73,18 +73,17 @@ def report(
     ]
     style = f"{sheet.css()}\n{_file('report.css')}"
     script = _file("report.js")
-    title = f"{found.reference} and others" if len(_policies(found)) > 2 else "Comparison"
     scenarios = list(dict.fromkeys(row["scenario"] for row in found.rows))
-    heading = f"{len(_policies(found))} policies on {_several(scenarios)}"
-    known = {"version": posse.__version__, "commit": commit() or "unknown"}
+    heading = f"{len({row['policy'] for row in found.rows})} policies on {_several(scenarios)}"
+    known = facts | {f"posse {posse.__version__}": commit() or "unknown commit"}
     values = {
-        "title": html.escape(f"{heading}: {title}"),
+        "title": html.escape(f"{heading}: comparison with {found.reference}"),
         "policy": _policy(script, style),
         "style": style,
         "heading": html.escape(heading),
         "facts": "".join(
             f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd></div>"
-            for name, text in (facts | {f"posse {known['version']}": known["commit"]}).items()
+            for name, text in known.items()
         ),
         "sections": "\n".join(sections),
         "shell": in_letters(zlib.compress(json.dumps(shell()).encode(), 9)) if packed else "",
@@ -107,14 +106,11 @@ def _policy(script: str, style: str) -> str:
     return "; ".join(f"{name} {value}" for name, value in parts.items())
 
 
-def _policies(found: Comparison) -> list[str]:
-    return list(dict.fromkeys(row["policy"] for row in found.rows))
-
-
 def _several(names: Sequence[str]) -> str:
     if len(names) > 3:
         return f"{len(names)} scenarios"
-    return " and ".join(names) if names else "no scenario"
+    first, last = names[:-1], names[-1:]
+    return " and ".join(part for part in (", ".join(first), *last) if part) or "no scenario"
 
 
 def _section(title: str, *parts: str) -> str:
