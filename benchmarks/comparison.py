@@ -171,9 +171,10 @@ def pivot_table(pivot: Pivot, trained: Collection[tuple[str, str]]) -> list[str]
     for policy, cells in pivot.rows:
         shown = []
         for scenario, cell in zip(pivot.scenarios, cells, strict=True):
-            value = f"**{cell.value}**" if cell.best else cell.value
             mark = " †" if cell.value and (policy, scenario) in trained else ""
-            shown.append(f"{value}{mark}" + (f"<br>{cell.interval}" if cell.interval else ""))
+            value = f"**{cell.value}**{mark}" if cell.best else f"{cell.value}{mark}"
+            parts = (value, cell.interval) if cell.interval else (value,)
+            shown.append("<br>".join(parts).replace(" ", "&nbsp;"))
         lines.append(row(f"`{policy}`", *shown))
     return lines
 

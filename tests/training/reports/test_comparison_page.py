@@ -85,12 +85,12 @@ def test_the_page_says_what_was_played(page: Path, tmp_path: Path) -> None:
     base = {name: scores("ddcs-tuned", name) for name in ("constant", "radio")}
     mine = {name: scores(policy, name) for name in base}
     cells = []
-    for name, mark in (("constant", " †"), ("radio", "")):
+    for name, mark in (("constant", "&nbsp;†"), ("radio", "")):
         gap = difference(mine[name], base[name])
-        cells.append(f"{gap.value:+.3f}{mark}<br>[{gap.low:+.3f}, {gap.high:+.3f}]")
+        cells.append(f"{gap.value:+.3f}{mark}<br>[{gap.low:+.3f},&nbsp;{gap.high:+.3f}]")
     assert f"| `learned-any` | {cells[0]} | {cells[1]} |" in text
     rows = [line for line in text.splitlines() if line.startswith("| `ddcs-tuned` |")]
-    assert " †<br>" in rows[0].split("|")[3], "tuned for radio"
+    assert "&nbsp;†<br>" in rows[0].split("|")[3], "tuned for radio"
     assert f"{base['constant'].mean():.3f}" in rows[0].split("|")[2]
     expected = difference([scores(seed, "constant") for seed in seeds], base["constant"])
     assert f"| constant | `mine` | 3 | {expected} |" in text

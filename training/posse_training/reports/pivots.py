@@ -79,20 +79,20 @@ def _pivot(
             row = rows.get((name, policy))
             value = None if row is None else row[column]
             text = ("", "") if value is None else cell(value)
-            is_best = column != "difference" and row is not None and row is best[name]
-            cells.append(Cell(*text, best=is_best))
+            is_best = policy != REFERENCE and value is not None and _number(value) == best[name]
+            cells.append(Cell(*text, best=is_best and column != "difference"))
         shown.append((policy, tuple(cells)))
     return Pivot(title, meaning, scenarios, tuple(shown))
 
 
-def _best(rows: Sequence[dict[str, Any] | None], column: str) -> dict[str, Any] | None:
-    """Return the row with the greatest value, of those that do not read the state."""
+def _best(rows: Sequence[dict[str, Any] | None], column: str) -> float | None:
+    """Return the greatest value of those that do not read the state; ``None``: nothing to rank."""
     fair = [
-        row
+        _number(row[column])
         for row in rows
         if row is not None and row["policy"] != REFERENCE and row[column] is not None
     ]
-    return max(fair, key=lambda row: _number(row[column])) if len(fair) > 1 else None
+    return max(fair) if len(fair) > 1 else None
 
 
 def _number(value: Estimate | float) -> float:
