@@ -9,8 +9,10 @@ from typing import Final
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, FancyArrowPatch
 
+from posse_training.reports.pictures import palette
+
 Point = tuple[float, float]
-TARGET, TRACKER, OTHER, GREY = "#1A1A1A", "#0072B2", "#009E73", "#8C8C8C"
+TARGET, TRACKER, OTHER, GREY = palette.INK, palette.BLUE, palette.GREEN, palette.GREY
 _RADIUS: Final = 0.16
 _TEXT: Final = 11
 

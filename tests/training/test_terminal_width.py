@@ -83,7 +83,9 @@ def test_the_papers_experiments() -> None:
         "settled": 1000, "in_slots": 1000,
     }  # fmt: skip
     text = on_a_terminal(settling_times([row], 0.1))
-    holds(text, "centralized", "11.5 [10.5, 12.5]", "1000 of 1000", "exchange")
+    holds(
+        text, "median [quartiles]", "centralized", "11.5 [10.5, 12.5]", "1000 of 1000", "exchange"
+    )
 
 
 def test_a_tuning(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 import posse
 from posse_baselines.ddcs.family import FAMILY
@@ -139,7 +140,7 @@ def table(rows: Sequence[dict[str, Any]], tolerance: float) -> Table:
     )  # fmt: skip
     shown.add_column("policy", overflow="fold")
     for column in ("model", "paper", "median [quartiles]", "settled", "all in\nslots"):
-        shown.add_column(column, no_wrap=True)
+        shown.add_column(Text(column), no_wrap=True)  # brackets are not markup
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
         paper = row["paper_settling_time"]

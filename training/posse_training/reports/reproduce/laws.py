@@ -17,11 +17,12 @@ from matplotlib.patches import Patch
 import posse
 from posse_baselines import with_settings
 from posse_baselines.ddcs import TASKS
+from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, GRID, ORANGE
 from posse_training.reports.reproduce.motion import COLOURS, TARGET, draw_robots, look_of
 from posse_training.reports.reproduce.recording import Recording, median_world, record
 
 _HEADING: Final = 2.6  # rad; of the target in the tracks
-_TASK_COLOURS: Final = ("#D9D9D9", "#E69F00", "#009E73", "#0072B2")
+_TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
 
 
 def tracks(seed: int) -> Figure:
@@ -38,7 +39,7 @@ def tracks(seed: int) -> Figure:
             _track(axes[0, column], run, 0, number)
             _bearing(axes[1, column], run, 0, number, f"K = {k:g}")
             if column == 0:
-                axes[1, 0].axhline(_HEADING / k, color="#8C8C8C", lw=0.6)
+                axes[1, 0].axhline(_HEADING / k, color=GREY, lw=0.6)
     axes[0, 0].set_title("K of three values, c = 0", loc="left")
     axes[0, 1].set_title("K of three values, c = ψ - K σ_d", loc="left")
     team = posse.get_scenario("constant", horizon=300)
@@ -101,7 +102,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     for number in range(robots):
         alive = run.working[:, world, number] & keep
         axes[1].plot(run.time[alive], run.error[alive, world, number], lw=1.3, **look_of(number))
-    axes[1].axhline(0.3, color="#8C8C8C", lw=0.8)
+    axes[1].axhline(0.3, color=GREY, lw=0.8)
     axes[1].set_ylabel("distance from\nthe nearest slot, m")
     axes[1].set_ylim(0.0, None)
     extent = (start, end, robots - 0.5, -0.5)

@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, INK, PINK, RED
 from posse_training.reports.reproduce.recording import Recording
 
-COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#8C8C8C")
+COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
 LINES: Final[tuple[Any, ...]] = (
     "-",
     (0, (5, 2)),
@@ -21,7 +22,7 @@ LINES: Final[tuple[Any, ...]] = (
     (0, (5, 1.5, 1, 1.5)),
     (0, (8, 3)),
 )
-TARGET: Final = "#1A1A1A"
+TARGET: Final = INK
 _AFTER: Final = 1.5  # share of the settling time that curves go on for
 _LEAST: Final = 5.0  # s
 
@@ -46,9 +47,9 @@ def frames(shown: list[tuple[str, Recording, int, float]]) -> Figure:
     for axis in axes[-1]:
         axis.set_xlabel("x, m")
     handles = [
-        Line2D([], [], marker="o", ls="", mfc="none", mec="#8C8C8C", ms=9, label="slot"),
+        Line2D([], [], marker="o", ls="", mfc="none", mec=GREY, ms=9, label="slot"),
         Line2D([], [], marker="o", ls="", mfc=TARGET, mec=TARGET, ms=7, label="target"),
-        Line2D([], [], color="#8C8C8C", lw=1.2, label="trail"),
+        Line2D([], [], color=GREY, lw=1.2, label="trail"),
     ]
     if any((recording.leader[:, world] >= 0).any() for _, recording, world, _ in shown):
         rim = Line2D([], [], marker="o", ls="", mfc="w", mec=TARGET, mew=2.2, ms=8, label="leader")
@@ -62,7 +63,7 @@ def draw_robots(axis: Axes, recording: Recording, world: int, instant: int, sinc
     target, trackers = recording.target[instant, world], recording.trackers[instant, world]
     r = recording.radius
     for x, y in recording.slots[instant, world]:
-        axis.add_patch(mpl.patches.Circle((x, y), 1.35 * r, fill=False, ec="#8C8C8C", lw=0.8))
+        axis.add_patch(mpl.patches.Circle((x, y), 1.35 * r, fill=False, ec=GREY, lw=0.8))
     trail = recording.target[since : instant + 1, world]
     axis.plot(trail[:, 0], trail[:, 1], color=TARGET, lw=0.9)
     for number in range(len(trackers)):
@@ -110,9 +111,9 @@ def curves(shown: list[tuple[str, Recording, int, float]], paper: float) -> Figu
         for axis, what in zip(column, values, strict=True):
             for number in range(what.shape[1]):
                 axis.plot(recording.time[keep], what[:, number], lw=1.3, **look_of(number))
-            axis.axvline(paper, color="#8C8C8C", ls=":", lw=1.2)
+            axis.axvline(paper, color=GREY, ls=":", lw=1.2)
             if np.isfinite(settled):
-                axis.axvline(settled, color="#8C8C8C", lw=1.0)
+                axis.axvline(settled, color=GREY, lw=1.0)
         when = f"settled at {settled:.1f} s" if np.isfinite(settled) else "not settled"
         column[0].set_title(f"{name}: {when}", loc="left")
         column[-1].set_xlabel("time, s")
@@ -121,8 +122,8 @@ def curves(shown: list[tuple[str, Recording, int, float]], paper: float) -> Figu
     robots = range(shown[0][1].trackers.shape[2])
     handles = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in robots]
     handles += [
-        Line2D([], [], color="#8C8C8C", lw=1.0, label="settled"),
-        Line2D([], [], color="#8C8C8C", ls=":", lw=1.2, label=f"the paper's {paper:g} s"),
+        Line2D([], [], color=GREY, lw=1.0, label="settled"),
+        Line2D([], [], color=GREY, ls=":", lw=1.2, label=f"the paper's {paper:g} s"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     return figure
