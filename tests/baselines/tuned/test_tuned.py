@@ -20,7 +20,7 @@ from posse_training import evaluate
 FILES = [(name, path) for name in TUNED for path in tuned_files(name).values()]
 IDS = [f"{name}-{path.stem}" for name, path in FILES]
 SHIPPED = {
-    "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field"},
+    "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field", "duel"},
     "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss"},
 }
 TOLERANCE = 0.02
