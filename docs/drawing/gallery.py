@@ -2,8 +2,9 @@
 
     python docs/drawing/gallery.py [--scenarios smart field]
 
-Writes docs/media/replays/NAME.html, docs/media/scenarios/NAME.png of the last team in it, and
-docs/media/replays/NAME-others.html of further teams in the same world, for the leaderboard.
+Writes docs/media/replays/NAME.html, docs/media/scenarios/NAME.png of the last team in it,
+docs/media/replays/NAME-others.html of further teams in the same world, for the leaderboard, and
+docs/media/replays/duel-evader.html with the learned target.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from posse_training.replay import record, write_replay
 MEDIA: Final = Path(__file__).parents[1] / "media"
 SEED: Final = 7
 OTHERS: Final = ("pursuit", "ddcs-centralized", "learned-generalist", "planner")
+EVADER: Final = "evader"
 SIDE: Final = 440  # px of a picture
 
 
@@ -74,13 +76,15 @@ def picture(scenario: str, shown: Shown) -> Image.Image:
     return Image.fromarray(frame).quantize(64)
 
 
-def write(file: str, teams: tuple[str, ...], shown: Shown) -> Path:
+def write(
+    scenario: str, suffix: str, teams: tuple[str, ...], shown: Shown, target: str | None = None
+) -> Path:
     """Write a replay of teams in a scenario's world."""
     replay = record(
-        list(teams), file.removesuffix("-others"), seed=SEED, world=shown.world,
+        list(teams), scenario, target=target, seed=SEED, world=shown.world,
         seconds=shown.seconds, observations=False,
     )  # fmt: skip
-    return write_replay(replay, MEDIA / "replays" / f"{file}.html")
+    return write_replay(replay, MEDIA / "replays" / f"{scenario}{suffix}.html")
 
 
 def main() -> None:
@@ -88,9 +92,11 @@ def main() -> None:
     (MEDIA / "scenarios").mkdir(exist_ok=True)
     for name in tyro.cli(_Arguments).scenarios:
         shown = GALLERY[name]
-        path = write(name, shown.teams, shown)
+        path = write(name, "", shown.teams, shown)
         if not name.startswith("paper"):
-            write(f"{name}-others", OTHERS, shown)
+            write(name, "-others", OTHERS, shown)
+        if name == "duel":
+            write(name, f"-{EVADER}", ("ddcs-tuned", "learned-smart"), shown, EVADER)
         file = MEDIA / "scenarios" / f"{name}.png"
         picture(name, shown).save(file, optimize=True)
         print(f"{name:18s} {path.stat().st_size:8,} {file.stat().st_size:8,} bytes", flush=True)

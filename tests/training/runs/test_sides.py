@@ -14,6 +14,7 @@ from tests.support.runs import HORIZON, assert_equal, numbers, quiet, small
 import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
+from posse_training.cli import main as cli
 from posse_training.errors import CheckpointError, SettingsError
 from posse_training.runs import TrainSettings
 from posse_training.runs.callback import TrainingCallback
@@ -168,3 +169,20 @@ def test_a_target_has_defaults_of_its_own() -> None:
     settings = default_settings("smart", side="target")
     assert (settings.encoding, settings.beside) == ("plain", "smart")
     assert set(settings.reward_weights) == {"team", "contact"}
+
+
+def test_the_command_says_how_to_watch_a_target(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = (
+        "train --side target --scenario smart --against ddcs-distributed,idle --steps 160 "
+        "--num-worlds 4 --rollout 20 --minibatch 20 --hidden 8 --evaluate-worlds 2 --beside None "
+        "--no-tensorboard --overrides horizon 40 settle_time 1.0 num_trackers 2 "
+        f"--folder {tmp_path / 'run'}"
+    )
+    assert cli(words.split()) == 0
+    file = tmp_path / "run" / "best.safetensors"
+    shown = capsys.readouterr().out
+    assert f"posse watch ddcs-distributed --scenario smart --target {file}" in shown
+    assert f"posse compare ddcs-distributed idle --scenarios smart --target {file}" in shown
+    assert load_target(file).motion == "agent"

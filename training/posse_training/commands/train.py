@@ -14,7 +14,7 @@ import tyro
 
 from posse_training.errors import require
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.settings import TrainSettings
+from posse_training.runs.settings import TrainSettings, opponents_of
 
 _NEEDED = ("training", "torch", "stable_baselines3")
 
@@ -74,11 +74,17 @@ def _what_next(path: Path) -> str:
     scenario, _, _ = run["scenario"].partition(",")
     beside, policy = shlex.quote(run["beside"] or "ddcs-tuned"), shlex.quote(str(path))
     page = shlex.quote(str(path.with_name("replay.html")))
+    opponents = [shlex.quote(name) for name in opponents_of(run["against"])]
+    watched, teams, target = policy, f"{beside} {policy}", ""
+    if run["side"] == "target":
+        watched, teams, target = opponents[0], " ".join(opponents), f" --target {policy}"
+    elif opponents:
+        target = f" --target {opponents[-1]}"
     return (
         f"{path}\nnext:\n"
-        f"  posse watch {policy} --scenario {scenario}\n"
-        f"  posse compare {beside} {policy} --scenarios {scenario}\n"
-        f"  posse replay {beside} {policy} --scenario {scenario} --out {page}"
+        f"  posse watch {watched} --scenario {scenario}{target}\n"
+        f"  posse compare {teams} --scenarios {scenario}{target}\n"
+        f"  posse replay {teams} --scenario {scenario}{target} --out {page}"
     )
 
 
