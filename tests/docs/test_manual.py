@@ -20,8 +20,8 @@ import posse
 
 ROOT = Path(__file__).parents[2]
 MODULES = (
-    "posse", "posse_baselines", "posse_training", "posse_training.replay",
-    "posse_training.leaderboard",
+    "posse", "posse_baselines", "posse_training", "posse_training.cluster",
+    "posse_training.replay", "posse_training.leaderboard",
 )  # fmt: skip
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
 

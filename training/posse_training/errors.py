@@ -38,13 +38,17 @@ class ResultFileError(ValueError):
     """A result file of the leaderboard that is damaged, forged, or cannot be checked."""
 
 
+class ClusterError(RuntimeError):
+    """Work on a cluster that cannot begin or go on; the message says why and what to do."""
+
+
 class MissingExtraError(ImportError):
     """A package that only an extra installs; the message says which."""
 
 
 OWN: Final = (
     SettingsError, RunFolderError, CheckpointError, DivergedError, ComparisonError,
-    TrainedSplitError, TimeLimitError, ResultFileError, MissingExtraError,
+    TrainedSplitError, TimeLimitError, ResultFileError, ClusterError, MissingExtraError,
 )  # fmt: skip
 """All errors of this module."""
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import tyro
 
+from posse_training.cluster.settings import RayOption, how_to_resume, of_option
 from posse_training.errors import require
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.settings import TrainSettings, opponents_of
@@ -29,6 +30,16 @@ class _Which:
 
 
 @dataclass(frozen=True)
+class _Seeds:
+    """Several runs."""
+
+    seeds: tuple[int, ...] = ()
+    """Seeds of the runs."""
+    ray: RayOption = None
+    """Where they are made."""
+
+
+@dataclass(frozen=True)
 class _Resume:
     """Resume a training run."""
 
@@ -41,7 +52,7 @@ class _Resume:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Train a team, or resume a training run: ``posse train --resume DIR``."""
+    """Train a team, once or with several seeds, or resume: ``posse train --resume DIR``."""
     if any(a == "--resume" or a.startswith("--resume=") for a in arguments):
         which = tyro.cli(_Resume, prog="posse train", args=arguments)
         require(*_NEEDED)
@@ -53,14 +64,22 @@ def main(arguments: Sequence[str]) -> None:
         return
     asked = [a for a in arguments if a not in ("-h", "--help")]
     some, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
+    several, rest = tyro.cli(_Seeds, args=asked, return_unknown_args=True)
+    if several.seeds or several.ray is not None:
+        arguments = [*rest, *(a for a in arguments if a in ("-h", "--help"))]
     settings = tyro.cli(
         TrainSettings,
         prog="posse train",
-        description="Train a team. To resume a run: posse train --resume DIR",
+        description="Train a team. To resume a run: posse train --resume DIR. Several seeds: "
+        "--seeds 1 2 3 ..., in turn, or with --ray [ADDRESS] at once on a Ray cluster; the same "
+        "command again resumes them.",
         default=default_settings(some.scenario, some.algorithm, side=some.side),
         args=arguments,
     )
     require(*_NEEDED)
+    if several.seeds or several.ray is not None:
+        _train_all(settings, several)
+        return
     from posse_training.runs.train import train
 
     with _how_to_resume(settings.run_folder):
@@ -86,6 +105,17 @@ def _what_next(path: Path) -> str:
         f"  posse compare {teams} --scenarios {scenario}{target}\n"
         f"  posse replay {teams} --scenario {scenario}{target} --out {page}"
     )
+
+
+def _train_all(settings: TrainSettings, several: _Seeds) -> None:
+    """Train with every seed, and print the files of the best policies."""
+    from posse_training.runs.seeds import train_seeds, with_seeds
+
+    cluster = of_option(several.ray, Path())  # the run folders hold the results
+    runs = with_seeds(settings, several.seeds or (settings.seed,))
+    with how_to_resume(("--seeds",)):
+        for path in train_seeds(runs, cluster):
+            print(path)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import tyro
 
+from posse_training.cluster.settings import RayOption, how_to_resume, of_option, work_of
 from posse_training.errors import require
 
 
@@ -30,6 +31,9 @@ class _Record:
     """Seed of the worlds."""
     split: str = "train"
     """Split of the worlds: train, validation or test."""
+    ray: RayOption = None
+    """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
+    this machine, or else all its cores. Interrupted, the same command resumes. Extra: cluster."""
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -39,11 +43,14 @@ def main(arguments: Sequence[str]) -> None:
     from posse_training.datasets.record import record_dataset
     from posse_training.reports.evaluation import progress_bar
 
-    with progress_bar() as bar:
+    cluster = of_option(which.ray, work_of(which.out))
+    # With a cluster, its own bar is the one that counts.
+    with how_to_resume(which.ray), progress_bar(disable=cluster is not None) as bar:
         task = bar.add_task("episodes", total=which.episodes)
         dataset = record_dataset(
             which.policies, which.scenario, which.episodes, out=which.out, name=which.name,
             seed=which.seed, split=which.split, progress=lambda count: bar.advance(task, count),
+            ray=cluster or False,
         )  # fmt: skip
     print(
         f"{dataset.total_episodes} episodes, {dataset.total_steps:,} steps: "

@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from minari.data_collector import EpisodeBuffer
 
-from posse import Batch
+from posse import Batch, Scenario
 from posse_baselines import Policy, begin
+from posse_training.cluster.shards import Shard
 
 Metrics = dict[str, float]
+Part = tuple[list[EpisodeBuffer], list[dict[str, Any]]]
+"""Buffers of some episodes, and their metadata."""
+
+
+def play_part(
+    players: Sequence[Policy], scenario: Scenario, seed: int, split: str, shard: Shard
+) -> Part:
+    """Play an episode in every world of a shard, world i by player i mod their number."""
+    buffers, about = [], []
+    for i in range(shard.first, shard.first + shard.count):
+        policy = players[i % len(players)]
+        batch = Batch(
+            scenario, 1, seed=seed, split=split, first_world=i, autoreset="same_step",
+            num_threads=1,
+        )  # fmt: skip
+        for buffer, metrics in play_episodes(batch, policy, i):
+            buffers.append(buffer)
+            about.append({"policy": policy.name, "world": i, **metrics})
+    return buffers, about
 
 
 def play_episodes(

@@ -15,9 +15,11 @@ import gymnasium
 import minari
 
 import posse
-from posse import Batch, Scenario, get_scenario
+from posse import Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load
-from posse_training.datasets.episodes import play_episodes
+from posse_training.cluster.settings import Cluster, as_cluster
+from posse_training.cluster.shards import cut
+from posse_training.datasets.episodes import Part, play_part
 from posse_training.errors import SettingsError
 from posse_training.provenance import commit
 
@@ -36,6 +38,7 @@ def record_dataset(
     seed: int = 7,
     split: str = "train",
     progress: Callable[[int], object] = lambda episodes: None,
+    ray: bool | str | Cluster = False,
     **overrides: Any,
 ) -> minari.MinariDataset:
     """Record episodes of ``posse/Team-v0`` as a Minari data set, ``posse/SCENARIO/NAME-v0``.
@@ -54,12 +57,16 @@ def record_dataset(
         seed: Seed of the worlds.
         split: Split of the worlds.
         progress: Called with the number of episodes that have been written since the last call.
+        ray: Play on a Ray cluster, as in :func:`posse_training.evaluate`; the data set is the same.
         overrides: Settings of the scenario.
 
     Raises:
         SettingsError: Too few episodes, or a data set of this name in ``out``.
         PolicyError: No policy, an unknown one, or one that does not fit the scenario.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
+        MissingExtraError: Ray is to be used and not installed.
+        ClusterError: There is no such cluster, or the workers of some episodes died again and
+            again.
     """
     given = (
         [policies] if isinstance(policies, str) or not isinstance(policies, Sequence) else policies
@@ -79,10 +86,21 @@ def record_dataset(
     if (folder / called).exists():
         raise SettingsError(f"{folder / called} exists: remove it, or choose another name")
     env = gymnasium.make("posse/Team-v0", scenario=scenario, split=split, **overrides)
-    with _datasets_in(folder), warnings.catch_warnings():
+    with contextlib.ExitStack() as stack:
+        cluster = as_cluster(ray)
+        if cluster is None:
+            parts = _buffers(players, settings, episodes, seed, split)
+        else:
+            from posse_training.datasets.on_cluster import recorded_on_cluster
+
+            parts = stack.enter_context(
+                recorded_on_cluster(players, settings, episodes, seed, split, cluster)
+            )
+        stack.enter_context(_datasets_in(folder))
+        stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", UserWarning)  # that an e-mail address is missing
         dataset = _write(
-            called, env, _buffers(players, settings, episodes, seed, split), progress,
+            called, env, parts, progress,
             description=f"{episodes} episodes of posse's scenario {scenario!r}, played by {name}",
             algorithm_name=name, code_permalink=f"posse {posse.__version__} {commit() or ''}",
         )  # fmt: skip
@@ -110,26 +128,16 @@ def load_dataset(out: str | Path, name: str) -> minari.MinariDataset:
 
 def _buffers(
     players: Sequence[Policy], settings: Scenario, episodes: int, seed: int, split: str
-) -> Iterator[tuple[list[Any], list[dict[str, Any]]]]:
+) -> Iterator[Part]:
     """Yield buffers of episodes and their metadata, some at a time."""
-    for first in range(0, episodes, AT_ONCE):
-        buffers, about = [], []
-        for i in range(first, min(episodes, first + AT_ONCE)):
-            policy = players[i % len(players)]
-            batch = Batch(
-                settings, 1, seed=seed, split=split, first_world=i, autoreset="same_step",
-                num_threads=1,
-            )  # fmt: skip
-            for buffer, metrics in play_episodes(batch, policy, i):
-                buffers.append(buffer)
-                about.append({"policy": policy.name, "world": i, **metrics})
-        yield buffers, about
+    for shard in cut(episodes, AT_ONCE):
+        yield play_part(players, settings, seed, split, shard)
 
 
 def _write(
     called: str,
     env: gymnasium.Env[Any, Any],
-    parts: Iterator[tuple[list[Any], list[dict[str, Any]]]],
+    parts: Iterator[Part],
     progress: Callable[[int], object],
     **about: Any,
 ) -> minari.MinariDataset:

@@ -15,6 +15,7 @@ from rich.console import Console
 
 from posse import Batch, get_scenario, scenario_names
 from posse_baselines import load_target
+from posse_training.cluster.settings import RayOption, how_to_resume, of_option, work_of
 from posse_training.errors import SettingsError
 from posse_training.reports.comparison import Comparison, table, write_summary
 from posse_training.reports.comparison_folder import replaced
@@ -67,8 +68,11 @@ class Settings:
     """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval
     and rliable read."""
     time_limit: float = 1800.0
-    """Time limit of a policy on one scenario, for each training seed, s; a policy that exceeds it
-    is stopped and skipped on the remaining scenarios."""
+    """Time limit of a policy on one scenario, for each training seed, s (with --ray: of a shard of
+    500 worlds); a policy that exceeds it is stopped and skipped on the remaining scenarios."""
+    ray: RayOption = None
+    """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
+    this machine, or else all its cores. Interrupted, the same command resumes. Extra: cluster."""
     target: str | None = None
     """Target that all teams play against: a motion, a learned target, a file or
     package.module:Class; default: the scenario's own."""
@@ -89,6 +93,8 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
         PolicyError: An unknown policy or target, or no policy; nothing is played.
         ScenarioError: An unknown scenario or split, an invalid seed; nothing is played.
         TrainedSplitError: A split that a policy was trained on; nothing is played.
+        MissingExtraError: Ray is to be used and not installed.
+        ClusterError: There is no such cluster.
         ComparisonError: The folder cannot be replaced; what it held is unchanged.
     """
     scenarios, sweeps = _check(settings)
@@ -101,11 +107,12 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
                 refuse_trained_split(policy, settings.split)
     if settings.target is not None:
         refuse_trained_split(load_target(settings.target), settings.split)
-    with Players(settings.time_limit, settings.target) as players:
+    with _players(settings) as players:
         for contender in contenders:
             players.check(contender)
         with replaced(settings.out) as folder:
             run = ComparisonRun(settings, players, contenders, scenarios, sweeps, folder)
+            players.expect(run.plays(), settings.seed, settings.split)
             with Progress(*run.planned(), console or Console(stderr=True)) as progress:
                 run.play(progress)
                 if settings.figures:
@@ -113,7 +120,17 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
             if "marl-eval" in settings.export:
                 write_marl_eval(run.found, folder / MARL_EVAL)
             write_summary(run.found, folder / SUMMARY, settings)
+        players.forget()
     return run.found
+
+
+def _players(settings: Settings) -> Players:
+    cluster = of_option(settings.ray, work_of(settings.out))
+    if cluster is None:
+        return Players(settings.time_limit, settings.target)
+    from posse_training.cluster.players import ClusterPlayers
+
+    return ClusterPlayers(settings.time_limit, settings.target, cluster)
 
 
 def _check(settings: Settings) -> tuple[tuple[str, ...], tuple[Sweep, ...]]:
@@ -163,7 +180,8 @@ def asked_sweeps(settings: Settings) -> tuple[Sweep, ...]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare policies, print the table, and return 1 if a policy failed, else 0."""
     settings = tyro.cli(Settings, prog="posse compare", args=arguments)
-    found = compare(settings)
+    with how_to_resume(settings.ray):
+        found = compare(settings)
     console = Console(width=None if sys.stdout.isatty() else _PIPED)
     console.print(table(found, settings, console.width))
     for row in found.left_out:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from posse import get_scenario
 from posse_baselines import PolicyError
+from posse_training.cluster.settings import WORLDS
+from posse_training.cluster.shards import cut
 from posse_training.errors import SettingsError
 from posse_training.replay import Replay, join
 from posse_training.reports.comparison import Comparison, summary
 from posse_training.reports.comparison_folder import FileNames
 from posse_training.reports.contenders import Contender
-from posse_training.reports.evaluation import WORLDS_AT_ONCE
 from posse_training.reports.extremes import Extreme, extremes
-from posse_training.reports.players import PlayError, Players
+from posse_training.reports.players import Play, PlayError, Players
 from posse_training.reports.plays import Plays
 from posse_training.reports.progress import Progress
 from posse_training.reports.sweeps import LEADER_LOSS, Sweep, play_sweeps, write_points
@@ -114,6 +115,15 @@ class ComparisonRun:
             )  # fmt: skip
             write_points(self.folder / POINTS, self.found.points)
 
+    def plays(self) -> Iterator[Play]:
+        """Yield all that will be played."""
+        s = self.settings
+        wanted = [(get_scenario(name), s.episodes) for name in self.scenarios]
+        wanted += [(w.at(value), s.sweep_episodes) for w in self.sweeps for value in w.values]
+        for scenario, episodes in wanted:
+            for contender in self.contenders:
+                yield contender, scenario, self._worlds(contender, episodes)
+
     def _worlds(self, contender: Contender, episodes: int) -> int:
         """Return the number of worlds that a contender plays."""
         if contender.label == PLANNER and PLANNER not in self.settings.policies:
@@ -132,7 +142,7 @@ class ComparisonRun:
         """Play; return ``None`` and note why if the contender cannot or fails."""
         s, worlds, seeds = self.settings, self._worlds(contender, episodes), len(contender.policies)
         scenario = get_scenario(name, **overrides)
-        steps = -(-worlds // WORLDS_AT_ONCE) * scenario.horizon
+        steps = len(cut(worlds, WORLDS)) * scenario.horizon
         progress.begin(contender.label, what, worlds * seeds, steps * seeds)
         try:
             return self._players.play(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from rich.markup import escape
@@ -16,13 +16,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import posse
 from posse import Scenario, get_scenario
 from posse_baselines import Policy, Target, against, load, load_target, rollout
+from posse_training.cluster import Cluster
+from posse_training.cluster.settings import WORLDS, as_cluster
+from posse_training.cluster.shards import Shard, cut, joined
 from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
 from posse_training.reports.exchanges import ExchangeCounter, leaders_of
 from posse_training.reports.results import Column, Results
 
 __all__ = ["Results", "TrainedSplitError", "evaluate", "play_episode", "progress_bar"]
-
-WORLDS_AT_ONCE: Final = 500
 
 
 def evaluate(
@@ -36,9 +37,10 @@ def evaluate(
     progress: bool | Callable[[int], object] = True,
     num_threads: int | None = None,
     time_limit: float | None = None,
+    ray: bool | str | Cluster = False,
     **overrides: Any,
 ) -> Results:
-    """Play episodes of a scenario with a policy.
+    """Play episodes of a scenario with a policy, here or on a Ray cluster, with the same result.
 
     Args:
         policy: A policy, or an argument of :func:`posse_baselines.load`.
@@ -49,9 +51,12 @@ def evaluate(
             scenario's own motion.
         split: Split of the worlds; no training and no tuning uses ``"test"``.
         progress: Whether to show a bar; or a function that is called after each control step with
-            the number of steps played, 1.
-        num_threads: Threads that step the worlds; never changes a result.
-        time_limit: Time for all episodes, s, checked after each control step; default: none.
+            the number of steps played, 1; on a cluster after each shard, with its steps.
+        num_threads: Threads that step the worlds; never changes a result; on a cluster one a shard.
+        time_limit: Time for all episodes, on a cluster for each shard, s, checked after each
+            control step; default: none.
+        ray: Play on a Ray cluster (extra ``cluster``): its address; ``True`` for the cluster of
+            this machine, or else all its cores; or a :class:`posse_training.cluster.Cluster`.
         **overrides: Settings of the scenario.
 
     Raises:
@@ -60,7 +65,11 @@ def evaluate(
         TrainedSplitError: A split that the policy or the target was trained on.
         TimeLimitError: The time limit is exceeded.
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
+        MissingExtraError: Ray is to be used and not installed.
+        ClusterError: There is no such cluster, or the workers of one shard died again and again.
+        PlayError: The policy failed on the cluster.
     """
+    cluster, given = as_cluster(ray), policy
     if isinstance(policy, str):
         policy = load(policy)
     if episodes < 1:
@@ -71,18 +80,26 @@ def evaluate(
         settings, policy = chased.fit(settings), against(policy, chased)
     refuse_trained_split(policy, split)
     settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
-    if callable(progress):
-        advance = _limited(progress, time_limit)
+    if cluster is not None:
+        from posse_training.cluster.evaluation import evaluate_on_cluster, sent
+
+        posse.Batch(settings, 1, seed=seed, split=split)  # raises here what is invalid
+        columns = evaluate_on_cluster(
+            sent(given, policy) if chased is None else policy, policy.name, settings, episodes,
+            seed, split, cluster, progress=progress, time_limit=time_limit,
+        )  # fmt: skip
+    elif callable(progress):
+        advance = limited(progress, time_limit)
         columns = _play_all(policy, settings, episodes, seed, split, num_threads, advance)
     else:
         with progress_bar(disable=not progress) as bar:
-            parts = -(-episodes // WORLDS_AT_ONCE)
+            parts = len(cut(episodes, WORLDS))
             task = bar.add_task(
                 escape(f"{policy.name} on {settings.name}"), total=parts * settings.horizon
             )
             columns = _play_all(
                 policy, settings, episodes, seed, split, num_threads,
-                _limited(lambda steps: bar.advance(task, steps), time_limit),
+                limited(lambda steps: bar.advance(task, steps), time_limit),
             )  # fmt: skip
     named = None if chased is None else chased.name
     return Results(policy.name, settings, seed, split, columns, named)
@@ -111,7 +128,7 @@ def refuse_trained_split(policy: Policy | Target, split: str) -> None:
         )
 
 
-def _limited(advance: Callable[[int], object], time_limit: float | None) -> Callable[[int], object]:
+def limited(advance: Callable[[int], object], time_limit: float | None) -> Callable[[int], object]:
     """Return a function that calls another one, and raises once a time limit is exceeded."""
     if time_limit is None:
         return advance
@@ -134,14 +151,29 @@ def _play_all(
     num_threads: int | None,
     advance: Callable[[int], object],
 ) -> dict[str, Column]:
-    parts = []
-    for first in range(0, episodes, WORLDS_AT_ONCE):
-        count = min(WORLDS_AT_ONCE, episodes - first)
-        batch = posse.Batch(
-            scenario, count, seed=seed, split=split, first_world=first, num_threads=num_threads
-        )
-        parts.append(play_episode(batch, policy, advance))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return joined(
+        [
+            play_shard(policy, scenario, shard, seed, split, num_threads, advance)
+            for shard in cut(episodes, WORLDS)
+        ]
+    )
+
+
+def play_shard(
+    policy: Policy,
+    scenario: Scenario,
+    shard: Shard,
+    seed: int,
+    split: str,
+    num_threads: int | None,
+    advance: Callable[[int], object],
+) -> dict[str, Column]:
+    """Play one episode in every world of a shard; return every metric by name, (count,)."""
+    batch = posse.Batch(
+        scenario, shard.count, seed=seed, split=split, first_world=shard.first,
+        num_threads=num_threads,
+    )  # fmt: skip
+    return play_episode(batch, policy, advance)
 
 
 def play_episode(

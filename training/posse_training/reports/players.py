@@ -8,7 +8,7 @@ exceeds the time limit.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -30,6 +30,9 @@ _OURS: Final = tuple(
     str(Path(module.__file__ or "").parent) for module in (posse, posse_baselines, posse_training)
 )
 _LONGEST: Final = 300  # characters of an error in a summary
+
+Play = tuple[Contender, Scenario, int]
+"""A contender, a scenario and a number of episodes."""
 
 
 class PlayError(RuntimeError):
@@ -69,10 +72,13 @@ class Players:
         """
         for policy in contender.policies:
             if isinstance(policy, str):
-                try:
-                    self._worker.call(_check, (policy,), self._limit)
-                except (TimeLimitError, EOFError) as error:
-                    raise PolicyError(f"{policy!r} cannot be loaded: {error}") from error
+                self._load_elsewhere(policy)
+
+    def expect(self, plays: Iterable[Play], seed: int, split: str) -> None:
+        """Be told what will be asked for; of use where much can be played at once."""
+
+    def forget(self) -> None:
+        """Drop what was kept for a repetition: all results are written."""
 
     def play(
         self,
@@ -96,18 +102,7 @@ class Players:
         results: list[Results] = []
         for policy in contender.policies:
             try:
-                if isinstance(policy, str):
-                    given = (
-                        policy, scenario, episodes, seed, split, self._limit, self._target,
-                    )  # fmt: skip
-                    results.append(self._worker.call(_evaluate, given, self._limit, advance))
-                else:
-                    results.append(
-                        evaluate(
-                            policy, scenario, episodes, seed, split=split, target=self._target,
-                            progress=advance, time_limit=self._limit,
-                        )
-                    )  # fmt: skip
+                results.append(self._play(policy, scenario, episodes, seed, split, advance))
             except (PolicyError, SettingsError, TrainedSplitError):
                 raise
             except EOFError as error:
@@ -119,6 +114,32 @@ class Players:
             except Exception as error:
                 raise PlayError(describe(error)) from error
         return Plays(contender.label, tuple(results))
+
+    def _play(
+        self,
+        policy: str | Policy,
+        scenario: Scenario,
+        episodes: int,
+        seed: int,
+        split: str,
+        advance: Callable[[int], object],
+    ) -> Results:
+        if isinstance(policy, str):
+            given = (policy, scenario, episodes, seed, split, self._limit, self._target)
+            found: Results = self._worker.call(_evaluate, given, self._limit, advance)
+            return found
+        return evaluate(
+            policy, scenario, episodes, seed, split=split, target=self._target, progress=advance,
+            time_limit=self._limit,
+        )  # fmt: skip
+
+    def _load_elsewhere(self, policy: str) -> tuple[str, int]:
+        """Load a code policy in the worker's process; return its name and message size."""
+        try:
+            name, size = self._worker.call(_check, (policy,), self._limit)
+        except (TimeLimitError, EOFError) as error:
+            raise PolicyError(f"{policy!r} cannot be loaded: {error}") from error
+        return name, size
 
     def record(
         self,
@@ -152,12 +173,13 @@ class Players:
             raise PlayError(describe(error)) from error
 
 
-def _check(report: Any, policy: str) -> None:
-    """Load a policy in the worker's process."""
+def _check(report: Any, policy: str) -> tuple[str, int]:
+    """Load a policy in the worker's process; return its name and message size."""
     try:
-        posse_baselines.load(policy)
+        loaded = posse_baselines.load(policy)
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # without what may not survive pickling
+    return loaded.name, loaded.message_size
 
 
 def _evaluate(

@@ -24,9 +24,9 @@ _ADAM_EPSILON: Final = 1e-5  # the default of stable-baselines3's PPO
 _EXPLORATION: Final = 0.1  # standard deviation of the noise on td3's actions
 
 
-def make_env(settings: TrainSettings) -> TeamVecEnv:
-    """Return the training worlds, of the split ``"train"``."""
-    batches = make_batches(settings)
+def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVecEnv:
+    """Return the training worlds, of the split ``"train"``, stepped by so many threads."""
+    batches = make_batches(settings, num_threads)
     encoding = encoding_of(settings, batches)
     adviser = make_adviser(settings)
     return TeamVecEnv(

@@ -74,8 +74,12 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
     return tuple(found)
 
 
-def make_batches(settings: TrainSettings) -> list[posse.Batch]:
+def make_batches(settings: TrainSettings, num_threads: int | None = None) -> list[posse.Batch]:
     """Return the training worlds, divided among the pairings by their shares.
+
+    Args:
+        settings: Of the run.
+        num_threads: Threads that step the worlds; default: one per core.
 
     Raises:
         SettingsError: Fewer worlds than pairings.
@@ -100,7 +104,7 @@ def make_batches(settings: TrainSettings) -> list[posse.Batch]:
         batches.append(
             posse.batch(
                 pair.scenario, last - first, seed=settings.seed, first_world=first,
-                autoreset="disabled", **inside,
+                autoreset="disabled", num_threads=num_threads, **inside,
             )
         )  # fmt: skip
     return batches

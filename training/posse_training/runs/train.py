@@ -32,13 +32,20 @@ _NOT_FINITE = (
 )  # fmt: skip
 
 
-def train(settings: TrainSettings, *, console: Console | None = None, resume: bool = False) -> Path:
+def train(
+    settings: TrainSettings,
+    *,
+    console: Console | None = None,
+    resume: bool = False,
+    num_threads: int | None = None,
+) -> Path:
     """Train a policy; return the file of the one that scored best on the validation worlds.
 
     Args:
         settings: All that the result depends on.
         console: Where to show progress.
         resume: Continue from the run folder's checkpoint.
+        num_threads: Threads that step the worlds; default: one per core. Never changes the result.
 
     Raises:
         SettingsError: More memory than there is, or a package that is not installed.
@@ -55,7 +62,7 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
         Display(settings, console or Console()) as display,
     ):
         saved = open_run(folder, settings, resume)
-        env = make_env(settings)
+        env = make_env(settings, num_threads)
         model = make_model(settings, env)
         model.set_logger(make_logger(folder, settings, display.note))
         steps = steps_made(settings, env.num_envs)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, runtime_checkable
 
@@ -94,6 +94,29 @@ class Scorer:
     ) -> Scores:
         """Return the safe scores of a candidate, (count,)."""
         return self.metrics(values, split, first, count, seed)["safe_score"]
+
+    def scores_of(
+        self,
+        candidates: Sequence[dict[str, float]],
+        split: str,
+        first: int,
+        count: int,
+        report: Callable[[int], object],
+    ) -> list[Scores]:
+        """Return the safe scores of several candidates on the same worlds, (count,) each.
+
+        Args:
+            candidates: Their settings.
+            split: Split of the worlds.
+            first: The first world.
+            count: How many.
+            report: Called with the number of candidates scored so far.
+        """
+        found = []
+        for k, values in enumerate(candidates):
+            found.append(self.scores(values, split, first, count))
+            report(k + 1)
+        return found
 
     def effective(self, found: tuple[Tunable, ...]) -> tuple[str, ...]:
         """Return the names of the settings whose ends of the range change any score.

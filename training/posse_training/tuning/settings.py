@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final
 
 import tyro
 
+from posse_training.cluster.settings import RayOption
 from posse_training.errors import SettingsError
 
 _RANGES: Final[dict[str, tuple[float, float]]] = {
@@ -52,6 +53,9 @@ class TuneSettings:
     """Settings to search over; default: all that have an effect on this scenario."""
     threads: int | None = None
     """Threads that step the worlds; default: as many as cores. Never changes the result."""
+    ray: RayOption = None
+    """Score candidates on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for
+    the cluster of this machine, or else all its cores. Extra: cluster."""
     ship: bool = False
     """Write the result to the package, where the policy's tuned version finds it."""
 

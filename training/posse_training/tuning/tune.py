@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -15,6 +16,7 @@ from posse_baselines import Tunable
 from posse_baselines.learned.policy_file import write_atomically
 from posse_baselines.tuned import TUNED
 from posse_baselines.tuned.files import SHIPPED_TUNED
+from posse_training.cluster.settings import of_option
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.files import InUseError, locked
 from posse_training.provenance import commit
@@ -41,6 +43,8 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
             cannot ship, or nothing that has an effect.
         RunFolderError: The folder is in use, or holds something else.
         CheckpointError: Its state is damaged or cannot be written.
+        MissingExtraError: Ray is to be used and not installed.
+        ClusterError: There is no such cluster, or workers died again and again.
     """
     settings.check()
     policy, tunables = tunable_policy(settings.policy)
@@ -50,8 +54,11 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
     identity = {**settings.identity(), "scenario_version": scorer.scenario.version}
     read_state(settings.folder, identity)  # before anything is made
     try:
-        with locked(settings.folder), Display(settings, console or Console()) as display:
-            scorer = replace(scorer, played=display.played)
+        with (
+            locked(settings.folder),
+            Display(settings, console or Console()) as display,
+            _place(settings, replace(scorer, played=display.played), display) as scorer,
+        ):
             state = read_state(settings.folder, identity)
             if state is None:
                 display.note("finding the settings that have an effect")
@@ -71,6 +78,21 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
         shipped.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(shipped, content)
     return path
+
+
+@contextlib.contextmanager
+def _place(settings: TuneSettings, scorer: Scorer, display: Display) -> Iterator[Scorer]:
+    """Yield a scorer that plays where the settings say."""
+    cluster = of_option(settings.ray, settings.folder)
+    if cluster is None:
+        yield scorer
+        return
+    from posse_training.cluster.ray_backend import RayBackend
+    from posse_training.tuning.on_cluster import ClusterScorer, Elsewhere
+
+    with RayBackend(cluster) as backend:
+        elsewhere = Elsewhere(backend, cluster.attempts, display.note)
+        yield ClusterScorer(**vars(scorer), elsewhere=elsewhere)
 
 
 def _run(
@@ -116,12 +138,11 @@ def _generation(
     report: Callable[[int], object],
 ) -> None:
     """Score a generation on worlds of its own, the same for all its candidates."""
-    points, scores = search.ask(), []
+    points = search.ask()
     first = len(state.generations) * settings.worlds
-    for k, point in enumerate(points):
-        found = scorer.scores(space.values(point), "train", first, settings.worlds)
-        scores.append(float(found.mean()))
-        report(k + 1)
+    candidates = [space.values(point) for point in points]
+    found = scorer.scores_of(candidates, "train", first, settings.worlds, report)
+    scores = [float(each.mean()) for each in found]
     state.generations.append(Generation(points=points.tolist(), scores=scores))
     search.tell(points, scores)
 

@@ -1,0 +1,158 @@
+"""What only a Ray cluster can show; run by ``tests/training/cluster/test_ray.py`` where Ray is."""
+
+from __future__ import annotations
+
+import filecmp
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ray
+from ray.cluster_utils import Cluster as Nodes
+from safetensors.numpy import load_file
+from tests.support.ray_policies import Watched
+
+from posse_baselines import load
+from posse_training import Results, evaluate
+from posse_training.cli import main
+from posse_training.cluster import Cluster
+from posse_training.reports.players import PlayError
+
+SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}
+EPISODES = 45
+WORLDS = 5  # nine shards
+
+
+@pytest.fixture(scope="module")
+def nodes() -> Iterator[Nodes]:
+    """Three nodes: one for the driver, two with a worker each."""
+    found = Nodes(initialize_head=True, head_node_args={"num_cpus": 0})
+    for _ in range(2):
+        found.add_node(num_cpus=1)
+    ray.init(address=found.address, log_to_driver=False, logging_level="error")
+    yield found
+    ray.shutdown()
+    found.shutdown()
+
+
+@pytest.fixture(scope="module")
+def local() -> Results:
+    return evaluate("pursuit", "smart", EPISODES, **SHORT)
+
+
+def same(one: Results, other: Results) -> None:
+    assert list(one.columns) == list(other.columns)
+    for name, column in one.columns.items():
+        np.testing.assert_array_equal(column, other[name], err_msg=name)
+
+
+def begun(folder: Path) -> int:
+    return len(list(folder.glob("begun-*")))
+
+
+def test_it_is_equal_to_a_local_run(nodes: Nodes, local: Results, tmp_path: Path) -> None:
+    cluster = Cluster(work=tmp_path / "work", worlds=WORLDS)
+    same(evaluate("pursuit", "smart", EPISODES, ray=cluster, **SHORT), local)
+    learned = load("learned-smart")
+    found = evaluate(learned, "smart", 12, ray=cluster, **SHORT)
+    same(found, evaluate("learned-smart", "smart", 12, **SHORT))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_worker_that_dies_costs_its_shard(nodes: Nodes, local: Results, tmp_path: Path) -> None:
+    policy = Watched(tmp_path, 4, "die")
+    cluster = Cluster(work=tmp_path / "work", worlds=WORLDS)
+    same(evaluate(policy, "smart", EPISODES, ray=cluster, **SHORT), local)
+    assert begun(tmp_path) == 9 + 1
+
+
+def test_a_killed_driver_resumes(nodes: Nodes, local: Results, tmp_path: Path) -> None:
+    """The shard that waits is lost with its driver; those that were done are not played again."""
+    code = (
+        "import sys; from pathlib import Path; from posse_training import evaluate\n"
+        "from posse_training.cluster import Cluster\n"
+        "from tests.support.ray_policies import Watched\n"
+        f"folder = Path({str(tmp_path)!r})\n"
+        f"cluster = Cluster(address={nodes.address!r}, work=folder / 'work', worlds={WORLDS})\n"
+        "policy = Watched(folder, 4, 'wait')\n"
+        f"evaluate(policy, 'smart', {EPISODES}, ray=cluster, **{SHORT!r})\n"
+    )
+    driver = subprocess.Popen([sys.executable, "-W", "ignore", "-c", code])
+    done = tmp_path / "work"
+    while len(list(done.rglob("*.npz"))) < EPISODES / WORLDS - 1:  # all but the one that waits
+        assert driver.poll() is None
+        time.sleep(0.1)
+    driver.kill()
+    driver.wait()
+    assert begun(tmp_path) == 9
+    (tmp_path / "go").touch()
+    policy = Watched(tmp_path, 4, "wait")
+    found = evaluate(
+        policy, "smart", EPISODES, ray=Cluster(work=tmp_path / "work", worlds=WORLDS), **SHORT
+    )
+    same(found, local)
+    assert begun(tmp_path) == 9 + 1
+
+
+def test_an_error_of_a_policy_says_where(nodes: Nodes, tmp_path: Path) -> None:
+    policy = Watched(tmp_path, 1, "fail")
+    with pytest.raises(PlayError, match=r"^ValueError: no idea \(.*ray_policies.py, line"):
+        evaluate(policy, "smart", 3, ray=Cluster(work=tmp_path / "work"), **SHORT)
+
+
+def test_commands_give_the_same_files(
+    nodes: Nodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = {
+        "compare idle pursuit --scenarios smart constant --episodes 3 --sweep-episodes 0 "
+        "--planner-episodes 0 --no-figures --out {}/compare": ("smart-idle.csv", "summary.json"),
+        "record idle pursuit --scenario constant --episodes 2 --out {}/record": (
+            "posse/constant/idle-and-pursuit-v0/data/main_data.hdf5",
+        ),
+        "tune ddcs-distributed --generations 1 --population 4 --worlds 2 --validation-worlds 4 "
+        "--only gain --out {}/tune": ("tuned.json",),
+        "train --seeds 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None "
+        "--advise None --imitate None --no-tensorboard --folder {}/train": (
+            "seed-1/settings.json",
+        ),
+    }  # fmt: skip
+    for command, files in commands.items():
+        name = command.split()[0]
+        for place in ("here", "there"):
+            words = command.format(place).split()
+            assert main([*words, "--ray"] if place == "there" else words) == 0
+        for file in files:
+            one, other = (tmp_path / place / name / file for place in ("here", "there"))
+            assert filecmp.cmp(one, other, shallow=False), file
+        assert not list((tmp_path / "there").glob(".*.work"))
+    trained = [load_file(tmp_path / p / "train/seed-1/last.safetensors") for p in ("here", "there")]
+    assert trained[0].keys() == trained[1].keys()
+    assert all(np.array_equal(array, trained[1][name]) for name, array in trained[0].items())
+
+
+def test_a_node_that_dies_costs_its_shard(nodes: Nodes, local: Results, tmp_path: Path) -> None:
+    """The last test: it leaves two nodes of three."""
+    policy = Watched(tmp_path, 4, "wait")
+
+    def remove() -> None:
+        while not (tmp_path / "begun-4").exists():
+            time.sleep(0.05)
+        time.sleep(0.2)
+        doomed = (tmp_path / "begun-4").read_text()
+        (node,) = [n for n in nodes.worker_nodes if n.node_id == doomed]
+        nodes.remove_node(node, allow_graceful=False)
+        (tmp_path / "go").touch()
+
+    removing = threading.Thread(target=remove)
+    removing.start()
+    cluster = Cluster(work=tmp_path / "work", worlds=WORLDS)
+    same(evaluate(policy, "smart", EPISODES, ray=cluster, **SHORT), local)
+    removing.join()
+    assert begun(tmp_path) >= 9 + 1

@@ -1,0 +1,124 @@
+"""Plays the contenders of a comparison on a cluster, all scenarios at once."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import NamedTuple
+
+from posse import Scenario
+from posse_baselines import Policy, load_target
+from posse_training.cluster.collect import Watcher, collect
+from posse_training.cluster.evaluation import evaluation_job
+from posse_training.cluster.progress import ClusterProgress
+from posse_training.cluster.ray_backend import RayBackend
+from posse_training.cluster.settings import Cluster
+from posse_training.cluster.shards import Job, joined
+from posse_training.cluster.store import Folder
+from posse_training.reports.contenders import Contender
+from posse_training.reports.players import Play, Players
+from posse_training.reports.results import Results
+
+
+class _Known(NamedTuple):
+    """What a driver knows of a policy that it has not loaded."""
+
+    name: str
+    message_size: int
+
+
+class ClusterPlayers(Players):
+    """Plays contenders on a Ray cluster; results of a killed driver are found again.
+
+    Args:
+        time_limit: Time for one shard, s.
+        target: What :func:`evaluate` takes; default: the scenarios' own.
+        cluster: The cluster.
+
+    Raises:
+        MissingExtraError: Ray is not installed.
+    """
+
+    def __init__(self, time_limit: float, target: str | None, cluster: Cluster) -> None:
+        super().__init__(time_limit, target)
+        self._chased = None if target is None else load_target(target)
+        self._cluster = cluster
+        self._store = Folder(cluster.work)
+        self._backend = RayBackend(cluster)
+        self._known: dict[str, _Known] = {}
+        self._failed: dict[str, Exception] = {}
+        self._open = contextlib.ExitStack()
+
+    def __enter__(self) -> ClusterPlayers:
+        self._open.enter_context(self._backend)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._open.close()
+        super().__exit__(kind, error, trace)
+
+    def check(self, contender: Contender) -> None:
+        """See :class:`~posse_training.reports.players.Players`."""
+        for policy in contender.policies:
+            if isinstance(policy, str):
+                self._known[policy] = _Known(*self._load_elsewhere(policy))
+
+    def expect(self, plays: Iterable[Play], seed: int, split: str) -> None:
+        """Play all that will be asked for, at once."""
+        jobs = {
+            (job.key, job.shards): job
+            for contender, scenario, episodes in plays
+            for policy in contender.policies
+            for job in (self._job(policy, scenario, episodes, seed, split),)
+        }
+        with ClusterProgress("comparison") as watcher:
+            self._collect(list(jobs.values()), watcher)
+
+    def forget(self) -> None:
+        """See :class:`~posse_training.reports.players.Players`."""
+        self._store.clear()
+
+    def _play(
+        self,
+        policy: str | Policy,
+        scenario: Scenario,
+        episodes: int,
+        seed: int,
+        split: str,
+        advance: Callable[[int], object],
+    ) -> Results:
+        job = self._job(policy, scenario, episodes, seed, split)
+        if job.key not in self._failed and self._store.missing(job):  # not expected
+            self._collect([job], Watcher())
+        if job.key in self._failed:
+            raise self._failed[job.key]
+        name, _ = self._of(policy)
+        settings: Scenario = job.arguments[1]
+        chased = None if self._chased is None else self._chased.name
+        return Results(name, settings, seed, split, joined(self._store.read(job)), chased)
+
+    def _job(
+        self, policy: str | Policy, scenario: Scenario, episodes: int, seed: int, split: str
+    ) -> Job:
+        name, size = self._of(policy)
+        if self._chased is not None:
+            scenario = self._chased.fit(scenario)
+        fitted = scenario.replace(message_size=max(scenario.message_size, size))
+        return evaluation_job(
+            policy, name, fitted, episodes, seed, split, self._cluster, self._limit, self._chased
+        )
+
+    def _of(self, policy: str | Policy) -> _Known:
+        if isinstance(policy, str):
+            return self._known[policy]
+        return _Known(policy.name, policy.message_size)
+
+    def _collect(self, jobs: list[Job], watcher: Watcher) -> None:
+        failed = collect(jobs, self._backend, self._store, watcher, self._cluster.attempts)
+        self._failed |= {job.key: error for job, error in failed.items()}
