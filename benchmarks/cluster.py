@@ -49,6 +49,8 @@ class Settings:
     """Measure RLlib's PPO."""
     iterations: int = 5
     """Timed iterations of PPO; one more is not timed."""
+    steps: int = 4_000
+    """Control steps of the world in an iteration of PPO."""
 
 
 def timed(*arguments: Any) -> Arrays:
@@ -110,7 +112,7 @@ def here(settings: Settings, threads: int) -> dict[str, Any]:
 
 
 def rllib(settings: Settings, runners: int) -> dict[str, Any]:
-    """Train one policy for all trackers with RLlib's PPO; return agent-steps a second."""
+    """Train one policy for all trackers with RLlib's PPO; return control steps a second."""
     from ray.rllib.algorithms.ppo import PPOConfig
     from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
     from ray.tune import register_env
@@ -120,27 +122,32 @@ def rllib(settings: Settings, runners: int) -> dict[str, Any]:
     register_env("posse", lambda s: ParallelPettingZooEnv(posse.parallel_env(settings.scenario)))
     config = PPOConfig().environment("posse").env_runners(num_env_runners=runners)
     config.multi_agent(policies={"tracker"}, policy_mapping_fn=lambda agent, _: "tracker")
-    config.training(train_batch_size=4000, minibatch_size=500, num_epochs=4)
+    config.training(
+        train_batch_size=settings.steps, minibatch_size=min(500, settings.steps), num_epochs=4
+    )
     algorithm = config.build_algo()
     try:
-        algorithm.train()
-        began = time.perf_counter()
-        steps, sampling, learning = 0.0, 0.0, 0.0
+        before = _steps(algorithm.train())
+        began, sampling, learning = time.perf_counter(), 0.0, 0.0
         for _ in range(settings.iterations):
             found = algorithm.train()
-            steps += sum(found["env_runners"]["num_agent_steps_sampled"].values())
             sampling += found["timers"]["env_runner_sampling_timer"]
             learning += found["timers"]["learner_update_timer"]
         seconds = time.perf_counter() - began
         return {
             "runners": runners,
-            "agent_steps_per_second": steps / seconds,
+            "steps_per_second": (_steps(found) - before) / seconds,
             "sampling_s_per_iteration": sampling / settings.iterations,
             "learning_s_per_iteration": learning / settings.iterations,
         }
     finally:
         algorithm.stop()
         ray.shutdown()
+
+
+def _steps(found: dict[str, Any]) -> float:
+    """Return the control steps of all worlds so far."""
+    return float(found["env_runners"]["num_env_steps_sampled_lifetime"])
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ LINES = (
         "posse_training.tuning",
     ),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
-    ("posse_training.sb3", "posse_training.torchrl"),
+    ("posse_training.sb3", "posse_training.torchrl", "posse_training.cluster"),
     ("posse_baselines.learned", "posse_baselines.policies"),
     ("posse_baselines.tuned",),
     ("posse_baselines.ddcs",),

@@ -119,7 +119,7 @@ def test_commands_give_the_same_files(
         "tune ddcs-distributed --generations 1 --population 4 --worlds 2 --validation-worlds 4 "
         "--only gain --out {}/tune": ("tuned.json",),
         "train --seeds 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None "
-        "--advise None --imitate None --no-tensorboard --folder {}/train": (
+        "--advise None --imitate None --encoding plain --no-tensorboard --folder {}/train": (
             "seed-1/settings.json",
         ),
     }  # fmt: skip

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import platform
+import time
 from collections.abc import Hashable
 from types import TracebackType
 from typing import Any, Final, Self
@@ -15,6 +17,7 @@ from posse_training.cluster.shards import Job, Shard
 from posse_training.errors import ClusterError, require
 
 _LONGEST: Final = 200  # characters of why a worker died
+_ASK_AGAIN: Final = 1.0  # s between two questions how many workers there are
 
 
 class RayBackend:
@@ -35,6 +38,7 @@ class RayBackend:
         self._cluster, self._log = cluster, log
         self._shared: WeakKeyDictionary[Job, Any] = WeakKeyDictionary()
         self._out: set[Any] = set()
+        self._cpus, self._asked = 0, -math.inf
 
     def __enter__(self) -> Self:
         import ray
@@ -64,7 +68,10 @@ class RayBackend:
 
     def workers(self) -> int:
         """See :class:`~posse_training.cluster.collect.Backend`."""
-        return int(self._ray.cluster_resources().get("CPU", 0))
+        if time.monotonic() > self._asked + _ASK_AGAIN:
+            self._cpus = int(self._ray.cluster_resources().get("CPU", 0))
+            self._asked = time.monotonic()
+        return self._cpus
 
     def start(self, job: Job, shard: Shard) -> Hashable:
         """See :class:`~posse_training.cluster.collect.Backend`."""
@@ -76,7 +83,10 @@ class RayBackend:
 
     def finished(self, timeout: float) -> list[tuple[Hashable, Outcome]]:
         """See :class:`~posse_training.cluster.collect.Backend`."""
-        ready, _ = self._ray.wait(list(self._out), num_returns=1, timeout=timeout)
+        ready, rest = self._ray.wait(list(self._out), num_returns=1, timeout=timeout)
+        if ready and rest:  # and whatever else has ended by now
+            more, _ = self._ray.wait(rest, num_returns=len(rest), timeout=0)
+            ready = [*ready, *more]
         self._out.difference_update(ready)
         return [(ticket, self._outcome(ticket)) for ticket in ready]
 
