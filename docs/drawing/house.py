@@ -22,12 +22,8 @@ COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "
 LINES = (
     ("posse_training.cli",),
     ("posse_training.commands", "posse_training.shipping", "posse_training.leaderboard"),
-    (
-        "posse_training.viewer",
-        "posse_training.play",
-        "posse_training.datasets",
-        "posse_training.tuning",
-    ),
+    ("posse_training.viewer", "posse_training.play", "posse_training.league"),
+    ("posse_training.datasets", "posse_training.tuning"),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl", "posse_training.cluster"),
     ("posse_baselines.learned", "posse_baselines.policies"),
@@ -41,7 +37,8 @@ LINES = (
     ("posse.scenarios",),
     ("posse.numeric",),
 )
-PACKAGE_BEGINS = {0: "posse_training", 5: "posse_baselines", 8: "posse"}
+PACKAGES = [line[0].partition(".")[0] for line in LINES]
+PACKAGE_BEGINS = {PACKAGES.index(name): name for name in SOURCES}
 WIDTH, HEIGHT, STEP, GAP = 8.0, 0.78, 0.95, 0.16
 
 
