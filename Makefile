@@ -18,7 +18,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test recipes fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce tune train-shipped clean
+.PHONY: help demo test recipes fuzz lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -56,6 +56,9 @@ bench-costs: $(FULL) ## Measure the time of each part of a step, and how it scal
 
 bench-training: $(FULL) ## Measure throughput and time shares of PPO training
 	$(BIN)/python benchmarks/training.py
+
+algorithms: $(FULL) ## Train the field's algorithms and write docs/algorithms.md (hours); resumes
+	$(BIN)/python benchmarks/algorithms.py
 
 bench-peers: $(FULL) ## Compare throughput with other simulators
 	$(BIN)/python benchmarks/peers.py
