@@ -70,3 +70,11 @@ ADVISED: dict[str, Any] = {
     "advise": "ddcs-distributed",
     "overrides": {"horizon": HORIZON, "settle_time": 1.0},
 }
+BELIEVING: dict[str, Any] = {
+    **ADVISED,
+    "advise": "ddcs-tuned",
+    "correction": "velocity",
+    "encoding": "belief",
+    "contact_bound": 0.03,
+}
+"""With the settings of the shipped trainings: adviser, belief, bound on contact."""

@@ -38,7 +38,7 @@ def feel_body(f: Record, o: FloatArray, body: Record) -> None:
 
 
 @compiled
-def decide(
+def plan(
     f: Record,
     s: Record,
     slots: Records,
@@ -49,13 +49,9 @@ def decide(
     o: FloatArray,
     cost: FloatArray,
     work: FloatArray,
-    beams: FloatArray,
-    discs: Records,
     body: Record,
-    plays: Record,
-    action: FloatArray,
 ) -> None:
-    """Write the action (2 + m,) of one tracker for its observation (F,)."""
+    """Monitor and track: set the wanted velocity of one tracker for its observation (F,)."""
     own = int(o[f.number])
     x, y = float(o[f.position]), float(o[f.position + 1])
     hc, hs = float(o[f.heading]), float(o[f.heading + 1])
@@ -85,7 +81,28 @@ def decide(
         vx, vy, speed, omega = take_up(body, vx, vy, 0.0)
     else:
         vx, vy, speed, omega = wanted_motion(f, s, d, mates, slots, own, x, y, body)
-    # Actuation
+    d.wish_x, d.wish_y, d.wish_speed, d.wish_omega = vx, vy, speed, omega
+
+
+@compiled
+def carry_out(
+    f: Record,
+    s: Record,
+    slots: Records,
+    d: Record,
+    mates: Records,
+    o: FloatArray,
+    beams: FloatArray,
+    discs: Records,
+    body: Record,
+    plays: Record,
+    action: FloatArray,
+) -> None:
+    """Actuate: write the action (2 + m,) of one tracker that realises its wanted velocity."""
+    own = int(o[f.number])
+    x, y = float(o[f.position]), float(o[f.position + 1])
+    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
+    vx, vy, speed, omega = d.wish_x, d.wish_y, d.wish_speed, d.wish_omega
     count = surround(f, s, d, mates, slots, own, x, y, hc, hs, o, beams, discs)
     past = False
     if s.detour > 0.0 and d.task != FLOCKING:
@@ -124,8 +141,12 @@ def decide_all(
     f, s = offsets[0], settings[0]
     for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
-            decide(
-                f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                costs[thread], work[thread], beams, discs[thread], bodies[thread],
-                plays[thread], actions[e, i],
+            d, o, body = minds[e, i], observations[e, i], bodies[thread]
+            plan(
+                f, s, slots, outermost, d, mates[e, i], seen[e, i], o, costs[thread],
+                work[thread], body,
+            )  # fmt: skip
+            carry_out(
+                f, s, slots, d, mates[e, i], o, beams, discs[thread], body, plays[thread],
+                actions[e, i],
             )  # fmt: skip

@@ -46,6 +46,9 @@ MIND: Final = _record(
     ("pursues", _I),  # 1: under PNGL
     ("closing", _I),  # 1: the law itself, not the safeguard, keeps the range to the target
     ("side", _I), ("side_step", _I),  # of the last detour: 1 left, -1 right; when
+    # the tracking layer's result; float64, so that storing it changes no action
+    ("wish_x", np.float64), ("wish_y", np.float64),  # wanted velocity, common frame, m/s
+    ("wish_speed", np.float64), ("wish_omega", np.float64),  # its command: m/s, rad/s
     # leadership
     ("leader", _I),  # -1: none yet
     ("term", _I),  # how often the lead has passed, modulo 256; the higher claim wins

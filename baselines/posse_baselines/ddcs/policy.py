@@ -13,7 +13,9 @@ from posse import ObservationLayout, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.rules import beam_directions, slot_records
 from posse.scenarios.formation import slot_offsets
+from posse_baselines.ddcs.belief import BELIEF_SIZE
 from posse_baselines.ddcs.controller import decide_all
+from posse_baselines.ddcs.correction import correct_all, propose_all, write_beliefs
 from posse_baselines.ddcs.memory import GRID, MATE, MIND
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings, settings_record
@@ -131,6 +133,78 @@ class DDCS(OwnArrays, BasePolicy):
             n,
         )  # fmt: skip
         return actions, m
+
+    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
+
+        Ahead and to the left of each tracker, as shares of its greatest speed. The first half of
+        :meth:`act`; the second half, :meth:`carry_out`, follows with the same observations.
+        """
+        m: _Minds = memory
+        num_worlds, n = m.minds.shape
+        observations = check_observations(self, observations, num_worlds, m.layout)
+        proposals = np.zeros((num_worlds, n, 2), np.float32)
+        parts = MOST_THREADS
+        over_worlds(
+            propose_all,
+            (
+                m.offsets, m.settings, m.slots, m.outermost, m.minds, m.mates, m.seen,
+                observations, np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)),
+                np.empty(parts, BODY), proposals,
+            ),
+            num_worlds,
+            n,
+        )  # fmt: skip
+        return proposals, m
+
+    def carry_out(
+        self, observations: FloatArray, memory: Memory, corrections: FloatArray
+    ) -> tuple[FloatArray, Memory]:
+        """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
+
+        Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
+        give the actions of :meth:`act`.
+        """
+        m: _Minds = memory
+        num_worlds, n = m.minds.shape
+        observations = check_observations(self, observations, num_worlds, m.layout)
+        actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
+        parts = MOST_THREADS
+        over_worlds(
+            correct_all,
+            (
+                m.offsets, m.settings, m.slots, m.minds, m.mates, observations, m.beams,
+                np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+                np.empty(parts, PLAYS), np.ascontiguousarray(corrections, np.float32), actions,
+            ),
+            num_worlds,
+            n,
+        )  # fmt: skip
+        return actions, m
+
+    @property
+    def belief_size(self) -> int:
+        """Numbers in a belief."""
+        return BELIEF_SIZE
+
+    def belief(self, observations: FloatArray, memory: Memory) -> FloatArray:
+        """Return what each tracker believes after :meth:`propose`, (E, N, belief_size).
+
+        The order is that of :mod:`posse_baselines.ddcs.belief`.
+        """
+        m: _Minds = memory
+        num_worlds, n = m.minds.shape
+        observations = check_observations(self, observations, num_worlds, m.layout)
+        beliefs = np.empty((num_worlds, n, BELIEF_SIZE), np.float32)
+        over_worlds(
+            write_beliefs,
+            (
+                m.offsets, m.settings, m.slots, m.minds, m.mates, m.seen, observations, beliefs,
+            ),
+            num_worlds,
+            n,
+        )  # fmt: skip
+        return beliefs
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).

@@ -1,10 +1,18 @@
 """A scripted adviser beside a learned policy (residual policy learning).
 
-At each step the adviser proposes a motion. The network reads the proposal together with the
-observation; the action is the proposal plus twice the network's output, clipped to [-1, 1]. An
-output of zero reproduces the adviser, and every action stays reachable. The adviser's messages are
-sent unchanged, and its memory is its own, so the network needs no memory. References: Silver et
-al. 2018, Johannink et al. 2019.
+At each step the adviser proposes something, the network reads the proposal together with the
+observation, and its output corrects the proposal. Two things can be corrected:
+
+``motion``: the adviser's action. The action is the proposal plus twice the output, clipped to
+[-1, 1].
+
+``velocity``: the velocity that the adviser wants, before its safeguard against contact
+(:class:`GuardedAdviser`). Whatever the network does, the safeguard comes after it.
+
+An output of zero reproduces the adviser, and every motion stays reachable. The adviser's messages
+are sent unchanged, and its memory is its own, so the network needs no memory. With ``belief`` the
+network also reads what the adviser believes (:class:`BelievingAdviser`). References: Silver et al.
+2018, Johannink et al. 2019; Alshiekh et al. 2018 (safeguard).
 """
 
 from __future__ import annotations
@@ -14,14 +22,16 @@ from typing import Any, Final, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch
+from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray
-from posse_baselines.policy import Memory, Policy, PolicyError, begin
+from posse_baselines.policy import Memory, Policy, PolicyError, begin, message_size_of
 
 REACH: Final = np.float32(2.0)
 """Factor of the network's output: spans the whole of [-1, 1] from either end."""
 MOTION: Final = 2
 """Numbers of an action that move the tracker; a proposal adds as many inputs."""
+CORRECTIONS: Final = ("motion", "velocity")
+"""What the output corrects."""
 
 
 @runtime_checkable
@@ -33,12 +43,57 @@ class Adviser(Policy, Protocol):
         ...
 
 
-def check_adviser(name: str, policy: Policy) -> Adviser:
+@runtime_checkable
+class GuardedAdviser(Adviser, Protocol):
+    """An adviser whose control step has two halves, with its safeguard in the second."""
+
+    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return wanted velocities (E, N, 2) for observations (E, N, F), and the memory.
+
+        Ahead and to the left, as shares of the greatest speed.
+        """
+        ...
+
+    def carry_out(
+        self, observations: FloatArray, memory: Memory, corrections: FloatArray
+    ) -> tuple[FloatArray, Memory]:
+        """Return actions (E, N, 2 + m) for wanted velocities plus corrections (E, N, 2)."""
+        ...
+
+
+@runtime_checkable
+class BelievingAdviser(GuardedAdviser, Protocol):
+    """An adviser that offers what it believes."""
+
+    @property
+    def belief_size(self) -> int:
+        """Numbers in a belief."""
+        ...
+
+    def belief(self, observations: FloatArray, memory: Memory) -> FloatArray:
+        """Return what each tracker believes, (E, N, belief_size), after ``propose``."""
+        ...
+
+
+def check_adviser(
+    name: str, policy: Policy, correction: str = "motion", *, believes: bool = False
+) -> Adviser:
     """Return a policy as an adviser.
 
+    Args:
+        name: Its name in messages.
+        policy: The policy.
+        correction: One of :data:`CORRECTIONS`.
+        believes: Whether the network reads its belief.
+
     Raises:
-        PolicyError: It reads the state of the worlds, or its memory cannot be saved.
+        PolicyError: It reads the state of the worlds, its memory cannot be saved, or it lacks what
+            the correction or the belief needs.
     """
+    if correction not in CORRECTIONS:
+        raise PolicyError(
+            f"correction={correction!r:.80} is unknown; corrections are: {', '.join(CORRECTIONS)}"
+        )
     if policy.reads_state:
         raise PolicyError(
             f"{name!r} cannot be an adviser: it reads the state of the worlds, which no tracker "
@@ -46,6 +101,16 @@ def check_adviser(name: str, policy: Policy) -> Adviser:
         )
     if not isinstance(policy, Adviser):
         raise PolicyError(f"{name!r} cannot be an adviser: it has no method arrays(memory)")
+    if correction == "velocity" and not isinstance(policy, GuardedAdviser):
+        raise PolicyError(
+            f"{name!r} has no methods propose and carry_out, so that its velocity cannot be "
+            'corrected before its safeguard: use correction="motion", or a policy of the DDCS'
+        )
+    if believes and not (correction == "velocity" and isinstance(policy, BelievingAdviser)):
+        raise PolicyError(
+            f"{name!r} with correction={correction!r} offers no belief: use another encoding than "
+            '"belief", or correction="velocity" with a policy of the DDCS'
+        )
     return policy
 
 
@@ -56,39 +121,107 @@ def advised(proposals: FloatArray, outputs: FloatArray) -> FloatArray:
     return np.clip(actions, np.float32(-1.0), np.float32(1.0))
 
 
-class Advice:
-    """The adviser's memory and latest proposals for one batch.
+class Advising:
+    """How a network and its adviser make actions together; without any memory of its own.
 
     Args:
-        adviser: The policy that proposes.
+        adviser: The policy that proposes, by :func:`check_adviser`.
+        correction: One of :data:`CORRECTIONS`.
+        believes: Whether the network reads the adviser's belief.
+
+    Attributes:
+        inputs: How many numbers the network reads in addition to its encoding.
+
+    Raises:
+        PolicyError: An adviser without what the correction or the belief needs.
+    """
+
+    def __init__(
+        self, adviser: Adviser, correction: str = "motion", *, believes: bool = False
+    ) -> None:
+        self.adviser = check_adviser(adviser.name, adviser, correction, believes=believes)
+        self.correction = correction
+        self.inputs = MOTION
+        self._guarded = adviser if isinstance(adviser, GuardedAdviser) else None
+        self._believing = adviser if believes and isinstance(adviser, BelievingAdviser) else None
+        if self._believing is not None:
+            self.inputs += self._believing.belief_size
+
+    def proposal_size(self, layout: ObservationLayout) -> int:
+        """Return the length of a proposal."""
+        return MOTION if self.correction == "velocity" else MOTION + message_size_of(layout)
+
+    def ask(
+        self, observations: FloatArray, memory: Memory
+    ) -> tuple[FloatArray, FloatArray, Memory]:
+        """Return proposals (E, N, p), the network's further inputs (E, N, k), and the memory."""
+        if self._guarded is None or self.correction == "motion":
+            proposals, memory = self.adviser.act(observations, memory)
+            return proposals, proposals[..., :MOTION], memory
+        proposals, memory = self._guarded.propose(observations, memory)
+        if self._believing is None:
+            return proposals, proposals, memory
+        belief = self._believing.belief(observations, memory)
+        return proposals, np.concatenate([proposals, belief], axis=-1), memory
+
+    def answer(
+        self, observations: FloatArray, proposals: FloatArray, outputs: FloatArray, memory: Memory
+    ) -> tuple[FloatArray, Memory]:
+        """Return actions (E, N, 2 + m) for the network's outputs (E, N, 2), and the memory."""
+        if self._guarded is None or self.correction == "motion":
+            return advised(proposals, outputs), memory
+        return self._guarded.carry_out(observations, memory, REACH * outputs)
+
+
+class Advice:
+    """The adviser's memory, latest proposals and the network's further inputs for one batch.
+
+    Args:
+        advising: How actions are made.
         batch: The worlds; their episodes may begin at different times.
 
     Attributes:
-        proposals: (E, N, 2 + m), for the latest observations.
+        proposals: (E, N, p), for the latest observations.
+        inputs: (E, N, k), what the network reads in addition to its encoding.
     """
 
-    def __init__(self, adviser: Adviser, batch: Batch) -> None:
-        self._adviser = adviser
-        self._memory = begin(adviser, batch)
-        worlds, trackers = batch.num_worlds, batch.scenario.num_trackers
-        self.proposals = np.zeros(
-            (worlds, trackers, MOTION + batch.scenario.message_size), np.float32
-        )
+    def __init__(self, advising: Advising, batch: Batch) -> None:
+        self._advising = advising
+        self._memory = begin(advising.adviser, batch)
+        team = (batch.num_worlds, batch.scenario.num_trackers)
+        self.proposals = np.zeros((*team, advising.proposal_size(batch.layout)), np.float32)
+        self.inputs = np.zeros((*team, advising.inputs), np.float32)
+        # What a velocity is carried out with; an action needs none.
+        size = batch.layout.size if advising.correction == "velocity" else 0
+        self._observations = np.zeros((*team, size), np.float32)
 
     def follow(self, observations: FloatArray) -> None:
         """Compute proposals for the observations (E, N, F) after a step."""
-        proposals, self._memory = self._adviser.act(observations, self._memory)
-        self.proposals[...] = proposals
+        proposals, inputs, self._memory = self._advising.ask(observations, self._memory)
+        self.proposals[...], self.inputs[...] = proposals, inputs
+        self._observations[...] = observations[..., : self._observations.shape[-1]]
+
+    def actions(self, outputs: FloatArray) -> FloatArray:
+        """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2)."""
+        actions, self._memory = self._advising.answer(
+            self._observations, self.proposals, outputs, self._memory
+        )
+        return actions
 
     def restart(self, observations: FloatArray, mask: BoolArray) -> None:
         """Compute proposals for the first observations of the worlds in a mask (E,)."""
         others = ~mask
         kept = {name: array[others] for name, array in self.arrays().items()}
-        self._memory = self._adviser.restart(self._memory, mask)
+        self._memory = self._advising.adviser.restart(self._memory, mask)
         self.follow(observations)
         for name, array in self.arrays().items():
             array[others] = kept[name]
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return the adviser's memory and the proposals as arrays by name; views, not copies."""
-        return {**self._adviser.arrays(self._memory), "proposals": self.proposals}
+        """Return the memory, the proposals and the inputs as arrays by name; views, not copies."""
+        return {
+            **self._advising.adviser.arrays(self._memory),
+            "proposals": self.proposals,
+            "inputs": self.inputs,
+            "observations": self._observations,
+        }

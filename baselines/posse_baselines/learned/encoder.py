@@ -71,7 +71,7 @@ class Encoder(OwnArrays):
         columns, unknown = encoding.columns(layout)
         offsets, slots = feature_tables(layout)
         self._scratch = np.empty((MOST_THREADS, SCRATCH), np.float32)
-        self.tables = (columns, unknown, offsets, slots, int(encoding.kind == "slots"))
+        self.tables = (columns, unknown, offsets, slots, int(encoding.with_features))
         """The arguments of :func:`encode_row` between the observation and the scratch memory."""
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:

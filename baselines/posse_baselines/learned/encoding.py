@@ -22,9 +22,10 @@ from posse.numeric import FloatArray
 from posse_baselines.learned.features import NUM_FEATURES
 from posse_baselines.policy import PolicyError
 
-KINDS: Final = ("plain", "slots")
+KINDS: Final = ("plain", "slots", "belief")
 """``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
-observation."""
+observation; ``belief``: the same, and behind the adviser's proposal what the adviser believes
+(:mod:`posse_baselines.learned.advice`), which is no part of the encoding's ``size``."""
 MOST_NEIGHBOURS: Final = 4096
 """Team-mates that an encoding reads, at most."""
 
@@ -98,7 +99,17 @@ class Encoding:
     @property
     def size(self) -> int:
         """Number of network inputs."""
-        return self.read_size + (NUM_FEATURES if self.kind == "slots" else 0)
+        return self.read_size + (NUM_FEATURES if self.with_features else 0)
+
+    @property
+    def with_features(self) -> bool:
+        """Whether derived features precede the observation."""
+        return self.kind != "plain"
+
+    @property
+    def believes(self) -> bool:
+        """Whether the network also reads the adviser's belief."""
+        return self.kind == "belief"
 
     @property
     def digest(self) -> str:

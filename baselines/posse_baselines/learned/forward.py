@@ -42,7 +42,7 @@ def act(
     offsets: npt.NDArray[np.int64],
     slots: FloatArray,
     with_features: int,
-    proposals: FloatArray,
+    further: FloatArray,
     mean: FloatArray,
     scale: FloatArray,
     limit: np.float32,
@@ -56,7 +56,10 @@ def act(
     thread: int,
     blocks: Blocks,
 ) -> None:
-    """Write the actions (E, N, 2 + m) of a thread's worlds."""
+    """Write the actions (E, N, 2 + m) of a thread's worlds.
+
+    ``further`` (E, N, k) are inputs behind those of the encoding.
+    """
     widest = 0
     for k in range(len(sizes)):
         widest = max(widest, sizes[k])
@@ -66,8 +69,8 @@ def act(
             x = scratch[thread, SCRATCH : SCRATCH + widest]
             y = scratch[thread, SCRATCH + widest :]
             encode_row(observations[e, i], columns, unknown, offsets, slots, with_features, work, x)
-            for j in range(proposals.shape[2]):
-                x[sizes[0] - proposals.shape[2] + j] = proposals[e, i, j]
+            for j in range(further.shape[2]):
+                x[sizes[0] - further.shape[2] + j] = further[e, i, j]
             for k in range(sizes[0]):
                 x[k] = min(max((x[k] - mean[k]) * scale[k], -limit), limit)
             at_weight, at_bias = 0, 0

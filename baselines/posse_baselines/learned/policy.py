@@ -12,7 +12,7 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
-from posse_baselines.learned.advice import MOTION, Adviser, advised, check_adviser
+from posse_baselines.learned.advice import MOTION, Adviser, Advising, check_adviser
 from posse_baselines.learned.card import check_card
 from posse_baselines.learned.encoder import Encoder
 from posse_baselines.learned.encoding import Encoding
@@ -34,7 +34,8 @@ from posse_baselines.policy import (
     message_size_of,
 )
 
-FORMAT: Final = 1
+FORMATS: Final = (1, 2)
+"""Formats of policy files. 2: with a correction, or a belief, that format 1 does not know."""
 
 
 class LearnedPolicy(OwnArrays, BasePolicy):
@@ -46,6 +47,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         card: Describes the policy: ``name``, ``trained_splits``, and anything else on record.
         adviser: Scripted policy whose proposals the network refines, if any
             (:mod:`posse_baselines.learned.advice`).
+        correction: What the network's output corrects: ``"motion"`` or ``"velocity"``.
 
     Attributes:
         trained_splits: Splits whose worlds it was trained on; evaluations refuse them.
@@ -60,9 +62,15 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         encoding: Encoding,
         card: Mapping[str, Any],
         adviser: Adviser | None = None,
+        correction: str = "motion",
     ) -> None:
         network.check()
-        size = encoding.size + (0 if adviser is None else MOTION)
+        if adviser is None and encoding.believes:
+            raise PolicyError("a policy that reads an adviser's belief needs an adviser")
+        self._advising = (
+            None if adviser is None else Advising(adviser, correction, believes=encoding.believes)
+        )
+        size = encoding.size + (0 if self._advising is None else self._advising.inputs)
         if network.sizes[0] != size:
             raise PolicyError(
                 f"the network takes {network.sizes[0]} numbers, its encoding gives {size}"
@@ -117,20 +125,22 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         trackers = observations.shape[1]
         actions = np.empty((num_worlds, trackers, MOTION + message_size_of(layout)), np.float32)
         scratch = np.empty((MOST_THREADS, SCRATCH + 2 * max(self.network.sizes)), np.float32)
-        proposals = actions[..., :0]
-        if self.adviser is not None:
-            proposals, adviser_memory = self.adviser.act(observations, adviser_memory)
+        proposals = inputs = actions[..., :0]
+        if self._advising is not None:
+            proposals, inputs, adviser_memory = self._advising.ask(observations, adviser_memory)
         over_worlds(
             act,
             (
-                observations, *encoder.tables, np.ascontiguousarray(proposals[..., :MOTION]),
+                observations, *encoder.tables, np.ascontiguousarray(inputs),
                 *self._numbers, scratch, actions,
             ),
             num_worlds,
             trackers,
         )  # fmt: skip
-        if self.adviser is not None:
-            actions = advised(proposals, actions[..., :MOTION])
+        if self._advising is not None:
+            actions, adviser_memory = self._advising.answer(
+                observations, proposals, actions[..., :MOTION], adviser_memory
+            )
         return actions, (layout, num_worlds, encoder, adviser_memory)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -152,8 +162,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         Raises:
             OSError: A file could not be written; an old one of that name is unchanged.
         """
+        correction = "motion" if self._advising is None else self._advising.correction
+        old = correction == "motion" and not self.encoding.believes
         description = {
-            "format": FORMAT,
+            "format": FORMATS[0] if old else FORMATS[-1],
             "limit": self.network.limit,
             "activation": self.network.activation,
             "output": self.network.output,
@@ -161,6 +173,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
         }
+        if not old:
+            description["correction"] = correction
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), description)
         card = json.dumps(self.card, indent=2, sort_keys=True) + "\n"
@@ -186,10 +200,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     def _from_parts(
         cls, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]
     ) -> LearnedPolicy:
-        if description["format"] != FORMAT:
+        if description["format"] not in FORMATS:
             raise PolicyError(
-                f"its format is {description['format']!r:.80}, this version reads {FORMAT}: "
-                "install the version that wrote it"
+                f"its format is {description['format']!r:.80}, this version reads "
+                f"{' and '.join(map(str, FORMATS))}: install the version that wrote it"
             )
         count = sum(name.endswith(".weight") for name in tensors)
         network = Network(
@@ -202,7 +216,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             output=str(description["output"]),
         )
         encoding = Encoding.from_dict(description["encoding"])
-        return cls(network, encoding, description["card"], _adviser(description.get("adviser")))
+        return cls(
+            network, encoding, description["card"], _adviser(description.get("adviser")),
+            str(description.get("correction", "motion")),
+        )  # fmt: skip
 
 
 def _adviser(name: str | None) -> Adviser | None:

@@ -6,21 +6,34 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.learned import policy_for
 
 import posse
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_baselines.learned.advice import Advice, advised, check_adviser
+from posse_baselines.learned.advice import (
+    Advice,
+    Advising,
+    BelievingAdviser,
+    advised,
+    check_adviser,
+)
 from posse_baselines.playing import play
 
 DDCS = "ddcs-distributed"
 SAID = load(DDCS).message_size
 
 
-def listener(layout: posse.ObservationLayout, answer: tuple[float, float]) -> LearnedPolicy:
+def listener(
+    layout: posse.ObservationLayout,
+    answer: tuple[float, float],
+    correction: str = "motion",
+    kind: str = "slots",
+) -> LearnedPolicy:
     """Return a policy whose network has a constant output."""
-    encoding = Encoding.of(layout, "slots")
-    size = encoding.size + 2
+    encoding = Encoding.of(layout, kind)
+    adviser = check_adviser(DDCS, load(DDCS))
+    size = encoding.size + Advising(adviser, correction, believes=encoding.believes).inputs
     network = Network(
         mean=np.zeros(size, np.float32),
         scale=np.ones(size, np.float32),
@@ -30,15 +43,21 @@ def listener(layout: posse.ObservationLayout, answer: tuple[float, float]) -> Le
         activation="tanh",
         output="clip",
     )
-    return LearnedPolicy(network, encoding, {"name": "mine"}, check_adviser(DDCS, load(DDCS)))
+    return LearnedPolicy(network, encoding, {"name": "mine"}, adviser, correction)
 
 
 def worlds(count: int = 6, first: int = 0) -> posse.Batch:
     return posse.batch("field", count, message_size=SAID, first_world=first, horizon=80)
 
 
-def test_an_answer_of_zero_is_the_adviser_itself() -> None:
-    mine = play(worlds(), listener(worlds().layout, (0.0, 0.0)), seed=3)
+KINDS = pytest.mark.parametrize(
+    ("correction", "kind"), [("motion", "slots"), ("velocity", "plain"), ("velocity", "belief")]
+)
+
+
+@KINDS
+def test_an_answer_of_zero_is_the_adviser_itself(correction: str, kind: str) -> None:
+    mine = play(worlds(), listener(worlds().layout, (0.0, 0.0), correction, kind), seed=3)
     ddcs = play(worlds(), load(DDCS), seed=3)
     for name, values in ddcs.items():
         np.testing.assert_array_equal(mine[name], values, err_msg=name)
@@ -52,8 +71,35 @@ def test_an_answer_reaches_from_one_end_to_the_other_and_leaves_the_message() ->
     np.testing.assert_array_equal(proposals[0], np.array([-1.0, 1.0, 0.3], np.float32))
 
 
-def test_a_file_keeps_the_adviser(tmp_path: Path) -> None:
-    policy = listener(worlds().layout, (0.1, -0.2))
+def test_the_safeguard_comes_after_a_corrected_velocity() -> None:
+    def contacts(correction: str) -> float:
+        policy = listener(worlds().layout, (0.3, 0.0), correction)
+        return 1.0 - float(play(worlds(40), policy, seed=3)["contact_free"].mean())
+
+    # Always faster, come what may: without the safeguard, most teams touch something.
+    assert contacts("velocity") < 0.5 * contacts("motion")
+
+
+def test_a_velocity_is_corrected_in_the_trackers_own_directions() -> None:
+    batch = posse.batch("smart", 8, message_size=SAID)
+    ddcs = load(DDCS)
+    assert isinstance(ddcs, BelievingAdviser)
+    observations = batch.reset(seed=1)
+    proposals, memory = ddcs.propose(observations, ddcs.begin(batch.layout, 8))
+    halt, _ = ddcs.carry_out(observations, memory, -proposals)
+    np.testing.assert_array_equal(halt[..., 0], -1.0)
+    proposals, memory = ddcs.propose(observations, ddcs.begin(batch.layout, 8))
+    ahead = np.zeros_like(proposals)
+    ahead[..., 0] = 1.0
+    straight, _ = ddcs.carry_out(observations, memory, ahead - proposals)
+    # The safeguard has to do with two trackers that start near each other, and no others.
+    alone = (straight[..., 0] > 1.0 - 1e-6) & (np.abs(straight[..., 1]) < 1e-5)
+    assert alone.mean() > 0.9
+
+
+@KINDS
+def test_a_file_keeps_the_adviser(tmp_path: Path, correction: str, kind: str) -> None:
+    policy = listener(worlds().layout, (0.1, -0.2), correction, kind)
     policy.save(tmp_path / "mine.safetensors")
     again = LearnedPolicy.from_file(tmp_path / "mine.safetensors")
     assert again.adviser is not None
@@ -63,18 +109,20 @@ def test_a_file_keeps_the_adviser(tmp_path: Path) -> None:
     np.testing.assert_array_equal(first["score"], second["score"])
 
 
-def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was() -> None:
+@pytest.mark.parametrize(("correction", "believes"), [("motion", False), ("velocity", True)])
+def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was(
+    correction: str, believes: bool
+) -> None:
     rng = np.random.default_rng(0)
     batch, alone = worlds(4), worlds(1, first=2)
-    policy = check_adviser(DDCS, load(DDCS))
-    advice, other = Advice(policy, batch), Advice(policy, alone)
+    advising = Advising(check_adviser(DDCS, load(DDCS)), correction, believes=believes)
+    advice, other = Advice(advising, batch), Advice(advising, alone)
     advice.restart(batch.reset(seed=5), np.ones(4, np.bool_))
     other.restart(alone.reset(seed=5), np.ones(1, np.bool_))
     for step in range(40):
-        np.testing.assert_array_equal(advice.proposals[2], other.proposals[0])
+        np.testing.assert_array_equal(advice.inputs[2], other.inputs[0])
         answers = rng.uniform(-0.2, 0.2, (4, 5, 2)).astype(np.float32)
-        actions = advised(advice.proposals, answers)
-        alone_actions = advised(other.proposals, answers[2:3])
+        actions, alone_actions = advice.actions(answers), other.actions(answers[2:3])
         advice.follow(batch.step(actions)[0])
         other.follow(alone.step(alone_actions)[0])
         if step % 3 == 0:
@@ -93,6 +141,17 @@ def test_who_cannot_advise() -> None:
     mute: Policy = Mute()  # type: ignore[assignment]
     with pytest.raises(PolicyError, match="arrays"):
         check_adviser("mute", mute)
+    pursuit = load("pursuit")
+    check_adviser("pursuit", pursuit)
+    with pytest.raises(PolicyError, match="propose and carry_out"):
+        check_adviser("pursuit", pursuit, "velocity")
+    with pytest.raises(PolicyError, match="offers no belief"):
+        check_adviser("pursuit", pursuit, believes=True)
+    with pytest.raises(PolicyError, match="motion, velocity"):
+        check_adviser("pursuit", pursuit, "speed")
+    layout = worlds().layout
+    with pytest.raises(PolicyError, match="needs an adviser"):
+        policy_for(layout, "belief")
 
 
 def test_a_file_that_listens_to_unknown_code_is_refused(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ FIELD = ["speed", 1, "m/s", 0.0, False]
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"format": 2}, "its format is 2"),
+        ({"format": 3}, "its format is 3"),
         ({"format": None}, "its format is None"),
         ({"limit": "wide"}, "damaged"),
         ({"limit": 1e300}, "limit=1e\\+300"),

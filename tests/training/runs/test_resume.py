@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.runs import ADVISED, ALGORITHMS, assert_equal, numbers, quiet, small
+from tests.support.runs import ADVISED, ALGORITHMS, BELIEVING, assert_equal, numbers, quiet, small
 
 from posse_training.runs import TrainSettings, checkpoint
 from posse_training.runs import callback as module
@@ -21,7 +21,8 @@ from posse_training.runs.train import resume, train
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "changes"), [*((name, {}) for name in ALGORITHMS), ("mappo", ADVISED)]
+    ("algorithm", "changes"),
+    [*((name, {}) for name in ALGORITHMS), ("mappo", ADVISED), ("ppo", BELIEVING)],
 )
 def test_a_training_that_was_cut_ends_where_it_would_have(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str, changes: dict[str, Any]

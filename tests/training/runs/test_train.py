@@ -6,12 +6,13 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
-from tests.support.runs import ADVISED, ALGORITHMS, assert_equal, numbers, quiet, small
+from tests.support.runs import ADVISED, ALGORITHMS, BELIEVING, assert_equal, numbers, quiet, small
 
 from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
@@ -32,18 +33,23 @@ def test_two_trainings_from_one_seed_agree_exactly(tmp_path: Path, algorithm: st
     assert not np.array_equal(mine["layers.0.weight"], other["layers.0.weight"])
 
 
-def test_an_advised_training_exports_what_it_played(tmp_path: Path) -> None:
-    file = train(small(tmp_path / "run", **ADVISED), console=quiet())
+@pytest.mark.parametrize("changes", [ADVISED, BELIEVING])
+def test_an_advised_training_exports_what_it_played(
+    tmp_path: Path, changes: dict[str, Any]
+) -> None:
+    file = train(small(tmp_path / "run", **changes), console=quiet())
     policy = load(file)
     assert isinstance(policy, LearnedPolicy)
     assert policy.adviser is not None
-    scenario = small(tmp_path, **ADVISED).scenarios[0]
-    again = evaluate(policy, scenario, 3, 0, split="validation", progress=False)["score"].mean()
-    assert again == pytest.approx(policy.card["validation_score"], abs=1e-12)
+    scenario = small(tmp_path, **changes).scenarios[0]
+    results = evaluate(policy, scenario, 3, 0, split="validation", progress=False)
+    for name in ("safe_score", "score", "contact_free"):
+        assert results[name].mean() == pytest.approx(policy.card[f"validation_{name}"], abs=1e-12)
+    again = results["safe_score"].mean()
     with (file.parent / "curve.csv").open(newline="") as lines:
         curve = list(csv.DictReader(lines))
     assert float(curve[0]["steps"]) == 0, "what it begins with is scored, too"
-    assert again == pytest.approx(max(float(row["score"]) for row in curve), abs=1e-12)
+    assert again == pytest.approx(max(float(row["safe_score"]) for row in curve), abs=1e-12)
     with pytest.raises(SettingsError, match="neither imitate nor message_size"):
         small(tmp_path, advise="ddcs-distributed", message_size=1)
 
@@ -59,7 +65,7 @@ def test_the_card_says_what_it_is(tmp_path: Path) -> None:
     assert card["encoding_hash"] == policy.encoding.digest
     curve = json.loads((tmp_path / "last.json").read_text())["curve"]
     assert [point["steps"] for point in curve] == [640, 1280]
-    assert card["validation_score"] == max(p["score"] for p in curve)
+    assert card["validation_safe_score"] == max(p["safe_score"] for p in curve)
     table = (tmp_path / "curve.csv").read_text().splitlines()
     assert len(table) == 3
 
@@ -69,11 +75,20 @@ def test_the_best_policy_is_kept_not_the_last(
 ) -> None:
     scores = iter([0.2, 0.9, 0.4])
     monkeypatch.setattr(
-        module, "validate", lambda *_: {"score": next(scores), "low": 0.0, "high": 1.0}
+        module,
+        "validate",
+        # The score alone would choose the first.
+        lambda *_: {
+            "safe_score": (safe := next(scores)),
+            "low": 0.0,
+            "high": 1.0,
+            "score": 1 - safe,
+            "contact_free": 1.0,
+        },
     )
     best = train(small(tmp_path, steps=1920), console=quiet())
     assert LearnedPolicy.from_file(best).card["steps"] == 1280
-    assert LearnedPolicy.from_file(best).card["validation_score"] == 0.9
+    assert LearnedPolicy.from_file(best).card["validation_safe_score"] == 0.9
 
 
 def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(

@@ -59,13 +59,15 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(
             evaluate(
                 str(run / "best.safetensors"), "constant", 10, CHOICE_SEED, split="validation",
                 progress=False, num_trackers=size, horizon=40, settle_time=1.0,
-            )["score"].mean()
+            )["safe_score"].mean()
             for size in (2, 3)
         ) / 2
         for run in runs
     ]  # fmt: skip
-    recorded = [run["score"]["value"] for run in shipped.card["training_seeds"]]
+    recorded = [run["safe_score"]["value"] for run in shipped.card["training_seeds"]]
     assert recorded == pytest.approx(scores)
+    assert shipped.card["validation_safe_score"] == pytest.approx(max(scores))
+    assert {"score", "contact_free"} <= set(shipped.card["training_seeds"][0])
     best = max(range(3), key=lambda k: scores[k])
     assert [run["seed"] for run in shipped.card["training_seeds"]] == [1, 2, 3]
     assert shipped.card["seed"] == best + 1

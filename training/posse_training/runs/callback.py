@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +14,7 @@ from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy_file import write_atomically
 from posse_training.errors import CheckpointError
 from posse_training.runs.checkpoint import Arrays, write_checkpoint
+from posse_training.runs.curve import Point, as_csv, best_of, read_points
 from posse_training.runs.display import Display
 from posse_training.runs.export import export, make_card
 from posse_training.runs.folder import BEST, CURVE, LAST
@@ -28,10 +27,10 @@ from posse_training.runs.model_state import (
 from posse_training.runs.models import make_adviser
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.validation import validate
+from posse_training.sb3.contact_bound import ContactBound
 from posse_training.sb3.normalisation import RunningStatistics
 from posse_training.sb3.vec_env import TeamVecEnv
 
-_POINT: Final = ("steps", "seconds", "score", "low", "high")  # of the curve
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 
 
@@ -49,7 +48,8 @@ class TrainingCallback(BaseCallback):
         display: Shows progress.
 
     Attributes:
-        curve: One point for each evaluation: steps, seconds, score and its interval.
+        curve: One point for each evaluation.
+        bound: The bound on contact, if there is one.
     """
 
     def __init__(
@@ -68,7 +68,10 @@ class TrainingCallback(BaseCallback):
         self.model = model
         self.statistics = statistics
         self.display = display
-        self.curve: list[dict[str, float]] = []
+        self.curve: list[Point] = []
+        share = settings.contact_bound
+        self.bound = None if share is None else ContactBound(share)
+        self._price()
         self._seconds_before = 0.0
         self._started = time.monotonic()
         # A copy or an adviser may already be better than what a short run makes of it.
@@ -76,6 +79,11 @@ class TrainingCallback(BaseCallback):
         self._next_evaluation = 0 if warm else settings.evaluate_every
         self._next_checkpoint = 0
         self._rollouts = 0
+
+    def _price(self) -> None:
+        """Have contacts cost what the bound's multiplier says."""
+        if self.bound is not None:
+            self.env.set_contact_cost(self.bound.multiplier)
 
     def _on_step(self) -> bool:
         return True
@@ -87,6 +95,12 @@ class TrainingCallback(BaseCallback):
         elif self._rollouts % _STATISTICS_EVERY == 0:
             self.statistics.add(np.asarray(self.model._last_obs))
         self._rollouts += 1
+        first, episodes = self.env.take_contacts()
+        if self.bound is not None:
+            self.bound.update(first, episodes)
+            self._price()
+            self.model.logger.record("contact/share", self.bound.share)
+            self.model.logger.record("contact/multiplier", self.bound.multiplier)
 
     def _on_rollout_start(self) -> None:
         if self.settings.on_policy or self._rollouts % 100 == 0:
@@ -99,7 +113,10 @@ class TrainingCallback(BaseCallback):
         if steps >= self._next_checkpoint:
             self._next_checkpoint = steps + self.settings.checkpoint_every
             self._checkpoint()
-        self.display.progress(steps, self._training_score())
+        self._show_progress()
+
+    def _show_progress(self) -> None:
+        self.display.progress(self.model.num_timesteps, self._training_score(), self.bound)
 
     def _training_score(self) -> float | None:
         episodes = self.model.ep_info_buffer or ()
@@ -109,7 +126,8 @@ class TrainingCallback(BaseCallback):
         card = make_card(
             self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.curve
         )
-        return export(self.model, self.env.encoding, card, make_adviser(self.settings))
+        adviser = make_adviser(self.settings)
+        return export(self.model, self.env.encoding, card, adviser, self.settings.correction)
 
     def _seconds(self) -> float:
         return self._seconds_before + time.monotonic() - self._started
@@ -121,21 +139,20 @@ class TrainingCallback(BaseCallback):
             "seconds": self._seconds(),
             **validate(self.settings, self._policy()),
         }
-        best = max((p["score"] for p in self.curve), default=-1.0)
+        best = best_of(self.curve)
         self.curve.append(point)
-        self._write(BEST if point["score"] > best else None)
-        self.model.logger.record("validation/score", point["score"])
-        self.display.progress(self.model.num_timesteps, self._training_score())
+        self._write(BEST if best is None or point["safe_score"] > best else None)
+        for name in ("safe_score", "score", "contact_free"):
+            self.model.logger.record(f"validation/{name}", point[name])
+        # Now, so that they are logged at the step that they belong to.
+        self.model.logger.dump(self.model.num_timesteps)
+        self._show_progress()
         self.display.evaluated(point)
 
     def _write(self, name: str | None) -> None:
         """Write the curve, and the policy under a name if there is one."""
-        text = io.StringIO()
-        writer = csv.DictWriter(text, _POINT)
-        writer.writeheader()
-        writer.writerows(self.curve)
         try:
-            write_atomically(self.folder / CURVE, text.getvalue().encode())
+            write_atomically(self.folder / CURVE, as_csv(self.curve))
             if name is not None:
                 self._policy().save(self.folder / name)
         except OSError as error:
@@ -152,6 +169,7 @@ class TrainingCallback(BaseCallback):
             "next_evaluation": self._next_evaluation,
             "next_checkpoint": self._next_checkpoint,
             "rollouts": self._rollouts,
+            "contact_bound": None if self.bound is None else self.bound.save(),
         }
         for name, (part, values) in {
             "model": model_state(self.model),
@@ -179,11 +197,14 @@ class TrainingCallback(BaseCallback):
             self.statistics.restore(part("statistics"))
             restore_model(self.model, part("model"), state["model"])
             restore_random_state(part("random"), state["random"])
-            self.curve = [{name: float(point[name]) for name in _POINT} for point in state["curve"]]
+            self.curve = read_points(state["curve"])
             self._seconds_before = float(state["seconds"])
             self._next_evaluation = int(state["next_evaluation"])
             self._next_checkpoint = int(state["next_checkpoint"])
             self._rollouts = int(state["rollouts"])
+            if self.bound is not None:
+                self.bound.restore(state["contact_bound"])
+                self._price()
         except Exception as error:  # whatever a state of other settings, or a forged one, raises
             raise CheckpointError(
                 f"the checkpoint in {self.folder} does not fit its settings: {error!s:.300}. "

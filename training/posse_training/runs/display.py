@@ -12,7 +12,9 @@ from rich.table import Table
 from rich.text import Text
 
 from posse_training.live_display import LiveDisplay
+from posse_training.runs.curve import Point
 from posse_training.runs.settings import TrainSettings
+from posse_training.sb3.contact_bound import ContactBound
 
 _BARS: Final = "▁▂▃▄▅▆▇█"
 _WIDTH: Final = 40
@@ -33,10 +35,11 @@ class Display(LiveDisplay):
         self._from_steps = 0
         self._steps = 0
         self._training_score: float | None = None
-        self._curve: list[dict[str, float]] = []
+        self._bound: ContactBound | None = None
+        self._curve: list[Point] = []
         self._beside: float | None = None
 
-    def begin(self, steps: int, curve: list[dict[str, float]]) -> None:
+    def begin(self, steps: int, curve: list[Point]) -> None:
         """Start the clock: training begins, or resumes after ``steps`` steps."""
         self._started = time.monotonic()
         self._from_steps = self._steps = steps
@@ -44,27 +47,33 @@ class Display(LiveDisplay):
         self._note = ""
 
     def beside(self, score: float | None) -> None:
-        """Show the score of ``settings.beside`` on the same worlds."""
+        """Show the safe score of ``settings.beside`` on the same worlds."""
         self._beside = score
 
-    def progress(self, steps: int, training_score: float | None) -> None:
-        """Show the steps made, and the mean score of the latest training episodes."""
+    def progress(
+        self, steps: int, training_score: float | None, bound: ContactBound | None = None
+    ) -> None:
+        """Show the steps made, the mean score of the latest training episodes, and contacts."""
         self._steps = steps
         self._training_score = training_score
+        self._bound = bound
 
-    def evaluated(self, point: dict[str, float]) -> None:
-        """Show a score on validation worlds."""
+    def evaluated(self, point: Point) -> None:
+        """Show results on validation worlds."""
         self._curve.append(point)
         if self._live is None:
             self._console.print(self._line(point), markup=False)
 
-    def _line(self, point: dict[str, float]) -> str:
+    def _line(self, point: Point) -> str:
         line = (
-            f"{int(point['steps']):>12,} steps  score {point['score']:.3f} "
-            f"[{point['low']:.3f}, {point['high']:.3f}]"
+            f"{int(point['steps']):>12,} steps  safe score {point['safe_score']:.3f} "
+            f"[{point['low']:.3f}, {point['high']:.3f}]  score {point['score']:.3f}  "
+            f"contact-free {point['contact_free']:.2f}"
         )
         if self._beside is not None:
             line += f"  ({self._settings.beside} {self._beside:.3f})"
+        if self._bound is not None and self._bound.share is not None:
+            line += f"  {_bound_text(self._bound)}"
         rate = self.rate
         return line + (f"  {rate:,.0f} steps/s, {_clock(self.time_left)} left" if rate else "")
 
@@ -93,13 +102,17 @@ class Display(LiveDisplay):
         table.add_row("", ProgressBar(total=s.steps, completed=self._steps, width=_WIDTH))
         if self._training_score is not None:
             table.add_row("training score", f"{self._training_score:.3f}")
+        if self._bound is not None and self._bound.share is not None:
+            table.add_row("training", _bound_text(self._bound))
         if self._curve:
-            last, best = self._curve[-1], max(p["score"] for p in self._curve)
+            last, best = self._curve[-1], max(p["safe_score"] for p in self._curve)
             table.add_row(
-                "validation score",
-                f"{last['score']:.3f} [{last['low']:.3f}, {last['high']:.3f}]   best {best:.3f}",
+                "safe score",
+                f"{last['safe_score']:.3f} [{last['low']:.3f}, {last['high']:.3f}]   "
+                f"best {best:.3f}   on validation worlds",
             )
-            scores = [p["score"] for p in self._curve[-_WIDTH:]]
+            table.add_row("score", f"{last['score']:.3f}   contact-free {last['contact_free']:.2f}")
+            scores = [p["safe_score"] for p in self._curve[-_WIDTH:]]
             table.add_row("", Text(sparkline(scores, self._beside), style="cyan"))
         if s.beside is not None and self._beside is not None:
             table.add_row(Text(s.beside, style="bold"), f"{self._beside:.3f}")
@@ -113,6 +126,13 @@ def sparkline(scores: list[float], beside: float | None = None) -> str:
     """Return scores as a row of bars; full height is the best score, or ``beside`` if higher."""
     top = max([*scores, beside or 0.0, 1e-9])
     return "".join(_BARS[min(7, max(0, int(8 * score / top)))] for score in scores)
+
+
+def _bound_text(bound: ContactBound) -> str:
+    return (
+        f"contact in {bound.share or 0.0:.1%} of episodes (bound {bound.bound:.1%}, "
+        f"multiplier {bound.multiplier:.2f})"
+    )
 
 
 def _clock(seconds: float) -> str:

@@ -16,8 +16,9 @@ from torch import nn
 
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_baselines.learned.advice import MOTION, Adviser
+from posse_baselines.learned.advice import Adviser, Advising
 from posse_training.provenance import commit
+from posse_training.runs.curve import Point
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.normalisation import LIMIT, Normaliser
 from posse_training.sb3.speedups import QuickTanh
@@ -28,6 +29,7 @@ def export(
     encoding: Encoding,
     card: Mapping[str, Any],
     adviser: Adviser | None = None,
+    correction: str = "motion",
 ) -> LearnedPolicy:
     """Return a model as a policy that plays without torch.
 
@@ -39,6 +41,7 @@ def export(
         encoding: Which inputs the model reads from an observation.
         card: The policy's card.
         adviser: The policy whose proposals the model reads, if any.
+        correction: What the model's output corrects.
 
     Raises:
         TypeError: The model's networks are not plain feed-forward ones.
@@ -49,7 +52,9 @@ def export(
     names: dict[type[nn.Module], str] = {nn.Tanh: "tanh", QuickTanh: "tanh", nn.ReLU: "relu"}
     if len(between) > 1 or not between <= set(names):
         raise TypeError(f"no policy file holds layers of {sorted(t.__name__ for t in between)}")
-    inputs = encoding.size + (0 if adviser is None else MOTION)
+    inputs = encoding.size
+    if adviser is not None:
+        inputs += Advising(adviser, correction, believes=encoding.believes).inputs
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     network = Network(
         mean=_numbers(normaliser.mean)[:inputs],
@@ -60,7 +65,7 @@ def export(
         activation=names[between.pop()] if between else "relu",
         output=output,
     )
-    return LearnedPolicy(network, encoding, card, adviser)
+    return LearnedPolicy(network, encoding, card, adviser, correction)
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], str]:
@@ -87,12 +92,11 @@ def make_card(
     encoding: Encoding,
     *,
     steps: int,
-    curve: list[dict[str, float]],
+    curve: list[Point],
 ) -> dict[str, Any]:
     """Return a policy's card: its training scenarios, settings, software and scores."""
     scenarios = settings.scenarios
     kind = settings.scenario.replace(",", "+")
-    best = max(curve, key=lambda point: point["score"], default=None)
     return {
         "name": f"{kind}-{settings.algorithm}-{settings.seed}",
         "scenarios": [scenario.to_dict() for scenario in scenarios],
@@ -107,7 +111,9 @@ def make_card(
         "steps": steps,
         "commit": commit(),
         "curve": curve,
-        "validation_score": None if best is None else curve[-1]["score"],
+        "validation_safe_score": curve[-1]["safe_score"] if curve else None,
+        "validation_score": curve[-1]["score"] if curve else None,
+        "validation_contact_free": curve[-1]["contact_free"] if curve else None,
         "software": {
             "python": platform.python_version(),
             "posse": posse.__version__,

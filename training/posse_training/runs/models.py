@@ -13,7 +13,7 @@ from torch import nn
 import posse
 from posse_baselines import load
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.advice import Adviser, check_adviser
+from posse_baselines.learned.advice import Adviser, Advising, check_adviser
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.centralized_critic import CentralizedCriticPolicy
 from posse_training.sb3.normalisation import Normaliser
@@ -37,8 +37,14 @@ def make_env(settings: TrainSettings) -> TeamVecEnv:
     ]
     largest = max(batches, key=lambda batch: batch.layout.neighbours)
     encoding = Encoding.of(largest.layout, settings.encoding, settings.num_neighbours)
+    adviser = make_adviser(settings)
     return TeamVecEnv(
-        batches, encoding, adviser=make_adviser(settings), see_state=settings.algorithm == "mappo"
+        batches,
+        encoding,
+        advising=(
+            Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None
+        ),
+        see_state=settings.algorithm == "mappo",
     )
 
 
@@ -50,7 +56,12 @@ def make_adviser(settings: TrainSettings) -> Adviser | None:
     """
     if settings.advise is None:
         return None
-    return check_adviser(settings.advise, load(settings.advise))
+    return check_adviser(
+        settings.advise,
+        load(settings.advise),
+        settings.correction,
+        believes=settings.encoding == "belief",
+    )
 
 
 def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
@@ -72,7 +83,7 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
         network |= {"private_size": env.private_size, "hidden": s.hidden}
     else:
         network |= {"net_arch": list(s.hidden)}
-    return PPO(
+    model = PPO(
         CentralizedCriticPolicy if s.algorithm == "mappo" else "MlpPolicy",
         env,
         learning_rate=_LearningRate(s),
@@ -90,6 +101,11 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
         seed=s.seed,
         device="cpu",
     )
+    if s.advise is not None:
+        # The policy begins as its adviser, which small random corrections would already impair.
+        policy: Any = model.policy
+        nn.init.zeros_(policy.action_net.weight)
+    return model
 
 
 def _off_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> BaseAlgorithm:

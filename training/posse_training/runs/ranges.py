@@ -12,7 +12,8 @@ from posse_training.errors import SettingsError
 ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 _CHOICES: Final = {
     "algorithm": ALGORITHMS,
-    "encoding": ("plain", "slots"),
+    "encoding": ("plain", "slots", "belief"),
+    "correction": ("motion", "velocity"),
     "activation": ("tanh", "relu"),
 }
 _INTEGERS: Final = {
@@ -42,6 +43,7 @@ _NUMBERS: Final = {
     "value_weight": (0, 1000),
     "log_deviation": (-20, 5),
 }
+_LEAST_BOUND: Final = 0.001  # of the share of episodes with contact
 _TEXTS: Final = ("scenario", "imitate", "advise", "beside", "wandb")
 _LONGEST: Final = 4096
 _LAYERS: Final = 16
@@ -63,11 +65,9 @@ def check_ranges(settings: Any) -> None:
     if settings.num_neighbours is not None:
         _check_integer("num_neighbours", settings.num_neighbours, 0, 4096)
     for name, (low, high) in _NUMBERS.items():
-        value = getattr(settings, name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            _fail(name, value, "it must be a number")
-        if not low <= value <= high:
-            _fail(name, value, f"it must lie in [{low:g}, {high:g}]")
+        _check_number(name, getattr(settings, name), low, high)
+    if settings.contact_bound is not None:
+        _check_number("contact_bound", settings.contact_bound, _LEAST_BOUND, 1)
     for name in _TEXTS:
         value = getattr(settings, name)
         if value is None and name != "scenario":
@@ -88,6 +88,13 @@ def _check_sequence(name: str, value: Any, lengths: Collection[int], highest: in
         _fail(name, value, f"it must name {min(lengths)} to {max(lengths)} numbers")
     for number in value:
         _check_integer(name, number, 1, highest)
+
+
+def _check_number(name: str, value: Any, low: float, high: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        _fail(name, value, "it must be a number")
+    if not low <= value <= high:
+        _fail(name, value, f"it must lie in [{low:g}, {high:g}]")
 
 
 def _check_integer(name: str, value: Any, low: int, high: int) -> None:

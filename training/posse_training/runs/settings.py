@@ -54,8 +54,8 @@ class TrainSettings:
     """Weight of each reward term; default: the scenario's own."""
 
     # The networks
-    encoding: Literal["plain", "slots"] = "slots"
-    """Network inputs: the observation, or features computed from it as well."""
+    encoding: Literal["plain", "slots", "belief"] = "slots"
+    """Network inputs: the observation; with features computed from it; and the adviser's belief."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
@@ -102,7 +102,12 @@ class TrainSettings:
     """Rounds of play and fit; the copy acts in a growing share of the worlds."""
 
     advise: str | None = None
-    """Scripted policy whose proposals are network inputs, and to which the output is added."""
+    """Scripted policy whose proposals are network inputs, and which the output corrects."""
+    correction: Literal["motion", "velocity"] = "motion"
+    """The output corrects the adviser's action, or its wanted velocity before its safeguard."""
+
+    contact_bound: float | None = None
+    """Largest share of training episodes with contact: contacts cost more while it is exceeded."""
 
     # Evaluation, checkpoints and logs
     evaluate_every: int = 1_000_000
@@ -110,7 +115,7 @@ class TrainSettings:
     evaluate_worlds: int = 64
     """Validation worlds of each scenario; the best policy on them is kept."""
     beside: str | None = "ddcs-distributed"
-    """Policy whose score on the same worlds is shown for comparison."""
+    """Policy whose safe score on the same worlds is shown for comparison."""
     checkpoint_every: int = 1_000_000
     """Steps between two checkpoints: a killed run loses at most these."""
     threads: int = 1
@@ -182,9 +187,18 @@ class TrainSettings:
 
 def _check_together(s: TrainSettings) -> None:
     """Raise if settings that are valid on their own exclude each other."""
+    if s.contact_bound is not None and not s.on_policy:
+        raise SettingsError(
+            f"contact_bound={s.contact_bound} needs algorithm ppo or mappo, not {s.algorithm}: "
+            "set a weight of the reward term contact instead"
+        )
     if s.imitate is not None and not s.on_policy:
         raise SettingsError(
             f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out"
+        )
+    if s.encoding == "belief" and s.advise is None:
+        raise SettingsError(
+            "encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned"
         )
     if s.advise is not None and (s.imitate is not None or s.message_size):
         raise SettingsError(

@@ -40,27 +40,37 @@ def first_statistics(
 
 
 def score_beside(settings: TrainSettings, display: Display) -> float | None:
-    """Return the score of ``settings.beside`` on the validation worlds; ``None``: not available."""
+    """Return the safe score of ``settings.beside`` on the validation worlds; ``None``: none."""
     if settings.beside is None:
         return None
     display.note(f"evaluating {settings.beside} on the validation worlds")
     try:
-        return validate(settings, load(settings.beside))["score"]
+        return validate(settings, load(settings.beside))["safe_score"]
     except PolicyError as error:
         display.note(f"no score of {settings.beside}: {error}")
         return None
 
 
 def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
-    """Return a policy's mean score on the validation worlds, with its 95 % interval."""
-    scores = np.concatenate(
-        [
-            evaluate(
-                policy, scenario, settings.evaluate_worlds, VALIDATION_SEED,
-                split="validation", progress=False,
-            )["score"]
-            for scenario in settings.scenarios
-        ]
-    )  # fmt: skip
-    estimate = mean(scores)
-    return {"score": estimate.value, "low": estimate.low, "high": estimate.high}
+    """Return a policy's results on the validation worlds.
+
+    ``safe_score`` with its 95 % interval ``low``, ``high``; ``score``; and ``contact_free``, the
+    share of episodes.
+    """
+    results = [
+        evaluate(
+            policy, scenario, settings.evaluate_worlds, VALIDATION_SEED,
+            split="validation", progress=False,
+        )
+        for scenario in settings.scenarios
+    ]  # fmt: skip
+    safe = mean(np.concatenate([r["safe_score"] for r in results]))
+    return {
+        "safe_score": safe.value,
+        "low": safe.low,
+        "high": safe.high,
+        **{
+            name: float(np.mean(np.concatenate([r[name] for r in results])))
+            for name in ("score", "contact_free")
+        },
+    }

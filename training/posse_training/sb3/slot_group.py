@@ -10,7 +10,7 @@ import numpy.typing as npt
 from posse import Batch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.learned.advice import MOTION, Advice, Adviser, advised
+from posse_baselines.learned.advice import Advice, Advising
 from posse_training.sb3.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -23,7 +23,7 @@ class SlotGroup:
     Args:
         batch: The worlds.
         encoding: Which inputs are read from an observation.
-        adviser: Scripted policy whose proposals are appended to the observations, if any.
+        advising: Adviser whose proposals are appended to the observations, if any.
         state: Writes the state of the world behind them, if given.
         first: Number of the group's first slot.
 
@@ -31,13 +31,14 @@ class SlotGroup:
         slots: The group's slots among those of all groups.
         private_size: Numbers of an observation that are the tracker's own.
         size: Numbers of an observation, the state included.
+        contact_cost: Subtracted from a tracker's reward for each contact that it makes.
     """
 
     def __init__(
         self,
         batch: Batch,
         encoding: Encoding,
-        adviser: Adviser | None,
+        advising: Advising | None,
         state: StateWriter | None,
         first: int,
     ) -> None:
@@ -45,15 +46,18 @@ class SlotGroup:
         worlds, trackers = batch.num_worlds, batch.scenario.num_trackers
         self.slots = slice(first, first + worlds * trackers)
         self._own_size = encoding.size
-        self.private_size = encoding.size + (MOTION if adviser else 0)
+        self.private_size = encoding.size + (advising.inputs if advising else 0)
         self.size = self.private_size + (state.size if state else 0)
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
-        self._advice = Advice(adviser, batch) if adviser else None
+        self._advice = Advice(advising, batch) if advising else None
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
-        # Rewards of the present episode so far, (E, N).
+        # Rewards of the present episode so far, (E, N), without the cost of contacts.
         self._returns = np.zeros((worlds, trackers))
+        self.contact_cost = 0.0
+        self._touched = np.zeros(worlds, np.bool_)  # whether the present episode had a contact
+        self._counted = np.zeros(2, np.int64)  # first contacts, and steps of worlds
 
     def reset(self, seed: int | None, options: Any, staggered: bool, out: FloatArray) -> None:
         """Start an episode in every world; write the observations (slots, size) to ``out``.
@@ -63,6 +67,7 @@ class SlotGroup:
         """
         raw = self.batch.reset(seed=seed, options=options)
         self._returns[:] = 0
+        self._touched[:] = False
         if staggered:
             worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
             self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
@@ -82,10 +87,12 @@ class SlotGroup:
         batch = self.batch
         actions = actions.reshape(*batch.action_shape[:2], -1)
         if self._advice is not None:
-            actions = advised(self._advice.proposals, actions)
-        raw, reward, terminated, truncated, _ = batch.step(actions)
-        rewards[:] = reward.reshape(-1)
+            actions = self._advice.actions(actions)
+        raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
+        contacts = told["reward_terms"]["contact"]
+        rewards[:] = (reward - np.float32(self.contact_cost) * contacts).reshape(-1)
+        self._count(contacts)
         over = terminated | truncated
         ended = over | (batch.worlds["step"] == self._cut_at)
         if self._advice is not None:
@@ -97,15 +104,31 @@ class SlotGroup:
             if self._advice is not None:
                 self._advice.restart(raw, ended)
             self._returns[ended] = 0
+            self._touched[ended] = False
             self._cut_at[ended] = _NEVER
         self._encode(raw, observations)
+
+    def _count(self, contacts: FloatArray) -> None:
+        """Count the worlds whose episode has its first contact in this step."""
+        touching = np.asarray((contacts > 0).any(axis=1))
+        self._counted += np.array([np.sum(touching & ~self._touched), len(touching)])
+        self._touched |= touching
+
+    def take_contacts(self) -> tuple[int, float]:
+        """Return how many episodes had their first contact since the last call.
+
+        And how many whole episodes the steps since then amount to.
+        """
+        first, steps = (int(number) for number in self._counted)
+        self._counted[:] = 0
+        return first, steps / self.batch.scenario.horizon
 
     def _encode(self, raw: FloatArray, out: FloatArray, worlds: Any = _ALL) -> None:
         """Write the observations of all slots, or of those of some worlds, to ``out``."""
         self._encoder.encode(raw[worlds], out[:, : self._own_size])
         if self._advice is not None:
-            proposals = self._advice.proposals[worlds, :, :MOTION].reshape(-1, MOTION)
-            out[:, self._own_size : self.private_size] = proposals
+            further = self._advice.inputs[worlds]
+            out[:, self._own_size : self.private_size] = further.reshape(-1, further.shape[-1])
         if self._state is not None:
             self._state.write(out[:, self.private_size :], worlds)
 
@@ -142,7 +165,12 @@ class SlotGroup:
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return every array by name; views, not copies, without padding between fields."""
-        own = {"cut_at": self._cut_at, "returns": self._returns}
+        own = {
+            "cut_at": self._cut_at,
+            "returns": self._returns,
+            "touched": self._touched,
+            "counted": self._counted,
+        }
         memory = self._advice.arrays() if self._advice is not None else {}
         advice = {f"advice.{name}": array for name, array in memory.items()}
         return {**self.batch.arrays.by_name(), **advice, **own}

@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 from posse import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.advice import MOTION, Adviser
+from posse_baselines.learned.advice import MOTION, Advising
 from posse_training.sb3.slot_group import SlotGroup
 from posse_training.sb3.world_state import StateWriter
 
@@ -38,8 +38,8 @@ class TeamVecEnv(VecEnv):
         batches: Batches of worlds, made with ``autoreset="disabled"`` and equal ``message_size``;
             team sizes may differ.
         encoding: Which inputs are read from an observation.
-        adviser: Scripted policy whose proposals are appended to the observations and to which the
-            actions (2,) are added (:mod:`posse_baselines.learned.advice`).
+        advising: Adviser whose proposals are appended to the observations, and corrected by the
+            actions (2,) (:mod:`posse_baselines.learned.advice`).
         see_state: Append the state of the world, for a centralized critic
             (:mod:`posse_training.sb3.world_state`).
         staggered: Shorten the first episodes.
@@ -58,11 +58,11 @@ class TeamVecEnv(VecEnv):
         batches: Sequence[Batch],
         encoding: Encoding,
         *,
-        adviser: Adviser | None = None,
+        advising: Advising | None = None,
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
-        lengths = _check(batches, adviser)
+        lengths = _check(batches, advising)
         self.encoding = encoding
         self.staggered = staggered
         places = max(batch.scenario.num_trackers for batch in batches)
@@ -71,7 +71,7 @@ class TeamVecEnv(VecEnv):
         slots = 0
         for batch in batches:
             state = StateWriter(batch, places, obstacles) if see_state else None
-            group = SlotGroup(batch, encoding, adviser, state, slots)
+            group = SlotGroup(batch, encoding, advising, state, slots)
             self._groups.append(group)
             slots = group.slots.stop
         self.private_size = self._groups[0].private_size
@@ -137,6 +137,19 @@ class TeamVecEnv(VecEnv):
             mine = infos[s]
             group.step(self._actions[s], observations[s], rewards[s], dones[s], mine)
         return observations, rewards, dones, infos
+
+    def set_contact_cost(self, cost: float) -> None:
+        """Set what each contact subtracts from the reward of the tracker that makes it."""
+        for group in self._groups:
+            group.contact_cost = cost
+
+    def take_contacts(self) -> tuple[int, float]:
+        """Return how many episodes had their first contact since the last call.
+
+        And how many whole episodes the steps since then amount to.
+        """
+        counts = [group.take_contacts() for group in self._groups]
+        return sum(first for first, _ in counts), sum(episodes for _, episodes in counts)
 
     def save(self) -> dict[str, npt.NDArray[Any]]:
         """Return the complete state of the vector as arrays by name."""
@@ -220,7 +233,7 @@ class TeamVecEnv(VecEnv):
         return [owners[slot] for slot in self._get_indices(indices)]
 
 
-def _check(batches: Sequence[Batch], adviser: Adviser | None) -> set[int]:
+def _check(batches: Sequence[Batch], advising: Advising | None) -> set[int]:
     """Return the length of an action, as a set of one."""
     if not batches:
         raise ValueError("no batches given: a vector of slots needs at least one")
@@ -234,7 +247,7 @@ def _check(batches: Sequence[Batch], adviser: Adviser | None) -> set[int]:
             raise ValueError(
                 f"the target of {batch.scenario.name!r} is an agent; one policy drives trackers"
             )
-    lengths = {MOTION} if adviser else {batch.action_shape[2] for batch in batches}
+    lengths = {MOTION} if advising else {batch.action_shape[2] for batch in batches}
     if len(lengths) > 1:
         raise ValueError(f"batches have actions of different lengths: {sorted(lengths)}")
     return lengths

@@ -22,6 +22,7 @@ from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import LEARNED, SHIPPED
 from posse_training.errors import SettingsError
 from posse_training.reports.evaluation import evaluate
+from posse_training.reports.results import Column
 from posse_training.reports.statistics import mean
 from posse_training.runs.command import command_of
 from posse_training.runs.settings import TrainSettings, read_settings
@@ -31,6 +32,8 @@ CHOICE_SEED: Final = 1  # seed 0 is evaluated during training
 LARGEST: Final = 1_000_000
 """Largest size of a shipped file, bytes."""
 
+_JUDGED: Final = ("safe_score", "score", "contact_free")
+"""The first one decides; the others are stated beside it."""
 _MAY_DIFFER: Final = {
     "seed", "folder", "steps", "evaluate_every", "evaluate_worlds", "beside", "checkpoint_every",
     "threads", "tensorboard", "wandb",
@@ -64,16 +67,8 @@ def ship(settings: Settings) -> Path:
         raise SettingsError(f"name={settings.name!r} must begin with {LEARNED!r}")
     trained = _one_training(settings.runs)
     policies = [LearnedPolicy.from_file(run / "best.safetensors") for run in settings.runs]
-    scores = [
-        np.concatenate(
-            [
-                evaluate(policy, scenario, settings.worlds, CHOICE_SEED, split=SPLIT)["score"]
-                for scenario in trained[0].scenarios
-            ]
-        )
-        for policy in policies
-    ]
-    best = int(np.argmax([score.mean() for score in scores]))
+    plays = [_play(policy, trained[0], settings.worlds) for policy in policies]
+    best = int(np.argmax([play["safe_score"].mean() for play in plays]))
     card = {
         **policies[best].card,
         "name": settings.name,
@@ -86,18 +81,24 @@ def ship(settings: Settings) -> Path:
                 "steps": policy.card.get("steps"),
                 "commit": policy.card.get("commit"),
                 "command": command_of(run),
-                "score": mean(score).to_dict(),
+                **{name: mean(play[name]).to_dict() for name in _JUDGED},
             }
-            for run, policy, score in zip(trained, policies, scores, strict=True)
+            for run, policy, play in zip(trained, policies, plays, strict=True)
         ],
         "choice": {"split": SPLIT, "seed": CHOICE_SEED, "worlds": settings.worlds},
-        "validation_score": float(scores[best].mean()),
+        **{f"validation_{name}": float(plays[best][name].mean()) for name in _JUDGED},
         "curve": _curve(settings.runs[best]),
     }
     card["check"] = make_check(policies[best], trained[0].scenarios)
     path = settings.out / f"{settings.name}.safetensors"
     _save(policies[best].with_card(card), path)
     return path
+
+
+def _play(policy: LearnedPolicy, run: TrainSettings, worlds: int) -> dict[str, Column]:
+    """Return the results of a policy over all scenarios of a run, by name."""
+    results = [evaluate(policy, s, worlds, CHOICE_SEED, split=SPLIT) for s in run.scenarios]
+    return {name: np.concatenate([r[name] for r in results]) for name in _JUDGED}
 
 
 def _save(policy: LearnedPolicy, path: Path) -> None:
@@ -165,10 +166,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     path = ship(settings)
     policy = LearnedPolicy.from_file(path)
     for run in policy.card["training_seeds"]:
-        score = run["score"]
+        score = run["safe_score"]
         console.print(
-            f"training seed {run['seed']}: {score['value']:.3f} "
-            f"[{score['low']:.3f}, {score['high']:.3f}] on {score['count']:,} validation worlds"
+            f"training seed {run['seed']}: safe score {score['value']:.3f} "
+            f"[{score['low']:.3f}, {score['high']:.3f}], score {run['score']['value']:.3f}, "
+            f"contact-free {run['contact_free']['value']:.3f} "
+            f"on {score['count']:,} validation worlds"
         )
     console.print(
         f"{path} ({path.stat().st_size:,} bytes) holds training seed {policy.card['seed']}"
