@@ -18,10 +18,10 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test recipes fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce tune clean
+.PHONY: help demo test recipes fuzz lint format docs bench bench-costs bench-training bench-peers results reproduce tune train-shipped clean
 
 help: ## List these commands
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(BASE) ## Show teams in action; installs only the base packages, without torch
 	$(BIN)/posse demo
@@ -71,6 +71,9 @@ reproduce: $(FULL) ## Reproduce the paper's experiments
 
 tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted, it resumes
 	$(BIN)/python -m posse_training.tuning.again
+
+train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
+	$(BIN)/python -m posse_training.shipping.train_all $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

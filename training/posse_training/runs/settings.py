@@ -114,7 +114,7 @@ class TrainSettings:
     """Steps between two evaluations on validation worlds."""
     evaluate_worlds: int = 64
     """Validation worlds of each scenario; the best policy on them is kept."""
-    beside: str | None = "ddcs-distributed"
+    beside: str | None = "ddcs-tuned"
     """Policy whose safe score on the same worlds is shown for comparison."""
     checkpoint_every: int = 1_000_000
     """Steps between two checkpoints: a killed run loses at most these."""
