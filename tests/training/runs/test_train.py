@@ -14,13 +14,14 @@ import torch
 from stable_baselines3 import PPO
 from tests.support.runs import ADVISED, ALGORITHMS, BELIEVING, assert_equal, numbers, quiet, small
 
-from posse_baselines import load
+from posse_baselines import PolicyError, load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.errors import DivergedError, SettingsError
 from posse_training.reports import evaluate
 from posse_training.runs import callback as module
+from posse_training.runs.checkpoint import read_checkpoint
 from posse_training.runs.models import even_minibatch, make_env, make_model
-from posse_training.runs.train import steps_made, train
+from posse_training.runs.train import resume, steps_made, train
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -120,5 +121,50 @@ def test_a_training_that_diverges_says_so(tmp_path: Path, monkeypatch: pytest.Mo
                 parameter.fill_(float("nan"))
 
     monkeypatch.setattr(PPO, "train", diverge)
-    with pytest.raises(DivergedError, match=r"diverged at \d+ steps.*Lower --learning-rate"):
+    with pytest.raises(DivergedError, match=r"diverged at 160 steps.*Lower --learning-rate"):
         train(small(tmp_path / "run"), console=quiet())
+
+
+def test_what_was_good_before_a_divergence_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = PPO.train
+
+    def diverge(self: PPO) -> None:
+        usual(self)
+        if self.num_timesteps > 800:
+            with torch.no_grad():
+                next(self.policy.parameters()).fill_(float("inf"))
+
+    monkeypatch.setattr(PPO, "train", diverge)
+    with pytest.raises(DivergedError, match=r"the checkpoint at 640 steps is kept, and best"):
+        train(small(tmp_path / "run", steps=2560), console=quiet())
+    monkeypatch.undo()
+    assert read_checkpoint(tmp_path / "run")[1]["model"]["num_timesteps"] == 640
+    resume(tmp_path / "run", console=quiet())
+    assert read_checkpoint(tmp_path / "run")[1]["model"]["num_timesteps"] == 2560
+
+
+@pytest.mark.parametrize("name", ["imitate", "advise", "beside"])
+def test_a_name_that_does_not_exist_leaves_no_folder(tmp_path: Path, name: str) -> None:
+    changes: dict[str, Any] = {name: "nobody"}
+    with pytest.raises(PolicyError, match="unknown policy 'nobody'"):
+        train(small(tmp_path / "run", **changes), console=quiet())
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
+    accumulators = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    train(small(tmp_path, tensorboard=True, contact_bound=0.1), console=quiet())
+    log = accumulators.EventAccumulator(str(tmp_path)).Reload()
+    with (tmp_path / "curve.csv").open(newline="") as lines:
+        curve = list(csv.DictReader(lines))
+    for name in ("safe_score", "score", "contact_free"):
+        logged = [(event.step, event.value) for event in log.Scalars(f"validation/{name}")]
+        wanted = [(int(float(row["steps"])), float(row[name])) for row in curve]
+        assert [step for step, _ in logged] == [step for step, _ in wanted] == [640, 1280]
+        assert [v for _, v in logged] == pytest.approx([v for _, v in wanted], abs=1e-6)
+    assert {"reward/slot", "reward/contact", "training/score", "rollout/success_rate"} <= set(
+        log.Tags()["scalars"]
+    )
+    assert {"contact/share", "contact/multiplier"} <= set(log.Tags()["scalars"])

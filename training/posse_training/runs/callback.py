@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy_file import write_atomically
-from posse_training.errors import CheckpointError
+from posse_training.errors import CheckpointError, DivergedError
 from posse_training.runs.checkpoint import Arrays, write_checkpoint
 from posse_training.runs.curve import Point, as_csv, best_of, read_points
 from posse_training.runs.display import Display
@@ -79,6 +80,7 @@ class TrainingCallback(BaseCallback):
         self._next_evaluation = 0 if warm else settings.evaluate_every
         self._next_checkpoint = 0
         self._rollouts = 0
+        self._saved_at: int | None = None  # steps at the last checkpoint
 
     def _price(self) -> None:
         """Have contacts cost what the bound's multiplier says."""
@@ -95,6 +97,10 @@ class TrainingCallback(BaseCallback):
         elif self._rollouts % _STATISTICS_EVERY == 0:
             self.statistics.add(np.asarray(self.model._last_obs))
         self._rollouts += 1
+        terms = self.env.take_terms()
+        steps = self.settings.rollout if self.settings.on_policy else 1
+        for name, total in terms.items():
+            self.model.logger.record_mean(f"reward/{name}", total / steps)
         first, episodes = self.env.take_contacts()
         if self.bound is not None:
             self.bound.update(first, episodes)
@@ -103,9 +109,14 @@ class TrainingCallback(BaseCallback):
             self.model.logger.record("contact/multiplier", self.bound.multiplier)
 
     def _on_rollout_start(self) -> None:
+        score = self._training_score()
+        if score is not None:
+            self.model.logger.record("training/score", score)
         if self.settings.on_policy or self._rollouts % 100 == 0:
             self.statistics.apply(self.model.policy)
         steps = self.model.num_timesteps
+        if min(self._next_evaluation, self._next_checkpoint) <= steps:
+            self._check_finite()
         if steps >= self._next_evaluation:
             self._next_evaluation = steps - steps % self.settings.evaluate_every
             self._next_evaluation += self.settings.evaluate_every
@@ -114,6 +125,30 @@ class TrainingCallback(BaseCallback):
             self._next_checkpoint = steps + self.settings.checkpoint_every
             self._checkpoint()
         self._show_progress()
+
+    def _check_finite(self) -> None:
+        """Raise before numbers that are not finite are evaluated or saved.
+
+        Raises:
+            DivergedError: The message names what is kept.
+        """
+        tensors = self.model.policy.state_dict().values()
+        if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors):
+            raise DivergedError(self.divergence())
+
+    def divergence(self) -> str:
+        """Return what happened, what is kept, and what to do, where networks are not finite."""
+        kept = "nothing was saved before"
+        if self._saved_at is not None:
+            kept = f"the checkpoint at {self._saved_at:,} steps is kept"
+            if self.curve:
+                best = max(self.curve, key=lambda point: point["safe_score"])
+                kept += f", and {BEST} of {int(best['steps']):,} steps"
+        return (
+            f"the training diverged at {self.model.num_timesteps:,} steps: its networks give "
+            f"numbers that are not finite; {kept}. Lower --learning-rate, or --log-deviation, and "
+            "train again in another --folder"
+        )
 
     def _show_progress(self) -> None:
         self.display.progress(self.model.num_timesteps, self._training_score(), self.bound)
@@ -180,6 +215,7 @@ class TrainingCallback(BaseCallback):
             state[name] = values
             arrays |= {f"{name}/{key}": array for key, array in part.items()}
         write_checkpoint(self.folder, arrays, state)
+        self._saved_at = self.model.num_timesteps
 
     def restore(self, arrays: Arrays, state: dict[str, Any]) -> None:
         """Go back to where a checkpoint was written.
@@ -202,6 +238,7 @@ class TrainingCallback(BaseCallback):
             self._next_evaluation = int(state["next_evaluation"])
             self._next_checkpoint = int(state["next_checkpoint"])
             self._rollouts = int(state["rollouts"])
+            self._saved_at = self.model.num_timesteps
             if self.bound is not None:
                 self.bound.restore(state["contact_bound"])
                 self._price()
@@ -214,6 +251,7 @@ class TrainingCallback(BaseCallback):
     def finish(self) -> None:
         """Evaluate once more, and write the last policy and checkpoint."""
         self.statistics.apply(self.model.policy)
+        self._check_finite()
         if not self.curve or self.curve[-1]["steps"] < self.model.num_timesteps:
             self._evaluate()
         self._write(LAST)

@@ -81,6 +81,7 @@ def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:
         "n_updates": model._n_updates,
         "progress": model._current_progress_remaining,
         "episodes": list(model.ep_info_buffer or ()),
+        "successes": [bool(success) for success in model.ep_success_buffer or ()],
         "action_space": model.action_space.np_random.bit_generator.state,
     }
     arrays["last_obs"] = np.asarray(model._last_obs)
@@ -127,7 +128,8 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     model._current_progress_remaining = float(state["progress"])
     episodes = [{key: info[key] + 0 for key in ("r", "l", "score")} for info in state["episodes"]]
     model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
-    model.ep_success_buffer = deque(maxlen=model._stats_window_size)
+    successes = [bool(success) for success in state["successes"]]
+    model.ep_success_buffer = deque(successes, maxlen=model._stats_window_size)
     model.action_space.np_random.bit_generator.state = state["action_space"]
     model._last_obs = arrays["last_obs"].copy()
     model._last_episode_starts = arrays["last_starts"].copy()

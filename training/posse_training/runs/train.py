@@ -9,7 +9,6 @@ from pathlib import Path
 
 import torch
 from rich.console import Console
-from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_baselines import PolicyError, load
 from posse_training.errors import DivergedError
@@ -72,13 +71,13 @@ def train(settings: TrainSettings, *, console: Console | None = None, resume: bo
                 expert = load(settings.imitate)
                 imitate(model, settings, env.encoding, expert, statistics, copy_report(display))
         display.begin(model.num_timesteps, callback.curve)
-        with _divergence(model):
+        with _divergence(callback):
             model.learn(
                 settings.steps - model.num_timesteps,
                 callback=callback,
                 reset_num_timesteps=saved is None,
             )
-        callback.finish()
+            callback.finish()
     return folder / (BEST if (folder / BEST).is_file() else LAST)
 
 
@@ -126,17 +125,14 @@ def steps_made(settings: TrainSettings, num_envs: int) -> int:
 
 
 @contextlib.contextmanager
-def _divergence(model: BaseAlgorithm) -> Iterator[None]:
+def _divergence(callback: TrainingCallback) -> Iterator[None]:
     """Name what torch's distributions, and policies that are exported, refuse."""
     try:
         yield
     except (ValueError, PolicyError) as error:
         if not any(text in str(error) for text in _NOT_FINITE):
             raise
-        raise DivergedError(
-            f"the training diverged at {model.num_timesteps:,} steps: its networks give numbers "
-            "that are not finite. Lower --learning-rate, or --log-deviation, and train again"
-        ) from error
+        raise DivergedError(callback.divergence()) from error
 
 
 @contextlib.contextmanager

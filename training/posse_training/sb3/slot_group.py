@@ -58,6 +58,7 @@ class SlotGroup:
         self.contact_cost = 0.0
         self._touched = np.zeros(worlds, np.bool_)  # whether the present episode had a contact
         self._counted = np.zeros(2, np.int64)  # first contacts, and steps of worlds
+        self._terms = np.zeros(len(batch.term_names))  # means over the trackers, summed over steps
 
     def reset(self, seed: int | None, options: Any, staggered: bool, out: FloatArray) -> None:
         """Start an episode in every world; write the observations (slots, size) to ``out``.
@@ -93,6 +94,7 @@ class SlotGroup:
         contacts = told["reward_terms"]["contact"]
         rewards[:] = (reward - np.float32(self.contact_cost) * contacts).reshape(-1)
         self._count(contacts)
+        self._terms += [float(term.mean()) for term in told["reward_terms"].values()]
         over = terminated | truncated
         ended = over | (batch.worlds["step"] == self._cut_at)
         if self._advice is not None:
@@ -123,6 +125,15 @@ class SlotGroup:
         self._counted[:] = 0
         return first, steps / self.batch.scenario.horizon
 
+    def take_terms(self) -> tuple[dict[str, float], float]:
+        """Return each reward term per tracker and step, summed over the steps since the last call.
+
+        And the number of trackers, by which groups are weighted.
+        """
+        terms = dict(zip(self.batch.term_names, self._terms.tolist(), strict=True))
+        self._terms[:] = 0
+        return terms, float(self.slots.stop - self.slots.start)
+
     def _encode(self, raw: FloatArray, out: FloatArray, worlds: Any = _ALL) -> None:
         """Write the observations of all slots, or of those of some worlds, to ``out``."""
         self._encoder.encode(raw[worlds], out[:, : self._own_size])
@@ -149,6 +160,7 @@ class SlotGroup:
         steps = self.batch.worlds["step"]
         for k, e in enumerate(worlds):
             whole = over[e] and (self._cut_at[e] == _NEVER or steps[e] == horizon)
+            settled = bool(np.isfinite(metrics["settling_time"][e]))
             summary = {name: float(values[e]) for name, values in metrics.items()}
             for i in range(trackers):
                 info = infos[e * trackers + i]
@@ -157,6 +169,7 @@ class SlotGroup:
                 info["TimeLimit.truncated"] = not terminated[e]
                 if whole:
                     info["metrics"] = dict(summary)
+                    info["is_success"] = settled
                     info["episode"] = {
                         "r": float(self._returns[e, i]),
                         "l": int(steps[e]),
@@ -170,6 +183,7 @@ class SlotGroup:
             "returns": self._returns,
             "touched": self._touched,
             "counted": self._counted,
+            "terms": self._terms,
         }
         memory = self._advice.arrays() if self._advice is not None else {}
         advice = {f"advice.{name}": array for name, array in memory.items()}

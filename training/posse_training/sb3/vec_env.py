@@ -126,7 +126,7 @@ class TeamVecEnv(VecEnv):
 
         Where an episode ended, the observation is the first of the next episode, and the info holds
         ``terminal_observation`` (size,), ``TimeLimit.truncated``, and for whole episodes
-        ``episode`` (return, length, score) and ``metrics``.
+        ``episode`` (return, length, score), ``metrics`` and ``is_success`` (the team settled).
         """
         observations = np.empty((self.num_envs, self._size), np.float32)
         rewards = np.empty(self.num_envs, np.float32)
@@ -150,6 +150,20 @@ class TeamVecEnv(VecEnv):
         """
         counts = [group.take_contacts() for group in self._groups]
         return sum(first for first, _ in counts), sum(episodes for _, episodes in counts)
+
+    def take_terms(self) -> dict[str, float]:
+        """Return each reward term per tracker, unscaled, summed over the steps since the last call.
+
+        A term that some batches lack is averaged over the others.
+        """
+        sums: dict[str, float] = {}
+        slots: dict[str, float] = {}
+        for group in self._groups:
+            terms, count = group.take_terms()
+            for name, total in terms.items():
+                sums[name] = sums.get(name, 0.0) + count * total
+                slots[name] = slots.get(name, 0.0) + count
+        return {name: total / slots[name] for name, total in sums.items()}
 
     def save(self) -> dict[str, npt.NDArray[Any]]:
         """Return the complete state of the vector as arrays by name."""
