@@ -23,8 +23,15 @@ from posse_training.runs.folder import LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import resume, train
 
-SCENARIOS: Final = ("smart", "radio", "leader-loss", "obstacles", "field", "search")
-"""Scenarios of their own learned team, ``learned-SCENARIO``."""
+ALGORITHMS: Final = {
+    "smart": "ppo",
+    "radio": "ppo",
+    "leader-loss": "mappo",
+    "obstacles": "mappo",
+    "field": "mappo",
+    "search": "mappo",
+}
+"""Scenarios with a learned team of their own, ``learned-SCENARIO``, and how it is trained."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +40,7 @@ class Settings:
 
     seeds: tuple[int, ...] = (1, 2, 3)
     """Training seeds."""
-    only: tuple[str, ...] = SCENARIOS
+    only: tuple[str, ...] = tuple(ALGORITHMS)
     """Scenarios to train on."""
     folder: Path = Path("runs/shipped")
     """Folder of the run folders SCENARIO-SEED."""
@@ -48,13 +55,17 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
         SettingsError: A scenario without a learned team of its own.
     """
     for name in settings.only:
-        if name not in SCENARIOS:
+        if name not in ALGORITHMS:
             raise SettingsError(
                 f"only={name!r:.80} has no learned team of its own; those that have: "
-                f"{', '.join(SCENARIOS)}"
+                f"{', '.join(ALGORITHMS)}"
             )
     return [
-        replace(default_settings(name), seed=seed, folder=settings.folder / f"{name}-{seed}")
+        replace(
+            default_settings(name, ALGORITHMS[name]),
+            seed=seed,
+            folder=settings.folder / f"{name}-{seed}",
+        )
         for seed in settings.seeds
         for name in settings.only
     ]
