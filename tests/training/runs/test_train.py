@@ -145,6 +145,25 @@ def test_what_was_good_before_a_divergence_is_kept(
     assert read_checkpoint(tmp_path / "run")[1]["model"]["num_timesteps"] == 2560
 
 
+def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path) -> None:
+    deviations = []
+    usual = PPO.train
+
+    def note(self: PPO) -> None:
+        deviations.append(self.policy.log_std.max().item())
+        usual(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PPO, "train", note)
+        settings = small(tmp_path, log_deviation=-1.0, final_log_deviation=-3.0)
+        train(settings, console=quiet())
+    assert len(deviations) == 8
+    for k, deviation in enumerate(deviations):
+        assert deviation == pytest.approx(-1.0 - 2.0 * k / 8, abs=0.02)
+    with pytest.raises(SettingsError, match=r"final_log_deviation=0.0 must not exceed"):
+        small(tmp_path, log_deviation=-1.0, final_log_deviation=0.0)
+
+
 @pytest.mark.parametrize("name", ["imitate", "advise", "beside"])
 def test_a_name_that_does_not_exist_leaves_no_folder(tmp_path: Path, name: str) -> None:
     changes: dict[str, Any] = {name: "nobody"}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.policies import ActorCriticPolicy
 
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy_file import write_atomically
@@ -109,6 +110,7 @@ class TrainingCallback(BaseCallback):
             self.model.logger.record("contact/multiplier", self.bound.multiplier)
 
     def _on_rollout_start(self) -> None:
+        self._limit_deviation()
         score = self._training_score()
         if score is not None:
             self.model.logger.record("training/score", score)
@@ -125,6 +127,16 @@ class TrainingCallback(BaseCallback):
             self._next_checkpoint = steps + self.settings.checkpoint_every
             self._checkpoint()
         self._show_progress()
+
+    def _limit_deviation(self) -> None:
+        """Keep the actions' deviation within its limit, which falls with the steps made."""
+        s, policy = self.settings, self.model.policy
+        if s.final_log_deviation is None or not s.on_policy:
+            return
+        share = min(1.0, self.model.num_timesteps / s.steps)
+        limit = s.log_deviation + share * (s.final_log_deviation - s.log_deviation)
+        with torch.no_grad():
+            cast("ActorCriticPolicy", policy).log_std.clamp_(max=limit)
 
     def _check_finite(self) -> None:
         """Raise before numbers that are not finite are evaluated or saved.

@@ -66,6 +66,8 @@ def check_ranges(settings: Any) -> None:
         _check_integer("num_neighbours", settings.num_neighbours, 0, 4096)
     for name, (low, high) in _NUMBERS.items():
         _check_number(name, getattr(settings, name), low, high)
+    if settings.final_log_deviation is not None:
+        _check_number("final_log_deviation", settings.final_log_deviation, -20, 5)
     if settings.contact_bound is not None:
         _check_number("contact_bound", settings.contact_bound, _LEAST_BOUND, 1)
     for name in _TEXTS:

@@ -86,6 +86,8 @@ class TrainSettings:
     """Weight of the value function's error."""
     log_deviation: float = -0.5
     """Logarithm of the actions' standard deviation at the start."""
+    final_log_deviation: float | None = None
+    """Upper limit of that logarithm at the end; it falls linearly. Default: no limit."""
 
     # sac and td3
     replay: int = 400_000
@@ -195,6 +197,11 @@ def _check_together(s: TrainSettings) -> None:
     if s.imitate is not None and not s.on_policy:
         raise SettingsError(
             f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out"
+        )
+    if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
+        raise SettingsError(
+            f"final_log_deviation={s.final_log_deviation} must not exceed "
+            f"log_deviation={s.log_deviation}, where it begins"
         )
     if s.encoding == "belief" and s.advise is None:
         raise SettingsError(
