@@ -26,8 +26,8 @@ from posse_training.runs.train import resume, train
 ALGORITHMS: Final = {
     "smart": "ppo",
     "radio": "ppo",
-    "leader-loss": "mappo",
-    "obstacles": "mappo",
+    "leader-loss": "ppo",
+    "obstacles": "ppo",
     "field": "mappo",
     "search": "mappo",
 }
