@@ -32,9 +32,8 @@ from posse_training.runs.train import resume, train
 LIMITS: Final[dict[str, dict[str, float]]] = {
     "smart": {"tracker_turn_rate": 1.2, "target_turn_rate": 2.0},
     "equal": {"tracker_turn_rate": 1.5, "target_turn_rate": 1.5},
-    "wide": {"tracker_turn_rate": 1.5, "target_turn_rate": 1.2},
-    "fast": {"tracker_turn_rate": 1.5, "target_turn_rate": 1.2, "target_speed": 0.75},
-    "fast-equal": {"tracker_turn_rate": 1.2, "target_turn_rate": 1.2, "target_speed": 0.75},
+    "moving": {"tracker_turn_rate": 1.5, "target_turn_rate": 1.5, "target_least_speed": 0.45},
+    "full-speed": {"tracker_turn_rate": 1.5, "target_turn_rate": 1.5, "target_least_speed": 0.6},
 }
 """What each candidate changes in the scenario ``smart``; rad/s and m/s."""
 WORLDS: Final = 200

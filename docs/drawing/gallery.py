@@ -47,6 +47,7 @@ GALLERY: Final = {
         ("ddcs-centralized-no-exchange", "pngl-l-phi"), seconds=30.0, picture=20.0
     ),
     "field": Shown(("ddcs-distributed", "learned-field"), picture=26.0),
+    "duel": Shown(("ddcs-distributed", "learned-smart"), picture=18.0),
     "paper-centralized": Shown(("pngl-l-phi", "ddcs-centralized"), seconds=8.0, picture=4.0),
     "paper-distributed": Shown(("pngl", "ddcs-distributed"), seconds=8.0, picture=4.0),
 }

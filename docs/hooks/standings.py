@@ -30,6 +30,7 @@ SUMMARY: Final = {
     "radio": "messages are late and get lost",
     "leader-loss": "the only one that sees the target breaks",
     "field": "all of it at once, with noise",
+    "duel": "a target that may have learned to escape",
 }
 
 

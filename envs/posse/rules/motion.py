@@ -171,7 +171,8 @@ def command_target(
     """Set the target's speed and turn rate for the control step."""
     if c.target_agent != 0:
         action = actions[c.num_trackers]
-        w.speed = _HALF * (action[0] + _ONE) * c.target_speed
+        share, least = _HALF * (action[0] + _ONE), c.target_least_speed
+        w.speed = least + share * (c.target_speed - least)
         w.turn_rate = action[1] * c.target_turn_rate
     else:
         w.turn_rate = target_turn_rate(c, w, trackers, obstacles, set_goal, scratch)

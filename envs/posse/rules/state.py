@@ -56,7 +56,7 @@ CONFIG: Final = _record(
     ("dt", _F), ("physics_dt", _F),
     ("fastest", _F),  # greatest speed of any tracker
     ("speed_change", _F), ("turn_change", _F),
-    ("target_speed", _F), ("target_turn_rate", _F), ("radius", _F),
+    ("target_speed", _F), ("target_turn_rate", _F), ("target_least_speed", _F), ("radius", _F),
     ("tolerance", _F), ("frame_c", _F), ("frame_s", _F), ("slots_reach", _F),
     ("half_arena", _F), ("obstacle_least", _F), ("obstacle_most", _F), ("obstacle_gap", _F),
     ("start_least", _F), ("start_most", _F), ("target_extent", _F), ("safe_distance", _F),
@@ -310,6 +310,7 @@ def config_record(scenario: Scenario) -> Records:
     c.speed_change = min(s.tracker_acceleration * c.physics_dt, FAR)
     c.turn_change = min(s.tracker_turn_acceleration * c.physics_dt, FAR)
     c.target_speed, c.target_turn_rate = s.target_speed, s.target_turn_rate
+    c.target_least_speed = s.target_least_speed
     c.radius = s.robot_radius
     c.tolerance = s.tolerance
     most = min(s.slot_turn_rate * s.control_step, math.pi / 2)

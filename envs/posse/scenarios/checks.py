@@ -54,6 +54,11 @@ def _check_motion(s: Scenario) -> None:
             f"target_speed={s.target_speed:g} must be below tracker_speed={slowest:g}, by "
             "0.01 % at least: a slower team cannot catch up (paper, assumption ii)"
         )
+    if s.target_least_speed > s.target_speed:
+        fail(
+            "target_least_speed", s.target_least_speed,
+            f"it must be at most target_speed={s.target_speed:g}",
+        )  # fmt: skip
     if s.target_speed == 0 and s.target_motion != "constant":
         fail("target_speed", s.target_speed, "only a target of constant motion may rest")
     steps = s.control_step / s.physics_step

@@ -97,6 +97,14 @@ def _named() -> dict[str, Scenario]:
             sensor_outages=0.2,
             radio_outages=0.2,
         ),
+        Scenario(
+            name="duel",
+            target_motion="smart",
+            tracker_turn_rate=1.5,
+            target_turn_rate=1.5,
+            target_least_speed=0.45,
+            target_reward_weights={"team": -1.0, "contact": -0.2},
+        ),
         paper.replace(name="paper-centralized"),
         paper.replace(name="paper-distributed"),
     )

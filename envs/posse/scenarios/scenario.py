@@ -91,6 +91,9 @@ class Scenario:
     )  # fmt: skip
     target_speed: float = number(0.6, "m/s", 0, 1000, "speed of the target; an agent's greatest")
     target_turn_rate: float = number(1.0, "rad/s", SMALL, WIDE, "greatest turn rate of the target")
+    target_least_speed: float = number(
+        0.0, "m/s", 0, 1000, "least speed of a target that is an agent, at most target_speed"
+    )
 
     # The formation
     formation: str = text(

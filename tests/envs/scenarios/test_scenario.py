@@ -133,6 +133,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"reward_weights": {"slot": "much"}}, "number"),
     ({"reward_weights": 3}, "terms"),
     ({"reward_weights": {1: 1.0, "slot": 1.0}}, "terms"),
+    ({"target_least_speed": 0.7}, "at most target_speed=0.6"),
     ({"target_reward_weights": {"slot": 1.0}}, "trackers only"),
     ({"target_reward_weights": {"teams": 1.0}}, "team"),
 ]
@@ -319,7 +320,7 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
 def test_all_the_scenarios_that_the_benchmark_names_are_there() -> None:
     assert set(posse.scenario_names()) == {
         "constant", "accelerating", "smart", "search", "obstacles", "radio", "leader-loss",
-        "field", "paper-centralized", "paper-distributed",
+        "field", "duel", "paper-centralized", "paper-distributed",
     }  # fmt: skip
 
 

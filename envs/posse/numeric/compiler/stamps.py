@@ -23,8 +23,8 @@ _POSSE: Final = Path(__file__).resolve().parents[2]
 _NO_KERNELS: Final = {
     "posse": ("adapters", "rendering"),
     "posse_training": (
-        "commands", "datasets", "leaderboard", "play", "replay", "reports", "runs", "shipping",
-        "tuning", "viewer",
+        "commands", "datasets", "leaderboard", "league", "play", "replay", "reports", "runs",
+        "shipping", "tuning", "viewer",
     ),
 }  # fmt: skip
 """Rooms without compiled code, by package; kernels do not depend on them."""
