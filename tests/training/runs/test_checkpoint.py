@@ -80,6 +80,21 @@ def test_forged_arrays(run: Path, tmp_path: Path, change: str) -> None:
             resume(tmp_path, console=quiet())
 
 
+@pytest.mark.parametrize("change", ["return", "nan", "over"])
+def test_forged_episodes(run: Path, tmp_path: Path, change: str) -> None:
+    """What would fail in a later step or log is found before the run goes on."""
+    arrays, state = read_checkpoint(run)
+    (tmp_path / "settings.json").write_bytes((run / "settings.json").read_bytes())
+    if change == "over":
+        arrays["worlds/0.world_over"] = np.ones_like(arrays["worlds/0.world_over"])
+    else:
+        number = 10**400 if change == "return" else float("nan")
+        state["model"]["episodes"] = [{"r": number, "l": 40, "score": 0.5}]
+    write_checkpoint(tmp_path, arrays, state)
+    with pytest.raises(CheckpointError, match="does not fit its settings"):
+        resume(tmp_path, console=quiet(), steps=640)
+
+
 def optimiser_of(state: dict[str, Any]) -> dict[str, Any]:
     """The optimiser's part of a state, as dictionaries."""
     parts = dict(state["model"]["parts"]["items"])

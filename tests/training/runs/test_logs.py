@@ -49,6 +49,20 @@ def test_a_full_disk_ends_the_logs_and_not_the_training(
     assert next(path.name for path in (tmp_path / "run").iterdir()).startswith("events.out")
 
 
+def test_a_disk_that_is_full_from_the_start_prints_no_traceback(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    notes: list[str] = []
+    with largest_file(0):
+        logger = make_logger(tmp_path, small(tmp_path, "ppo", tensorboard=True), notes.append)
+        for step in range(5):
+            logger.record("score", 0.5)
+            logger.dump(step)
+    logger.close()
+    assert len(notes) == 1
+    assert not capfd.readouterr().err
+
+
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     notes: list[str] = []
     (tmp_path / "file").touch()

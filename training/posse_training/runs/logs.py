@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.util
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -50,12 +51,11 @@ class _TensorBoard(KVWriter):
     def __init__(self, folder: Path, note: Callable[[str], None]) -> None:
         self._folder, self._note = folder, note
         self._files: TensorBoardOutputFormat | None = None
-        before = set(threading.enumerate())
-        try:
-            self._files = TensorBoardOutputFormat(str(folder))
-        except OSError as error:
-            self._stop(error)
-        _silence(set(threading.enumerate()) - before)
+        with _silent_threads():
+            try:
+                self._files = TensorBoardOutputFormat(str(folder))
+            except OSError as error:
+                self._stop(error)
 
     def write(self, *arguments: Any, **named: Any) -> None:
         """Write the values of one step."""
@@ -79,12 +79,20 @@ class _TensorBoard(KVWriter):
         self._note(f"no more TensorBoard logs, {self._folder} cannot be written: {reason}")
 
 
-def _silence(threads: set[threading.Thread]) -> None:
-    """Print no traceback of threads that write files; the next write raises their error."""
-    others = threading.excepthook
+@contextlib.contextmanager
+def _silent_threads() -> Iterator[None]:
+    """Print no traceback of threads begun here that cannot write; the next write raises it."""
+    others, before = threading.excepthook, set(threading.enumerate())
+    begun: set[threading.Thread] | None = None  # once known: a thread can fail before that
 
     def hook(arguments: threading.ExceptHookArgs) -> None:
-        if arguments.thread not in threads or not isinstance(arguments.exc_value, OSError):
+        thread = arguments.thread
+        mine = thread not in before if begun is None else thread in begun
+        if not (mine and isinstance(arguments.exc_value, OSError)):
             others(arguments)
 
     threading.excepthook = hook
+    try:
+        yield
+    finally:
+        begun = set(threading.enumerate()) - before

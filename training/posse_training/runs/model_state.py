@@ -126,7 +126,10 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     model._episode_num = int(state["episode_num"])
     model._n_updates = int(state["n_updates"])
     model._current_progress_remaining = float(state["progress"])
-    episodes = [{key: info[key] + 0 for key in ("r", "l", "score")} for info in state["episodes"]]
+    episodes = [
+        {key: _checked_number(key, info[key]) for key in ("r", "l", "score")}
+        for info in state["episodes"]
+    ]
     model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
     successes = [bool(success) for success in state["successes"]]
     model.ep_success_buffer = deque(successes, maxlen=model._stats_window_size)
@@ -140,6 +143,14 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
             getattr(buffer, name)[: buffer.size()] = arrays[f"replay.{name}"]
 
 
+def _checked_number(name: str, value: Any) -> float:
+    """Return an episode's length, return or score, or raise."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < _MOST:
+        raise ValueError(f"{name}={value!r:.80} of an episode must be a number below {_MOST:g}")
+    return value
+
+
+_MOST: Final = 1e30
 _MOMENTS: Final = {"step", "exp_avg", "exp_avg_sq"}  # of Adam
 
 

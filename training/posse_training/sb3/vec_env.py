@@ -182,6 +182,8 @@ class TeamVecEnv(VecEnv):
                     f"the saved worlds do not fit these: {name!r} is missing or not of shape "
                     f"{array.shape}"
                 )
+            if name.endswith(".world_over") and saved[name].any():
+                raise ValueError("the saved worlds have episodes that are over; none goes on there")
         for name, array in mine.items():
             array[...] = saved[name]
         for group in self._groups:
