@@ -28,6 +28,8 @@ def table() -> str:
     ]
     for scenario in standings.SCENARIOS:
         found = {r.policy: r for r in standings.of_scenario(scenario)}  # the best first
+        if not found:
+            continue
         teams = {name: r for name, r in found.items() if not r.reads_state}
         learned = [name for name in teams if name.startswith("learned-")]
         scripted = [name for name in teams if not name.startswith("learned-")]

@@ -49,6 +49,7 @@ def batch(
     are those of the target, one row and actions of two numbers. Both are on the CPU only; see
     :class:`posse.engine.paired_batch.PairedBatch`.
     """
+    made = _batch_class(device)
     inside = team_policy if target_policy is None else target_policy
     if team_policy is not None and target_policy is not None:
         raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
@@ -63,7 +64,7 @@ def batch(
         return PairedBatch(settings, num_worlds, inside, moves_target=moves_target, **arguments)
     if inside is not None:
         raise ValueError(f"{side}_policy= needs device='cpu', not {shown(device)}")
-    return _batch_class(device)(settings, num_worlds, **arguments)
+    return made(settings, num_worlds, **arguments)
 
 
 def _batch_class(device: str) -> type[Batch]:

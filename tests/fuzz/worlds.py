@@ -27,8 +27,10 @@ from posse.scenarios import Setting
 WORLDS, STEPS, DRAWS = 24, 60, 50
 ROUNDING = 1e-3
 """m that a robot may seem to have moved too far: float32 at up to 2,000 m."""
-NOT_DRAWN = ("name", "version", "extra_fields", "metrics", "reward_weights")
-"""Settings without a range: names, what a user's module declares, and one that is drawn apart."""
+WEIGHTS = ("reward_weights", "target_reward_weights")
+NOT_DRAWN = ("name", "version", "extra_fields", "metrics", *WEIGHTS)
+"""Settings without a range: names, what a user's module declares, and those drawn apart."""
+ALL_TERMS = tuple(term.name for term in posse.REWARD_TERMS)
 BROADEN = 2.0
 """Numbers are drawn up to so many powers of two from their default."""
 
@@ -81,9 +83,11 @@ def scenario(rng: random.Random) -> posse.Scenario | None:
             # Together: the one has to be a multiple of the other.
             step = base.physics_step * 2 ** rng.uniform(-BROADEN, 1)
             changes |= {"physics_step": step, "control_step": step * rng.randint(1, 4)}
-        if rng.random() < share:
-            terms = [term.name for term in posse.REWARD_TERMS if rng.random() < 0.5]
-            changes["reward_weights"] = {name: rng.uniform(-10, 10) for name in terms}
+        for name in WEIGHTS:
+            if rng.random() < share:
+                terms = ("contact", "effort", "team") if name == WEIGHTS[1] else ALL_TERMS
+                chosen = [term for term in terms if rng.random() < 0.5]
+                changes[name] = {term: rng.uniform(-10, 10) for term in chosen}
         try:
             return base.replace(**changes)
         except posse.ScenarioError:

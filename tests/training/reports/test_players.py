@@ -128,7 +128,7 @@ def alive(pid: int) -> bool:
 def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
     settings = Settings(
         (f"{BAD}Sleeps", "idle"), ("constant", "smart"), episodes=1, out=tmp_path / "out",
-        figures=False, planner_episodes=0, time_limit=5.0,
+        figures=False, planner_episodes=0, time_limit=10.0,
     )  # fmt: skip
     first, second = compare(settings).failed
     assert first["what"] == "constant"

@@ -92,6 +92,8 @@ STYLES: Final[dict[str, Style]] = {
     "learned-radio": Style(ORANGE, "P"),
     "learned-obstacles": Style(GREEN, "X"),
     "learned-field": Style(PURPLE, "<"),
+    "learned-search": Style(PURPLE, (6, 1, 0), _DASHED),
+    "learned-leader-loss": Style(GREEN, (3, 1, 0)),
     "learned-generalist": Style(RED, "*", _DASHED),
 }
 _OTHERS: Final = tuple(
