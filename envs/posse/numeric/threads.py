@@ -36,8 +36,8 @@ _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it
 _LOOKS: Final = 400_000  # turns of a spin, some tenths of a millisecond
 _PAUSE: Final = 10_000  # turns until the caller's kernel has released Python's lock
 _ENDED: Final = 2**62
-_CORES: Final = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
-MOST_THREADS: Final = len(_CORES)
+_LEVELS: Final = 12  # exceptions in a row, within some microseconds, that are borne
+MOST_THREADS: Final = len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
 """Most threads that :func:`over_worlds` uses: the number of cores available to the process."""
 
 
@@ -56,10 +56,7 @@ def divide(num_worlds: int, threads: int) -> Blocks:
 
 @compiled
 def blocks_of(thread: int, blocks: Blocks) -> Iterator[tuple[int, int]]:
-    """Claim and yield blocks while there are any: first world, world after the last.
-
-    First the thread's own, which its core has cached in the previous step, then those of others.
-    """
+    """Claim and yield blocks (first world, end); the thread's own first, which are cached."""
     if blocks[0, SIZE] == 0:
         yield 0, blocks[0, END]
     else:
@@ -108,20 +105,21 @@ def run_threads(work: Callable[[int, Blocks], T], num_worlds: int, threads: int)
 
     Each call takes worlds from :func:`worlds_of` or :func:`blocks_of`. The caller is thread 0, and
     the only one while another thread of the program uses the workers. An exception raised by a
-    signal handler propagates only when all worlds are done, or before any is started, so no worker
-    writes afterwards.
+    signal handler propagates when all worlds are done, or before any is started.
     """
     if threads == 1 or UNCOMPILED:
         return [work(0, divide(num_worlds, 1))]
-    workers: list[_Worker] = []
+    return _finished(_LEVELS, work, divide(num_worlds, threads).copy(), [])
+
+
+def _finished(levels: int, work: Any, blocks: Blocks, workers: list[_Worker]) -> list[Any]:
+    """Share the work; after an exception, end it. Each level bears one more in the meantime."""
     try:
-        try:
-            return _share(work, divide(num_worlds, threads).copy(), workers)
-        except BaseException:
-            _end(workers)
-            raise
+        if levels == 0:
+            return _share(work, blocks, workers)
+        return _finished(levels - 1, work, blocks, workers)
     except BaseException:
-        _end(workers)  # a second exception may have interrupted the first call
+        _end(workers)
         raise
 
 
