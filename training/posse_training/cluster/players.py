@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable
-from types import TracebackType
 from typing import NamedTuple
 
 from posse import Scenario
@@ -54,14 +53,9 @@ class ClusterPlayers(Players):
         self._open.enter_context(self._backend)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._open.close()
-        super().__exit__(kind, error, trace)
+        super().__exit__()
 
     def check(self, contender: Contender) -> None:
         """See :class:`~posse_training.reports.players.Players`."""

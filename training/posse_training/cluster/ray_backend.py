@@ -6,7 +6,6 @@ import math
 import platform
 import time
 from collections.abc import Hashable
-from types import TracebackType
 from typing import Any, Final, Self
 from weakref import WeakKeyDictionary
 
@@ -55,12 +54,7 @@ class RayBackend:
         self._task = ray.remote(num_cpus=1, max_retries=0)(_work)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for ticket in tuple(self._out):
             self.cancel(ticket)
         if self._connected:
