@@ -36,7 +36,7 @@ _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it
 _LOOKS: Final = 400_000  # turns of a spin, some tenths of a millisecond
 _PAUSE: Final = 10_000  # turns until the caller's kernel has released Python's lock
 _ENDED: Final = 2**62
-_LEVELS: Final = 12  # exceptions in a row, within some microseconds, that are borne
+_LEVELS: Final = 12  # exceptions within some microseconds that a step survives
 MOST_THREADS: Final = len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
 """Most threads that :func:`over_worlds` uses: the number of cores available to the process."""
 
@@ -113,7 +113,7 @@ def run_threads(work: Callable[[int, Blocks], T], num_worlds: int, threads: int)
 
 
 def _finished(levels: int, work: Any, blocks: Blocks, workers: list[_Worker]) -> list[Any]:
-    """Share the work; after an exception, end it. Each level bears one more in the meantime."""
+    """Share the work; after an exception, wait for the workers. A level survives one exception."""
     try:
         if levels == 0:
             return _share(work, blocks, workers)

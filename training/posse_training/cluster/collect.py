@@ -46,12 +46,12 @@ class Backend(Protocol):
         ...
 
     def cancel(self, ticket: Hashable) -> None:
-        """Have no more work done on a shard; its outcome may still come."""
+        """Cancel a shard; its outcome may still arrive."""
         ...
 
 
 class Watcher:
-    """Told how the work goes; this one shows nothing."""
+    """Is notified of progress; this one shows nothing."""
 
     def begin(self, jobs: Sequence[Job], kept: int) -> None:
         """Work begins; results of ``kept`` shards were found."""
@@ -76,7 +76,7 @@ def collect(
     watcher: Watcher,
     attempts: int = 4,
 ) -> dict[Job, Exception]:
-    """Have all shards done that the store has no results of; return the jobs that failed, and why.
+    """Compute all shards that the store lacks; return the jobs that failed, with their errors.
 
     A shard whose worker dies is given out again, up to ``attempts`` times in all. Results are
     stored under their shard, so none is lost or doubled. An error that a shard's function raises

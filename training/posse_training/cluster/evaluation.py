@@ -27,7 +27,7 @@ _GRACE: Final = 4.0  # s beyond the time limit, after which a hanging process is
 
 
 def sent(given: str | Policy, loaded: Policy) -> str | Policy:
-    """Return what workers are sent of a policy: a name, unless it is that of a file here."""
+    """Return what workers get: a name that they can load themselves, else the loaded policy."""
     is_name = isinstance(given, str) and (given in policy_names() or is_code(given))
     return given if is_name else loaded
 
@@ -52,9 +52,9 @@ def evaluation_job(
         episodes: Number of episodes.
         seed: Seed of the worlds.
         split: Split of the worlds.
-        cluster: How it is cut.
+        cluster: Says how many worlds a shard has.
         time_limit: Of a shard, s.
-        target: Whom the policy plays against, unless it knows.
+        target: What the policy plays against; default: what it holds, or the scenario's own.
     """
     return Job(
         f"{label} on {scenario.name}",

@@ -41,7 +41,7 @@ class ClusterPlayers(Players):
 
     def __init__(self, time_limit: float, target: str | None, cluster: Cluster) -> None:
         super().__init__(time_limit, target)
-        self._chased = None if target is None else load_target(target)
+        self._opponent = None if target is None else load_target(target)
         self._cluster = cluster
         self._store = Folder(cluster.work)
         self._backend = RayBackend(cluster)
@@ -64,7 +64,7 @@ class ClusterPlayers(Players):
                 self._known[policy] = _Known(*self._load_elsewhere(policy))
 
     def expect(self, plays: Iterable[Play], seed: int, split: str) -> None:
-        """Play all that will be asked for, at once."""
+        """Play everything that will be asked for in parallel."""
         jobs = {
             (job.key, job.shards): job
             for contender, scenario, episodes in plays
@@ -94,18 +94,18 @@ class ClusterPlayers(Players):
             raise self._failed[job.key]
         name, _ = self._of(policy)
         settings: Scenario = job.arguments[1]
-        chased = None if self._chased is None else self._chased.name
-        return Results(name, settings, seed, split, joined(self._store.read(job)), chased)
+        opponent = None if self._opponent is None else self._opponent.name
+        return Results(name, settings, seed, split, joined(self._store.read(job)), opponent)
 
     def _job(
         self, policy: str | Policy, scenario: Scenario, episodes: int, seed: int, split: str
     ) -> Job:
         name, size = self._of(policy)
-        if self._chased is not None:
-            scenario = self._chased.fit(scenario)
+        if self._opponent is not None:
+            scenario = self._opponent.fit(scenario)
         fitted = scenario.replace(message_size=max(scenario.message_size, size))
         return evaluation_job(
-            policy, name, fitted, episodes, seed, split, self._cluster, self._limit, self._chased
+            policy, name, fitted, episodes, seed, split, self._cluster, self._limit, self._opponent
         )
 
     def _of(self, policy: str | Policy) -> _Known:

@@ -1,4 +1,4 @@
-"""Shows how work on a cluster goes: shards, time left, workers, and what was lost."""
+"""Progress of work on a cluster: shards, time left, workers, lost shards."""
 
 from __future__ import annotations
 

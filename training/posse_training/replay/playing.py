@@ -48,9 +48,9 @@ def record(
         ScenarioError: An unknown scenario or split, an invalid setting, seed or world.
     """
     settings = get_scenario(scenario, **overrides)
-    chased = None if target is None else load_target(target)
-    if chased is not None:
-        settings = chased.fit(settings)
+    opponent = None if target is None else load_target(target)
+    if opponent is not None:
+        settings = opponent.fit(settings)
     if not 1 <= len(policies) <= MOST_PLAYERS:
         raise SettingsError(
             f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies"
@@ -63,7 +63,8 @@ def record(
         label, policy = given if isinstance(given, tuple) else (None, given)
         if isinstance(policy, str):
             policy = load(policy)
-        check_moves_all(against(policy, chased), settings)
+        player = against(policy, opponent)
+        check_moves_all(player, settings)
         longest = max(settings.message_size, policy.message_size)
         batch = Batch(
             settings.replace(message_size=longest), 1,
@@ -72,11 +73,10 @@ def record(
         recorder = Recorder(
             batch, label or policy.name, observations=observations, about=_about(policy)
         )
-        policy = against(policy, chased)
-        memory, seen = begin(policy, batch), recorder.reset()
+        memory, seen = begin(player, batch), recorder.reset()
         for _ in range(max(1, steps)):
-            actions, memory = policy.act(seen, memory)
-            seen, *_ = recorder.step(actions, policy.annotations(memory))
+            actions, memory = player.act(seen, memory)
+            seen, *_ = recorder.step(actions, player.annotations(memory))
             if recorder.over:
                 break
         replays.append(recorder.replay())

@@ -75,9 +75,9 @@ def evaluate(
     if episodes < 1:
         raise SettingsError(f"episodes={episodes} must be at least 1")
     settings = get_scenario(scenario, **overrides)
-    chased = None if target is None else load_target(target)
-    if chased is not None:
-        settings, policy = chased.fit(settings), against(policy, chased)
+    opponent = None if target is None else load_target(target)
+    if opponent is not None:
+        settings, policy = opponent.fit(settings), against(policy, opponent)
     refuse_trained_split(policy, split)
     settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
     if cluster is not None:
@@ -85,7 +85,7 @@ def evaluate(
 
         posse.Batch(settings, 1, seed=seed, split=split)  # raises here what is invalid
         columns = evaluate_on_cluster(
-            sent(given, policy) if chased is None else policy, policy.name, settings, episodes,
+            sent(given, policy) if opponent is None else policy, policy.name, settings, episodes,
             seed, split, cluster, progress=progress, time_limit=time_limit,
         )  # fmt: skip
     elif callable(progress):
@@ -101,7 +101,7 @@ def evaluate(
                 policy, settings, episodes, seed, split, num_threads,
                 limited(lambda steps: bar.advance(task, steps), time_limit),
             )  # fmt: skip
-    named = None if chased is None else chased.name
+    named = None if opponent is None else opponent.name
     return Results(policy.name, settings, seed, split, columns, named)
 
 

@@ -69,10 +69,10 @@ class Players:
                 self._load_elsewhere(policy)
 
     def expect(self, plays: Iterable[Play], seed: int, split: str) -> None:
-        """Be told what will be asked for; of use where much can be played at once."""
+        """Announce what will be asked for, so that it can be played in parallel."""
 
     def forget(self) -> None:
-        """Drop what was kept for a repetition: all results are written."""
+        """Delete what a repetition would resume from: all results are written."""
 
     def play(
         self,

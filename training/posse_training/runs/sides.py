@@ -66,8 +66,8 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
             if settings.side == TARGET:
                 policy = load(name)
                 size = max(scenario.message_size, policy.message_size)
-                chased = scenario.replace(target_motion="agent", message_size=size)
-                found.append(Pairing(chased, policy, share))
+                faced = scenario.replace(target_motion="agent", message_size=size)
+                found.append(Pairing(faced, policy, share))
             else:
                 target = load_target(name)
                 found.append(Pairing(target.fit(scenario), target, share))
