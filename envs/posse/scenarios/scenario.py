@@ -349,8 +349,8 @@ class Scenario:
         for key in overrides:
             if key not in names:
                 raise UnknownSettingError(
-                    f"unknown setting {shown(key)}{near(key, names)}: unexpected "
-                    f"keyword argument; settings are: {', '.join(names)}"
+                    f"unknown setting {shown(key)}{near(key, names)}: unexpected keyword argument "
+                    f"{shown(key)}; settings are: {', '.join(names)}"
                 )
         return dataclasses.replace(self, **overrides)
 
