@@ -68,6 +68,7 @@ results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 	$(BIN)/python benchmarks/leaderboard.py
 	$(BIN)/python docs/drawing/readme_table.py
 	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
+	$(BIN)/python benchmarks/behaviour.py
 
 reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce

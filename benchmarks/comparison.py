@@ -28,7 +28,8 @@ from posse_training.reports.pictures.figures import CAPTIONS
 from posse_training.reports.pivots import Pivot, pivots
 from posse_training.reports.statistics import Estimate
 
-SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
+SCENARIOS = tuple(n for n in posse.scenario_names() if not n.startswith(("paper", "duel")))
+"""In `duel` the target plays too: ``posse league`` makes its table."""
 SCRIPTED = ("ddcs-tuned", "ddcs-distributed", "ddcs-centralized", "pngl-l-phi-tuned", "pngl-l-phi")
 """The first is the baseline of the differences."""
 MARK = "<!-- `make results` writes what follows -->"

@@ -21,9 +21,17 @@ from posse.engine.kernels import (
 )
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
-from posse.engine.user_parts import check_fields, explain
+from posse.engine.user_parts import check_fields, check_functions
 from posse.engine.world_views import WorldViews
-from posse.numeric import Blocks, BoolArray, FloatArray, direct, run_threads, threads_for
+from posse.numeric import (
+    Blocks,
+    BoolArray,
+    FloatArray,
+    checked_before_compiling,
+    direct,
+    run_threads,
+    threads_for,
+)
 from posse.rules.scratch import new_scratch
 from posse.signals.parts import parts_for
 
@@ -118,10 +126,11 @@ class Stepping(WorldViews):
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         agents, length = self.scenario.num_agents, 2 + self.scenario.message_size
         actions = np.empty((self.num_worlds, agents, length), np.float32)  # not read
-        try:
+        with checked_before_compiling(self._untyped, self._check_functions):
             self._run(orders, actions, results)
-        except Exception:
-            explain(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])
-            raise
         self._kernel = direct(self._untyped)  # now compiled
         return results.observations
+
+    def _check_functions(self) -> None:
+        """Raise if a user's function cannot be compiled: sooner, and clearer, than the kernel."""
+        check_functions(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])

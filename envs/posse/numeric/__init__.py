@@ -5,7 +5,13 @@ distribution of work over threads. It depends on no other room, and every room m
 """
 
 from posse.numeric.arrays import BoolArray, FloatArray, OwnArrays, Record, Records
-from posse.numeric.compiling import UNCOMPILED, compiled, direct, kernel
+from posse.numeric.compiling import (
+    UNCOMPILED,
+    checked_before_compiling,
+    compiled,
+    direct,
+    kernel,
+)
 from posse.numeric.simd.lanes import (
     WIDTH,
     Lanes,
@@ -54,6 +60,7 @@ __all__ = [
     "Records",
     "bits",
     "blocks_of",
+    "checked_before_compiling",
     "choose",
     "compiled",
     "counts",

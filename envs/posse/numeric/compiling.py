@@ -10,7 +10,8 @@ With ``NUMBA_DISABLE_JIT=1`` both decorators return the plain function, for debu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, TypeVar, cast, overload
 
 import numba
@@ -93,6 +94,22 @@ def kernel(
         return cast("F", dispatcher)
 
     return decorate if function is None else decorate(function)
+
+
+@contextlib.contextmanager
+def checked_before_compiling(
+    function: Callable[..., Any], check: Callable[[], None]
+) -> Iterator[None]:
+    """Call ``check`` if a kernel has to be compiled in this context, before it is; it may raise."""
+    cache = getattr(function, "_cache", None)
+    if not isinstance(cache, KernelCache):  # uncompiled
+        yield
+        return
+    plain, cache.before_compiling = cache.before_compiling, check
+    try:
+        yield
+    finally:
+        cache.before_compiling = plain
 
 
 def direct(function: F) -> F:

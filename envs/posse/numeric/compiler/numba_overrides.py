@@ -121,6 +121,7 @@ class KernelCache(NullCache):
 
     def __init__(self, *stamped: Any) -> None:
         self._stamped = stamped
+        self.before_compiling: Callable[[], None] = lambda: None
 
     @functools.cached_property
     def _stamp(self) -> Stamp:
@@ -136,6 +137,7 @@ class KernelCache(NullCache):
             signature, parts = pickle.loads(kept) if kept is not None else (None, ())  # noqa: S301
             if signature == sig:
                 return CompileResult._rebuild(target_context, *parts)
+        self.before_compiling()
         kernel_files.announce()
         return None
 
