@@ -23,6 +23,7 @@ from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.cluster import Cluster
 from posse_training.reports.players import PlayError
+from posse_training.runs.folder import LAST
 
 SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}
 EPISODES = 45
@@ -113,6 +114,8 @@ def test_commands_give_the_same_files(
     commands = {
         "compare idle pursuit --scenarios smart constant --episodes 3 --sweep-episodes 0 "
         "--planner-episodes 0 --no-figures --out {}/compare": ("smart-idle.csv", "summary.json"),
+        "compare idle --target evader --scenarios duel --episodes 3 --sweep-episodes 0 "
+        "--planner-episodes 1 --no-figures --out {}/duel": ("duel-idle.csv", "summary.json"),
         "record idle pursuit --scenario constant --episodes 2 --out {}/record": (
             "posse/constant/idle-and-pursuit-v0/data/main_data.hdf5",
         ),
@@ -122,9 +125,13 @@ def test_commands_give_the_same_files(
         "--advise None --imitate None --encoding plain --no-tensorboard --folder {}/train": (
             "seed-1/settings.json",
         ),
+        "league --scenario smart --generations 1 --teams idle pursuit --target-steps 16 "
+        "--team-steps 16 --response-steps 16 --episodes 2 --overrides horizon 20 settle_time 0.5 "
+        "num_trackers 2 --training num_worlds 2 rollout 8 evaluate_worlds 1 imitate_rounds 1 "
+        "--folder {}/league": ("matrix.csv", "summary.json"),
     }  # fmt: skip
     for command, files in commands.items():
-        name = command.split()[0]
+        name = command.split("{}/")[1]
         for place in ("here", "there"):
             words = command.format(place).split()
             assert main([*words, "--ray"] if place == "there" else words) == 0
@@ -132,9 +139,12 @@ def test_commands_give_the_same_files(
             one, other = (tmp_path / place / name / file for place in ("here", "there"))
             assert filecmp.cmp(one, other, shallow=False), file
         assert not list((tmp_path / "there").glob(".*.work"))
-    trained = [load_file(tmp_path / p / "train/seed-1/last.safetensors") for p in ("here", "there")]
-    assert trained[0].keys() == trained[1].keys()
-    assert all(np.array_equal(array, trained[1][name]) for name, array in trained[0].items())
+    for run in (
+        "train/seed-1", "league/generation-01/target", "league/responses/target-to-trackers-1",
+    ):  # fmt: skip
+        here, there = (load_file(tmp_path / p / run / LAST) for p in ("here", "there"))
+        assert here.keys() == there.keys()
+        assert all(np.array_equal(array, there[name]) for name, array in here.items()), run
 
 
 def test_a_node_that_dies_costs_its_shard(nodes: Nodes, local: Results, tmp_path: Path) -> None:

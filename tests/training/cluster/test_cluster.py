@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from posse_baselines import from_function, load
+from posse_baselines import against, from_function, load, load_target
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.cluster import Cluster
@@ -27,6 +27,7 @@ COMMANDS = (
     "record idle --episodes 2 --ray 10.0.0.1:6379",
     "tune ddcs-distributed --generations 1 --ray",
     "train --steps 1000 --seeds 1 2 --ray",
+    "league --generations 1 --ray",
 )
 
 
@@ -103,10 +104,15 @@ def test_a_policys_module_is_part_of_its_identity(
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     source = tmp_path / "team_of_mine.py"
-    source.write_text("A = 1\n")
-    before = policy_identity("team_of_mine:Team")
-    source.write_text("A = 2\n")
-    assert policy_identity("team_of_mine:Team") != before
+    text = "class Still:\n    def begin(s, *a): ...\n    act = restart = begin\n"
+    source.write_text(text)
+    target = load_target("team_of_mine:Still")
+    given: Any = ("team_of_mine:Team", target, against(load("idle"), target))
+    before = [policy_identity(each) for each in given]
+    assert [policy_identity(each) for each in given] == before
+    source.write_text(f"{text}# other\n")
+    for each, was in zip(given, before, strict=True):
+        assert policy_identity(each) != was
 
 
 @pytest.mark.parametrize(

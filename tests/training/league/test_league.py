@@ -13,7 +13,7 @@ from tests.support.runs import HORIZON, quiet
 
 from posse_baselines import PolicyError
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.league import cross_play
+from posse_training.league import work
 from posse_training.league.command import main
 from posse_training.league.figure import draw_matrix
 from posse_training.league.league import play_league
@@ -84,7 +84,7 @@ def test_a_killed_league_ends_as_one_that_was_not(
     for owner, name, call in (
         (TrainingCallback, "_on_rollout_start", 4),
         (TrainingCallback, "_checkpoint", 7),
-        (cross_play, "evaluate", 9),
+        (work, "evaluate", 9),
     ):
         with monkeypatch.context() as patched:
             die_at(patched, owner, name, call)
@@ -122,6 +122,7 @@ def test_other_settings_are_refused(tmp_path: Path) -> None:
         ({"generations": 0}, SettingsError, "generations=0 must be"),
         ({"teams": ()}, SettingsError, "teams"),
         ({"targets": ("smart,evader",)}, SettingsError, "without commas"),
+        ({"teams": ("a/best.json", "b/best.json")}, SettingsError, "must have different names"),
         ({"teams": ("nobody",)}, PolicyError, "unknown policy 'nobody'"),
         ({"targets": ("nobody",)}, PolicyError, "unknown target 'nobody'"),
     ],
@@ -144,7 +145,7 @@ def test_harder_opponents_get_more_of_the_worlds() -> None:
 def test_the_command_says_how_to_resume(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(settings: LeagueSettings) -> None:
+    def interrupted(settings: LeagueSettings, ray: bool) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("posse_training.league.league.play_league", interrupted)

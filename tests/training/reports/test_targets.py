@@ -20,6 +20,8 @@ from posse_training.replay import record
 from posse_training.reports.compare import Settings, compare
 from posse_training.reports.compare import main as compare_main
 from posse_training.reports.comparison_run import SUMMARY
+from posse_training.reports.contenders import Contender
+from posse_training.reports.players import Players
 from posse_training.viewer.viewer import Viewer
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -85,6 +87,9 @@ def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None
     replay = record(["pursuit"], SHORT, target=str(file), seconds=2.0)
     actions = replay.players[0].columns["action"].values
     assert actions.shape[1] == SHORT.num_trackers + 1, "the target's action as well"
+    with Players(60.0, str(file)) as players:  # as a comparison's report does
+        shown = players.record(Contender("p", (load("pursuit"),)), 0, SHORT, 7, 0, "test")
+    assert shown.players[0].columns["action"].values.shape[1] == SHORT.num_trackers + 1
     film = tmp_path / "film.gif"
     asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--num-trackers", "3"]
     watch.main([*asked, "--film", str(film), "--seconds", "0.3"])

@@ -15,7 +15,9 @@ import llvmlite
 import numba
 import numpy as np
 
+from posse import TargetPolicy
 from posse_baselines import Policy, Target
+from posse_baselines.match import Match
 
 _PACKAGES: Final = ("posse", "posse_baselines", "posse_training")
 _SUFFIXES: Final = (".py", ".json", ".safetensors", ".toml")
@@ -38,11 +40,16 @@ def installed() -> str:
     )
 
 
-def policy_identity(policy: str | Policy | Target) -> Any:
+def policy_identity(policy: str | Policy | Target | TargetPolicy) -> Any:
     """Return what a policy's actions depend on: its name or contents, and its module's source."""
     if isinstance(policy, str):
         module, sign, _ = policy.partition(":")
         return [policy, _source(module) if sign else ""]
+    if isinstance(policy, Match):
+        return [policy_identity(policy.policy), policy_identity(policy.target)]
+    if isinstance(policy, Target):
+        moves = None if policy.policy is None else policy_identity(policy.policy)
+        return [policy.name, policy.motion, moves]
     return [_digest(cloudpickle.dumps(policy)), _source(type(policy).__module__)]
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from posse import Scenario
-from posse_baselines import Policy, load_target
+from posse_baselines import Policy, PolicyError, against, load_target
 from posse_training.cluster.collect import Watcher, collect
 from posse_training.cluster.evaluation import evaluation_job
 from posse_training.cluster.progress import ClusterProgress
@@ -65,12 +65,12 @@ class ClusterPlayers(Players):
 
     def expect(self, plays: Iterable[Play], seed: int, split: str) -> None:
         """Play everything that will be asked for in parallel."""
-        jobs = {
-            (job.key, job.shards): job
-            for contender, scenario, episodes in plays
-            for policy in contender.policies
-            for job in (self._job(policy, scenario, episodes, seed, split),)
-        }
+        jobs: dict[Any, Job] = {}
+        for contender, scenario, episodes in plays:
+            for policy in contender.policies:
+                with contextlib.suppress(PolicyError):  # left out when it is asked for
+                    job = self._job(policy, scenario, episodes, seed, split)
+                    jobs[job.key, job.shards] = job
         with ClusterProgress("comparison") as watcher:
             self._collect(list(jobs.values()), watcher)
 
@@ -103,6 +103,8 @@ class ClusterPlayers(Players):
         name, size = self._of(policy)
         if self._opponent is not None:
             scenario = self._opponent.fit(scenario)
+            if not isinstance(policy, str):
+                against(policy, self._opponent)  # raises here if it cannot play against it
         fitted = scenario.replace(message_size=max(scenario.message_size, size))
         return evaluation_job(
             policy, name, fitted, episodes, seed, split, self._cluster, self._limit, self._opponent

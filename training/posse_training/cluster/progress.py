@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Self
 
+from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -18,9 +19,12 @@ class ClusterProgress(Watcher):
     Args:
         title: What is done.
         disable: Show nothing.
+        console: Where to show it.
     """
 
-    def __init__(self, title: str, *, disable: bool = False) -> None:
+    def __init__(
+        self, title: str, *, disable: bool = False, console: Console | None = None
+    ) -> None:
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -28,6 +32,7 @@ class ClusterProgress(Watcher):
             TextColumn("shards, {task.fields[state]}"),
             TimeRemainingColumn(),
             transient=True,
+            console=console,
             disable=disable,
         )
         self._task = self._bar.add_task(escape(title), total=None, state="")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from posse_training.league.settings import LeagueSettings
+from posse_training.league.settings import LeagueSettings, label_of
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.folder import BEST, LAST
-from posse_training.runs.settings import TrainSettings
+from posse_training.runs.folder import BEST, LAST, SETTINGS
+from posse_training.runs.settings import TrainSettings, read_settings
 
 TEAM: Final = "trackers"
 TARGET: Final = "target"
@@ -42,7 +42,7 @@ class Member:
 def founders(settings: LeagueSettings, side: str) -> list[Member]:
     """Return the teams or targets at the beginning."""
     names = settings.teams if side == TEAM else settings.targets
-    return [Member(Path(name).stem if Path(name).suffix else name, name) for name in names]
+    return [Member(label_of(name), name) for name in names]
 
 
 def member(settings: LeagueSettings, side: str, generation: int) -> Member:
@@ -87,7 +87,13 @@ def training(
     steps: int,
     start: Member | None,
 ) -> TrainSettings:
-    """Return the settings of a member's training; ``start``: whose networks it begins with."""
+    """Return the settings of a member's training; ``start``: whose networks it begins with.
+
+    They are those of its folder if it has begun.
+    """
+    assert trained.run is not None
+    if (trained.run / SETTINGS).is_file():
+        return replace(read_settings(trained.run / SETTINGS), folder=trained.run)
     values = default_settings(settings.scenario, side=side).to_dict()
     begun = start is not None and start.run is not None
     fresh: dict[str, Any] = {"imitate": None} if begun else {}

@@ -70,6 +70,12 @@ class LeagueSettings:
             named = getattr(self, name)
             if not named or any("," in each or not each for each in named):
                 raise SettingsError(f"{name}={named!r:.80} must name one or more, without commas")
+            labels = [label_of(each) for each in named]
+            if len(set(labels)) < len(labels):
+                raise SettingsError(
+                    f"{name}={named!r:.80} must have different names: rename the files of those "
+                    "that have the same one, or leave one out"
+                )
         if "," in str(self.path):
             raise SettingsError(f"the folder {str(self.path)!r:.80} must have no comma in its name")
 
@@ -94,6 +100,11 @@ class LeagueSettings:
         """Return the settings as plain values, without the folder."""
         values = json.loads(json.dumps({**dataclasses.asdict(self), "folder": None}))
         return {name: value for name, value in values.items() if name != "folder"}
+
+
+def label_of(name: str) -> str:
+    """Return how tables name a founder: its name, or that of its file."""
+    return Path(name).stem if Path(name).suffix else name
 
 
 def keep(settings: LeagueSettings) -> None:

@@ -157,7 +157,9 @@ class Players:
         Raises:
             PlayError: The policy failed.
         """
-        given = (contender.label, contender.policies[member], scenario, seed, world, split)
+        given = (
+            contender.label, contender.policies[member], scenario, seed, world, split, self._target
+        )  # fmt: skip
         try:
             if isinstance(given[1], str):
                 found: Replay = self._worker.call(_record, given, self._limit)
@@ -208,13 +210,15 @@ def _record(
     seed: int,
     world: int,
     split: str,
+    target: str | None,
 ) -> Replay:
     """Record, in this process or the worker's."""
     try:
         loaded = posse_baselines.load(policy) if isinstance(policy, str) else policy
         return record(
-            [(label, loaded)], scenario, seed=seed, world=world, split=split, observations=False
-        )
+            [(label, loaded)], scenario, target=target, seed=seed, world=world, split=split,
+            observations=False,
+        )  # fmt: skip
     except Exception as error:
         raise PlayError(describe(error)) from None
 

@@ -1,4 +1,4 @@
-"""The files of a run folder as arrays, to be sent to a worker and back."""
+"""A run folder's files, and those that settings name, as arrays that are sent to a worker."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.registry import is_file
 from posse_training.cluster.shards import Arrays
 from posse_training.files import LOCK
 from posse_training.runs.checkpoint import CHECKPOINT
+from posse_training.runs.settings import TrainSettings, opponents_of
 
 
 def read_files(folder: Path) -> Arrays:
@@ -18,6 +20,21 @@ def read_files(folder: Path) -> Arrays:
         path.relative_to(folder).as_posix(): np.frombuffer(path.read_bytes(), np.uint8)
         for path in sorted(folder.rglob("*"))
         if path.is_file() and path.name != LOCK
+    }
+
+
+def named_files(settings: TrainSettings) -> Arrays:
+    """Return the files that a training's settings name, uint8, by the name that they have there.
+
+    They are policies, and the checkpoint of the run that it begins with.
+    """
+    named = [settings.advise, settings.imitate, settings.beside, *opponents_of(settings.against)]
+    if settings.start is not None:
+        named.append(str(Path(settings.start) / CHECKPOINT))
+    return {
+        name: np.frombuffer(Path(name).read_bytes(), np.uint8)
+        for name in named
+        if name is not None and is_file(name)
     }
 
 

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from posse_training.cluster.collect import collect
-from posse_training.cluster.progress import ClusterProgress
 from posse_training.cluster.settings import Cluster
-from posse_training.cluster.shards import Arrays, Job, Shard
-from posse_training.errors import CheckpointError, RunFolderError, SettingsError
-from posse_training.runs.files import read_files, write_files
-from posse_training.runs.folder import BEST, LAST, SETTINGS, locked_run
-from posse_training.runs.on_worker import train_on_worker
+from posse_training.errors import RunFolderError, SettingsError
+from posse_training.runs.folder import BEST, LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import check_before, train
 
@@ -41,8 +35,7 @@ def with_seeds(settings: TrainSettings, seeds: Sequence[int]) -> list[TrainSetti
 def train_seeds(runs: Sequence[TrainSettings], cluster: Cluster | None) -> Iterator[Path]:
     """Train every run, or resume it where its folder holds it; yield the best policies' files.
 
-    On a cluster each run is one task; what its folder holds is sent to the worker, and what the
-    worker's holds comes back when the run is finished.
+    On a cluster each run is one task.
 
     Raises:
         RunFolderError: A folder is in use, or holds a run with other settings.
@@ -57,48 +50,16 @@ def train_seeds(runs: Sequence[TrainSettings], cluster: Cluster | None) -> Itera
             yield train(settings, resume=(settings.run_folder / SETTINGS).exists())
         return
     from posse_training.cluster.ray_backend import RayBackend
+    from posse_training.runs.on_cluster import train_on_cluster
 
-    with contextlib.ExitStack() as stack:
-        backend = stack.enter_context(RayBackend(cluster, log=True))
-        for settings in runs:
-            stack.enter_context(locked_run(settings.run_folder))
-        watcher = stack.enter_context(ClusterProgress("training"))
-        jobs = {
-            Job(
-                f"training with seed {settings.seed}",
-                train_on_worker,
-                (replace(settings, folder=None), read_files(settings.run_folder)),
-                (Shard(settings.seed, 1),),
-            ): settings.run_folder
-            for settings in runs
-        }
-        failed = collect(list(jobs), backend, _RunFolders(jobs), watcher, cluster.attempts)
-    for job, folder in jobs.items():
-        if job in failed:
-            raise failed[job]
+    labelled = {f"seed {settings.seed}": settings for settings in runs}
+    with RayBackend(cluster, log=True) as backend:
+        failed = train_on_cluster(labelled, backend, cluster.attempts)
+    for label, settings in labelled.items():
+        if label in failed:
+            raise failed[label]
+        folder = settings.run_folder
         yield folder / (BEST if (folder / BEST).is_file() else LAST)
-
-
-class _RunFolders:
-    """Run folders as a store: a run that is there is resumed, which ends at once if it is over."""
-
-    def __init__(self, folders: dict[Job, Path]) -> None:
-        self._folders = folders
-
-    def missing(self, job: Job) -> list[Shard]:
-        return list(job.shards)
-
-    def write(self, job: Job, shard: Shard, arrays: Arrays) -> None:
-        try:
-            write_files(self._folders[job], arrays)
-        except OSError as error:
-            raise CheckpointError(
-                f"cannot write {error.filename}: {error.strerror or error}. Make room, then run "
-                "the same command again: it resumes"
-            ) from error
-
-    def read(self, job: Job) -> list[Arrays]:
-        return [read_files(self._folders[job])]
 
 
 def _check_folder(settings: TrainSettings) -> None:
