@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy  # its parts are imported when they are used: scipy.stats takes a second
 
 RESAMPLES: Final = 2000
 LEVEL: Final = 0.95
@@ -51,7 +51,7 @@ def _bootstrap(values: Values, statistic: Any) -> Estimate:
     value = float(statistic(values, axis=0))
     if len(values) == 1 or np.ptp(values) == 0:
         return Estimate(value, value, value, len(values))
-    interval = stats.bootstrap(
+    interval = scipy.stats.bootstrap(
         (values,),
         statistic,
         n_resamples=RESAMPLES,
@@ -75,7 +75,7 @@ def interquartile_mean(values: npt.ArrayLike) -> Estimate:
 
 def middle_mean(sample: Values, axis: int = -1) -> Any:
     """Return the mean of the middle half."""
-    return stats.trim_mean(sample, 0.25, axis=axis)
+    return scipy.stats.trim_mean(sample, 0.25, axis=axis)
 
 
 def share(happened: npt.ArrayLike) -> Estimate:
@@ -83,7 +83,7 @@ def share(happened: npt.ArrayLike) -> Estimate:
     events = np.asarray(happened, bool).reshape(-1)
     if len(events) == 0:
         return Estimate(np.nan, np.nan, np.nan, 0)
-    interval = stats.binomtest(int(events.sum()), len(events)).proportion_ci(
+    interval = scipy.stats.binomtest(int(events.sum()), len(events)).proportion_ci(
         confidence_level=LEVEL, method="wilson"
     )
     return Estimate(float(events.mean()), float(interval.low), float(interval.high), len(events))
