@@ -2,12 +2,14 @@
 
 ``python benchmarks/cluster.py`` evaluates with 1, 2, ... workers on this machine, and here
 without Ray; ``--training`` measures RLlib's PPO by the number of its environment runners instead.
-Needs Ray; RLlib from ``.venv-recipes`` (``make recipes``).
+Prints the tables of ``docs/cluster.md``. Needs Ray, and RLlib from ``.venv-recipes``
+(``make recipes``).
 """
 
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 import time
 from dataclasses import dataclass, replace
@@ -30,6 +32,7 @@ from posse_training.cluster.shards import Arrays, Job
 from posse_training.cluster.store import Folder
 
 OUT = Path("runs/bench/cluster.json")
+_ALONE: dict[str, Any] = {"address": "local", "include_dashboard": False}
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ def timed(*arguments: Any) -> Arrays:
 def on_cluster(settings: Settings, workers: int) -> dict[str, Any]:
     """Evaluate with so many workers; the clock starts when each has done a shard."""
     s = settings
-    ray.init(num_cpus=workers, log_to_driver=False, logging_level="error", include_dashboard=False)
+    ray.init(num_cpus=workers, log_to_driver=False, logging_level="error", **_ALONE)
     try:
         with tempfile.TemporaryDirectory() as folder, RayBackend(Cluster()) as backend:
             cluster, store = Cluster(work=folder), Folder(folder)
@@ -119,6 +122,7 @@ def rllib(settings: Settings, runners: int) -> dict[str, Any]:
 
     import posse
 
+    ray.init(num_cpus=runners + 1, log_to_driver=False, logging_level="error", **_ALONE)
     register_env("posse", lambda s: ParallelPettingZooEnv(posse.parallel_env(settings.scenario)))
     config = PPOConfig().environment("posse").env_runners(num_env_runners=runners)
     config.multi_agent(policies={"tracker"}, policy_mapping_fn=lambda agent, _: "tracker")
@@ -127,7 +131,7 @@ def rllib(settings: Settings, runners: int) -> dict[str, Any]:
     )
     algorithm = config.build_algo()
     try:
-        before = _steps(algorithm.train())
+        before, load = _steps(algorithm.train()), os.getloadavg()[0]
         began, sampling, learning = time.perf_counter(), 0.0, 0.0
         for _ in range(settings.iterations):
             found = algorithm.train()
@@ -139,6 +143,7 @@ def rllib(settings: Settings, runners: int) -> dict[str, Any]:
             "steps_per_second": (_steps(found) - before) / seconds,
             "sampling_s_per_iteration": sampling / settings.iterations,
             "learning_s_per_iteration": learning / settings.iterations,
+            "load_average": load,
         }
     finally:
         algorithm.stop()
@@ -150,6 +155,14 @@ def _steps(found: dict[str, Any]) -> float:
     return float(found["env_runners"]["num_env_steps_sampled_lifetime"])
 
 
+def _table(rows: list[dict[str, Any]]) -> str:
+    """Return rows as a table in Markdown; columns that a row lacks are empty."""
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    lines = [columns, ["---"] * len(columns)]
+    lines += [[f"{row[c]:,.4g}" if c in row else "" for c in columns] for row in rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
 def main() -> None:
     """Measure, print and write the figures."""
     settings = tyro.cli(Settings)
@@ -158,11 +171,12 @@ def main() -> None:
         rows += [here(settings, threads) for threads in settings.workers]
     for count in settings.workers:
         rows.append((rllib if settings.training else on_cluster)(settings, count))
-    for row in rows:
-        print("  ".join(f"{name} {value:,.4g}" for name, value in row.items()))
+    machine = describe()
+    print(_table(rows))
+    print("{processor}, {cores} cores, Python {python}, {date}, commit {commit}".format(**machine))
     OUT.parent.mkdir(parents=True, exist_ok=True)
     out = OUT.with_stem("cluster-training") if settings.training else OUT
-    out.write_text(json.dumps({"machine": describe(), "rows": rows}, indent=2) + "\n")
+    out.write_text(json.dumps({"machine": machine, "rows": rows}, indent=2) + "\n")
 
 
 if __name__ == "__main__":
