@@ -7,6 +7,7 @@ import socket
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from posse_baselines import against, from_function, load, load_target
@@ -16,7 +17,9 @@ from posse_training.cluster import Cluster
 from posse_training.cluster.evaluation import sent
 from posse_training.cluster.identity import policy_identity
 from posse_training.cluster.settings import as_cluster, check_reachable, of_option
+from posse_training.cluster.shards import Shard
 from posse_training.errors import ClusterError, MissingExtraError, SettingsError
+from posse_training.runs.on_worker import train_on_worker
 from posse_training.runs.settings import TrainSettings
 
 without_ray = pytest.mark.skipif(
@@ -145,3 +148,10 @@ def test_a_seed_twice_and_another_run_are_refused(
     (folder / "settings.json").write_text('{"steps": 5}')
     assert main(["train", "--seeds", "1", "--folder", str(tmp_path)]) == 2
     assert "holds a run with another" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["/nowhere/team.safetensors", "../team.safetensors"])
+def test_a_policy_file_is_not_written_outside_of_the_workers_folder(name: str) -> None:
+    named = {name: np.zeros(1, np.uint8)}
+    with pytest.raises(ClusterError, match=f"has no {name}, which the training reads: name it by"):
+        train_on_worker("seed 1", TrainSettings(), {}, named, Shard(1, 1))
