@@ -16,6 +16,7 @@ from rich.console import Console
 from posse_training.reports.pictures.parts import legend, note
 from posse_training.reports.pictures.style import RC, WIDTH, looks_of, marker_of
 from posse_training.reports.statistics import mean
+from posse_training.runs.defaults import default_settings
 
 ROOT: Final = Path(__file__).parents[1]
 RESULTS: Final = ROOT / "benchmarks" / "algorithms"
@@ -86,13 +87,15 @@ def draw(groups: dict[tuple[str, str], list[Run]]) -> None:
         k = 2 * scenarios.index(scenario)
         for axis, measure, scale in ((axes[k], "steps", 1e6), (axes[k + 1], "seconds", 60.0)):
             band(axis, runs, measure, scale, marker_of(algorithm, looks[algorithm]))
-        axes[k].set_title(scenario, loc="left")
+        axes[k].set_title(f"{scenario} v{runs[0]['version']}", loc="left")
         axes[k].set(ylabel="validation safe score", xlabel="steps, millions")
         axes[k + 1].set(xlabel="time, min")
         axes[k].set_xscale("log")
         axes[k + 1].set_xscale("log")
     counts = sorted({len(runs) for runs in groups.values()})
-    note(figure, f"{' to '.join(map(str, counts))} training seeds; band: their range")
+    seeds = f"{' to '.join(map(str, counts))} training seeds; band: their range"
+    worlds = default_settings(own=False).evaluate_worlds
+    note(figure, f"{worlds:,} worlds of the validation split; {seeds}")
     legend(figure, algorithms, looks)
     figure.savefig(FIGURE, metadata={"Date": None})
 

@@ -22,9 +22,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import posse
+from posse_training.reports.pictures.parts import note
 from posse_training.reports.pictures.style import RC
 from posse_training.reports.reproduce.motion import TARGET, draw_robots, look_of
-from posse_training.reports.reproduce.recording import Recording, record
+from posse_training.reports.reproduce.recording import Recording, played, record
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
 SEED: Final = 7
@@ -70,7 +71,8 @@ def draw(law: Law) -> Figure:
     number = run.trackers.shape[2]
     handles = [Line2D([], [], lw=1.3, label=f"tracker {n}", **look_of(n)) for n in range(number)]
     handles.append(Line2D([], [], color=TARGET, lw=1.0, label="target"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
+    note(figure, f"world 0 of {played(scenario, SEED)}; starts 2 to 4 m from the target")
+    figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
     return figure
 
 

@@ -17,6 +17,7 @@ from posse_training.cli import main
 from posse_training.reports.comparison import Comparison, table
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.progress import Progress
+from posse_training.reports.reproduce import Settings
 from posse_training.reports.reproduce import table as settling_times
 from posse_training.reports.statistics import Estimate
 from posse_training.runs.display import Display as TrainDisplay
@@ -82,10 +83,9 @@ def test_the_papers_experiments() -> None:
         "paper_settling_time": 10.5, "settling_time_quartiles": [10.5, 11.5, 12.5],
         "settled": 1000, "in_slots": 1000,
     }  # fmt: skip
-    text = on_a_terminal(settling_times([row], 0.1))
-    holds(
-        text, "median [quartiles]", "centralized", "11.5 [10.5, 12.5]", "1000 of 1000", "exchange"
-    )
+    text = on_a_terminal(settling_times([row], Settings(starts=1000)))
+    holds(text, "[quartiles]", "centralized", "11.5 [10.5, 12.5]", "ddcs-centralized-no-exchange")
+    holds(text, "1,000 starts of paper-distributed v1, test split, seed 7")
 
 
 def test_a_tuning(tmp_path: Path) -> None:

@@ -9,7 +9,10 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from posse import get_scenario
+from posse_training.league.cross_play import TEST_SEED
 from posse_training.league.results import League
+from posse_training.reports.pictures.parts import note, plain
 from posse_training.reports.pictures.style import RC, WIDTH
 
 NAME: Final = "matrix"
@@ -39,7 +42,18 @@ def draw_matrix(found: League) -> list[Path]:
                     color=colour, fontsize=7,
                 )  # fmt: skip
         figure.colorbar(image, label="score of the team", shrink=0.8)
+        note(figure, _played(found))
         files = [found.settings.path / f"{NAME}.{suffix}" for suffix in ("png", "svg")]
         figure.savefig(files[0], dpi=150)
         figure.savefig(files[1], metadata=_META)
     return files
+
+
+def _played(found: League) -> str:
+    settings = found.settings
+    scenario = get_scenario(settings.scenario)
+    changed = "".join(f", {name}={value}" for name, value in settings.overrides.items())
+    return plain(
+        f"{scenario.name} v{scenario.version}{changed}: {settings.episodes:,} worlds a pair, "
+        f"test split, seed {TEST_SEED}; training seed {settings.seed}"
+    )

@@ -179,7 +179,12 @@ def asked_sweeps(settings: Settings) -> tuple[Sweep, ...]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare policies, print the table, and return 1 if a policy failed, else 0."""
-    settings = tyro.cli(Settings, prog="posse compare", args=arguments)
+    settings = tyro.cli(
+        Settings,
+        prog="posse compare",
+        description="Score policies on the same worlds; write tables, figures and a report page.",
+        args=arguments,
+    )
     with how_to_resume(settings.ray):
         found = compare(settings)
     console = Console(width=None if sys.stdout.isatty() else _PIPED)

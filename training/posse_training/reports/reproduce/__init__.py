@@ -27,16 +27,22 @@ from posse_training.reports.pictures.style import RC
 from posse_training.reports.reproduce.laws import leader_loss, tracks
 from posse_training.reports.reproduce.motion import curves, frames
 from posse_training.reports.reproduce.recording import (
+    SPLIT,
     Floats,
     Recording,
     draw_starts,
     median_world,
+    played,
     record,
     settling_times,
 )
 
 HORIZON: Final = 250
 """Control steps of an episode, enough for the slowest law to settle."""
+
+
+PLAYED: Final = "paper-distributed"
+"""Scenario of all runs; that of the centralized model differs only in name."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +79,8 @@ class Settings:
 
 
 def play_member(policy: str, settings: Settings) -> Recording:
-    """Play a policy from the drawn starts; the models' scenarios differ only in name."""
-    scenario = posse.get_scenario("paper-distributed", horizon=HORIZON)
+    """Play a policy from the drawn starts."""
+    scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
     tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
     options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
     return record(policy, scenario, settings.starts, settings.seed, options)
@@ -83,7 +89,7 @@ def play_member(policy: str, settings: Settings) -> Recording:
 def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
     """Return the numbers of a policy: times (E,) s, and final distances from slots (E, N) m."""
     known = times[np.isfinite(times)]
-    model = next((m for m in MODELS if policy in (m.paper_policy, m.our_policy)), None)
+    model = next((m for m in MODELS if policy == m.paper_policy), None)
     return {
         "policy": policy,
         "model": "centralized" if FAMILY[policy].model == "centralized" else "distributed",
@@ -114,12 +120,17 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
                 (policy, shown[policy][0], world, float(shown[policy][1][world]))
                 for policy in (model.paper_policy, model.our_policy)
             ]
-            _write(settings.out, f"{model.name}-frames", frames(pair))
-            _write(settings.out, f"{model.name}-curves", curves(pair, model.paper_settling_time))
+            facts = (
+                f"start {world}, the median of {settings.starts:,} starts, "
+                f"{played(posse.get_scenario(PLAYED), settings.seed)}"
+            )
+            _write(settings.out, f"{model.name}-frames", frames(pair, facts))
+            paper = model.paper_settling_time
+            _write(settings.out, f"{model.name}-curves", curves(pair, paper, facts))
         _write(settings.out, "tracks", tracks(settings.seed))
         loss = leader_loss("pngl-l-phi", settings.starts, settings.seed)
         _write(settings.out, "leader-loss", loss)
-    stated = {"seed": settings.seed, "split": "test", "tolerance": settings.tolerance}
+    stated = {"seed": settings.seed, "split": SPLIT, "tolerance": settings.tolerance}
     text = json.dumps({**stated, "policies": rows}, indent=2)
     (settings.out / "settling.json").write_text(text + "\n")
     return rows
@@ -132,14 +143,15 @@ def _write(folder: Path, name: str, figure: Figure) -> None:
     plt.close(figure)
 
 
-def table(rows: Sequence[dict[str, Any]], tolerance: float) -> Table:
-    """Return the settling times with those of the paper."""
+def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
+    """Return the settling times with those of the paper, at most 80 characters wide."""
     shown = Table(
-        title=f"settling time, s: finally within {tolerance:g} m and 0.1 m/s", box=box.HORIZONTALS,
-        pad_edge=False, collapse_padding=True,
+        title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
+        f"{settings.starts:,} starts of {played(posse.get_scenario(PLAYED), settings.seed)}",
+        box=box.HORIZONTALS, show_edge=False, pad_edge=False, padding=0,
     )  # fmt: skip
     shown.add_column("policy", overflow="fold")
-    for column in ("model", "paper", "median [quartiles]", "settled", "all in\nslots"):
+    for column in ("model", "paper", "median\n[quartiles]", "settled", "all in\nslots"):
         shown.add_column(Text(column), no_wrap=True)  # brackets are not markup
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
@@ -149,16 +161,21 @@ def table(rows: Sequence[dict[str, Any]], tolerance: float) -> Table:
             row["model"],
             "-" if paper is None else f"{paper:.1f}",
             "-" if middle is None else f"{middle:.1f} [{low:.1f}, {high:.1f}]",
-            f"{row['settled']} of {row['starts']}",
-            f"{row['in_slots']} of {row['starts']}",
+            str(row["settled"]),
+            str(row["in_slots"]),
         )
     return shown
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Reproduce the paper's experiments and print the settling times with those of the paper."""
-    settings = tyro.cli(Settings, prog="posse reproduce", args=arguments)
+    settings = tyro.cli(
+        Settings,
+        prog="posse reproduce",
+        description="Repeat the experiments of the paper's section 4: figures and settling times.",
+        args=arguments,
+    )
     rows = reproduce(settings)
     console = Console()
-    console.print(table(rows, settings.tolerance))
+    console.print(table(rows, settings))
     console.print(f"figures and numbers: {settings.out}", markup=False, soft_wrap=True)

@@ -18,8 +18,14 @@ import posse
 from posse_baselines import with_settings
 from posse_baselines.ddcs import TASKS
 from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, GRID, ORANGE
+from posse_training.reports.pictures.parts import note
 from posse_training.reports.reproduce.motion import COLOURS, TARGET, draw_robots, look_of
-from posse_training.reports.reproduce.recording import Recording, median_world, record
+from posse_training.reports.reproduce.recording import (
+    Recording,
+    median_world,
+    played,
+    record,
+)
 
 _HEADING: Final = 2.6  # rad; of the target in the tracks
 _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
@@ -63,7 +69,8 @@ def tracks(seed: int) -> Figure:
     axes[1, 0].set_ylabel("line of sight σ, rad")
     handles = [Line2D([], [], lw=1.4, label=f"robot {n}", **look_of(n)) for n in range(5)]
     handles.append(Line2D([], [], color=TARGET, lw=1.0, label="target"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
+    note(figure, f"one run each from a given start, {played(team, seed)}")
+    figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
     return figure
 
 
@@ -84,7 +91,8 @@ def _bearing(axis: Axes, run: Recording, number: int, look: int, label: str) -> 
 
 def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     """Draw a run in which the leader breaks: error, task and leader of each robot over time."""
-    run = record(policy, posse.get_scenario("leader-loss"), worlds, seed)
+    scenario = posse.get_scenario("leader-loss")
+    run = record(policy, scenario, worlds, seed)
     world, broke, recovered = _shown(run)
     figure, axes = plt.subplots(
         4, 1, figsize=(8.4, 8.2), layout="constrained",
@@ -131,7 +139,8 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
         Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)
     ]
     handles += [Patch(fc=c, label=t) for c, t in zip(_TASK_COLOURS, TASKS, strict=True)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
+    note(figure, f"world {world}, the median of {worlds:,} worlds, {played(scenario, seed)}")
+    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)
     return figure
 
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, INK, PINK, RED
+from posse_training.reports.pictures.parts import note
 from posse_training.reports.reproduce.recording import Recording
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
@@ -32,8 +33,11 @@ def look_of(number: int) -> dict[str, Any]:
     return {"color": COLOURS[number % 5], "ls": LINES[number % 5]}
 
 
-def frames(shown: list[tuple[str, Recording, int, float]]) -> Figure:
-    """Draw start, half the settling time and the settled formation, a row for each (name, ...)."""
+def frames(shown: list[tuple[str, Recording, int, float]], played: str) -> Figure:
+    """Draw start, half the settling time and the settled formation, a row for each (name, ...).
+
+    ``played`` is written below: world, split, seed and version.
+    """
     figure, axes = plt.subplots(
         len(shown), 3, figsize=(9.6, 3.3 * len(shown)), layout="constrained", squeeze=False
     )
@@ -54,7 +58,8 @@ def frames(shown: list[tuple[str, Recording, int, float]]) -> Figure:
     if any((recording.leader[:, world] >= 0).any() for _, recording, world, _ in shown):
         rim = Line2D([], [], marker="o", ls="", mfc="w", mec=TARGET, mew=2.2, ms=8, label="leader")
         handles.append(rim)
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    note(figure, played)
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
     return figure
 
 
@@ -88,7 +93,7 @@ def draw_robots(axis: Axes, recording: Recording, world: int, instant: int, sinc
     axis.set_aspect("equal")
 
 
-def curves(shown: list[tuple[str, Recording, int, float]], paper: float) -> Figure:
+def curves(shown: list[tuple[str, Recording, int, float]], paper: float, played: str) -> Figure:
     """Draw every tracker against time, a column for each (name, recording, world, settled)."""
     rows = (
         "x from the\ntarget, m", "y from the\ntarget, m", "speed V, m/s",
@@ -125,5 +130,6 @@ def curves(shown: list[tuple[str, Recording, int, float]], paper: float) -> Figu
         Line2D([], [], color=GREY, lw=1.0, label="settled"),
         Line2D([], [], color=GREY, ls=":", lw=1.2, label=f"the paper's {paper:g} s"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    note(figure, played)
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
     return figure

@@ -16,6 +16,7 @@ from posse_baselines import Policy, begin, load
 
 Floats = npt.NDArray[np.floating[Any]]
 
+SPLIT: Final = "test"
 TARGET_HEADING: Final = math.pi
 """In the paper's figure 7 the target is the leftmost robot: it heads towards -x."""
 DRAWN_AT_ONCE: Final = 2000
@@ -70,7 +71,7 @@ def draw_starts(scenario: posse.Scenario, starts: int, seed: int) -> tuple[Float
     """
     trackers, targets = [], []
     for first in range(0, 1_000_000, DRAWN_AT_ONCE):
-        batch = posse.Batch(scenario, DRAWN_AT_ONCE, seed=seed, split="test", first_world=first)
+        batch = posse.Batch(scenario, DRAWN_AT_ONCE, seed=seed, split=SPLIT, first_world=first)
         batch.reset()
         tracker, target = _poses(batch.state, "tracker"), _poses(batch.state, "world")
         behind = (tracker[..., 0] > target[:, None, 0]).all(axis=1)
@@ -83,6 +84,11 @@ def draw_starts(scenario: posse.Scenario, starts: int, seed: int) -> tuple[Float
     return np.concatenate(trackers)[:starts], drawn
 
 
+def played(scenario: posse.Scenario, seed: int) -> str:
+    """Return what a figure says of its worlds: scenario with version, split, seed."""
+    return f"{scenario.name} v{scenario.version}, {SPLIT} split, seed {seed}"
+
+
 def record(
     policy: str | Policy,
     scenario: posse.Scenario,
@@ -90,10 +96,10 @@ def record(
     seed: int,
     options: Mapping[str, Any] | None = None,
 ) -> Recording:
-    """Play a whole episode of ``worlds`` worlds of the split ``test``."""
+    """Play a whole episode of ``worlds`` worlds of :data:`SPLIT`."""
     team = load(policy) if isinstance(policy, str) else policy
     scenario = scenario.replace(message_size=team.message_size)
-    batch = posse.Batch(scenario, worlds, seed=seed, split="test", autoreset="disabled")
+    batch = posse.Batch(scenario, worlds, seed=seed, split=SPLIT, autoreset="disabled")
     observations = batch.reset(options=dict(options or {}))
     memory, offsets = begin(team, batch), np.array(slot_offsets(scenario))
     instants = []
