@@ -151,6 +151,21 @@ def test_another_policy_plays_the_same_world_up_to_the_same_moment() -> None:
     np.testing.assert_array_equal(shown.moment.scene.position, before.position)
 
 
+def test_what_is_being_loaded_is_said_before() -> None:
+    told: list[str] = []
+    shown = Viewer(
+        ("pursuit", "ddcs-distributed"), posse.get_scenario("field"), size=(960, 640),
+        show=lambda _: told.append(shown.message),
+    )  # fmt: skip
+    assert told == []
+    for command in (Command("policy", 1), Command("policy", -1), Command("world", 1)):
+        shown.do(command)
+        assert shown.message == ""
+    first, second = told  # what has been loaded is there at once
+    assert first == "Loading ddcs-distributed, world 0 ..."
+    assert second == "Loading pursuit, world 1 ..."
+
+
 def test_a_policy_that_cannot_play_is_said_and_changes_nothing() -> None:
     shown = viewer("pursuit", "no-such-policy")
     play(shown, 5)

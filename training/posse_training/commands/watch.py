@@ -86,13 +86,14 @@ def main(arguments: Sequence[str]) -> None:
         raise SettingsError(f"--size {size[0]} {size[1]} must be {_LEAST} to {_MOST} px each")
     from posse_baselines import policy_names
     from posse_training.viewer.viewer import Viewer
-    from posse_training.viewer.window import open_window, run
+    from posse_training.viewer.window import open_window, run, show
 
     others = [name for name in policy_names() if name not in which.policies]
     names = [*which.policies, *(others if len(which.policies) == 1 else [])]
     viewer = Viewer(
-        names, scenario, target, seed=which.seed, world=which.world, split=which.split, size=size
-    )
+        names, scenario, target, seed=which.seed, world=which.world, split=which.split, size=size,
+        show=show,
+    )  # fmt: skip
     command = f"posse watch {' '.join(which.policies)} --scenario {which.scenario}"
     if which.target is not None:
         command += f" --target {which.target}"

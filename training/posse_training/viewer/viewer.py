@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -51,6 +51,8 @@ class Viewer:
         world: Index of the first world.
         split: ``"train"``, ``"validation"`` or ``"test"``.
         size: Of the window, px.
+        show: Shows a picture at once. It is called before a policy or a world is loaded, which may
+            take some seconds.
 
     Attributes:
         state: What is shown.
@@ -71,12 +73,14 @@ class Viewer:
         world: int = 0,
         split: str = "test",
         size: tuple[int, int] = (1280, 720),
+        show: Callable[[pygame.Surface], None] | None = None,
     ) -> None:
         self.state = State(world=world)
         self.message = ""
         self._policies = list(policies)
         self._scenario, self._target = scenario, target
         self._seed, self._split = seed, split
+        self._show = show
         self._tapes: dict[int, Tape] = {}
         self._tape = self._load(0, world)
         self._tapes[0] = self._tape
@@ -201,9 +205,9 @@ class Viewer:
             draw_panel(canvas, layout, title, self._lines(), state.scroll)
         tape = self._tape
         draw_timeline(
-            canvas, layout, playing=not state.paused, step=scene.step, first=tape.first,
-            played=tape.last, end=tape.end, control_step=self._scenario.control_step,
-            contacts=tape.contacts,
+            canvas, layout, playing=not (state.paused or self._ended), step=scene.step,
+            first=tape.first, played=tape.last, end=tape.end,
+            control_step=self._scenario.control_step, contacts=tape.contacts,
         )  # fmt: skip
         if self.message:
             draw_message(canvas, layout, self.message)
@@ -242,20 +246,34 @@ class Viewer:
         """Show another policy or world: nothing is changed if that is not possible."""
         tapes = self._tapes if state.world == self.state.world else {}
         if state.policy not in tapes:
+            self._announce(state)
             tapes = {**tapes, state.policy: self._load(state.policy, state.world)}
         self._tapes, self._tape = tapes, tapes[state.policy]
+
+    def _announce(self, state: State) -> None:
+        """Show what is about to be loaded."""
+        if self._show is not None:
+            given = self._policies[state.policy]
+            name = given if isinstance(given, str) else given.name
+            self.message = f"Loading {name}, world {state.world} ..."
+            self._show(self.draw())
+            self.message = ""
 
     def _lines(self) -> list[Line]:
         if self.state.selected is None:
             return []
         return lines_of(self.moment, self._tape.layout, self.state.selected)
 
+    @property
+    def _ended(self) -> bool:
+        return self._tape.over and int(self.state.step) >= self._tape.last
+
     def _remark(self) -> str:
         state = self.state
         told = [f"world {state.world}", f"{SPEEDS[state.speed]:g}× speed"]
         if int(state.step) > self._tape.last:
             told.append(f"playing up to {state.step * self._scenario.control_step:.1f} s")
-        elif self._tape.over and int(state.step) >= self._tape.last:
+        elif self._ended:
             told.append("the end")
         elif state.paused:
             told.append("paused")

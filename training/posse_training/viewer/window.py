@@ -59,6 +59,14 @@ def open_window(size: tuple[int, int], caption: str, instead: str) -> None:
     pygame.key.set_repeat(350, 40)
 
 
+def show(picture: pygame.Surface) -> None:
+    """Show a picture in the window, if one is open."""
+    surface = pygame.display.get_surface()
+    if surface is not None:
+        surface.blit(picture, (0, 0))
+        pygame.display.flip()
+
+
 def run(shown: Shown) -> None:
     """Show something in the open window until the user closes it, then close the window."""
     clock = pygame.time.Clock()
@@ -67,9 +75,6 @@ def run(shown: Shown) -> None:
             for event in pygame.event.get():
                 shown.handle(event)
             shown.tick(min(clock.tick(_RATE) / 1000, _LONGEST))
-            surface = pygame.display.get_surface()
-            if surface is not None:
-                surface.blit(shown.draw(), (0, 0))
-                pygame.display.flip()
+            show(shown.draw())
     finally:
         pygame.display.quit()
