@@ -3,8 +3,8 @@
     python docs/drawing/gallery.py [--scenarios smart field]
 
 Writes docs/media/replays/NAME.html, docs/media/scenarios/NAME.png of the last team in it,
-docs/media/replays/NAME-others.html of further teams in the same world, for the leaderboard, and
-docs/media/replays/duel-evader.html with the learned target.
+docs/media/replays/NAME-others.html, NAME-others-2.html ... of all other teams of the leaderboard in
+the same world, and docs/media/replays/duel-evader.html with the learned target.
 """
 
 from __future__ import annotations
@@ -19,11 +19,14 @@ from PIL import Image
 import posse
 from posse.rendering.renderer import Renderer
 from posse_baselines import begin, load
+from posse_training.leaderboard import read_result
 from posse_training.replay import record, write_replay
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
+RESULTS: Final = MEDIA.parents[1] / "benchmarks" / "leaderboard"
 SEED: Final = 7
 OTHERS: Final = ("pursuit", "ddcs-centralized", "learned-generalist", "planner")
+SIDE_BY_SIDE: Final = 4
 EVADER: Final = "evader"
 SIDE: Final = 440  # px of a picture
 
@@ -76,6 +79,15 @@ def picture(scenario: str, shown: Shown) -> Image.Image:
     return Image.fromarray(frame).quantize(64)
 
 
+def others(scenario: str, shown: Shown) -> list[tuple[str, ...]]:
+    """Return the teams on the leaderboard whom a scenario's replay does not show, by replay."""
+    found = [read_result(path) for path in sorted(RESULTS.glob(f"{scenario}-*.json"))]
+    teams = [r.policy for r in found if r.scenario == scenario and r.policy_kind == "shipped"]
+    rest = [team for team in teams if team not in (*shown.teams, *OTHERS)]
+    starts = range(0, len(rest), SIDE_BY_SIDE)
+    return [OTHERS, *(tuple(rest[k : k + SIDE_BY_SIDE]) for k in starts)]
+
+
 def write(
     scenario: str, suffix: str, teams: tuple[str, ...], shown: Shown, target: str | None = None
 ) -> Path:
@@ -94,7 +106,8 @@ def main() -> None:
         shown = GALLERY[name]
         path = write(name, "", shown.teams, shown)
         if not name.startswith("paper"):
-            write(name, "-others", OTHERS, shown)
+            for number, teams in enumerate(others(name, shown), 1):
+                write(name, f"-others-{number}" if number > 1 else "-others", teams, shown)
         if name == "duel":
             write(name, f"-{EVADER}", ("ddcs-tuned", "learned-smart"), shown, EVADER)
         file = MEDIA / "scenarios" / f"{name}.png"

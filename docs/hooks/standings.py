@@ -15,7 +15,7 @@ from posse_training.errors import ResultFileError
 from posse_training.leaderboard import ResultFile, read_result
 from posse_training.leaderboard.submit import SEED, WORLDS
 from posse_training.replay import read_replay
-from posse_training.reports.statistics import mean, share
+from posse_training.reports.statistics import Estimate, mean, share
 
 ROOT: Final = Path(__file__).parents[2]
 FOLDER: Final = ROOT / "benchmarks" / "leaderboard"
@@ -95,7 +95,7 @@ def scores(scenario: str) -> str:
     for result in mine:
         value = mean(result.column("safe_score"))
         of_planner = "" if best is None or result.reads_state else f"{value.value / best:.2f}"
-        rows.append((_name(result), str(value), of_planner, _contact_free(result)))
+        rows.append((_name(result), _whole(value), of_planner, _contact_free(result)))
     header = ("team", "safe score [95 %]", "of the planner's", "contact-free")
     return table(header, rows) + "\n" + _made_of(mine)
 
@@ -110,9 +110,9 @@ def leaderboard() -> str:
             rows.append(
                 (
                     "" if result.reads_state else rank, _name(result),
-                    str(mean(result.column("safe_score"))), _contact_free(result),
+                    _whole(mean(result.column("safe_score"))), _contact_free(result),
                     f"{result.worlds:,}", result.seed, code((result.commit or "")[:7]),
-                    _replay(result),
+                    replay_link(result),
                 )
             )  # fmt: skip
         header = (
@@ -139,14 +139,21 @@ def _name(result: ResultFile) -> str:
     return shown + (" (reference)" if result.reads_state else "")
 
 
+def _whole(value: Estimate) -> str:
+    """Return an estimate whose interval is not broken across lines."""
+    return str(value).replace(", ", ",&nbsp;")
+
+
 def _contact_free(result: ResultFile) -> str:
     return f"{100 * share(result.column('contact_free') == 1).value:.1f} %"
 
 
-def _replay(result: ResultFile) -> str:
+def replay_link(result: ResultFile) -> str:
+    """Return a link to a replay of the team, or the command that writes one."""
     if result.replay:
         return f'<a href="{html.escape(result.replay)}">replay</a>'
-    for file in (result.scenario, f"{result.scenario}-others"):
+    further = sorted(path.stem for path in (MEDIA / "replays").glob(f"{result.scenario}-others*"))
+    for file in (result.scenario, *further):
         if result.policy_kind == "shipped" and result.policy in players(file):
             return f'<a href="site:media/replays/{file}.html">replay</a>'
     return code(f"posse replay {result.policy} --scenario {result.scenario}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -69,7 +70,7 @@ def test_teams_are_ranked_by_the_safe_score(standings: ModuleType, tmp_path: Pat
         f"<span>{n}</span>" for n in ("first", "second", "third")
     ]
     assert "all-knowing</span> (reference)" in rows[0][1]
-    value, low, high = (float(part.strip("[],")) for part in rows[1][2].split())
+    value, low, high = (float(n) for n in re.findall(r"[\d.]+", rows[1][2]))
     assert low < value < high
     assert value == pytest.approx(0.8, abs=0.01)
     assert rows[1][3] == "{:.1f} %".format(100 * (np.array(free_of("first")) == 1).mean())
@@ -81,6 +82,18 @@ def free_of(label: str) -> list[float]:
     rng = np.random.default_rng(len(label))
     rng.normal(0.5, 0.05, WORLDS)
     return [float(value < 0.75) for value in rng.uniform(size=WORLDS)]
+
+
+def test_every_row_in_the_repository_has_a_replay(
+    standings: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(standings, "FOLDER", DOCS.parent / "benchmarks" / "leaderboard")
+    found = standings.results()
+    assert len(found) > 100
+    for result in found:
+        link = re.fullmatch(r'<a href="(site:)?(.+)">replay</a>', standings.replay_link(result))
+        assert link, f"run docs/drawing/gallery.py: {result.policy} on {result.scenario}"
+        assert not link[1] or (DOCS / link[2]).is_file()
 
 
 def test_other_worlds_and_versions_are_not_listed(standings: ModuleType, tmp_path: Path) -> None:
