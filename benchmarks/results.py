@@ -1,14 +1,17 @@
 """Part of ``make results``: evaluates the scripted teams on every scenario, 1,000 test worlds each.
 
-Writes docs/results.md, with seed and commit, its data, and result files for the leaderboard.
+Writes docs/results.md, with seed and commit, its figure and data, and result files for the
+leaderboard.
 Nothing was tuned on these worlds.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import tyro
 from leaderboard import keep
@@ -17,6 +20,9 @@ import posse
 from posse_baselines import load
 from posse_training.provenance import commit
 from posse_training.reports.evaluation import Results, evaluate
+from posse_training.reports.pictures.figures import scores
+from posse_training.reports.pictures.style import RC, looks_of
+from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
@@ -32,6 +38,12 @@ ABLATIONS = (
     ("radio", "ddcs-no-radio"),
     ("field", "ddcs-no-radio"),
 )
+
+DRAWN = (
+    "pngl-l-phi", "pngl-l-phi-tuned", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned", PLANNER
+)  # fmt: skip
+"""Policies of the figure: those that reach a safe score of 0.4 on most scenarios."""
+FIGURE = "results-scenarios.svg"
 
 SMART_COST = (
     "The scenario `smart`, compared with the same starts, speeds and limits and a target that "
@@ -79,6 +91,18 @@ def main() -> None:
         for policy in ("ddcs-distributed", PLANNER)
     }  # fmt: skip
     settings.page.write_text(page(settings, results, straight))
+    draw(results, settings.page.parent / "media" / FIGURE)
+
+
+def draw(results: Mapping[tuple[str, str], Results], path: Path) -> None:
+    """Draw the safe scores of the policies of the figure."""
+    plays = {
+        (scenario, policy): Plays(policy, (result,))
+        for (scenario, policy), result in results.items()
+        if policy in DRAWN
+    }
+    with mpl.rc_context(RC):
+        scores(plays, looks_of(DRAWN)).savefig(path, metadata={"Date": None})
 
 
 def page(
@@ -101,7 +125,8 @@ def page(
         "| scenario | policy | safe score | of the planner's | score | contact-free | bound "
         "| settled | settling time, s | target found | recovered |"
     )
-    lines = ["# Results of the scripted teams", "", made, "", *pivot(results), ""]
+    picture = f"![Mean safe score of six teams on every scenario](media/{FIGURE})"
+    lines = ["# Results of the scripted teams", "", made, "", picture, "", *pivot(results), ""]
     lines += ["## Details", "", header, "|---" * 11 + "|"]
     for (scenario, policy), result in ranked(results):
         best = results[scenario, PLANNER]
