@@ -48,6 +48,9 @@ def test_what_is_written_is_what_was_drawn(tmp_path: Path) -> None:
         batch.step(np.full(batch.action_shape, 0.3, np.float32))
     write_gif(tmp_path / "a.gif", drawn, 0.07)
     frames, times = read(tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as image:
+        colours = len(image.getpalette() or []) // 3
+        assert image.info["transparency"] < colours, "strict readers refuse one beyond the table"
     assert frames.shape == (20, 300, 300, 3)
     assert set(times[:-1]) == {70}
     assert times[-1] > 1000

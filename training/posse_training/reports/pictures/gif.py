@@ -15,7 +15,7 @@ from posse.rendering.style import PALETTE
 Frame = npt.NDArray[np.uint8]
 
 _BLENDS: Final = 64  # colours for fading and anti-aliased edges
-_TRANSPARENT: Final = 255
+_UNKNOWN: Final = 255
 _SAMPLED: Final = 12  # frames that the palette is made from
 _LAST_SHOWN: Final = 1.5  # s, before the film repeats
 
@@ -27,14 +27,17 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
     transparent, which compresses well.
     """
     palette = _Palette(frames)
+    clear = len(palette.entries)
+    # The transparent colour has an entry too: strict readers refuse an index beyond the table.
+    table = palette.entries.tobytes() + bytes(3)
     images: list[Image.Image] = []
     before: Frame | None = None
     for frame in frames:
         indices = palette.indices(frame)
-        changed = indices if before is None else np.where(indices == before, _TRANSPARENT, indices)
+        changed = indices if before is None else np.where(indices == before, clear, indices)
         before = indices
         image = Image.fromarray(changed.astype(np.uint8))
-        image.putpalette(palette.entries.tobytes())
+        image.putpalette(table)
         images.append(image)
     # In 1/1000 s; a GIF counts in 1/100 s, and players slow down frames of less than 2/100 s.
     shown_for = max(2, round(frame_time * 100)) * 10
@@ -47,7 +50,7 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
         duration=times,
         loop=0,
         disposal=1,  # each frame is drawn over the previous one
-        transparency=_TRANSPARENT,
+        transparency=clear,
         optimize=False,
     )
 
@@ -70,13 +73,13 @@ class _Palette:
         image = Image.fromarray(blends[None]).quantize(_BLENDS, method=Image.Quantize.MEDIANCUT)
         shared = np.reshape(image.getpalette() or [], (-1, 3))[:_BLENDS]
         self.entries = np.concatenate([np.array(PALETTE), shared]).astype(np.uint8)
-        self._index = np.full(1 << 24, _TRANSPARENT, np.uint8)  # by code, filled on demand
+        self._index = np.full(1 << 24, _UNKNOWN, np.uint8)  # by code, filled on demand
 
     def indices(self, frame: Frame) -> Frame:
         """Return the (H, W) indices of the entries nearest to a frame's colours."""
         codes = _codes(frame)
         found = self._index[codes]
-        new = np.unique(codes[found == _TRANSPARENT])
+        new = np.unique(codes[found == _UNKNOWN])
         if len(new):
             apart = _colours(new)[:, None].astype(np.int32) - self.entries
             self._index[new] = (apart**2).sum(axis=-1).argmin(axis=-1)
