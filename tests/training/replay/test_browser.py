@@ -183,6 +183,9 @@ def test_what_is_not_known_is_grey(browser: Browser, tmp_path: Path) -> None:
         known = page.locator("tr", has=page.locator("th", has_text="target range")).locator("td")
         assert known.last.inner_text() == "not known"
         assert "unknown" in str(known.last.get_attribute("class"))
+        for name in ("estimate", "estimate age"):
+            row = page.locator("tr", has=page.get_by_role("rowheader", name=name, exact=True))
+            assert row.locator("td").last.inner_text() == "none"
         seen = page.locator("tr", has=page.locator("th", has_text="target seen")).locator("td")
         assert seen.last.inner_text() == "0"
         assert "unknown" not in str(seen.last.get_attribute("class"))

@@ -152,7 +152,8 @@ function beliefRows(robot) {
       const size = column.size / column.shape[0];
       const values = vector(column, frame, robot * size, size);
       const first = column.at(frame, robot * size);
-      if (size === 1 && first < 0) return ["none", false];
+      const age = player.columns.get(`belief/${name}_age`); // negative: there is none
+      if ((size === 1 && first < 0) || age?.at(frame, robot) < 0) return ["none", false];
       if (name === "task") return [app.world.tasks[first] ?? values[0], true];
       return [values.join(" "), true];
     }),

@@ -76,6 +76,8 @@ export function scoresOf(player) {
   return player.scores;
 }
 
+// Pixels that both scores, or one, and the margins of a title take.
+const [BOTH, ONE] = [204, 122];
 function cut(ctx, text, width) {
   if (ctx.measureText(text).width <= width) return text;
   let kept = text;
@@ -94,7 +96,10 @@ function title(d) {
   ctx.textBaseline = "middle";
   ctx.textAlign = "right";
   let right = look.width - 12;
-  const words = [["score", score.mean], ["safe", score.safe]].slice(0, look.width < 260 ? 1 : 2);
+  ctx.font = font(14, 650);
+  const free = look.width - ctx.measureText(player.name).width;
+  const words = [[free < ONE ? "" : "score", score.mean]];
+  if (free >= BOTH) words.push(["safe", score.safe]);
   for (const [name, value] of words.reverse()) {
     for (const [text, weight, colour, room] of [
       [value.toFixed(2), 600, colours.INK, 6],
