@@ -126,7 +126,9 @@ def page(
         "| settled | settling time, s | target found | recovered |"
     )
     picture = f"![Mean safe score of six teams on every scenario](media/{FIGURE})"
-    lines = ["# Results of the scripted teams", "", made, "", picture, "", *pivot(results), ""]
+    wide = ["---", "hide: [toc]", "---", ""]
+    lines = [*wide, "# Results of the scripted teams", "", made, "", picture, ""]
+    lines += [*pivot(results), ""]
     lines += ["## Details", "", header, "|---" * 11 + "|"]
     for (scenario, policy), result in ranked(results):
         best = results[scenario, PLANNER]
