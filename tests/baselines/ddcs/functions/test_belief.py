@@ -90,12 +90,12 @@ def test_a_belief_is_what_the_memory_holds(seed: int) -> None:
 def test_equally_near_ones_are_listed_once_each() -> None:
     m = Mind("field", own=2)
     m.d.step = 10
-    for j, place in ((0, 1j), (1, -1j), (3, 1 + 0j), (4, 2 + 0j)):
+    for j, place in ((0, 0.5j), (1, -1j), (3, 1 + 0j), (4, 2 + 0j)):
         m.mate(j, place)
     m.stand(0j, 0.0)
     out = np.zeros(belief.BELIEF_SIZE, np.float32)
     belief.write_belief(m.f, m.s, m.slots, m.d, m.mates, np.zeros(0, np.uint16), m.o, out)
-    np.testing.assert_allclose(out[23:30], [1, 0, 0.5, 0, -0.5, 0.5, 0])
+    np.testing.assert_allclose(out[23:30], [1, 0, 1 / 3, 0, -0.5, 0.5, 0], rtol=1e-6)
     assert (out[30:] == 0).all()
 
 

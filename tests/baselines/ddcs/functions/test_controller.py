@@ -243,6 +243,7 @@ def test_halves_and_whole_play_the_same_and_restart_forgets() -> None:
         if name.startswith("minds") and "wish" not in name:
             np.testing.assert_array_equal(array, policy.arrays(parts)[name])
     assert (whole.minds["step"] == 2).all()
+    assert {"seen", "minds.step", "mates.step"} <= set(policy.arrays(whole))
     shares = rng.uniform(-0.5, 0.5, (2, 5, 2)).astype(np.float32)
     single = np.zeros((2, 5, 7), np.float32)
     copies = parts.minds.copy(), parts.mates.copy()
