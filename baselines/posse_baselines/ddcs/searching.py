@@ -98,7 +98,8 @@ def age_of(
 
     With ``lost``, a cell not covered since the target was lost counts as never covered.
     """
-    looked = seen[i * GRID + j] - 1 if len(seen) > 0 else -1
+    # Signed: uncompiled, a cell that was never covered would count as one covered last.
+    looked = np.int64(seen[i * GRID + j]) - 1 if len(seen) > 0 else -1
     if looked < 0 or (lost and looked < d.lost_step):
         return float(s.stale_after)
     return min(float((d.step - looked) * f.dt), float(s.stale_after))

@@ -1,0 +1,149 @@
+"""Whether the fast tests notice a mutant: each is tried in a forked process of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import resource
+import signal
+import sys
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import hypothesis
+import numpy as np
+import pytest
+import scipy.optimize  # noqa: F401 (imported once, before the processes fork)
+from tests.mutation.mutants import Mutant
+from tests.mutation.uncompiled import import_changed, leave_uncompiled
+
+import posse
+
+TESTS: Final = ("tests/baselines/laws", "tests/baselines/ddcs")
+FAST_S: Final = 0.5
+"""Processor time within which a test counts as fast, uncompiled."""
+LEAST_S: Final = 20.0
+"""Processor time that a mutant may take at least; longer than this and 5 times the usual: hangs."""
+
+SURVIVED, KILLED, HUNG = "survived", "killed", "hung"
+Times = dict[str, float]
+"""Processor time of each fast test, s."""
+
+
+class _TooSlow(BaseException):
+    pass
+
+
+class _Timed:
+    """Times the tests, and gives up those that are not fast."""
+
+    def __init__(self) -> None:
+        self.times: Times = {}
+        self.failed: list[str] = []
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_pyfunc_call(self, pyfuncitem: pytest.Function) -> Iterator[None]:
+        def give_up(*_: Any) -> None:
+            raise _TooSlow
+
+        signal.signal(signal.SIGPROF, give_up)
+        signal.setitimer(signal.ITIMER_PROF, FAST_S)
+        try:
+            result = yield
+        except _TooSlow:
+            return None
+        finally:
+            left, _ = signal.setitimer(signal.ITIMER_PROF, 0)
+        self.times[pyfuncitem.nodeid] = round(FAST_S - left, 3)
+        return result
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+
+class _Ordered:
+    """Keeps the fast tests: those named as the module first, and the fastest first."""
+
+    def __init__(self, times: Times, stem: str) -> None:
+        self.times, self.stem = times, stem
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        kept = [item for item in items if item.nodeid in self.times]
+        kept.sort(key=lambda i: (self.stem not in i.path.stem, self.times[i.nodeid], i.nodeid))
+        items[:] = kept
+
+
+def _pytest(files: Iterable[str], plugin: object) -> int:
+    phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]  # a failure is not shrunk
+    hypothesis.settings.register_profile("mutation", phases=phases, deadline=None)
+    hypothesis.settings.load_profile("mutation")
+    leave_uncompiled()
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:faulthandler"]
+    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # hypothesis is there already
+    return pytest.main([*options, *files], plugins=[plugin])
+
+
+def _quiet() -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+
+
+def _time_all(answer: Any) -> None:
+    _quiet()
+    timed = _Timed()
+    _pytest(TESTS, timed)
+    answer.send((timed.times, timed.failed))
+
+
+def _try(mutant: Mutant, times: Times, limit: int) -> None:
+    _quiet()
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    sys.dont_write_bytecode = True
+    import_changed(mutant.module, mutant.code())
+    files = sorted({name.partition("::")[0] for name in times})
+    try:
+        code = _pytest(files, _Ordered(times, Path(mutant.path).stem))
+    except BaseException:
+        code = 1
+    os._exit(min(int(code), 1))
+
+
+def warm_up() -> None:
+    """Import what is not mutated, and load the environments' kernels, before processes fork."""
+    warnings.simplefilter("ignore", DeprecationWarning)
+    batch = posse.batch("constant", 1, message_size=5)
+    batch.reset()
+    batch.step(np.zeros(batch.action_shape, np.float32))
+
+
+def fast_tests() -> Times:
+    """Return the tests that pass in ``FAST_S`` without a mutant.
+
+    Raises:
+        RuntimeError: A test fails.
+    """
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_time_all, args=(theirs,))
+    process.start()
+    theirs.close()
+    times, failed = ours.recv()
+    process.join()
+    if failed:
+        raise RuntimeError(f"these tests fail without any mutant: {', '.join(failed)}")
+    return dict(times)
+
+
+def judge(mutant: Mutant, times: Times) -> str:
+    """Return the outcome of a mutant."""
+    limit = int(max(LEAST_S, 5.0 * sum(times.values())))
+    process = multiprocessing.get_context("fork").Process(target=_try, args=(mutant, times, limit))
+    process.start()
+    process.join()
+    if process.exitcode == 0:
+        return SURVIVED
+    return KILLED if process.exitcode == 1 else HUNG
