@@ -81,8 +81,7 @@ def _pytest(files: Iterable[str], plugin: object) -> int:
     hypothesis.settings.register_profile("mutation", phases=phases, deadline=None)
     hypothesis.settings.load_profile("mutation")
     leave_uncompiled()
-    options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:faulthandler"]
-    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # hypothesis is there already
+    options = ["-q", "-x", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:xdist"]
     return pytest.main([*options, *files], plugins=[plugin])
 
 
