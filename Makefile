@@ -18,7 +18,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test recipes fuzz lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test recipes fuzz mutants lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,6 +34,10 @@ recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose re
 
 fuzz: $(FULL) ## Run randomised tests in parallel, MINUTES=1 per campaign
 	$(BIN)/python -m tests.fuzz $(ONLY) --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0) $(if $(JOBS),--jobs $(JOBS))
+
+mutants: $(FULL) ## Try mutants of the laws and the DDCS (an hour for all), SAMPLE=400 SEED=1; resumes
+	$(BIN)/python -m tests.mutation $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) --jobs $(or $(JOBS),2)
+	$(BIN)/python -m tests.mutation.page
 
 lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check

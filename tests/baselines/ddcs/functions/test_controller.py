@@ -157,6 +157,34 @@ def test_the_safeguard_turns_away_from_what_is_near() -> None:
     assert abs(kept - free)[:2].max() > 0.1
 
 
+def test_a_command_that_is_safe_is_carried_out_as_it_is() -> None:
+    t = standing()
+    d = t.m.d
+    controller.feel_body(t.m.f, t.m.o, t.body)
+    d.wish_x, d.wish_y, d.wish_speed, d.wish_omega = 0.3, 0.4, 0.8, -0.5
+    assert t.carry_out()[:2] == pytest.approx([0.6, -0.25])
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7])
+def test_an_echo_is_where_the_beam_points(theta: float) -> None:
+    t = standing(at=1 - 2j, theta=theta)
+    controller.feel_body(t.m.f, t.m.o, t.body)
+    t.m.o[t.m.f.sonar] = 1.0
+    t.carry_out()
+    at = complex(t.discs[0].x, t.discs[0].y)
+    assert at == pytest.approx((1.0 + 0.15 + 0.46) * turn(theta), abs=1e-6)
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7])
+def test_a_team_mate_and_a_wall_are_where_they_are(theta: float) -> None:
+    t = standing("field", at=10 - 2j, theta=theta)
+    controller.feel_body(t.m.f, t.m.o, t.body)
+    t.m.mate(0, 11 - 2.5j)
+    t.carry_out()
+    found = [complex(t.discs[k].x, t.discs[k].y) for k in (0, 1)]
+    assert found == pytest.approx([1 - 0.5j, float(t.m.f.extent) - 10 - 0.15 + 1000], rel=1e-6)
+
+
 @pytest.mark.parametrize(("clearance", "task"), [(0.0, 1), (0.3, 1), (0.3, 2)])
 def test_a_detour_turns_the_way_before_the_safeguard(clearance: float, task: int) -> None:
     t = standing(at=0j, theta=0.0, detour=clearance)

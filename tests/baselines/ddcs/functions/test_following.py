@@ -160,11 +160,8 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
     square.d.slot, square.d.leader = 5, 0
     for j, k in ((2, 3), (3, 4), (4, 2)):
         square.mate(j, 0j, slot=k, task=FLOCKING)
-    kept = [
-        k for k in (2, 3, 4)
-        if abs(np.sin(cmath.phase((square.slot(5) - square.slot(0)) / (square.slot(5) - square.slot(k)))))
-        >= 0.3
-    ]  # fmt: skip
+    ways = {k: square.slot(5) - square.slot(k) for k in (0, 2, 3, 4)}
+    kept = [k for k in (2, 3, 4) if abs(np.sin(cmath.phase(ways[0] / ways[k]))) >= 0.3]
     wanted = {3: 2, 4: 3, 2: 4}[max(kept)]
     found = following.second_of(square.f, square.s, square.d, square.mates, square.slots, 1)
     assert found == wanted

@@ -14,7 +14,7 @@ from tests.support.plain import plain
 monitoring = plain("ddcs.monitoring")
 
 
-def near(value: float) -> Any:
+def near(value: complex) -> Any:
     return pytest.approx(value, abs=2e-5)
 
 
@@ -53,14 +53,14 @@ class Estimate:
     """What the layer should hold, from the fixes that it was given."""
 
     def __init__(self, s: Any, outermost: float) -> None:
-        self.s, self.outermost, self.step = s, outermost, None
+        self.s, self.outermost, self.step = s, outermost, -1000
         self.speed, self.measured, self.usual_age = 0.0, False, 0.0
         self.p = self.raw = self.mean = 0j
         self.theta = self.psi = self.rate = 0.0
 
     def fix(self, step: int, p: complex, theta: float, psi: float) -> None:
         s = self.s
-        t = math.inf if self.step is None else (step - self.step) * 0.1
+        t = (step - self.step) * 0.1
         if t > s.target_lost_after:
             self.p, self.rate = p, 0.0
             if not self.measured:

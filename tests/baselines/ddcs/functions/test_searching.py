@@ -35,7 +35,7 @@ def test_the_cells_with_their_centre_in_sight_are_covered(at: complex, middle: c
 
 def test_a_search_begins_where_the_target_was_lost_on_the_open_plane() -> None:
     for scenario, middle, left in (("constant", 3 - 1j, 0), ("field", 0j, 7)):
-        m = Mind(scenario, **({"sensing_range": 4.0} if scenario == "constant" else {}))
+        m = Mind(scenario, sensing_range=4.0)
         m.target(3 - 1j)
         m.seen[:], m.d.step, m.d.fix_step, m.d.goal_step = 7, 60, 50, 55
         searching.begin_search(m.f, m.d, m.seen)

@@ -55,7 +55,7 @@ def test_a_message_says_task_leader_term_pulse_and_slot() -> None:
     messages.write_message(m.d, action)
     assert [messages.decode(float(word)) for word in action[2:]] == [*said.values()]
     np.testing.assert_array_equal(
-        action, np.float32([0, 0, *((v + 1) / 512 for v in said.values())])
+        action, np.array([0, 0, *((v + 1) / 512 for v in said.values())], np.float32)
     )
 
 
