@@ -36,10 +36,12 @@ def run(file: Path, head: dict[str, object], mutants: list[Mutant], jobs: int) -
     warm_up()
     times = fast_tests()
     print(f"{len(missing)} of {len(mutants)} mutants to try with {len(times)} tests")
+    if missing and judge(missing[0].module, missing[0].original(), times) != SURVIVED:
+        raise SystemExit("the code without a mutant does not survive")
     if not known:
         begin(file, {**head, "tests": len(times)})
     with ThreadPoolExecutor(jobs) as pool:
-        outcomes = pool.map(lambda m: judge(m, times), missing)
+        outcomes = pool.map(lambda m: judge(m.module, m.code(), times), missing)
         for mutant, outcome in track(
             zip(missing, outcomes, strict=True), "mutants", total=len(missing)
         ):

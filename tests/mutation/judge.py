@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import resource
@@ -16,7 +17,6 @@ import hypothesis
 import numpy as np
 import pytest
 import scipy.optimize  # noqa: F401 (imported once, before the processes fork)
-from tests.mutation.mutants import Mutant
 from tests.mutation.uncompiled import import_changed, leave_uncompiled
 
 import posse
@@ -42,17 +42,22 @@ class _Timed:
     def __init__(self) -> None:
         self.times: Times = {}
         self.failed: list[str] = []
+        self.slow: set[str] = set()
 
     @pytest.hookimpl(wrapper=True)
     def pytest_pyfunc_call(self, pyfuncitem: pytest.Function) -> Iterator[None]:
         def give_up(*_: Any) -> None:
             raise _TooSlow
 
+        name = pyfuncitem.nodeid.partition("[")[0]
+        if name in self.slow:  # with other parameters
+            pytest.skip("not fast")
         signal.signal(signal.SIGPROF, give_up)
         signal.setitimer(signal.ITIMER_PROF, FAST_S)
         try:
             result = yield
         except _TooSlow:
+            self.slow.add(name)
             return None
         finally:
             left, _ = signal.setitimer(signal.ITIMER_PROF, 0)
@@ -80,7 +85,9 @@ def _pytest(files: Iterable[str], plugin: object) -> int:
     hypothesis.settings.register_profile("mutation", phases=phases, deadline=None)
     hypothesis.settings.load_profile("mutation")
     leave_uncompiled()
-    options = ["-q", "-x", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:xdist"]
+    # Each takes a share of the time that a mutant takes.
+    plugins = ("cacheprovider", "xdist", "unraisableexception", "hypothesispytest")
+    options = ["-q", "-x", "--assert=plain", *(f"-pno:{name}" for name in plugins)]
     return pytest.main([*options, *files], plugins=[plugin])
 
 
@@ -97,18 +104,23 @@ def _time_all(answer: Any) -> None:
     answer.send((timed.times, timed.failed))
 
 
-def _try(mutant: Mutant, text: str, times: Times, limit: int) -> None:
+def _try(module: str, text: str, times: Times, limit: int) -> None:
     _quiet()
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
     sys.dont_write_bytecode = True
-    import_changed(mutant.module, text)
-    stem = Path(mutant.path).stem
+    import_changed(module, text)
+    _, room, stem = module.rsplit(".", 2)
+
+    def far(file: str) -> int:
+        near = f"/{room}/" in file
+        return 2 - near - (near and stem in Path(file).stem)
+
+    # Most are noticed by the tests named as the module; others are collected if need be.
     files = sorted({name.partition("::")[0] for name in times})
-    # Most are noticed by the tests named as the module; the others are collected if need be.
-    first = [file for file in files if stem in Path(file).stem]
     code = 0
     try:
-        for some in (first, [file for file in files if file not in first]):
+        for away in range(3):
+            some = [file for file in files if far(file) == away]
             code = code or (_pytest(some, _Ordered(times)) if some else 0)
     except BaseException:
         code = 1
@@ -121,6 +133,7 @@ def warm_up() -> None:
     batch = posse.batch("constant", 1, message_size=5)
     batch.reset()
     batch.step(np.zeros(batch.action_shape, np.float32))
+    gc.freeze()  # what is imported is not searched again in each process
 
 
 def fast_tests() -> Times:
@@ -141,10 +154,10 @@ def fast_tests() -> Times:
     return dict(times)
 
 
-def judge(mutant: Mutant, times: Times) -> str:
-    """Return the outcome of a mutant."""
+def judge(module: str, text: str, times: Times) -> str:
+    """Return the outcome of a module's text."""
     limit = int(max(LEAST_S, 5.0 * sum(times.values())))
-    arguments = mutant, mutant.code(), times, limit
+    arguments = module, text, times, limit
     process = multiprocessing.get_context("fork").Process(target=_try, args=arguments)
     process.start()
     process.join()

@@ -52,17 +52,19 @@ class Mutant:
         """The name under which the file is imported."""
         return self.path.removesuffix(".py").replace("/", ".")
 
+    def original(self) -> str:
+        """The text of the file."""
+        return (SOURCES / self.path).read_text(encoding="utf-8")
+
     def code(self) -> str:
         """The text of the changed file."""
-        text = (SOURCES / self.path).read_text(encoding="utf-8")
-        changed = mutate_code(text, _operator(self.operator), self.occurrence)
+        changed = mutate_code(self.original(), _operator(self.operator), self.occurrence)
         assert changed is not None, self
         return str(changed)
 
     def change(self) -> tuple[str, str]:
         """The line before and after, or the first of several."""
-        before = (SOURCES / self.path).read_text(encoding="utf-8").splitlines()
-        after = self.code().splitlines()
+        before, after = self.original().splitlines(), self.code().splitlines()
         pairs = zip(before, after, strict=False)
         return next(((a.strip(), b.strip()) for a, b in pairs if a != b), ("", ""))
 

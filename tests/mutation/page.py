@@ -78,6 +78,8 @@ def survivors(outcomes: dict[Mutant, str]) -> str:
 def figures(head: dict[str, Any], outcomes: dict[Mutant, str]) -> str:
     """Return the figures of a run."""
     total = len(outcomes)
+    if total != (head["sample"] or head["all"]):
+        raise SystemExit(f"only {total} mutants were tried yet: run `make mutants` again")
     killed = sum(outcome != SURVIVED for outcome in outcomes.values())
     low, high = interval(killed, total)
     of_all = f"a random sample of {total} of all {head['all']:,} mutants (seed {head['seed']})"
