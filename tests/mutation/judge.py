@@ -9,6 +9,7 @@ import resource
 import signal
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -42,7 +43,7 @@ class _Timed:
     def __init__(self) -> None:
         self.times: Times = {}
         self.failed: list[str] = []
-        self.slow: set[str] = set()
+        self.slow: Counter[str] = Counter()
 
     @pytest.hookimpl(wrapper=True)
     def pytest_pyfunc_call(self, pyfuncitem: pytest.Function) -> Iterator[None]:
@@ -50,14 +51,14 @@ class _Timed:
             raise _TooSlow
 
         name = pyfuncitem.nodeid.partition("[")[0]
-        if name in self.slow:  # with other parameters
+        if self.slow[name] > 1:  # with other parameters
             pytest.skip("not fast")
         signal.signal(signal.SIGPROF, give_up)
         signal.setitimer(signal.ITIMER_PROF, FAST_S)
         try:
             result = yield
         except _TooSlow:
-            self.slow.add(name)
+            self.slow[name] += 1
             return None
         finally:
             left, _ = signal.setitimer(signal.ITIMER_PROF, 0)

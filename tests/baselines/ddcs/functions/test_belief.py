@@ -97,3 +97,26 @@ def test_equally_near_ones_are_listed_once_each() -> None:
     belief.write_belief(m.f, m.s, m.slots, m.d, m.mates, np.zeros(0, np.uint16), m.o, out)
     np.testing.assert_allclose(out[23:30], [1, 0, 0.5, 0, -0.5, 0.5, 0])
     assert (out[30:] == 0).all()
+
+
+def test_the_beliefs_of_all_worlds_are_written() -> None:
+    m = Mind("field")
+    observations = np.tile(m.o, (2, 5, 1))
+    for e in range(2):
+        for i in range(5):
+            m.stand(complex(e, i), 0.3 * i)
+            m.fill(number=i)
+            observations[e, i] = m.o
+    memory = m.policy.begin(m.layout, 2)
+    memory.minds["task"], memory.minds["slot"] = [[1, 2, 1, 2, 0], [2, 1, 3, 1, 1]], 2
+    beliefs = m.policy.belief(observations, memory)
+    assert beliefs.shape == (2, 5, m.policy.belief_size)
+    for e in range(2):
+        for i in range(5):
+            out = np.zeros(belief.BELIEF_SIZE, np.float32)
+            belief.write_belief(
+                m.f, m.s, m.slots, memory.minds[e, i], memory.mates[e, i], memory.seen[e, i],
+                observations[e, i], out,
+            )  # fmt: skip
+            np.testing.assert_array_equal(beliefs[e, i], out)
+            assert out.any()

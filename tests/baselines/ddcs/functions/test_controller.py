@@ -243,8 +243,18 @@ def test_halves_and_whole_play_the_same_and_restart_forgets() -> None:
         if name.startswith("minds") and "wish" not in name:
             np.testing.assert_array_equal(array, policy.arrays(parts)[name])
     assert (whole.minds["step"] == 2).all()
-    moved = policy.carry_out(observations, parts, np.full((2, 5, 2), (0.0, 0.4)))[0]
-    assert abs(moved[..., 1] - carried[..., 1]).max() > 0.05
+    shares = rng.uniform(-0.5, 0.5, (2, 5, 2)).astype(np.float32)
+    single = np.zeros((2, 5, 7), np.float32)
+    copies = parts.minds.copy(), parts.mates.copy()
+    for e in range(2):
+        for i in range(5):
+            t = Turn(m)
+            m.d, m.mates, m.o = copies[0][e, i], copies[1][e, i], observations[e, i]
+            controller.feel_body(m.f, m.o, t.body)
+            correction.correct(m.d, t.body, *(float(share) for share in shares[e, i]))
+            single[e, i] = t.carry_out()
+    np.testing.assert_array_equal(policy.carry_out(observations, parts, shares)[0], single)
+    assert abs(single - carried).max() > 0.1
     fresh, begun = policy.arrays(policy.begin(layout, 2)), policy.arrays(whole)
     before = {name: array.copy() for name, array in begun.items()}
     policy.restart(whole, np.array([False, True]))

@@ -87,3 +87,19 @@ def test_a_disc_blocks_the_way_within_its_reach_and_the_clearance() -> None:
         assert detour.blocks(discs[0], 0.2, 1.0, 0.0) == blocked
     safeguard.put_disc(discs, 0, 1.0, 0.0, 0.1, 0.0, 0.5, 0.1)
     assert not detour.blocks(discs[0], 0.2, 1.0, 0.0)
+
+
+def test_a_row_of_five_is_passed_and_a_longer_one_has_no_way() -> None:
+    row = [((1.2 + 0.1 * k) * turn(0.3 * k), 0.4) for k in range(6)]
+    discs = np.zeros(6, safeguard.DISC)
+    for k, (at, reach) in enumerate(row):
+        safeguard.put_disc(discs, k, at.real, at.imag, 0.0, 0.0, reach, 0.1)
+    for side in (1, -1):
+        discs["y"] = [side * at.imag for at, _ in row]
+        found = [detour.turn_past(discs, count, 0.2, 1.0, 0.0, side) for count in (1, 2, 5, 6)]
+        ends = [tangent(*row[k], 1) for k in (0, 1, 4)]
+        assert found == pytest.approx([*(side * end for end in ends), 4.0])
+    assert detour.turn_past(discs, 6, 0.2, -1.0, 0.0, -1.0) == 0.0
+    # An edge more than 2 rad to the side is no way past.
+    discs[0].x, discs[0].y = 0.5 * math.cos(1.2), 0.5 * math.sin(1.2)
+    assert detour.turn_past(discs, 1, 0.2, 1.0, 0.0, 1.0) == 4.0

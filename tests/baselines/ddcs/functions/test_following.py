@@ -102,6 +102,18 @@ def test_a_follower_under_l_phi_closes_in_at_its_rates(frame: str, heading: floa
     assert (speed, omega) == near(laws_phi.limit_command(*held, 0.15, 1.0, 2.0))
 
 
+def test_any_tracker_may_be_the_leader() -> None:
+    found = []
+    for number in (0, 2):
+        m = follower()
+        m.mate(number, 1 + 1j, cmath.rect(0.6, 2.0), turn=0.4, step=38, slot=0, task=FLOCKING)
+        m.mate(2 - number, -3 + 2j, 0.3 + 0j)
+        m.d.leader = number
+        body = m.body(-1 + 1j, 2.2)
+        found.append(following.on_leader(m.f, m.s, m.d, m.mates, m.slots, 1, -1.0, 1.0, body))
+    assert found[0] == found[1]
+
+
 def test_a_follower_under_l_l_keeps_its_distances_from_two() -> None:
     m = follower("slot-frame", "l-l")
     other = LEADER + (m.slot(2) - m.slot(0)) * turn(1.8)

@@ -145,6 +145,12 @@ def test_a_leader_counts_and_the_first_one_is_appointed_at_once() -> None:
     assert leading(m) == (1, 1, 0)
 
 
+def test_the_first_tracker_may_lead_too() -> None:
+    m = team(leader=0)
+    settle(m)
+    assert leading(m) == (0, 7, 20)
+
+
 def test_a_leader_hands_over_to_who_is_clearly_nearer_every_time_lag() -> None:
     def after(step: int, x: float, **values: Any) -> int:
         m = team(leader=1, step=step, **values)

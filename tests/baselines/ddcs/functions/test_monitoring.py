@@ -123,7 +123,8 @@ def test_the_estimate_follows_from_the_fixes(seed: int) -> None:
         shown[m.d.step] = (noisy, theta, theta - 0.2)
         age = int(rng.choice([0, 0, 0, 1, 2, 4]))
         m.fill(target_known=0, target_seen=0)
-        if rng.random() < 0.7 and k % 60 < 44 and m.d.step - age in shown:
+        silent = 20 < k % 60 < 32 or k % 60 >= 44
+        if rng.random() < 0.7 and not silent and m.d.step - age in shown:
             at, at_theta, at_psi = shown[m.d.step - age]
             m.stand(own, heading)
             sight = (at - own) / turn(heading)
@@ -229,3 +230,11 @@ def test_a_silence_of_over_twice_the_usual_ends_a_team_mate_s_presence() -> None
     deaf.mates[3].fresh = 1
     monitoring.hear_mates(deaf.f, deaf.s, deaf.d, deaf.mates, deaf.o)
     assert (deaf.mates[2].step, deaf.mates[3].fresh) == (-1, 0)
+
+
+def test_a_first_message_ends_no_silence() -> None:
+    m = Mind(own=0)
+    m.d.step = 3
+    m.fill(neighbour_number=2, neighbour_age=0.1, neighbour_range=1.0, neighbour_bearing=1 + 0j)
+    monitoring.hear_mates(m.f, m.s, m.d, m.mates, m.o)
+    assert (m.mates[2].step, m.d.usual_gap) == (2, 0.0)
