@@ -57,6 +57,13 @@ GALLERY: Final = {
     "paper-distributed": Shown(("pngl", "ddcs-distributed"), seconds=8.0, picture=4.0),
 }
 
+LOST: Final = {
+    "smart": ("ddcs-tuned", 12),
+    "field": ("ddcs-tuned", 17),
+    "leader-loss": ("pngl-l-phi-tuned", 26),
+}
+"""Of each scenario a tuned team, and the validation world where the planner is most ahead of it."""
+
 
 @dataclass(frozen=True)
 class _Arguments:
@@ -108,6 +115,13 @@ def main() -> None:
         if not name.startswith("paper"):
             for number, teams in enumerate(others(name, shown), 1):
                 write(name, f"-others-{number}" if number > 1 else "-others", teams, shown)
+        if name in LOST:
+            team, world = LOST[name]
+            replay = record(
+                [team, "planner"], name, seed=SEED, world=world, split="validation",
+                observations=False,
+            )  # fmt: skip
+            write_replay(replay, MEDIA / "replays" / f"{name}-lost.html")
         if name == "duel":
             write(name, f"-{EVADER}", ("ddcs-tuned", "learned-smart"), shown, EVADER)
         file = MEDIA / "scenarios" / f"{name}.png"
