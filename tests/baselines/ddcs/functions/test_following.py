@@ -177,3 +177,11 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
     wanted = {3: 2, 4: 3, 2: 4}[max(kept)]
     found = following.second_of(square.f, square.s, square.d, square.mates, square.slots, 1)
     assert found == wanted
+
+
+def test_a_silent_robot_does_not_end_the_search_for_the_second_one() -> None:
+    m = follower("slot-frame", "l-l")
+    m.d.slot = 4
+    for number, slot, step in ((2, 1, 40), (3, 2, 3), (4, 3, 40)):
+        m.mate(number, 0j, slot=slot, step=step, task=FLOCKING)
+    assert following.second_of(m.f, m.s, m.d, m.mates, m.slots, 1) == 4

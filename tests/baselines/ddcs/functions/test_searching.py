@@ -189,3 +189,16 @@ def test_a_searcher_goes_to_its_goal_at_full_speed_and_then_chooses_another() ->
     m.d.step, m.d.goal_x, m.d.goal_step = 100, 2.1, 80
     searching.wander(m.f, m.s, m.d, m.mates, m.seen, m.own, 0.0, 0.0, 1.0, 0.0, 0.9)
     assert m.d.goal_step == 80  # the range counts up to 4 m
+
+
+@pytest.mark.parametrize(("fix", "target"), [(0, 4 + 3j), (-1, 4 + 3j), (60, 90 + 0j)])
+def test_only_cells_near_a_lost_target_count_as_never_covered(fix: int, target: complex) -> None:
+    m = Mind(own=3, played={"age_weight": 2.0, "lost_drift": 0.0})
+    m.d.step, m.d.lost_step, m.d.fix_step = 150, 140, fix
+    m.target(target, known=0)
+    m.seen[:] = 131  # covered before the target was lost
+    grid(m)[2, 3] = 21  # covered long ago
+    searching.choose_goal(m.f, m.s, m.d, m.mates, m.seen, 3, 0.5, 0.2, 1.0, 0.0)
+    wanted = best_cell(m, 0.5 + 0.2j, 0.0, [])
+    assert complex(m.d.goal_x, m.d.goal_y) == pytest.approx(wanted, abs=1e-4)
+    assert (abs(wanted - target) < 2.0) == (fix == 0)

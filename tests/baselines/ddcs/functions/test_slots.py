@@ -155,3 +155,16 @@ def test_a_slot_is_an_arm_in_the_slot_frame() -> None:
     arm = m.slot(3) * turn(PSI)
     assert complex(arm_x, arm_y) == pytest.approx(arm, abs=1e-6)
     assert complex(x, y) == pytest.approx(2 + 1j + arm, abs=1e-6)
+
+
+def test_a_slot_counts_as_seeing_the_target_within_its_share_of_the_range() -> None:
+    m = Mind("constant", own=1, num_trackers=6, formation="ring", sensing_range=2.5,
+             start_distance=(1.0, 2.0))  # fmt: skip
+    m.d.step = 50
+    m.target(0j, 0j)
+    at = 1.0
+    m.slots["x"][2], m.slots["y"][2] = 2.0, 0.0  # in sight
+    for k in (0, 1, 3, 4, 5):
+        m.slots["x"][k], m.slots["y"][k] = 2.5 + 0.5 * k, 0.0  # out of sight
+    assert 2.0 < m.s.in_sight * m.f.sight < 2.5
+    assert choose(m, m.slot(0) + at * 0.1, 0.0) == 2

@@ -210,3 +210,34 @@ def test_what_is_safe_is_left_alone_and_walls_are_flat() -> None:
     aside = edge + 3j * (0.6 + 0.8j)
     assert abs(complex(wall.x, wall.y) - aside) - wall.reach < 0.01
     assert safeguard.put_disc(discs, 2, 1.0, 1.0, 0.0, 0.0, 0.3, 0.1) == 2
+
+
+def choose(body: Any, found: list[Disc], wanted: complex) -> tuple[complex, bool]:
+    plays = np.zeros(1, safeguard.PLAYS)[0]
+    x, y, changed = safeguard.safe_velocity(
+        body, discs_of(*found), len(found), wanted.real, wanted.imag, plays
+    )
+    return complex(x, y), changed
+
+
+def test_what_is_straight_ahead_is_passed_on_the_right() -> None:
+    body = body_of(0.0, 0.6, 0.0)
+    for ahead in (0.7, 0.8, 0.9):
+        velocity, changed = choose(body, [(ahead + 0j, -0.3 + 0j, 0.3, 0.2)], 0.8 + 0j)
+        assert changed
+        assert velocity.imag < -0.1
+
+
+def test_in_contact_no_velocity_is_better_than_the_wanted_one() -> None:
+    velocity, changed = choose(body_of(0.4), [(0.1 + 0j, 0j, 0.5, 0.2)], 0.7 + 0.1j)
+    assert (velocity, changed) == (0.7 + 0.1j, True)
+
+
+def test_from_rest_the_directions_count_from_the_heading() -> None:
+    body = body_of(0.4, 0.0, 0.0)
+    found: list[Disc] = [(0.2 + 0.9j, -0.1 - 0.9j, 0.3, 0.3)]
+    velocity, changed = choose(body, found, 0j)
+    assert changed
+    _, best = min(choices(body, found, 0j), key=lambda option: option[0])
+    assert abs(best) > 0.1
+    assert velocity == pytest.approx(best)
