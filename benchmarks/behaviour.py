@@ -30,7 +30,8 @@ from posse_training.reports.pictures.style import RC
 
 SPAN: Final = 0.6
 """Positions are counted up to this distance ahead of, behind and beside a slot, m."""
-BINS: Final = 48
+EDGES: Final = np.linspace(-SPAN, SPAN, 49)
+"""Edges of the cells in which positions are counted, m."""
 SCRIPT, REFERENCE = "ddcs-tuned", "planner"
 ROWS: Final = (
     "safe score", "contact-free", "settling time, s", "trackers' speed, m/s",
@@ -73,7 +74,7 @@ def look(name: str, scenario: str, worlds: int, s: Settings) -> Behaviour:
     observations = batch.reset()
     memory = begin(policy, batch)
     seen: dict[str, list[float]] = {}
-    density = np.zeros((BINS, BINS))
+    density = np.zeros((len(EDGES) - 1,) * 2)
     darting, darts = np.zeros(worlds, np.bool_), 0
     for step in range(scene.horizon):
         actions, memory = policy.act(observations, memory)
@@ -86,8 +87,7 @@ def look(name: str, scenario: str, worlds: int, s: Settings) -> Behaviour:
         works = trackers["broken_at"] > world["step"][:, None]
         ahead, left = beside(trackers, world, slots)
         near = works & (np.hypot(ahead, left) < SPAN)
-        edges = np.linspace(-SPAN, SPAN, BINS + 1)
-        density += np.histogram2d(ahead[near], left[near], bins=(edges, edges))[0]
+        density += np.histogram2d(ahead[near], left[near], bins=(EDGES, EDGES))[0]
         for key, value in {
             "trackers' speed, m/s": trackers["speed"][works],
             "trackers' turn rate, either way, rad/s": np.abs(trackers["turn_rate"][works]),
@@ -126,6 +126,7 @@ def beside(trackers: Any, world: Any, slots: npt.NDArray[np.float64]) -> tuple[A
 
 def draw(found: dict[str, Behaviour], scenario: str, s: Settings, path: Path) -> None:
     """Draw the density of positions around a slot, one panel for each team."""
+    scene = posse.get_scenario(scenario)
     with mpl.rc_context(RC):
         figure, axes = panels(1, len(found), 2.9)
         for axis, (name, behaviour) in zip(axes, found.items(), strict=True):
@@ -134,8 +135,9 @@ def draw(found: dict[str, Behaviour], scenario: str, s: Settings, path: Path) ->
                 share, origin="lower", extent=(-SPAN, SPAN, -SPAN, SPAN), cmap="Greys",
                 vmax=float(np.quantile(share, 0.999)), interpolation="nearest",
             )  # fmt: skip
-            tolerance = posse.get_scenario(scenario).tolerance
-            axis.add_patch(Circle((0, 0), tolerance, fill=False, edgecolor=INK, linewidth=1.2))
+            axis.add_patch(
+                Circle((0, 0), scene.tolerance, fill=False, edgecolor=INK, linewidth=1.2)
+            )
             axis.plot(0, 0, "+", color=NOTE)
             axis.set(title=name, xlabel="to the left of the slot, m", xlim=(SPAN, -SPAN))
             axis.set_aspect("equal")
@@ -143,7 +145,7 @@ def draw(found: dict[str, Behaviour], scenario: str, s: Settings, path: Path) ->
         worlds = ", ".join(f"{name} {each.worlds}" for name, each in found.items())
         note(
             figure,
-            f"{scenario} v{posse.get_scenario(scenario).version}, {s.split} split, seed {s.seed}, "
+            f"{scenario} v{scene.version}, {s.split} split, seed {s.seed}, "
             f"worlds: {worlds}; after {s.after:g} s",
         )
         figure.savefig(path, metadata={"Date": None})
