@@ -22,9 +22,9 @@ from posse_baselines import load
 from posse_training.provenance import commit
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import mean
-from posse_training.runs.curve import POINT
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.folder import LAST, SETTINGS
+from posse_training.runs.saved.curve import POINT
+from posse_training.runs.saved.folder import LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import resume, train
 

@@ -20,10 +20,10 @@ from posse_baselines.registry import shipped
 from posse_baselines.tuned import TUNED
 from posse_baselines.tuned.files import tuned_files
 from posse_training.provenance import commit
-from posse_training.reports.compare import Settings as CompareSettings
-from posse_training.reports.compare import compare
-from posse_training.reports.comparison import Comparison
-from posse_training.reports.contenders import play, read_contenders
+from posse_training.reports.comparing.compare import Settings as CompareSettings
+from posse_training.reports.comparing.compare import compare
+from posse_training.reports.comparing.comparison import Comparison
+from posse_training.reports.comparing.contenders import play, read_contenders
 from posse_training.reports.pictures.figures import CAPTIONS
 from posse_training.reports.pivots import Pivot, pivots
 from posse_training.reports.statistics import Estimate

@@ -25,7 +25,7 @@ from posse.numeric import FloatArray
 from posse_baselines import Target, against, load, load_target, rollout
 from posse_training.reports.evaluation import evaluate
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.folder import BEST, LAST, SETTINGS
+from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import resume, train
 

@@ -19,10 +19,10 @@ from leaderboard import keep
 import posse
 from posse_baselines import load
 from posse_training.provenance import commit
+from posse_training.reports.comparing.plays import Plays
 from posse_training.reports.evaluation import Results, evaluate
 from posse_training.reports.pictures.figures import scores
 from posse_training.reports.pictures.style import RC, looks_of
-from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))

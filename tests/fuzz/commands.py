@@ -23,8 +23,8 @@ from tests.support.runs import numbers, small
 from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.replay import read_replay
-from posse_training.runs.checkpoint import read_checkpoint
-from posse_training.runs.command import command_of
+from posse_training.runs.saved.checkpoint import read_checkpoint
+from posse_training.runs.saved.command import command_of
 from posse_training.runs.settings import read_settings
 
 Arguments = Callable[[Path], list[str]]

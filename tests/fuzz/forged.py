@@ -38,7 +38,7 @@ from posse_baselines.learned.policy_file import write_policy_file
 from posse_training.errors import OWN
 from posse_training.replay import read_replay, write_replay
 from posse_training.replay.episode import join
-from posse_training.runs.checkpoint import read_checkpoint, write_checkpoint
+from posse_training.runs.saved.checkpoint import read_checkpoint, write_checkpoint
 from posse_training.runs.train import resume, train
 
 REFUSED: Final = (*OWN, PolicyError, posse.ScenarioError)

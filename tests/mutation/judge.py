@@ -110,7 +110,7 @@ def _try(module: str, text: str, times: Times, limit: int) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
     sys.dont_write_bytecode = True
     import_changed(module, text)
-    _, room, stem = module.rsplit(".", 2)
+    room, stem = module.split(".")[1], module.rpartition(".")[2]
 
     def far(file: str) -> int:
         near = f"/{room}/" in file

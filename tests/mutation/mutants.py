@@ -104,5 +104,5 @@ def mutants_of(path: str) -> Iterator[Mutant]:
 
 def all_mutants() -> list[Mutant]:
     """Return every mutant of every file."""
-    files = sorted(file for folder in FOLDERS for file in (SOURCES / folder).glob("*.py"))
+    files = sorted(file for folder in FOLDERS for file in (SOURCES / folder).rglob("*.py"))
     return [m for file in files for m in mutants_of(file.relative_to(SOURCES).as_posix())]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from posse_training.reports.compare import Settings, compare
-from posse_training.reports.comparison import Comparison
+from posse_training.reports.comparing.compare import Settings, compare
+from posse_training.reports.comparing.comparison import Comparison
 
 HOSTILE: Final = "</script><script>window.ran++</script><img src onerror>'\"&lt;{{shell}}<!--$x$]]>"
 """A label that would run as code if a page treated it as markup."""

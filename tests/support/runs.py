@@ -11,7 +11,7 @@ from rich.console import Console
 from safetensors.numpy import load_file
 
 from posse_training.runs import TrainSettings
-from posse_training.runs.checkpoint import read_checkpoint
+from posse_training.runs.saved.checkpoint import read_checkpoint
 
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "sac", "td3")

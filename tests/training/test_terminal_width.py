@@ -14,9 +14,9 @@ import posse
 from posse_baselines import tunable
 from posse_training import demo
 from posse_training.cli import main
-from posse_training.reports.comparison import Comparison, table
+from posse_training.reports.comparing.comparison import Comparison, table
+from posse_training.reports.comparing.progress import Progress
 from posse_training.reports.evaluation import evaluate
-from posse_training.reports.progress import Progress
 from posse_training.reports.reproduce import Settings
 from posse_training.reports.reproduce import table as settling_times
 from posse_training.reports.statistics import Estimate

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import GRID, SEARCHING
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.ddcs.searching import age_of
-from posse_baselines.ddcs.slots import slot_place
+from posse_baselines.ddcs.tracking.searching import age_of
+from posse_baselines.ddcs.tracking.slots import slot_place
 from posse_baselines.laws.geometry import length
 
 MATES: Final = 3

@@ -6,16 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import Blocks, FloatArray, Record, Records, compiled, kernel, worlds_of
-from posse_baselines.ddcs.detour import way_past
-from posse_baselines.ddcs.leadership import settle_lead
 from posse_baselines.ddcs.memory import FLOCKING, SEARCHING
 from posse_baselines.ddcs.messages import write_message
 from posse_baselines.ddcs.monitoring import hear_mates, watch_target
-from posse_baselines.ddcs.searching import begin_search, look_around, wander
-from posse_baselines.ddcs.slots import choose_slot
 from posse_baselines.ddcs.surroundings import surround
-from posse_baselines.ddcs.tasks import next_task
-from posse_baselines.ddcs.tracking import CENTRALIZED, note_error, take_up, wanted_motion
+from posse_baselines.ddcs.tracking.detour import way_past
+from posse_baselines.ddcs.tracking.leadership import settle_lead
+from posse_baselines.ddcs.tracking.motion import CENTRALIZED, note_error, take_up, wanted_motion
+from posse_baselines.ddcs.tracking.searching import begin_search, look_around, wander
+from posse_baselines.ddcs.tracking.slots import choose_slot
+from posse_baselines.ddcs.tracking.tasks import next_task
 from posse_baselines.laws.heading import regulate
 from posse_baselines.laws.safeguard import safe_velocity
 from posse_baselines.laws.steering import write_motion

@@ -8,7 +8,7 @@ import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.monitoring import mate_now, patience
-from posse_baselines.ddcs.slots import slot_place
+from posse_baselines.ddcs.tracking.slots import slot_place
 from posse_baselines.laws.geometry import length
 from posse_baselines.laws.safeguard import put_disc, put_wall
 

@@ -14,9 +14,9 @@ from tests.support.reports import HOSTILE, compared
 import posse
 from posse_training.replay.format import decode
 from posse_training.replay.page import digest
-from posse_training.reports.comparison import Comparison
-from posse_training.reports.extremes import extremes
-from posse_training.reports.plays import Plays
+from posse_training.reports.comparing.comparison import Comparison
+from posse_training.reports.comparing.extremes import extremes
+from posse_training.reports.comparing.plays import Plays
 from posse_training.reports.results import Results
 
 

@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 from tests.support.runs import ADVISED, ALGORITHMS, BELIEVING, assert_equal, numbers, quiet, small
 
-from posse_training.runs import TrainSettings, checkpoint
+from posse_training.runs import TrainSettings
 from posse_training.runs import callback as module
-from posse_training.runs.checkpoint import read_checkpoint
+from posse_training.runs.saved import checkpoint
+from posse_training.runs.saved.checkpoint import read_checkpoint
 from posse_training.runs.train import resume, train
 
 

@@ -19,8 +19,8 @@ from posse_baselines.learned import LearnedPolicy
 from posse_training.errors import DivergedError, SettingsError
 from posse_training.reports import evaluate
 from posse_training.runs import callback as module
-from posse_training.runs.checkpoint import read_checkpoint
 from posse_training.runs.models import even_minibatch, make_env, make_model
+from posse_training.runs.saved.checkpoint import read_checkpoint
 from posse_training.runs.train import resume, steps_made, train
 
 

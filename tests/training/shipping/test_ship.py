@@ -16,7 +16,7 @@ from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.runs import TrainSettings, default_settings
-from posse_training.runs.command import command_of
+from posse_training.runs.saved.command import command_of
 from posse_training.runs.train import train
 from posse_training.shipping.check import replay
 from posse_training.shipping.ship import CHOICE_SEED, Settings, ship

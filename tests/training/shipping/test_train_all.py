@@ -9,8 +9,9 @@ import pytest
 from tests.support.runs import assert_equal, numbers, quiet, small
 
 from posse_training.errors import SettingsError
-from posse_training.runs import TrainSettings, checkpoint, default_settings
+from posse_training.runs import TrainSettings, default_settings
 from posse_training.runs import callback as module
+from posse_training.runs.saved import checkpoint
 from posse_training.runs.train import train
 from posse_training.shipping import train_all
 from posse_training.shipping.train_all import ALGORITHMS, Settings, all_runs, left_of, train_left

@@ -15,8 +15,8 @@ from posse_training.cluster.ray_backend import RayBackend
 from posse_training.cluster.settings import Cluster
 from posse_training.cluster.shards import Job, joined
 from posse_training.cluster.store import Folder
-from posse_training.reports.contenders import Contender
-from posse_training.reports.players import Play, Players
+from posse_training.reports.comparing.contenders import Contender
+from posse_training.reports.comparing.players import Play, Players
 from posse_training.reports.results import Results
 
 
@@ -58,7 +58,7 @@ class ClusterPlayers(Players):
         super().__exit__()
 
     def check(self, contender: Contender) -> None:
-        """See :class:`~posse_training.reports.players.Players`."""
+        """See :class:`~posse_training.reports.comparing.players.Players`."""
         for policy in contender.policies:
             if isinstance(policy, str):
                 self._known[policy] = _Known(*self._load_elsewhere(policy))
@@ -75,7 +75,7 @@ class ClusterPlayers(Players):
             self._collect(list(jobs.values()), watcher)
 
     def forget(self) -> None:
-        """See :class:`~posse_training.reports.players.Players`."""
+        """See :class:`~posse_training.reports.comparing.players.Players`."""
         self._store.clear()
 
     def _play(

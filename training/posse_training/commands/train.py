@@ -109,7 +109,7 @@ def _what_next(path: Path) -> str:
 
 def _train_all(settings: TrainSettings, several: _Seeds) -> None:
     """Train with every seed, and print the files of the best policies."""
-    from posse_training.runs.seeds import train_seeds, with_seeds
+    from posse_training.runs.seeds.in_turn import train_seeds, with_seeds
 
     cluster = of_option(several.ray, Path())  # the run folders hold the results
     runs = with_seeds(settings, several.seeds or (settings.seed,))

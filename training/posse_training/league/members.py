@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from posse_training.league.settings import LeagueSettings, label_of
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.folder import BEST, LAST, SETTINGS
+from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings, read_settings
 
 TEAM: Final = "trackers"

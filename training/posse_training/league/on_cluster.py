@@ -16,7 +16,7 @@ from posse_training.cluster.store import Folder
 from posse_training.league.settings import LeagueSettings
 from posse_training.league.work import Pair, Work
 from posse_training.reports.results import Results
-from posse_training.runs.on_cluster import train_on_cluster
+from posse_training.runs.seeds.on_cluster import train_on_cluster
 from posse_training.runs.settings import TrainSettings
 
 

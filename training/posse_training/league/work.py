@@ -11,7 +11,7 @@ from posse_training.league.members import Member
 from posse_training.league.settings import LeagueSettings
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.results import Results
-from posse_training.runs.folder import SETTINGS
+from posse_training.runs.saved.folder import SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import train
 

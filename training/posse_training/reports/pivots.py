@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse_training.reports.comparison import Comparison
+from posse_training.reports.comparing.comparison import Comparison
 from posse_training.reports.statistics import Estimate
 
 REFERENCE: Final = "planner"

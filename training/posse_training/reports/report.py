@@ -20,8 +20,8 @@ import posse
 from posse_training.provenance import commit
 from posse_training.replay import Replay
 from posse_training.replay.page import as_data, content_policy, contents, digest, in_letters, shell
-from posse_training.reports.comparison import Comparison
-from posse_training.reports.extremes import Extreme
+from posse_training.reports.comparing.comparison import Comparison
+from posse_training.reports.comparing.extremes import Extreme
 from posse_training.reports.pictures.figures import CAPTIONS
 from posse_training.reports.pictures.inline import Sheet, inline
 from posse_training.reports.pivots import Pivot, pivots

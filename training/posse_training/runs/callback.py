@@ -15,18 +15,18 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy_file import write_atomically
 from posse_training.errors import CheckpointError, DivergedError
-from posse_training.runs.checkpoint import Arrays, write_checkpoint
-from posse_training.runs.curve import Point, as_csv, best_of, read_points
 from posse_training.runs.display import Display
-from posse_training.runs.export import export, make_card
-from posse_training.runs.folder import BEST, CURVE, LAST
-from posse_training.runs.model_state import (
+from posse_training.runs.models import make_adviser
+from posse_training.runs.saved.checkpoint import Arrays, write_checkpoint
+from posse_training.runs.saved.curve import Point, as_csv, best_of, read_points
+from posse_training.runs.saved.export import export, make_card
+from posse_training.runs.saved.folder import BEST, CURVE, LAST
+from posse_training.runs.saved.model_state import (
     model_state,
     random_state,
     restore_model,
     restore_random_state,
 )
-from posse_training.runs.models import make_adviser
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.validation import validate
 from posse_training.sb3.contact_bound import ContactBound

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from posse_training.live_display import LiveDisplay, clock
-from posse_training.runs.curve import Point
+from posse_training.runs.saved.curve import Point
 from posse_training.runs.settings import TrainSettings
 from posse_training.sb3.contact_bound import ContactBound
 from posse_training.sparkline import sparkline

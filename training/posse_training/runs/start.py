@@ -8,8 +8,8 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_training.errors import CheckpointError
-from posse_training.runs.checkpoint import read_checkpoint
-from posse_training.runs.model_state import unflatten_tensors
+from posse_training.runs.saved.checkpoint import read_checkpoint
+from posse_training.runs.saved.model_state import unflatten_tensors
 from posse_training.sb3.normalisation import RunningStatistics
 
 

@@ -13,12 +13,12 @@ from rich.console import Console
 from posse_baselines import PolicyError, load
 from posse_training.errors import DivergedError
 from posse_training.runs.callback import TrainingCallback
-from posse_training.runs.checkpoint import read_checkpoint
 from posse_training.runs.display import Display
-from posse_training.runs.folder import BEST, LAST, SETTINGS, locked_run, open_run
 from posse_training.runs.logs import check_wandb, make_logger
 from posse_training.runs.memory import check_memory
 from posse_training.runs.models import make_adviser, make_env, make_model
+from posse_training.runs.saved.checkpoint import read_checkpoint
+from posse_training.runs.saved.folder import BEST, LAST, SETTINGS, locked_run, open_run
 from posse_training.runs.settings import TrainSettings, read_settings
 from posse_training.runs.sides import check_opponents, load_own
 from posse_training.runs.start import start_from

@@ -24,7 +24,7 @@ from posse_training.errors import SettingsError
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.results import Column
 from posse_training.reports.statistics import mean
-from posse_training.runs.command import command_of
+from posse_training.runs.saved.command import command_of
 from posse_training.runs.settings import TrainSettings, read_settings
 from posse_training.shipping.check import SPLIT, make_check
 

@@ -25,8 +25,8 @@ from posse_training.errors import SettingsError
 from posse_training.provenance import commit
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import difference
-from posse_training.runs.command import command_of
-from posse_training.runs.folder import BEST, SETTINGS
+from posse_training.runs.saved.command import command_of
+from posse_training.runs.saved.folder import BEST, SETTINGS
 from posse_training.runs.settings import read_settings
 
 TEST_SEED = 7

@@ -19,7 +19,7 @@ from rich.console import Console
 
 from posse_training.errors import SettingsError
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.folder import LAST, SETTINGS
+from posse_training.runs.saved.folder import LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import resume, train
 

@@ -12,7 +12,7 @@ from tests.support.plain import plain
 
 controller, correction = plain("ddcs.controller"), plain("ddcs.correction")
 heading, safeguard = plain("laws.heading"), plain("laws.safeguard")
-slots, tracking = plain("ddcs.slots"), plain("ddcs.tracking")
+slots, tracking = plain("ddcs.tracking.slots"), plain("ddcs.tracking.motion")
 OUTERMOST = 3.0
 
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 from tests.support.minds import Mind
 from tests.support.plain import plain
 
-family, settings, tracking = plain("ddcs.family"), plain("ddcs.settings"), plain("ddcs.tracking")
+family, settings, tracking = (
+    plain("ddcs.family"),
+    plain("ddcs.settings"),
+    plain("ddcs.tracking.motion"),
+)
 PURSUIT = {
     "pngl-l-phi", "pngl", "deviated-pursuit", "velocity-pursuit", "ddcs-centralized-pursuit",
 }  # fmt: skip

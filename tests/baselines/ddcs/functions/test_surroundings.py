@@ -232,7 +232,7 @@ def test_an_echo_from_a_slot_is_a_team_mate_in_it() -> None:
 
 def test_a_slot_beside_the_beam_gives_no_echo() -> None:
     m = strangers()
-    x, y, _, _ = plain("ddcs.slots").slot_place(m.d, m.slots[3])
+    x, y, _, _ = plain("ddcs.tracking.slots").slot_place(m.d, m.slots[3])
     place = complex(x, y)
     for aside, found in ((0.0, 3), (0.45, 3), (0.5, -1), (-0.45, 3)):
         beam = turn(2.0 + aside)

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_training.reports.contenders import Contender
+from posse_training.reports.comparing.contenders import Contender
+from posse_training.reports.comparing.plays import Plays
+from posse_training.reports.comparing.sweeps import BOUND, SWEEPS, Point
 from posse_training.reports.pictures import figures
 from posse_training.reports.pictures.learning import curves_of, learning
 from posse_training.reports.pictures.style import STYLES, looks_of
-from posse_training.reports.plays import Plays
 from posse_training.reports.results import Results
 from posse_training.reports.statistics import Estimate
-from posse_training.reports.sweeps import BOUND, SWEEPS, Point
 
 LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
 

@@ -9,9 +9,9 @@ from tests.support.colour_vision import LEAST, VISIONS, contrast, distance
 
 from posse.rendering.style import Colour
 from posse_baselines import policy_names
+from posse_training.reports.comparing.sweeps import BOUND
 from posse_training.reports.pictures.palette import CURVES, DARK, INK, NOTE, PAPER
 from posse_training.reports.pictures.style import STYLES, looks_of
-from posse_training.reports.sweeps import BOUND
 
 
 def rgb(colour: str) -> Colour:

@@ -14,6 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from posse import get_scenario
+from posse_training.reports.comparing.plays import Plays
+from posse_training.reports.comparing.sweeps import BOUND, SWEEPS, Point, Sweep
 from posse_training.reports.pictures.learning import Curve, learning
 from posse_training.reports.pictures.palette import BAND, NOTE, OWN
 from posse_training.reports.pictures.parts import (
@@ -33,9 +35,7 @@ from posse_training.reports.pictures.style import (
     marker_of,
     reference_of,
 )
-from posse_training.reports.plays import Plays
 from posse_training.reports.statistics import Estimate, share
-from posse_training.reports.sweeps import BOUND, SWEEPS, Point, Sweep
 
 CAPTIONS: Final = {
     "scenarios": "Mean safe score of every team on every scenario.",

@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from posse_training.reports.contenders import Contender
+from posse_training.reports.comparing.contenders import Contender
 from posse_training.reports.pictures.parts import legend, note, panels, plain
 from posse_training.reports.pictures.style import Looks, in_order, marker_of
 from posse_training.reports.statistics import Estimate

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from posse_training.reports.comparing.plays import Plays
+from posse_training.reports.comparing.sweeps import BOUND
 from posse_training.reports.pictures.palette import NOTE
 from posse_training.reports.pictures.style import WIDTH, Looks, in_order, marker_of
-from posse_training.reports.plays import Plays
-from posse_training.reports.sweeps import BOUND
 
 _MARKERS: Final = 6
 _LEGEND: Final = 124

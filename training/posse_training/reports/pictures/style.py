@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from posse_training.reports.comparing.sweeps import BOUND
 from posse_training.reports.pictures.palette import (
     BLUE,
     GREEN,
@@ -26,7 +27,6 @@ from posse_training.reports.pictures.palette import (
     RED,
     SKY,
 )
-from posse_training.reports.sweeps import BOUND
 
 WIDTH: Final = 7.2
 """Width of every figure, inches: that of a page of the manual."""

@@ -1,0 +1,33 @@
+"""An exported policy acts like its model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.support.runs import ALGORITHMS, quiet, small
+
+import posse
+from posse_baselines.learned import LearnedPolicy
+from posse_training.runs.models import make_env, make_model
+from posse_training.runs.saved.checkpoint import read_checkpoint
+from posse_training.runs.saved.model_state import restore_model
+from posse_training.runs.train import train
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_what_is_exported_acts_as_the_model_does(tmp_path: Path, algorithm: str) -> None:
+    settings = small(tmp_path, algorithm)
+    train(settings, console=quiet())
+    env = make_env(settings)
+    model = make_model(settings, env)
+    arrays, state = read_checkpoint(tmp_path)
+    part = {k.removeprefix("model/"): a for k, a in arrays.items() if k.startswith("model/")}
+    restore_model(model, part, state["model"])
+    policy = LearnedPolicy.from_file(tmp_path / "last.safetensors")
+    batch = posse.Batch(settings.scenarios[0], 4, seed=3)
+    actions, _ = policy.act(batch.reset(), policy.begin(batch.layout, 4))
+    expected, _ = model.predict(env.reset(), deterministic=True)
+    np.testing.assert_allclose(actions.reshape(8, 2), expected, atol=1e-5)
+    assert np.ptp(expected) > 1e-3

@@ -1,0 +1,1 @@
+"""One training with several seeds, here or on a cluster."""
