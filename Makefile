@@ -10,8 +10,8 @@ BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-# BenchMARL and RLlib need other versions. Their virtual environment holds these alone, and takes
-# everything else, torch above all, from ours.
+# BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
+# everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone.
 RECIPES := .venv-recipes
 
 # Suppresses a notice about later versions of mkdocs, which pyproject.toml excludes.
@@ -111,4 +111,6 @@ $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 	grep -viE '^(gymnasium|tensordict|torchrl)==' constraints.txt > $(RECIPES)/constraints.txt
 	$(RECIPES)/bin/python -m pip install --quiet --disable-pip-version-check \
 		--constraint $(RECIPES)/constraints.txt --constraint constraints-recipes.txt 'ray[rllib]' benchmarl
+	$(RECIPES)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
+		--constraint constraints-recipes.txt pufferlib gym gym-notices
 	@touch $@

@@ -40,6 +40,8 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the world within the seed.
         max_episode_steps: Steps per episode; ``None``: the scenario's horizon.
+        flat_infos: Whether infos are without nested dictionaries: ``info["metrics/score"]`` for
+            ``info["metrics"]["score"]``.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
@@ -61,12 +63,14 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         split: str = "train",
         first_world: int = 0,
         max_episode_steps: int | None = None,
+        flat_infos: bool = False,
         **overrides: Any,
     ) -> None:
         self.teammates = load(teammates) if isinstance(teammates, str) else teammates
         settings = shortened(scenario, max_episode_steps, overrides)
         settings = fitting(settings, self.teammates, number)
         self.number = number
+        self._flat_infos = flat_infos
         self._open(
             settings, render_mode=render_mode, seed=seed, split=split, first_world=first_world
         )
@@ -94,7 +98,7 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
             "metrics": self._world.no_metrics.copy(),
             "working": bool(self._world.working()[self.number]),
         }
-        return self._own(self._observations), info
+        return self._own(self._observations), self._told(info)
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -120,7 +124,7 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
             "metrics": world.no_metrics.copy(),
             "working": bool(world.working()[self.number]),
         }
-        terminated, truncated = self._end(over, info)
+        terminated, truncated, info = self._end(over, info)
         reward = float(world.rewards[self.number])
         return self._own(self._observations), reward, terminated, truncated, info
 

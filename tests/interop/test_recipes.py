@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
-OWN_ENVIRONMENT = {"benchmarl_mappo", "benchmarl_qmix", "rllib_shared"}
+OWN_ENVIRONMENT = {"benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared"}
 """Recipes with libraries that pin other versions than ours: ``make recipes`` installs those."""
 ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
 LONGEST = 15

@@ -51,6 +51,8 @@ class TeamEnv(OneAgentEnv):
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the world within the seed.
         target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
+        flat_infos: Whether infos are without nested dictionaries: ``info["metrics/score"]`` for
+            ``info["metrics"]["score"]``.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
@@ -69,8 +71,10 @@ class TeamEnv(OneAgentEnv):
         split: str = "train",
         first_world: int = 0,
         target_policy: TargetPolicy | None = None,
+        flat_infos: bool = False,
         **overrides: Any,
     ) -> None:
+        self._flat_infos = flat_infos
         fitting = with_agent(self.fitting_scenario(scenario, None, overrides), target_policy)
         self._open(
             fitting, render_mode=render_mode, discrete_actions=discrete_actions,
@@ -114,15 +118,16 @@ class TeamEnv(OneAgentEnv):
         observations = self._begin(seed, options)
         info: dict[str, Any] = {
             "score": 0.0,
-            "reward_terms": {
-                name: np.zeros(self.scenario.num_trackers, np.float32)
-                for name in self._world.batch.term_names
-            },
+            "reward_terms": self._no_terms(),
             "metrics": self._world.no_metrics.copy(),
         }
         if self._breakable:
             info["working"] = self._world.working()
-        return observations, info
+        return observations, self._told(info)
+
+    def _no_terms(self) -> dict[str, Any]:
+        n = self.scenario.num_trackers
+        return {name: np.zeros(n, np.float32) for name in self._world.batch.term_names}
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -145,7 +150,7 @@ class TeamEnv(OneAgentEnv):
         }
         if self._breakable:
             info["working"] = world.working()
-        terminated, truncated = self._end(over, info)
+        terminated, truncated, info = self._end(over, info)
         rewards = world.rewards.tolist()
         return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
 
@@ -197,8 +202,10 @@ class SoloEnv(TeamEnv):
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start an episode; see :class:`TeamEnv`."""
         observations, info = super().reset(seed=seed, options=solo_options(options))
-        info["reward_terms"] = self._world.no_terms
         return observations[0], info
+
+    def _no_terms(self) -> dict[str, Any]:
+        return self._world.no_terms
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step; see :class:`TeamEnv`."""
@@ -212,7 +219,7 @@ class SoloEnv(TeamEnv):
             "reward_terms": world.name_terms(*world.terms[0].tolist()),
             "metrics": world.no_metrics.copy(),
         }
-        terminated, truncated = self._end(over, info)
+        terminated, truncated, info = self._end(over, info)
         return world.observations[0].copy(), world.rewards.item(), terminated, truncated, info
 
 

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import MOTIONS
 from posse.adapters.gymnasium_env import SoloEnv, TeamEnv, solo_options
+from posse.adapters.infos import flattened
 from posse.adapters.single_world import (
     RENDER_MODES,
     check_render_mode,
@@ -64,6 +65,8 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         own_kernel: Whether to compile a kernel for this scenario, about a third faster; never
             changes a result.
         target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
+        flat_infos: Whether infos are without nested dictionaries: ``info["metrics/score"]`` for
+            ``info["metrics"]["score"]``.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
@@ -94,6 +97,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         num_threads: int | None = None,
         own_kernel: bool = False,
         target_policy: TargetPolicy | None = None,
+        flat_infos: bool = False,
         **overrides: Any,
     ) -> None:
         check_render_mode(render_mode)
@@ -127,6 +131,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             "autoreset_mode": self.autoreset_mode,
         }
         self._discrete = discrete_actions
+        self._flat_infos = flat_infos
         self._works_at = self.layout.offsets["working"]
         self._renderer: Any = None
 
@@ -163,7 +168,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             self.render()
         given = options_of(options).get("reset_mask")
         mask = np.ones(self.num_envs, np.bool_) if given is None else np.array(given, np.bool_)
-        infos = _masked(_zeroed(self._entries(observations), mask), mask)
+        infos = self._told(_zeroed(self._entries(observations), mask), mask)
         self._keep(observations)
         return self._observed(observations), infos
 
@@ -220,7 +225,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             infos["working"] = entries["working"]
         if "metrics" in found and not same_step:
             infos["metrics"] = _zeroed(found["metrics"], ended)
-        infos = _masked(infos, everywhere)
+        infos = self._told(infos, everywhere)
         if same_step and "final_obs" in found:
             last = found["final_obs"]
             final = {**self._entries(last, found), "metrics": found["metrics"]}
@@ -228,9 +233,12 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             for e in np.flatnonzero(ended):
                 kept[e] = self._observed(last[e : e + 1])[0]
             infos["final_obs"], infos["_final_obs"] = kept, ended.copy()
-            infos["final_info"] = _masked(_zeroed(final, ended), ended)
+            infos["final_info"] = self._told(_zeroed(final, ended), ended)
             infos["_final_info"] = ended.copy()
         return infos
+
+    def _told(self, entries: _Info, mask: BoolArray) -> _Info:
+        return _masked(flattened(entries) if self._flat_infos else entries, mask)
 
     def _entries(self, observations: FloatArray, found: _Info | None = None) -> _Info:
         """Return the infos of a step that ends no episode, or without ``found`` of a reset."""

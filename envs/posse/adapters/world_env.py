@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
+from posse.adapters.infos import flattened
 from posse.adapters.single_world import RENDER_MODES, SingleWorld, frames_per_second
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario
@@ -67,6 +68,8 @@ class WorldEnv:
 class OneAgentEnv(WorldEnv, gymnasium.Env[Any, Any]):
     """A Gymnasium environment of one world."""
 
+    _flat_infos: bool
+
     def _begin(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start an episode and return the observations (rows, F)."""
         observations = self._world.reset(seed, options)
@@ -75,11 +78,14 @@ class OneAgentEnv(WorldEnv, gymnasium.Env[Any, Any]):
             self.render()
         return observations
 
-    def _end(self, over: int, info: dict[str, Any]) -> tuple[bool, bool]:
+    def _told(self, info: dict[str, Any]) -> dict[str, Any]:
+        return flattened(info) if self._flat_infos else info
+
+    def _end(self, over: int, info: dict[str, Any]) -> tuple[bool, bool, dict[str, Any]]:
         """Complete a step: add the metrics to ``info`` at the end of the episode, and draw.
 
         Returns:
-            Whether the episode is terminated, and whether it is truncated.
+            Whether the episode is terminated, whether it is truncated, and the info.
         """
         terminated = truncated = False
         if over:
@@ -87,4 +93,4 @@ class OneAgentEnv(WorldEnv, gymnasium.Env[Any, Any]):
             truncated = not terminated
         if self.render_mode == "human":
             self.render()
-        return terminated, truncated
+        return terminated, truncated, self._told(info)
