@@ -113,4 +113,5 @@ $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 		--constraint $(RECIPES)/constraints.txt --constraint constraints-recipes.txt 'ray[rllib]' benchmarl
 	$(RECIPES)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
 		--constraint constraints-recipes.txt pufferlib gym gym-notices
+	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours
 	@touch $@

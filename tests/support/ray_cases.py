@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import filecmp
+import os
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +18,19 @@ import pytest
 import ray
 from ray.cluster_utils import Cluster as Nodes
 from safetensors.numpy import load_file
-from tests.support.ray_policies import Watched
+from tests.support.ray_policies import FOLDER, Watched
+from tests.support.runs import quiet
 
 from posse_baselines import load
 from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.cluster import Cluster
+from posse_training.cluster.ray_backend import RayBackend
+from posse_training.league.cross_play import Cell, CrossPlay
+from posse_training.league.members import TARGET, TEAM, founders
+from posse_training.league.on_cluster import ClusterWork
+from posse_training.league.settings import LeagueSettings
+from posse_training.league.work import Work
 from posse_training.reports.comparing.players import PlayError
 from posse_training.runs.saved.folder import LAST
 
@@ -31,8 +40,14 @@ WORLDS = 5  # nine shards
 
 
 @pytest.fixture(scope="module")
-def nodes() -> Iterator[Nodes]:
+def league_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("league")
+
+
+@pytest.fixture(scope="module")
+def nodes(league_folder: Path) -> Iterator[Nodes]:
     """Three nodes: one for the driver, two with a worker each."""
+    os.environ[FOLDER] = str(league_folder)
     head = {
         "num_cpus": 0,
         "include_dashboard": False,
@@ -156,22 +171,70 @@ def test_commands_give_the_same_files(
         assert all(np.array_equal(array, there[name]) for name, array in here.items()), run
 
 
-def test_a_node_that_dies_costs_its_shard(nodes: Nodes, local: Results, tmp_path: Path) -> None:
-    """The last test: it leaves two nodes of three."""
-    policy = Watched(tmp_path, 4, "wait")
+def removing(nodes: Nodes, folder: Path) -> threading.Thread:
+    """Start a thread that removes the node whose shard waits, and lets the others go on."""
 
     def remove() -> None:
-        while not (tmp_path / "begun-4").exists():
+        chosen = folder / "chosen"
+        while not chosen.exists():
             time.sleep(0.05)
         time.sleep(0.2)
-        doomed = (tmp_path / "begun-4").read_text()
-        (node,) = [n for n in nodes.worker_nodes if n.node_id == doomed]
+        (node,) = [n for n in nodes.worker_nodes if n.node_id == chosen.read_text()]
         nodes.remove_node(node, allow_graceful=False)
-        (tmp_path / "go").touch()
+        (folder / "go").touch()
 
-    removing = threading.Thread(target=remove)
-    removing.start()
-    cluster = Cluster(work=tmp_path / "work", worlds=WORLDS)
-    same(evaluate(policy, "smart", EPISODES, ray=cluster, **SHORT), local)
-    removing.join()
-    assert begun(tmp_path) >= 9 + 1
+    thread = threading.Thread(target=remove)
+    thread.start()
+    return thread
+
+
+def cells(folder: Path, team: str, ray: bool) -> list[Cell]:
+    """What two teams, one of them given, score against a target: three shards each."""
+    settings = LeagueSettings(
+        scenario="smart", teams=("idle", team), targets=("smart",), episodes=3 * WORLDS,
+        overrides={"horizon": 20, "settle_time": 0.5}, folder=folder / "league",
+    )  # fmt: skip
+    settings.path.mkdir(parents=True)
+    pairs = [(a, b) for a in founders(settings, TEAM) for b in founders(settings, TARGET)]
+    if not ray:
+        return CrossPlay(settings, Work(settings, quiet())).cells(pairs)
+    cluster = Cluster(work=folder / "work", worlds=WORLDS)
+    with RayBackend(cluster) as backend:
+        return CrossPlay(settings, ClusterWork(settings, quiet(), cluster, backend)).cells(pairs)
+
+
+def test_a_league_goes_on_when_a_worker_or_a_node_dies(
+    nodes: Nodes, league_folder: Path, tmp_path: Path
+) -> None:
+    """Of three nodes two are left."""
+    expected = cells(tmp_path / "here", "pursuit", ray=False)
+    for deed in ("die", "wait"):
+        for old in league_folder.iterdir():
+            old.unlink()
+        (league_folder / "deed").write_text(deed)
+        thread = removing(nodes, league_folder) if deed == "wait" else None
+        found = cells(tmp_path / deed, "tests.support.ray_policies:InLeague", ray=True)
+        if thread:
+            thread.join()
+        assert begun(league_folder) >= 3 + 1
+        for one, other in zip(found, expected, strict=True):
+            assert replace(one, team="") == replace(other, team="")
+
+
+def test_a_worker_of_two_nodes_and_a_node_of_three_die(
+    nodes: Nodes, local: Results, tmp_path: Path
+) -> None:
+    """The last test: it leaves two nodes."""
+    for alive, deed in ((2, "die"), (3, "wait")):
+        if deed == "wait":
+            nodes.add_node(num_cpus=1)
+        assert sum(node["Alive"] for node in ray.nodes()) == alive
+        folder = tmp_path / deed
+        folder.mkdir()
+        thread = removing(nodes, folder) if deed == "wait" else None
+        cluster = Cluster(work=tmp_path / "work", worlds=WORLDS)
+        found = evaluate(Watched(folder, 4, deed), "smart", EPISODES, ray=cluster, **SHORT)
+        same(found, local)
+        if thread:
+            thread.join()
+        assert begun(folder) >= 9 + 1

@@ -11,13 +11,15 @@ from typing import Any
 from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 
+FOLDER = "POSSE_TEST_FOLDER"
+
 
 class Watched(BasePolicy):
     """``pursuit``, which in one shard of a folder's choice does what the folder says.
 
     Args:
-        folder: Each shard leaves the node that plays it in ``begun-N``, N from 1 on. The one with
-            N = ``at`` does the deed.
+        folder: Each shard leaves the node that plays it in ``begun-N``, N from 1 on. The first one
+            from N = ``at`` on does the deed, and leaves its node in ``chosen``.
         at: Which one.
         deed: ``"die"`` ends the process, ``"wait"`` waits until the folder holds ``go``, ``"fail"``
             raises an error.
@@ -35,7 +37,8 @@ class Watched(BasePolicy):
 
         node = ray.get_runtime_context().get_node_id()
         number = next(n for n in range(1, 1000) if _claim(self._folder / f"begun-{n}", node))
-        deed = self._deed if number == self._at else ""
+        chosen = number >= self._at and _claim(self._folder / "chosen", node)
+        deed = self._deed if chosen else ""
         if deed == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if deed == "fail":
@@ -47,6 +50,17 @@ class Watched(BasePolicy):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         return self._pursuit.act(observations, memory)
+
+
+class InLeague(Watched):
+    """The same for a league, which loads its teams by name.
+
+    The environment of the cluster's nodes names its folder, whose file ``deed`` says what to do.
+    """
+
+    def __init__(self) -> None:
+        folder = Path(os.environ[FOLDER])
+        super().__init__(folder, 2, (folder / "deed").read_text())
 
 
 def _claim(path: Path, content: str) -> bool:
