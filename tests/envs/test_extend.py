@@ -48,7 +48,7 @@ settings = dict(
 batch = posse.batch("obstacles", 11, own_kernel=OWN, **settings)
 alone = [posse.batch("obstacles", 1, first_world=e, **settings) for e in (0, 9)]
 s, layout = batch.scenario, batch.layout
-plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": ()})
+plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": (), "reward_weights": {}})
 names = [field.name for field in layout.fields]
 assert [name for name in names if name not in {f.name for f in plain.layout.fields}] == [
     "wall_distance", "twice", "closing_speed"
@@ -128,16 +128,27 @@ def play(folder: Path, own_kernel: bool, breaks: int, **changed: str) -> tuple[s
     return done.stdout, done.stderr
 
 
+def test_the_examples_are_part_of_the_kernel(tmp_path: Path) -> None:
+    """Of that of any scenario, which is also that of the environments and kept on disk."""
+    for breaks in (0, 1):
+        said, errors = play(tmp_path, False, breaks)
+        assert said.startswith("hits"), errors
+    assert said == "hits 1\n"
+
+
+@pytest.mark.long
 def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
-    """Of one scenario or of any, and kept on disk until their source changes."""
     said, errors = play(tmp_path, True, 0)
     assert said.startswith("hits"), errors
-    for breaks in (0, 1):  # another scenario, the same kernel as that of the environments
-        said, errors = play(tmp_path, False, breaks)
-        assert said == "hits 1\n", errors
+
+
+@pytest.mark.long
+def test_an_edited_term_is_compiled_anew(tmp_path: Path) -> None:
+    said, errors = play(tmp_path, False, 0)
+    assert said.startswith("hits"), errors
     steady = examples(CHAPTER)["steady"].replace("return 1 -", "return 2 -")
     _, errors = play(tmp_path, False, 0, steady=steady)
-    assert "Not equal to tolerance" in errors, "an edited term is compiled anew"
+    assert "Not equal to tolerance" in errors
 
 
 def test_the_other_pieces_of_code_run(tmp_path: Path) -> None:

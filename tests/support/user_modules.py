@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
 from pathlib import Path
+
+from tests.support.forks import forks_of
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -23,12 +24,10 @@ def snippets(chapter: str) -> list[str]:
 
 
 def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
-    """Run code with a user's modules in a new interpreter."""
+    """Run code with a user's modules in a new process."""
     for name, source in {**modules, "main": code}.items():
         (folder / f"{name}.py").write_text(source, encoding="utf-8")
-    return subprocess.run(
-        [sys.executable, "main.py"], cwd=folder, capture_output=True, text=True, check=False
-    )
+    return forks_of("posse").run(code, folder, file=str(folder / "main.py"))
 
 
 def lines_of(source: str) -> int:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from tests.fuzz.kernel_cache import campaign
+from tests.support.forks import forks_of
 
 import posse
 
@@ -174,14 +175,17 @@ class Herd:
 
     def run(self, cache: Path, **environment: str) -> Run:
         clean = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
-        done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", self.main],
-            cwd=self.root,
-            env={**clean, "POSSE_CACHE_DIR": str(cache), **environment},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        variables = {**clean, "POSSE_CACHE_DIR": str(cache), **environment}
+        done = (
+            subprocess.run(  # since they matter before posse is imported
+                [sys.executable, "-W", "error", "-c", self.main],
+                cwd=self.root, env=variables, capture_output=True, text=True, check=False,
+            )
+            if environment.keys() & {"PYTHONPATH", "NUMBA_DISABLE_JIT"}
+            else forks_of("posse.numeric", options=("-W", "error")).run(
+                self.main, self.root, variables
+            )
+        )  # fmt: skip
         assert done.returncode == 0, done.stderr
         answer, hits, misses = done.stdout.split()
         return Run(float(answer), int(hits), int(misses), done.stderr)
