@@ -18,7 +18,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test recipes fuzz mutants lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes fuzz mutants lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,9 +26,15 @@ help: ## List these commands
 demo: $(BASE) ## Show teams in action; installs only the base packages, without torch
 	$(BIN)/posse demo
 
-test: lint ## Run all checks: lint, types, tests, docs
-	$(BIN)/python -m pytest -n auto --dist worksteal
-	$(BIN)/mkdocs build --strict --quiet
+test: $(FULL) ## Run all checks but the long tests: lint, types, tests, docs
+	$(MAKE) --no-print-directory --jobs 2 lint quick-tests
+
+# They build the manual, too.
+quick-tests: $(FULL)
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not long"
+
+test-long: $(FULL) ## Run the long tests: kills, full trainings, kernels compiled anew
+	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
 recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
 

@@ -35,7 +35,7 @@ def test_no_case_fails(case: Any, cases: int) -> None:
     assert tries == cases
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("case", "first"), [(kills.case, 0), (full_disk.case, 3), (together.case, 6)],
     ids=["kills", "full_disk", "together"],

@@ -33,7 +33,7 @@ def test_the_loop_is_in_the_readme_the_notebook_and_ten_lines_long() -> None:
     assert loop in ["".join(cell["source"]) for cell in notebook["cells"]]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_notebook_runs(tmp_path: Path) -> None:
     pytest.importorskip("nbclient", reason="no nbclient: pip install posse[docs]")
     out = tmp_path / "out.ipynb"

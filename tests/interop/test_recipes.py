@@ -14,6 +14,8 @@ RECIPES = ROOT / "docs" / "recipes"
 OWN_ENVIRONMENT = {"benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared"}
 """Recipes with libraries that pin other versions than ours: ``make recipes`` installs those."""
 ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
+LEARN = {"minari_clone", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
+"""Recipes that train, which takes long."""
 LONGEST = 15
 
 
@@ -22,7 +24,10 @@ def run(name: str, folder: Path, python: Path | str = sys.executable) -> str:
     done = subprocess.run(
         [str(python), "-W", "ignore", str(RECIPES / f"{name}.py")],
         cwd=folder, capture_output=True, text=True, timeout=300, check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy"},
+        env={
+            **os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy",
+            "OMP_NUM_THREADS": "1",  # torch's threads wait by spinning, and other tests run
+        },
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
@@ -32,11 +37,19 @@ def names() -> list[str]:
     return sorted(path.stem for path in RECIPES.glob("*.py"))
 
 
-@pytest.mark.parametrize("name", [name for name in names() if name not in OWN_ENVIRONMENT])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.long] if name in LEARN else [])
+        for name in names()
+        if name not in OWN_ENVIRONMENT
+    ],
+)
 def test_it_runs(name: str, tmp_path: Path) -> None:
     run(name, tmp_path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
 def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
     if not ELSEWHERE.exists():

@@ -65,7 +65,11 @@ def test_the_number_of_threads_changes_nothing() -> None:
 
 @pytest.mark.parametrize(
     ("name", "more"),
-    [("smart", {}), ("field", {}), ("smart", {"num_trackers": 11, "num_neighbours": 3})],
+    [
+        ("field", {}),
+        pytest.param("smart", {}, marks=pytest.mark.long),
+        pytest.param("smart", {"num_trackers": 11, "num_neighbours": 3}, marks=pytest.mark.long),
+    ],
 )
 def test_a_kernel_of_its_own_changes_nothing(name: str, more: dict[str, Any]) -> None:
     make: dict[str, Any] = {"seed": 3, "horizon": 60, "num_threads": 1, **more}

@@ -67,7 +67,6 @@ def test_an_unknown_device() -> None:
         posse.batch("smart", device="tpu")
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None, reason="needs posse[cuda], though no GPU"
 )

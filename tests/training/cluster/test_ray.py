@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_on_a_cluster_of_three_nodes(tmp_path: Path) -> None:
     if not ELSEWHERE.exists():
         pytest.skip("needs .venv-recipes: make recipes")

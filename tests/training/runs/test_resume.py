@@ -69,7 +69,7 @@ def start(action: str, folder: Path, settings: TrainSettings) -> subprocess.Pope
     return subprocess.Popen([sys.executable, "-c", SCRIPT, action, str(folder), told])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_kill_9_loses_at_most_one_interval(tmp_path: Path) -> None:
     settings = small(tmp_path / "x", steps=16_000, evaluate_every=8000, checkpoint_every=800)
     whole, killed = tmp_path / "whole", tmp_path / "killed"

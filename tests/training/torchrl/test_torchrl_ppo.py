@@ -127,7 +127,7 @@ def test_the_same_seed_gives_the_same_agent() -> None:
     assert [report["agent_steps"] for report in reports] == [800, 1600]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_learns_to_close_in() -> None:
     settings = Settings(
         num_worlds=32, rollout_steps=50, updates=12,

@@ -208,7 +208,7 @@ def start(out: Path, policies: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", SCRIPT, str(out), policies])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_kill_9_leaves_the_old_comparison_and_a_rerun_is_as_if_nothing_was(tmp_path: Path) -> None:
     out, whole = tmp_path / "out", tmp_path / "whole"
     assert start(out, "idle").wait() == 0

@@ -95,7 +95,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_hanging_policy_does_not_outlive_a_killed_comparison(tmp_path: Path) -> None:
     pid_file = tmp_path / "pid"
