@@ -24,10 +24,7 @@ def run(name: str, folder: Path, python: Path | str = sys.executable) -> str:
     done = subprocess.run(
         [str(python), "-W", "ignore", str(RECIPES / f"{name}.py")],
         cwd=folder, capture_output=True, text=True, timeout=300, check=False,
-        env={
-            **os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy",
-            "OMP_NUM_THREADS": "1",  # torch's threads wait by spinning, and other tests run
-        },
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -24,15 +23,6 @@ from posse_training.torchrl.ppo import Settings, objectives, roll_out, spread_fl
 
 SHORT: dict[str, Any] = {"horizon": 10, "settle_time": 0.5, "start_distance": (1.0, 2.5)}
 SMALL = Settings(num_worlds=16, rollout_steps=10, updates=2, minibatches=2, hidden=(8,))
-
-
-@pytest.fixture(autouse=True)
-def _one_thread() -> Iterator[None]:
-    """Small networks do not gain from threads, which wait for each other by spinning."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def an_agent_and_its_rollout(steps: int, **settings: Any) -> tuple[Agent, Any]:

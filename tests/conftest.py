@@ -1,0 +1,8 @@
+"""Settings of every process that runs tests, made before any library is imported."""
+
+from __future__ import annotations
+
+import os
+
+# Small networks do not gain from torch's threads, which wait for each other by spinning.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
