@@ -242,12 +242,13 @@ def test_what_is_allowed_is_finite_and_within_its_bounds(
         batch = posse.batch(name, 3, **settings, horizon=30, settle_time=1e-6, **chosen)
     except ScenarioError:
         hypothesis.reject()
-    bounds = [batch.layout.bounds(), StateLayout(batch.scenario).bounds()]
+    state = StateLayout(batch.scenario)
+    bounds = [batch.layout.bounds(), state.bounds()]
     observations = batch.reset(seed=1)
     rng = np.random.default_rng(1)
     total = np.zeros(batch.observation_shape[:2], np.float32)
     for _ in range(35):
-        vectors = [observations, StateLayout(batch.scenario).vector(batch.arrays)]
+        vectors = [observations, state.vector(batch.arrays)]
         for (low, high), vector in zip(bounds, vectors, strict=True):
             outside = (vector < low) | (vector > high) | ~np.isfinite(vector)
             assert not outside.any(), np.argwhere(outside)

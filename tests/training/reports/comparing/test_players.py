@@ -72,6 +72,7 @@ def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
     assert (there["score"] == here["score"]).all()
 
 
+@pytest.mark.long
 def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     started = time.monotonic()
     settings = settings_for(tmp_path, "Sleeps", "SleepsInC", "Slow", limit=12.0)
