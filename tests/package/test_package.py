@@ -45,12 +45,12 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the programs of an environment with nothing but the wheel and what it requires."""
     folder = tmp_path_factory.mktemp("empty")
-    run(sys.executable, "-m", "venv", folder / "venv", cwd=folder)
+    run(sys.executable, "-m", "venv", "--without-pip", folder / "venv", cwd=folder)
     programs = folder / "venv" / "bin"
     wheel = next(built.glob("*.whl"))
     run(
-        programs / "python", "-m", "pip", "install", "--quiet", "-c", ROOT / "constraints.txt",
-        wheel, cwd=folder,
+        sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet",
+        "-c", ROOT / "constraints.txt", wheel, cwd=folder,
     )  # fmt: skip
     return programs
 
