@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.parametrize(
     ("case", "cases"),
     [
-        (worlds.case, 40), (calls.case, 4), (processes.case, 24), (threads.case, 3),
+        (worlds.case, 40), (calls.case, 4), (processes.case, 12), (threads.case, 3),
         (forged.case, 50),
     ],
     ids=["worlds", "calls", "processes", "threads", "forged"],

@@ -59,7 +59,7 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
         ["ship", "--help"],
         ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0"],
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
-        ["reproduce", "--starts", "2"],
+        pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"],
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
     ],

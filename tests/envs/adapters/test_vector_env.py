@@ -154,6 +154,7 @@ def test_the_same_seed_gives_the_same_worlds_whatever_their_number() -> None:
     assert not np.array_equal(theirs[0], theirs[1])
 
 
+@pytest.mark.long
 def test_a_kernel_of_its_own_changes_nothing() -> None:
     general, own = (vector(own_kernel=own_kernel, **BUSY) for own_kernel in (False, True))
     assert own.batch.own_kernel

@@ -69,6 +69,7 @@ def test_with_nothing_shipped_the_page_stays(page: Path) -> None:
     assert fill(page) == before
 
 
+@pytest.mark.long
 def test_the_page_says_what_was_played(page: Path, tmp_path: Path) -> None:
     policy = make(tmp_path / "shipped" / "learned-any.safetensors", 1)
     files = [tmp_path / f"{k}.safetensors" for k in range(3)]

@@ -251,5 +251,6 @@ def test_a_collector_gathers_whole_batches() -> None:
     assert data["next", "truncated"].squeeze(-1)[:, 11].all()
 
 
+@pytest.mark.long
 def test_over_the_gpu_engine_in_the_simulator() -> None:
     run_in_simulator(Path(__file__).parents[2] / "support" / "torchrl_simulated.py")
