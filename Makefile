@@ -8,7 +8,10 @@ BIN := $(VENV)/bin
 PINS := pyproject.toml constraints.txt
 BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
-PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+INSTALL := install --no-compile --constraint
+# pip compiles modules on one core; this does on all. One module of torch is for another Python.
+COMPILE := python -m compileall -qq -j 0 -x /tests/
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone.
@@ -100,24 +103,28 @@ $(BIN)/python:
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "posse needs Python 3.11 or newer, and '$(PYTHON)' is $$("$(PYTHON)" --version 2>&1); name another: make PYTHON=python3.12 ..." >&2; exit 1; }
 	"$(PYTHON)" -m venv $(VENV)
+	@# Python 3.11 brings a pip that takes minutes to choose among so many packages.
+	$(PIP) install 'pip>=25' || true
 
 $(BASE): $(PINS) | $(BIN)/python
-	$(PIP_INSTALL) --editable .
+	$(PIP) $(INSTALL) constraints.txt --editable .
+	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $@
 
 $(FULL): $(PINS) | $(BIN)/python
-	$(PIP_INSTALL) --editable '.[training,dev,docs]'
+	$(PIP) $(INSTALL) constraints.txt --editable '.[training,dev,docs]'
+	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $(BASE) $@
 
 $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 	rm -rf $(RECIPES)
-	$(BIN)/python -m venv $(RECIPES)
+	$(BIN)/python -m venv --without-pip $(RECIPES)
 	echo "import site; site.addsitedir('$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" \
 		> "$$($(RECIPES)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/posse_base.pth"
 	grep -viE '^(gymnasium|tensordict|torchrl)==' constraints.txt > $(RECIPES)/constraints.txt
-	$(RECIPES)/bin/python -m pip install --quiet --disable-pip-version-check \
-		--constraint $(RECIPES)/constraints.txt --constraint constraints-recipes.txt 'ray[rllib]' benchmarl
-	$(RECIPES)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
-		--constraint constraints-recipes.txt pufferlib gym gym-notices
+	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) $(RECIPES)/constraints.txt \
+		--constraint constraints-recipes.txt 'ray[rllib]' benchmarl
+	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps pufferlib gym gym-notices
 	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours
+	@$(RECIPES)/bin/$(COMPILE) $(RECIPES)/lib || true
 	@touch $@
