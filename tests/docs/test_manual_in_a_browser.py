@@ -30,6 +30,7 @@ def address(site: Path) -> Iterator[str]:
         server.shutdown()
 
 
+@pytest.mark.long
 def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> None:
     with chromium() as browser:
         page = browser.new_page(viewport={"width": PHONE, "height": 844})
