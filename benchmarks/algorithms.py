@@ -32,6 +32,7 @@ OFF_POLICY: Final = ("sac", "td3")
 CHANGES: Final[dict[str, dict[str, Any]]] = {
     "ppo": {},
     "mappo": {"algorithm": "mappo"},
+    "recurrent-ppo": {"algorithm": "recurrent-ppo"},
     "sac": {"algorithm": "sac"},
     "td3": {"algorithm": "td3"},
     "ppo-imitation": {"imitate": "ddcs-tuned"},

@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 
 import posse
-from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_baselines.learned import LSTM, Encoding, LearnedPolicy, Network
 
 
-def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) -> Network:
+def network_for(
+    inputs: int, outputs: int = 2, seed: int = 0, *, cells: int = 0, **changes: Any
+) -> Network:
+    """A network of arbitrary weights; with a recurrent layer of so many cells, if there are any."""
     generator = np.random.default_rng(seed)
-    sizes = (inputs, 24, 16, outputs)
+    sizes = (cells or inputs, 24, 16, outputs)
 
     def draw(*shape: int) -> Any:
         return generator.normal(size=shape).astype(np.float32)
@@ -28,6 +31,9 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) ->
         activation="tanh",
         output="clip",
     )
+    if cells:
+        read = draw(4 * cells, inputs) / np.float32(inputs**0.5)
+        changes = {"lstm": LSTM(read, draw(4 * cells, cells), draw(4 * cells)), **changes}
     return replace(network, **changes)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,7 +20,8 @@ from posse_baselines.learned.encoder import Encoder
 from posse_baselines.learned.encoding import Encoding
 from posse_baselines.learned.features import SCRATCH
 from posse_baselines.learned.forward import act
-from posse_baselines.learned.network import Network
+from posse_baselines.learned.lstm import LSTM
+from posse_baselines.learned.network import LSTM_TENSORS, Network
 from posse_baselines.learned.policy_file import (
     read_policy_file,
     write_atomically,
@@ -35,8 +37,22 @@ from posse_baselines.policy import (
     message_size_of,
 )
 
-FORMATS: Final = (1, 2)
-"""Formats of policy files. 2: with a correction, or a belief, that format 1 does not know."""
+FORMATS: Final = (1, 2, 3)
+"""Formats of policy files. 2: with a correction, or a belief, that format 1 does not know. 3: with a
+recurrent layer."""
+MEMORIES: Final = (None, "lstm")
+"""Recurrent layers of a policy file; ``None``: there is none."""
+
+
+@dataclass
+class _Memory(OwnArrays):
+    """What a learned policy remembers of its worlds; changed in place."""
+
+    layout: ObservationLayout
+    num_worlds: int
+    encoder: Encoder
+    states: FloatArray  # of the network's recurrent layer, (E, robots, 2, cells)
+    adviser: Memory
 
 
 class LearnedPolicy(OwnArrays, BasePolicy):
@@ -73,24 +89,24 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             None if adviser is None else Advising(adviser, correction, believes=encoding.believes)
         )
         size = encoding.size + (0 if self._advising is None else self._advising.inputs)
-        if network.sizes[0] != size:
+        if network.inputs != size:
             raise PolicyError(
-                f"the network takes {network.sizes[0]} numbers, its encoding gives {size}"
+                f"the network takes {network.inputs} numbers, its encoding gives {size}"
             )
-        if network.sizes[-1] < MOTION:
+        if network.outputs < MOTION:
             raise PolicyError(
-                f"the network gives {network.sizes[-1]} numbers, an action has {MOTION} or more"
+                f"the network gives {network.outputs} numbers, an action has {MOTION} or more"
             )
         self.network = network
         self.encoding = encoding
         self._set_card(card)
-        self.message_size = max(network.sizes[-1] - MOTION, encoding.message_size)
+        self.message_size = max(network.outputs - MOTION, encoding.message_size)
         self.adviser = adviser
         if adviser is not None:
-            if network.sizes[-1] != MOTION:
+            if network.outputs != MOTION:
                 raise PolicyError(
                     f"a network with an adviser gives {MOTION} numbers, this one gives "
-                    f"{network.sizes[-1]}: the adviser sends the messages"
+                    f"{network.outputs}: the adviser sends the messages"
                 )
             self.message_size = max(self.message_size, adviser.message_size)
         self._numbers = network.flat()
@@ -111,59 +127,64 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         return other
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` worlds.
+        """Return the memory of ``num_worlds`` worlds: the network's states, and the adviser's.
 
         Raises:
             PolicyError: The layout lacks a field that the network reads, or has another size of it.
         """
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)
+        robots = 1 if self.side == "target" else layout.scenario.num_trackers
+        states = self.network.fresh(num_worlds, robots)
         adviser_memory = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        return layout, num_worlds, encoder, adviser_memory
+        return _Memory(layout, num_worlds, encoder, states, adviser_memory)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
 
         One that moves the target takes (E, 1, F).
         """
-        layout, num_worlds, encoder, adviser_memory = memory
-        rows = 1 if self.side == "target" else None
-        observations = check_observations(self, observations, num_worlds, layout, rows)
-        trackers = observations.shape[1]
-        actions = np.empty((num_worlds, trackers, MOTION + message_size_of(layout)), np.float32)
-        scratch = np.empty((MOST_THREADS, SCRATCH + 2 * max(self.network.sizes)), np.float32)
+        m: _Memory = memory
+        robots = m.states.shape[1]
+        observations = check_observations(self, observations, m.num_worlds, m.layout, robots)
+        length = MOTION + message_size_of(m.layout)
+        actions = np.empty((m.num_worlds, robots, length), np.float32)
+        scratch = np.empty((MOST_THREADS, SCRATCH + 2 * self.network.widest), np.float32)
         proposals = inputs = actions[..., :0]
         if self._advising is not None:
-            proposals, inputs, adviser_memory = self._advising.ask(observations, adviser_memory)
+            proposals, inputs, m.adviser = self._advising.ask(observations, m.adviser)
         over_worlds(
             act,
             (
-                observations, *encoder.tables, np.ascontiguousarray(inputs),
-                *self._numbers, scratch, actions,
+                observations, *m.encoder.tables, np.ascontiguousarray(inputs),
+                *self._numbers, scratch, m.states, actions,
             ),
-            num_worlds,
-            trackers,
+            m.num_worlds,
+            robots,
         )  # fmt: skip
         if self._advising is not None:
-            actions, adviser_memory = self._advising.answer(
-                observations, proposals, actions[..., :MOTION], adviser_memory
+            actions, m.adviser = self._advising.answer(
+                observations, proposals, actions[..., :MOTION], m.adviser
             )
-        return actions, (layout, num_worlds, encoder, adviser_memory)
+        return actions, m
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with the adviser restarted in a mask's worlds; the network has none."""
-        if self.adviser is None:
-            return memory
-        *rest, adviser_memory = memory
-        return (*rest, self.adviser.restart(adviser_memory, mask))
+        """Return the memory with network and adviser restarted in the worlds of a mask (E,)."""
+        m: _Memory = memory
+        m.states[mask] = 0
+        if self.adviser is not None:
+            m.adviser = self.adviser.restart(m.adviser, mask)
+        return m
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the adviser's memory as arrays by name."""
-        return {} if self.adviser is None else self.adviser.arrays(memory[-1])
+        """Return the memory of network and adviser as arrays by name; views, not copies."""
+        m: _Memory = memory
+        own = {"lstm": m.states} if self.network.cells else {}
+        return own if self.adviser is None else {**self.adviser.arrays(m.adviser), **own}
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
-        return {} if self.adviser is None else self.adviser.annotations(memory[-1])
+        return {} if self.adviser is None else self.adviser.annotations(memory.adviser)
 
     def save(self, path: Path) -> None:
         """Write the policy as one file, and its card beside it as readable JSON.
@@ -174,9 +195,11 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             OSError: A file could not be written; an old one of that name is unchanged.
         """
         correction = "motion" if self._advising is None else self._advising.correction
-        old = correction == "motion" and not self.encoding.believes
+        needed = 2 if correction != "motion" or self.encoding.believes else 1
+        if self.network.cells:
+            needed = 3
         description = {
-            "format": FORMATS[0] if old else FORMATS[-1],
+            "format": needed,
             "limit": self.network.limit,
             "activation": self.network.activation,
             "output": self.network.output,
@@ -184,8 +207,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
         }
-        if not old:
+        if needed > 1:
             description["correction"] = correction
+        if self.network.cells:
+            description["memory"] = "lstm"
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), description)
         card = json.dumps(self.card, indent=2, sort_keys=True) + "\n"
@@ -214,7 +239,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         if description["format"] not in FORMATS:
             raise PolicyError(
                 f"its format is {description['format']!r:.80}, this version reads "
-                f"{' and '.join(map(str, FORMATS))}: install the version that wrote it"
+                f"{', '.join(map(str, FORMATS))}: install the version that wrote it"
             )
         count = sum(name.endswith(".weight") for name in tensors)
         network = Network(
@@ -225,12 +250,22 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             biases=tuple(tensors[f"layers.{k}.bias"] for k in range(count)),
             activation=str(description["activation"]),
             output=str(description["output"]),
+            lstm=_lstm(description.get("memory"), tensors),
         )
         encoding = Encoding.from_dict(description["encoding"])
         return cls(
             network, encoding, description["card"], _adviser(description.get("adviser")),
             str(description.get("correction", "motion")),
         )  # fmt: skip
+
+
+def _lstm(memory: Any, tensors: Mapping[str, FloatArray]) -> LSTM | None:
+    """Return the recurrent layer of a file, if it has one."""
+    if memory not in MEMORIES:
+        raise PolicyError(f"its memory {memory!r:.80} is unknown: install the version that wrote it")
+    if memory is None:
+        return None
+    return LSTM(**{name: tensors[f"lstm.{name}"] for name in LSTM_TENSORS})
 
 
 def _adviser(name: str | None) -> Adviser | None:

@@ -52,7 +52,10 @@ FIELD = ["speed", 1, "m/s", 0.0, False]
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"format": 3}, "its format is 3"),
+        ({"format": 4}, "its format is 4"),
+        ({"memory": "gru"}, "its memory 'gru' is unknown"),
+        ({"memory": ["lstm"]}, "its memory"),
+        ({"memory": "lstm"}, "damaged: KeyError.*lstm"),
         ({"format": None}, "its format is None"),
         ({"limit": "wide"}, "damaged"),
         ({"limit": 1e300}, "limit=1e\\+300"),

@@ -17,7 +17,7 @@ from posse_training.errors import require
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.settings import TrainSettings, opponents_of
 
-_NEEDED = ("training", "torch", "stable_baselines3")
+_NEEDED = ("training", "torch", "stable_baselines3", "sb3_contrib")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from posse_training.runs.settings import TrainSettings
 
 _FLOAT: Final = 4  # bytes
 _OWN: Final = 16  # numbers beside the inputs in a row of a buffer: action, reward, value, ...
+_GATES: Final = 4  # of an LSTM
 _COPIES: Final = 8  # of each weight: two networks, gradients, Adam's two moments, copies for saving
 
 
@@ -25,8 +26,11 @@ def memory_needed(s: TrainSettings) -> int:
     each = min(scenario.num_trackers for scenario in scenarios) if s.side == "trackers" else 1
     slots = s.num_worlds * each
     rows = slots * s.rollout * (inputs + _OWN) if s.on_policy else s.replay * 2 * (inputs + _OWN)
-    widths = (inputs, *s.hidden, 2 + s.message_size)
+    read = s.lstm_size if s.recurrent else inputs
+    widths = (read, *s.hidden, 2 + s.message_size)
     weights = sum(a * b for a, b in itertools.pairwise(widths))
+    if s.recurrent:
+        weights += _GATES * s.lstm_size * (inputs + s.lstm_size)
     worlds = s.num_worlds * trackers * 2 * layout.size
     return _FLOAT * (rows + _COPIES * weights + worlds)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from posse_training.runs.settings import TrainSettings
 from posse_training.runs.sides import encoding_of, make_batches
 from posse_training.sb3.centralized_critic import CentralizedCriticPolicy
 from posse_training.sb3.normalisation import Normaliser
+from posse_training.sb3.recurrent import SequencePPO
 from posse_training.sb3.speedups import FlatRolloutBuffer, QuickTanh
 from posse_training.sb3.vec_env import TeamVecEnv
 
@@ -68,25 +70,31 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
 
 
 def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> BaseAlgorithm:
-    """Return PPO or MAPPO."""
+    """Return PPO, MAPPO or recurrent PPO."""
     network["optimizer_kwargs"]["eps"] = _ADAM_EPSILON
+    network |= {"net_arch": list(s.hidden)}
+    rows = even_minibatch(s.rollout * env.num_envs, s.minibatch)
+    kind: Any = partial(PPO, "MlpPolicy", rollout_buffer_class=FlatRolloutBuffer)
     if s.algorithm == "mappo":
+        kind = partial(PPO, CentralizedCriticPolicy, rollout_buffer_class=FlatRolloutBuffer)
+        del network["net_arch"]
         network |= {"private_size": env.private_size, "hidden": s.hidden}
-    else:
-        network |= {"net_arch": list(s.hidden)}
-    model = PPO(
-        CentralizedCriticPolicy if s.algorithm == "mappo" else "MlpPolicy",
+    elif s.recurrent:
+        kind = partial(SequencePPO, "MlpLstmPolicy")
+        network |= {"lstm_hidden_size": s.lstm_size}
+        # Whole rollouts of so many slots.
+        rows = s.rollout * even_minibatch(env.num_envs, max(1, s.minibatch // s.rollout))
+    model: BaseAlgorithm = kind(
         env,
         learning_rate=_LearningRate(s),
         n_steps=s.rollout,
-        batch_size=even_minibatch(s.rollout * env.num_envs, s.minibatch),
+        batch_size=rows,
         n_epochs=s.epochs,
         gamma=s.discount,
         gae_lambda=s.gae_lambda,
         clip_range=s.clip,
         ent_coef=s.entropy,
         vf_coef=s.value_weight,
-        rollout_buffer_class=FlatRolloutBuffer,
         policy_kwargs={**network, "log_std_init": s.log_deviation},
         stats_window_size=500,
         seed=s.seed,

@@ -31,8 +31,9 @@ class TrainSettings:
 
     scenario: str = "smart"
     """Scenario to train on, or several separated by commas."""
-    algorithm: Literal["ppo", "mappo", "sac", "td3"] = "ppo"
-    """mappo is ppo with a value function that reads the state of the world."""
+    algorithm: Literal["ppo", "mappo", "recurrent-ppo", "sac", "td3"] = "ppo"
+    """mappo is ppo with a value function that reads the state of the world; recurrent-ppo, with
+    networks that remember the episode."""
     steps: int = 20_000_000
     """Steps to train for, at least; rollouts are completed."""
     seed: int = 1
@@ -71,6 +72,8 @@ class TrainSettings:
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
     """Activation between the layers."""
+    lstm_size: int = 64
+    """recurrent-ppo: cells of the recurrent layer (LSTM) before the hidden layers."""
 
     # All algorithms
     learning_rate: float = 3e-4
@@ -82,9 +85,9 @@ class TrainSettings:
     minibatch: int = 8192
     """Steps in one gradient, about: a rollout is divided evenly."""
 
-    # ppo and mappo
+    # ppo, mappo and recurrent-ppo
     rollout: int = 64
-    """Control steps between two updates."""
+    """Control steps between two updates; gradients of recurrent-ppo reach back so far."""
     epochs: int = 4
     """Passes over a rollout."""
     gae_lambda: float = 0.95
@@ -161,7 +164,12 @@ class TrainSettings:
     @property
     def on_policy(self) -> bool:
         """Whether the algorithm learns from its latest rollout only."""
-        return self.algorithm in ("ppo", "mappo")
+        return self.algorithm in ("ppo", "mappo", "recurrent-ppo")
+
+    @property
+    def recurrent(self) -> bool:
+        """Whether the networks have a recurrent layer."""
+        return self.algorithm == "recurrent-ppo"
 
     @property
     def run_folder(self) -> Path:
@@ -213,10 +221,10 @@ def _check_together(s: TrainSettings) -> None:
     """Raise if settings that are valid on their own exclude each other."""
     if s.contact_bound is not None and not s.on_policy:
         raise SettingsError(
-            f"contact_bound={s.contact_bound} needs algorithm ppo or mappo, not {s.algorithm}: "
-            "set a weight of the reward term contact instead"
+            f"contact_bound={s.contact_bound} needs algorithm ppo, mappo or recurrent-ppo, "
+            f"not {s.algorithm}: set a weight of the reward term contact instead"
         )
-    if s.imitate is not None and not s.on_policy:
+    if s.imitate is not None and (s.recurrent or not s.on_policy):
         raise SettingsError(
             f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out"
         )
