@@ -8,7 +8,16 @@ from pathlib import Path
 
 import pytest
 
-EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "moviepy", "wandb")
+EXTRA = (
+    "torch",
+    "stable_baselines3",
+    "sb3_contrib",
+    "tensordict",
+    "torchrl",
+    "tensorboard",
+    "moviepy",
+    "wandb",
+)
 BLOCKED = f"""
 import sys
 

@@ -1,7 +1,7 @@
-"""A recurrent layer as plain arrays: the long short-term memory (Hochreiter and Schmidhuber, 1997).
+"""A recurrent layer as plain arrays: long short-term memory (Hochreiter and Schmidhuber, 1997).
 
-Of its state, (..., 2, cells), the first row is the hidden state h, which is also its output, and the
-second the cell state c. Both are 0 when an episode starts. One step::
+Of its state, (..., 2, cells), the first row is the hidden state h, which is also its output, and
+the second the cell state c. Both are 0 when an episode starts. One step::
 
     i, f, g, o = parts of input_weights x + memory_weights h + biases
     c <- sigmoid(f) c + sigmoid(i) tanh(g)
@@ -76,4 +76,4 @@ class LSTM(OwnArrays):
 
 def _sigmoid(x: FloatArray) -> FloatArray:
     """Return 1 / (1 + exp(-x)), computed such that no intermediate result overflows."""
-    return _HALF + _HALF * np.tanh(_HALF * x)
+    return np.asarray(_HALF + _HALF * np.tanh(_HALF * x))

@@ -49,7 +49,7 @@ class Network(OwnArrays):
     @property
     def outputs(self) -> int:
         """Numbers of an action."""
-        return self.weights[-1].shape[0]
+        return len(self.weights[-1])
 
     @property
     def cells(self) -> int:

@@ -38,8 +38,8 @@ from posse_baselines.policy import (
 )
 
 FORMATS: Final = (1, 2, 3)
-"""Formats of policy files. 2: with a correction, or a belief, that format 1 does not know. 3: with a
-recurrent layer."""
+"""Formats of policy files. 2: with a correction, or a belief, that format 1 does not know. 3: with
+a recurrent layer."""
 MEMORIES: Final = (None, "lstm")
 """Recurrent layers of a policy file; ``None``: there is none."""
 
@@ -262,7 +262,9 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 def _lstm(memory: Any, tensors: Mapping[str, FloatArray]) -> LSTM | None:
     """Return the recurrent layer of a file, if it has one."""
     if memory not in MEMORIES:
-        raise PolicyError(f"its memory {memory!r:.80} is unknown: install the version that wrote it")
+        raise PolicyError(
+            f"its memory {memory!r:.80} is unknown: install the version that wrote it"
+        )
     if memory is None:
         return None
     return LSTM(**{name: tensors[f"lstm.{name}"] for name in LSTM_TENSORS})

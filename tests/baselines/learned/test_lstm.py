@@ -29,10 +29,9 @@ def seen(scenario: str = "field", steps: int = 8, worlds: int = WORLDS) -> list[
     """Observations of some steps."""
     batch = posse.batch(scenario, worlds, seed=3)
     generator = np.random.default_rng(0)
-    found = [batch.reset()]
-    for _ in range(steps - 1):
-        found.append(batch.step(generator.uniform(-1, 1, batch.action_shape))[0])
-    return found
+    first = batch.reset()
+    chosen = generator.uniform(-1, 1, (steps - 1, *batch.action_shape))
+    return [first, *(batch.step(actions)[0] for actions in chosen)]
 
 
 def layout_of(scenario: str = "field") -> posse.ObservationLayout:

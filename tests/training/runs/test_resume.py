@@ -23,8 +23,12 @@ from posse_training.runs.train import resume, train
 
 @pytest.mark.parametrize(
     ("algorithm", "changes"),
-    [*((name, {}) for name in ALGORITHMS), ("mappo", ADVISED), ("ppo", BELIEVING),
-     ("recurrent-ppo", BELIEVING)],
+    [
+        *((name, {}) for name in ALGORITHMS),
+        ("mappo", ADVISED),
+        ("ppo", BELIEVING),
+        ("recurrent-ppo", BELIEVING),
+    ],
 )
 def test_a_training_that_was_cut_ends_where_it_would_have(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, algorithm: str, changes: dict[str, Any]

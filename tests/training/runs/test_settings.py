@@ -57,6 +57,13 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
         ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
         ({"threads": 10**9}, "threads="),
         ({"imitate": "pursuit", "algorithm": "sac"}, "imitate"),
+        (
+            {"imitate": "pursuit", "algorithm": "recurrent-ppo"},
+            "needs algorithm ppo or mappo, not recurrent-ppo: leave it out",
+        ),
+        ({"contact_bound": 0.1, "algorithm": "td3"}, "ppo, mappo or recurrent-ppo, not td3"),
+        ({"lstm_size": 0}, "lstm_size=0 is invalid: it must be at least 1"),
+        ({"lstm_size": 10**6}, "lstm_size=1000000 is invalid: it must be at most 8192"),
         ({"algorithm": "dqn"}, "algorithm='dqn' is invalid: unknown"),
         ({"encoding": ["plain"]}, "encoding="),
         ({"beside": "x" * 5000}, r"beside='x.*5,002 characters"),

@@ -1,10 +1,10 @@
 """PPO with a recurrent policy: sb3-contrib's, with a faster rollout buffer.
 
-Gradients are taken through sequences that begin where a rollout or an episode begins. In sb3-contrib
-the network loops over the steps of a minibatch in which any episode begins, and a sequence is cut
-where a minibatch happens to end. Here a minibatch holds whole sequences of slots in random order, and
-the state at their start is zero already where an episode begins, so that one call of torch's LSTM
-computes all steps.
+Gradients are taken through sequences that begin where a rollout or an episode begins. In
+sb3-contrib, sequences are cut where minibatches happen to end, and the network loops over the steps
+of a minibatch in which any episode begins. Here a minibatch holds all sequences of some slots,
+drawn at random, whose first state is zero already where an episode begins, so that one call of
+torch's LSTM computes all steps.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ _ROWS = ("observations", "actions")
 _NUMBERS = ("values", "log_probs", "advantages", "returns")
 
 
-class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):  # type: ignore[misc]
+class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):
     """A rollout buffer whose minibatches are sequences of whole slots, in random order.
 
     Of the network's states it keeps those before the first step: all other sequences begin with an
-    episode, at zero. The order is drawn from numpy's global generator; each slot occurs once a pass.
+    episode, at zero. The order is drawn from numpy's global generator; each slot occurs once a
+    pass.
     """
 
     def reset(self) -> None:
@@ -38,13 +39,15 @@ class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):  # type: ignore
         RolloutBuffer.reset(self)
         self.first_states: RNNStates | None = None
 
-    def add(self, *args: Any, lstm_states: RNNStates, **kwargs: Any) -> None:
+    def add(  # type: ignore[override]
+        self, *args: Any, lstm_states: RNNStates, **kwargs: Any
+    ) -> None:
         """Store one step of every slot, and the states before the first one."""
         if self.pos == 0:
             self.first_states = lstm_states
         super().add(*args, **kwargs)
 
-    def get(
+    def get(  # type: ignore[override]
         self, batch_size: int | None = None
     ) -> Generator[RecurrentRolloutBufferSamples, None, None]:
         """Yield minibatches of ``batch_size`` steps, about; default: all at once.
@@ -62,7 +65,7 @@ class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):  # type: ignore
     def _sequences(
         self, slots: npt.NDArray[np.int64], states: RNNStates
     ) -> RecurrentRolloutBufferSamples:
-        """Return the sequences of some slots, (sequences x steps, ...), filled up to equal length."""
+        """Return the sequences of some slots, padded to equal length: (sequences x steps, ...)."""
         begins = self.episode_starts[:, slots] > 0
         goes_on = ~begins[0]
         begins[0] = True
@@ -103,16 +106,17 @@ class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):  # type: ignore
         )
 
 
-class SequencePPO(RecurrentPPO):  # type: ignore[misc]
+class SequencePPO(RecurrentPPO):
     """sb3-contrib's PPO with a :class:`SequenceBuffer`."""
 
     def _setup_model(self) -> None:
         super()._setup_model()
+        usual: Any = self.rollout_buffer
         self.rollout_buffer = SequenceBuffer(
             self.n_steps,
             self.observation_space,
             self.action_space,
-            self.rollout_buffer.hidden_state_shape,
+            usual.hidden_state_shape,
             self.device,
             gamma=self.gamma,
             gae_lambda=self.gae_lambda,
