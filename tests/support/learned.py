@@ -58,8 +58,10 @@ def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides:
     return batch, observations
 
 
-def target_for(scenario: posse.Scenario, name: str = "evading", seed: int = 0) -> LearnedPolicy:
+def target_for(
+    scenario: posse.Scenario, name: str = "evading", seed: int = 0, cells: int = 0
+) -> LearnedPolicy:
     """A policy of arbitrary weights that moves the target."""
     encoding = Encoding.of(posse.ObservationLayout(scenario.replace(message_size=0)), "plain")
     card = {"name": name, "side": "target"}
-    return LearnedPolicy(network_for(encoding.size, seed=seed), encoding, card)
+    return LearnedPolicy(network_for(encoding.size, seed=seed, cells=cells), encoding, card)

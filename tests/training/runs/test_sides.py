@@ -56,14 +56,15 @@ class Killed(BaseException):
     pass
 
 
+@pytest.mark.parametrize("recurrent", [False, True])
 @pytest.mark.parametrize("side", ["target", "trackers"])
 def test_a_killed_run_resumes_bit_for_bit(
-    side: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    side: str, recurrent: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {"algorithm": "recurrent-ppo"} if recurrent else {}
     if side == "trackers":
         file = tmp_path / "evader.safetensors"
-        target_for(posse.get_scenario("smart")).save(file)
+        target_for(posse.get_scenario("smart"), cells=8 * recurrent).save(file)
         changes = {
             "side": "trackers", "encoding": "slots", "against": f"smart,{file}",
             "reward_weights": {}, "steps": 1920, "checkpoint_every": 480, "evaluate_every": 960,

@@ -15,6 +15,7 @@ from tests.support.runs import BELIEVING, HORIZON, small
 from posse_training.runs.models import make_adviser, make_env, make_model
 from posse_training.runs.saved.export import export
 from posse_training.runs.train import torch_threads
+from posse_training.sb3.policies import from_sb3
 from posse_training.sb3.recurrent import SequenceBuffer
 
 
@@ -88,6 +89,25 @@ def test_an_incomplete_rollout_is_refused(tmp_path: Path) -> None:
     model.rollout_buffer.reset()
     with pytest.raises(RuntimeError, match="must be complete"):
         next(model.rollout_buffer.get())
+
+
+def test_a_model_of_sb3_contrib_remembers_as_its_export_does(tmp_path: Path) -> None:
+    settings = small(tmp_path, "recurrent-ppo")
+    env = make_env(settings)
+    model = make_model(settings, env)
+    observations = env.batches[0].reset()
+    steps = [observations, *(env.batches[0].step(np.zeros((4, 2, 2)))[0] for _ in range(5))]
+    taken = []
+    for policy in (export(model, env.encoding, {}), from_sb3(model, encoding=env.encoding)):
+        memory = policy.begin(env.batches[0].layout, 4)
+        for row in steps:
+            _, memory = policy.act(row, memory)
+        memory = policy.restart(memory, np.array([False, True, False, True]))
+        taken.append(policy.act(steps[2], memory)[0])
+        fresh = policy.act(steps[2], policy.begin(env.batches[0].layout, 4))[0]
+        np.testing.assert_allclose(taken[-1][[1, 3]], fresh[[1, 3]], atol=1e-6)
+        assert np.abs(taken[-1][[0, 2]] - fresh[[0, 2]]).max() > 1e-5
+    np.testing.assert_allclose(taken[0], taken[1], atol=1e-5)
 
 
 @pytest.mark.parametrize("changes", [{}, {"encoding": "plain"}, BELIEVING])

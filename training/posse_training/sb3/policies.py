@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from posse import ObservationLayout
 from posse.adapters.actions import MOTIONS
-from posse.numeric import FloatArray
+from posse.numeric import BoolArray, FloatArray
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.policy import BasePolicy, check_fits, check_observations
@@ -46,7 +46,8 @@ def from_sb3(
 
     A model of one observation (F,), as in ``posse/Solo-v0``, ``posse/Tracker-v0`` and
     :class:`posse_training.sb3.TeamVecEnv`, plays every tracker of the team; one of (N, F), as in
-    ``posse/Team-v0``, the whole team. Discrete actions are understood too.
+    ``posse/Team-v0``, the whole team. Discrete actions are understood too, and so are recurrent
+    policies: their states restart with the episode.
 
     Args:
         model: A model, or the file that its ``save()`` wrote. A file **runs code** when it is
@@ -99,7 +100,7 @@ class ModelPolicy(BasePolicy):
         self._whole_team = len(shape) == 2
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
-        """Return the memory: the layout and, for encoded observations, how they are encoded.
+        """Return the memory: the layout, how observations are encoded, and a network's states.
 
         Raises:
             PolicyError: Observations are of another length than those that the model learned on.
@@ -116,11 +117,17 @@ class ModelPolicy(BasePolicy):
                 f"{got}: give from_sb3 the message_size that it learned with, and the scenario "
                 "its settings"
             )
-        return layout, num_worlds, encoder
+        rows = num_worlds * (1 if self._whole_team else layout.scenario.num_trackers)
+        return layout, num_worlds, encoder, None, np.ones(rows, np.bool_)
+
+    def restart(self, memory: Any, mask: BoolArray) -> Any:
+        """Return the memory with recurrent networks restarted in the worlds of a mask (E,)."""
+        *rest, begins = memory
+        return (*rest, begins | np.repeat(mask, len(begins) // len(mask)))
 
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return actions (E, N, 2 + m) for observations (E, N, F)."""
-        layout, worlds, encoder = memory
+        layout, worlds, encoder, states, begins = memory
         seen = check_observations(self, observations, worlds, layout)
         trackers = seen.shape[1]
         if encoder is not None:
@@ -128,12 +135,14 @@ class ModelPolicy(BasePolicy):
         rows = seen if self._whole_team else seen.reshape(worlds * trackers, -1)
         if self._normalize is not None:
             rows = np.asarray(self._normalize.normalize_obs(rows))
-        chosen, _ = self.model.predict(rows, deterministic=self._deterministic)
+        chosen, states = self.model.predict(
+            rows, state=states, episode_start=begins, deterministic=self._deterministic
+        )
         motions = MOTIONS[chosen] if self._discrete else np.clip(chosen, -1, 1)
         motions = motions.reshape(worlds, trackers, -1)
         actions = np.zeros((worlds, trackers, 2 + layout.scenario.message_size), np.float32)
         actions[..., : motions.shape[-1]] = motions
-        return actions, memory
+        return actions, (layout, worlds, encoder, states, np.zeros_like(begins))
 
 
 def _load(path: Path, algorithm: type[BaseAlgorithm] | None) -> BaseAlgorithm:
