@@ -23,6 +23,7 @@ from posse_baselines.ddcs.family import FAMILY
         ({"gain": math.nan}, r"gain=nan must lie in \[0.2, 6\] 1/s"),
         ({"time_lag": -1.0}, "time_lag=-1.0 must lie in"),
         ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
+        ({"near": 1.2}, "near=1.2 must be below far=1.2"),
         ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
         ({"fix_trust": 0.0}, "fix_trust=0.0 must lie in"),
         ({"spread": 0.2}, "spread=0.2 must lie in"),

@@ -99,6 +99,16 @@ def test_equally_near_ones_are_listed_once_each() -> None:
     assert (out[30:] == 0).all()
 
 
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_the_share_of_a_small_team_is_of_the_others(size: int) -> None:
+    m = Mind("field", own=0, num_trackers=size, breaks=0)
+    for j in range(1, size):
+        m.mate(j, complex(j, 0))
+    out = np.zeros(belief.BELIEF_SIZE, np.float32)
+    belief.write_belief(m.f, m.s, m.slots, m.d, m.mates, m.seen, m.o, out)
+    assert out[23] == (1 if size > 1 else 0)
+
+
 def test_the_beliefs_of_all_worlds_are_written() -> None:
     m = Mind("field")
     observations = np.tile(m.o, (2, 5, 1))

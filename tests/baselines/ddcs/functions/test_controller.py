@@ -86,13 +86,14 @@ def test_a_tracker_that_knows_its_target_goes_to_its_slot() -> None:
     assert action[2:].tolist() == [(w + 1) / 512 for w in (1, d.leader, d.term, d.pulse, chosen)]
 
 
-def test_slots_are_planned_anew_every_half_second() -> None:
+@pytest.mark.parametrize("away", [1, 2, 3, 4])
+def test_slots_are_planned_anew_every_half_second(away: int) -> None:
     t = standing()
     m, d = t.m, t.m.d
     sees(m, 5 + 1j)
     t.plan()
     best = int(d.slot)
-    other = (best + 2) % 5
+    other = (best + away) % 5
     for step, kept in ((1, True), (4, True), (5, False), (6, True), (10, False)):
         d.step, d.slot = step, other
         m.s.loyalty = 0.0
@@ -101,6 +102,55 @@ def test_slots_are_planned_anew_every_half_second() -> None:
         d.step, d.slot = 6, -1
         t.plan()
         assert d.slot == best
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_slots_are_planned_anew_in_every_step_at_the_least(dt: float) -> None:
+    t = standing(replan_time=0.1, loyalty=0.0)
+    t.m.f.dt = dt
+    sees(t.m, 5 + 1j)
+    t.plan()
+    best = int(t.m.d.slot)
+    for step in (1, 2):
+        t.m.d.step, t.m.d.slot = step, (best + 2) % 5
+        t.plan()
+        assert t.m.d.slot == best
+
+
+def test_the_first_slot_is_taken_up_like_others() -> None:
+    t = standing("field", at=1 - 2j)
+    m, d = t.m, t.m.d
+    sees(m, 4 + 1j)
+    d.slot, d.task, d.step = 0, 1, 1
+    t.plan()
+    assert (d.slot, d.goal_step) == (0, -1)
+    wanted = tracking.wanted_motion(m.f, m.s, d, m.mates, m.slots, 1, 1.0, -2.0, t.body)
+    assert (d.wish_x, d.wish_y, d.wish_speed, d.wish_omega) == pytest.approx(wanted)
+
+
+def test_one_that_may_not_search_looks_for_its_lost_target_too() -> None:
+    t = standing("field", at=1 - 2j, forbidden=("converging>searching",))
+    d = t.m.d
+    d.task, d.slot, d.step = 1, 3, 7
+    t.plan()
+    assert (d.task, d.slot, d.goal_step) == (1, -1, 7)
+    way = complex(d.goal_x, d.goal_y) - (1 - 2j)
+    assert complex(d.wish_x, d.wish_y) == pytest.approx(way / abs(way), abs=1e-6)
+
+
+@pytest.mark.parametrize("theta", [1.9, -1.3])
+def test_a_search_begins_ahead_and_straight(theta: float) -> None:
+    t = standing("field", at=0j, theta=theta, turn_weight=5.0)
+    t.m.f.sight = 2.0
+    t.plan()
+    d = t.m.d
+    goal = complex(d.goal_x, d.goal_y)
+    assert (goal / abs(goal) / turn(theta)).real > 0.9
+    t.m.stand(0j, math.atan2(goal.imag, goal.real))
+    d.step = 1
+    t.plan()
+    assert complex(d.goal_x, d.goal_y) == goal
+    assert (d.wish_speed, d.wish_omega) == pytest.approx((1.0, 0.0), abs=1e-4)
 
 
 def test_a_tracker_without_an_estimate_searches() -> None:
@@ -161,8 +211,10 @@ def test_a_command_that_is_safe_is_carried_out_as_it_is() -> None:
     t = standing()
     d = t.m.d
     controller.feel_body(t.m.f, t.m.o, t.body)
-    d.wish_x, d.wish_y, d.wish_speed, d.wish_omega = 0.3, 0.4, 0.8, -0.5
-    assert t.carry_out()[:2] == pytest.approx([0.6, -0.25])
+    for clearance in (0.0, 0.3):
+        t.m.s.detour = clearance  # with nothing to go round
+        d.wish_x, d.wish_y, d.wish_speed, d.wish_omega = 0.3, 0.4, 0.8, -0.5
+        assert t.carry_out()[:2] == pytest.approx([0.6, -0.25])
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.7])

@@ -27,13 +27,18 @@ def test_a_proposal_is_the_wanted_velocity_in_the_robot_s_frame() -> None:
     assert complex(*proposal) == pytest.approx((0.5 - 0.2j) / turn(2.0) / 0.8, abs=1e-6)
 
 
-@pytest.mark.parametrize("share", [0.1 + 0.2j, 0.3j, -0.2 + 0j, 1 + 1j, 0j])
+@pytest.mark.parametrize("theta", [2.0, 0.3])
+@pytest.mark.parametrize(
+    "share", [0.1 + 0.2j, 0.3j, -0.2 + 0j, 1 + 1j, 0j, 1 + 0j, -1 + 0j, 1j, -1j]
+)
 @pytest.mark.parametrize("wish", [0.5 - 0.2j, 0j, 1.5 + 0j])
-def test_a_correction_adds_to_it_within_the_greatest_speed(wish: complex, share: complex) -> None:
-    m, body = wishing(wish, 2.0)
+def test_a_correction_adds_to_it_within_the_greatest_speed(
+    wish: complex, share: complex, theta: float
+) -> None:
+    m, body = wishing(wish, theta)
     correction.correct(m.d, body, share.real, share.imag)
     found = complex(m.d.wish_x, m.d.wish_y)
-    wanted = wish + 0.8 * share * turn(2.0)
+    wanted = wish + 0.8 * share * turn(theta)
     if share:
         wanted /= max(1.0, abs(wanted) / max(0.8, abs(wish)))
     assert found == pytest.approx(wanted)

@@ -33,6 +33,7 @@ def test_pursuers_follow_a_circle_and_have_the_constants_of_the_paper() -> None:
 
 
 def test_a_record_holds_choices_by_their_place_and_numbers_as_they_are() -> None:
+    assert settings.settings_record(settings.Settings()).shape == (1,)
     m = Mind(played={
         "model": "centralized", "deviation": "occupant", "gain": 2.25, "radio": False,
         "forbidden": ("searching>flocking", "exchange>converging", "exchange>converging"),

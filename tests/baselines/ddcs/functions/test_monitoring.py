@@ -146,6 +146,75 @@ def test_the_estimate_follows_from_the_fixes(seed: int) -> None:
         m.d.step += 1
 
 
+def show(m: Mind, at: complex, theta: float = 0.0) -> None:
+    """A fix of this step, seen by a tracker at the origin that heads along x."""
+    m.fill(
+        target_known=1, target_seen=1, target_age=0, target_range=abs(at),
+        target_bearing=at / abs(at), target_heading=turn(theta), target_frame=turn(theta),
+    )  # fmt: skip
+    monitoring.watch_target(m.f, m.s, m.d, m.o, 2.0)
+
+
+def test_a_target_of_unknown_speed_has_a_share_of_the_own() -> None:
+    m = Mind(played={"unknown_speed": 0.5})
+    m.fill(max_speed=0.8)
+    show(m, 3 + 0j)
+    assert m.d.speed == near(0.4)
+
+
+def test_a_fix_in_the_first_step_is_one_that_the_next_is_blended_with() -> None:
+    m = Mind()
+    show(m, 3 + 0j)
+    m.d.step = 2
+    show(m, 3.1 + 0j)
+    assert m.d.speed == near(0.1 / 0.2)
+    guess = 3.0 + 0.6 * 0.2
+    assert m.d.x == near(guess + m.s.fix_trust * (3.1 - guess))
+
+
+def test_a_target_that_slips_backwards_counts_as_at_rest() -> None:
+    m = Mind()
+    show(m, 3 + 0j)
+    m.d.step = 2
+    show(m, 2.9 + 0j)
+    assert (m.d.speed, m.d.speed_known) == (0.0, 1)
+
+
+@pytest.mark.parametrize("age", [0, 3, 8])
+def test_a_caught_up_frame_turns_with_a_share_of_the_decaying_turn(age: int) -> None:
+    m = Mind(played={"turn_share": 0.7, "turn_memory": 0.6})
+    m.d.fix_step, m.d.step = 0, age
+    m.d.speed, m.d.turn, m.d.theta, m.d.psi = 0.5, 0.4, 1.0, 1.0
+    monitoring.watch_target(m.f, m.s, m.d, m.o, 0.1)  # the frame can turn at 4 rad/s
+    assert m.d.psi_rate == near(0.7 * 0.4 * math.exp(-0.1 * age / 0.6))
+
+
+@pytest.mark.parametrize("older", [0, 1])
+def test_fixes_of_up_to_the_bounds_are_delayed_and_followed(older: int) -> None:
+    m = Mind(played={"late_fix": 1.0, "target_lost_after": 2.0})
+    m.d.fix_step, m.d.step = 0, 10 + older
+    monitoring.watch_target(m.f, m.s, m.d, m.o, 2.0)
+    assert (m.d.usual_age > 0.0) == (not older)
+    m.d.step = 20 + older
+    monitoring.watch_target(m.f, m.s, m.d, m.o, 2.0)
+    assert m.d.known == (not older)
+
+
+@pytest.mark.parametrize(("bounds", "turn_rate", "blended"), [(2, 0.4, True), (1, 0.0, False)])
+def test_a_fix_measures_and_is_blended_up_to_the_bounds(
+    bounds: float, turn_rate: float, blended: bool
+) -> None:
+    m = Mind(played={"turn_memory": bounds, "target_lost_after": 1.5 * bounds, "fix_trust": 0.5})
+    m.f.dt = 0.5
+    show(m, 3 + 0j)
+    m.d.step = 4
+    show(m, 3.5 + 0j, 0.8)
+    assert m.d.turn == near(turn_rate)
+    m.d.step = 10
+    show(m, 3.9 + 0j, 0.8)
+    assert (m.d.x == near(3.9)) != blended
+
+
 def test_without_radio_only_the_own_sensor_gives_fixes() -> None:
     m = Mind(played={"radio": False})
     m.fill(target_known=1, target_range=2.0, target_bearing=1 + 0j, target_heading=1 + 0j)
@@ -230,6 +299,51 @@ def test_a_silence_of_over_twice_the_usual_ends_a_team_mate_s_presence() -> None
     deaf.mates[3].fresh = 1
     monitoring.hear_mates(deaf.f, deaf.s, deaf.d, deaf.mates, deaf.o)
     assert (deaf.mates[2].step, deaf.mates[3].fresh) == (-1, 0)
+
+
+def hear(m: Mind, step: int, number: int, age: float = 0.0, away: float = 1.0) -> None:
+    m.d.step = step
+    m.fill(neighbour_number=number, neighbour_age=age, neighbour_range=away)
+    m.fill(neighbour_bearing=1 + 0j)
+    monitoring.hear_mates(m.f, m.s, m.d, m.mates, m.o)
+
+
+def test_number_0_and_step_0_count_like_others() -> None:
+    m = Mind(own=1)
+    hear(m, 0, 0, away=2.0)
+    assert (m.mates[0].step, m.mates[0].fresh, m.mates[0].x) == (0, 1, 2.0)
+    hear(m, 4, 0)
+    assert (m.mates[0].step, m.mates[0].x) == (4, 1.0)
+    assert m.d.usual_gap == near(0.4)
+
+
+def test_a_step_longer_than_the_memory_of_silences_leaves_none() -> None:
+    m = Mind(own=1)
+    m.d.usual_gap, m.f.dt = 0.8, 20.0
+    monitoring.hear_mates(m.f, m.s, m.d, m.mates, m.o)
+    assert m.d.usual_gap == 0.0
+
+
+def test_all_nearer_than_the_last_one_heard_in_time_are_listed() -> None:
+    m = Mind(own=1)
+    for age, horizon in ((1.4, 3.0), (1.5, 0.0), (1.6, 0.0)):  # the timeout is 1.5 s
+        hear(m, 30, 2, age, away=3.0)
+        assert m.d.horizon == horizon
+
+
+def test_a_silence_of_just_the_timeout_is_none_and_no_usual_one() -> None:
+    m = Mind(own=1)
+    m.f.dt, m.d.usual_gap = 0.5, 0.6
+    mate = m.mate(2, 1 + 1j, 0.5 - 0.2j, step=0)
+    for step, there in ((3, True), (4, False)):  # 1.5 and 2 s
+        m.d.step = step
+        assert monitoring.is_there(m.f, m.s, m.d, mate, 5) == there
+        now = 1.75 + 0.7j if there else 1 + 1j
+        assert complex(*monitoring.mate_now(m.f, m.s, m.d, mate)) == near(now)
+    for step, gap in ((3, 0.0), (2, 1.0)):
+        m.d.usual_gap, mate.step = 0.0, 0
+        hear(m, step, 2)
+        assert m.d.usual_gap == gap
 
 
 def test_a_first_message_ends_no_silence() -> None:

@@ -65,7 +65,7 @@ def test_team_mates_are_kept_off_farther_the_older_their_message() -> None:
     m.mate(0, 1 + 1j, 0.4 + 0.2j)
     m.mate(2, -1 + 1j, 0.4 + 0.2j, step=38)
     m.mate(3, -1 - 1j, 0.4 + 0.2j, step=20)  # silent for too long: it counts as stopped
-    m.mate(4, 4 + 1j, 0j)
+    m.mate(4, 1 + 4j, 0j)
     m.mate(1, 0.5 + 0j)  # itself
     found = listed(m)
     assert found == [
@@ -86,6 +86,17 @@ def test_team_mates_are_kept_off_farther_the_older_their_message() -> None:
     assert len(listed(m, room=0)) == 0
 
 
+def test_a_silent_one_stops_and_is_forgotten_beyond_the_bounds() -> None:
+    m = open_plane()
+    m.f.dt, m.d.usual_gap = 0.5, 0.6  # the timeout is 1.5 s
+    m.mate(0, 1 + 1j, 0.4 + 0j, step=10)
+    for step, at, velocity in ((13, 1.6 + 1j, 0.4 + 0j), (14, 1 + 1j, 0j), (70, 1 + 1j, 0j)):
+        m.d.step = step
+        assert listed(m) == [disc(at, velocity, 0.3, 0.15 + 0.7 * 0.15)]
+    m.d.step = 71
+    assert listed(m) == []
+
+
 def test_one_that_would_have_a_place_in_the_observation_has_gone() -> None:
     m = open_plane(num_trackers=6, num_neighbours=4)
     m.mate(0, 1 + 0j, step=10)
@@ -93,6 +104,9 @@ def test_one_that_would_have_a_place_in_the_observation_has_gone() -> None:
     assert listed(m) == [disc(1 + 0j, 0j, 0.3, 0.15 + 0.7 * 0.15)]
     m.d.horizon = 1.1
     assert listed(m) == []
+    m.mate(3, 1 + 0j)
+    assert listed(m) == [disc(1 + 0j, 0j, 0.3, 0.15)]  # the others are still there
+    m.mates[3].step = -1
     m.mate(0, 1 + 0j, step=39)
     assert len(listed(m)) == 1
     few = open_plane()  # all have a place
@@ -110,6 +124,9 @@ def test_walls_are_large_discs() -> None:
         assert listed(m, at) == [disc(normal * (2.0 - 0.15 + planet), 0j, planet, 0.15)]
         assert listed(m, complex(normal) * (extent - 3.1)) == []
     assert len(listed(m, (extent - 2.9) * (1 + 1j))) == 2
+    narrow = Mind("field", own=1)
+    narrow.f.extent = 2.0
+    assert len(listed(narrow)) == 4
     m.mate(3, (extent - 1.0) * (1 + 0j))
     m.d.step = 0
     m.mates[3].step = 0
@@ -136,6 +153,16 @@ def test_an_echo_without_an_explanation_is_a_disc_that_fills_the_beam(
     assert len(listed(m, 1 + 1j, heading)) == 1
 
 
+def test_what_is_too_far_to_explain_an_echo_hides_nothing_that_does() -> None:
+    m = open_plane()
+    m.mate(0, 2.5 + 0j)
+    m.mate(2, 1.3 + 0j)
+    echo(m, 0, 1.0)
+    assert len(listed(m)) == 2
+    echo(m, 1, 1.0)
+    assert len(listed(m)) == 3  # that one is not explained
+
+
 def explained(m: Mind, x: float, y: float, reading: float, robots: int = 1) -> bool:
     discs = np.zeros(2, safeguard.DISC)
     discs[0].x, discs[0].y = x, y
@@ -157,6 +184,7 @@ def test_a_robot_explains_an_echo_from_its_distance_in_its_beam() -> None:
     assert explained(m, 0.5, 0.0, 1.0)
     assert explained(m, math.cos(0.46), math.sin(0.46), 1.0)
     assert not explained(m, math.cos(0.49), math.sin(0.49), 1.0)
+    assert not explained(m, 1.2 * math.cos(0.49), 1.2 * math.sin(0.49), 1.0)
     assert explained(m, 0.3, 0.24, 1.0)  # the beam touches it
     assert explained(m, 0.3, -0.24, 1.0)
     assert not explained(m, 0.3, 0.27, 1.0)
@@ -187,6 +215,7 @@ def test_a_wall_explains_an_echo_from_where_the_beam_meets_it() -> None:
         assert not by_wall(m, at.real, at.imag, angle + math.pi / 2 + 1e-3, 1.9)
         far = normal * (e - 3.05)
         assert not by_wall(m, far.real, far.imag, angle, 3.0)
+    assert not surroundings.wall_explains(m.f, e - 1.5, 0.0, 0.0, 1.0, 1.9)  # along the wall
     away = Mind("constant")
     away.f.extent = 2.0
     discs = np.zeros(1, safeguard.DISC)
@@ -202,9 +231,10 @@ def strangers() -> Mind:
     return m
 
 
-def test_an_echo_from_a_slot_is_a_team_mate_in_it() -> None:
+@pytest.mark.parametrize("slot", [0, 3])
+def test_an_echo_from_a_slot_is_a_team_mate_in_it(slot: int) -> None:
     m = strangers()
-    arm = m.slot(3) * turn(0.4)
+    arm = m.slot(slot) * turn(0.4)
     away = arm / abs(arm)
     at = arm + 1.2 * away
     heading = math.atan2(-away.imag, -away.real)
@@ -212,15 +242,18 @@ def test_an_echo_from_a_slot_is_a_team_mate_in_it() -> None:
     moving = 0.5 + 0.1j + 0.2j * arm
     found = listed(m, at, heading)
     assert found[-1] == disc(arm - at, moving, 0.3, 0.15)
-    assert m.d.taken == 1 << 3
+    assert m.d.taken == 1 << slot
     echo(m, 0, 1.12)
     assert listed(m, at, heading)[-1] == disc(arm - at, moving, 0.3, 0.15)
+    echo(m, 4, 1.0)
+    assert listed(m, at, heading)[-2] == disc(arm - at, moving, 0.3, 0.15)
+    echo(m, 4, 2.0)
     echo(m, 0, 1.2)  # too far from the slot's
     assert listed(m, at, heading)[-1][4] > 0.4
     m.d.step = 41
     echo(m, 0, 2.0)
     listed(m, at, heading)
-    assert m.d.taken == 1 << 3  # remembered
+    assert m.d.taken == 1 << slot  # remembered
     m.d.step = 60
     listed(m, at, heading)
     assert m.d.taken == 0  # every three seconds
@@ -228,6 +261,16 @@ def test_an_echo_from_a_slot_is_a_team_mate_in_it() -> None:
     m.d.known = 0
     listed(m, at, heading)
     assert m.d.taken == 0
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_an_echo_can_be_remembered_for_one_step(dt: float) -> None:
+    m = strangers()
+    m.s.taken_memory, m.f.dt = 0.1, dt
+    for step in (60, 61, 62):
+        m.d.step, m.d.taken = step, np.uint64(5)
+        listed(m, 9 + 0j)
+        assert m.d.taken == 0
 
 
 def test_a_slot_beside_the_beam_gives_no_echo() -> None:
