@@ -53,6 +53,10 @@ def test_a_side_is_kept_for_a_while(m: Mind) -> None:
     m.d.side, m.d.side_step = -1, 99
     at = 1.5 - 0.1j
     assert past(m, 1 + 0j, (at, 0.5)) == pytest.approx(turn(tangent(at, 0.5, -1)))
+    m.f.dt = 0.5
+    for ago, side in ((3, -1), (4, 1)):  # up to 1.5 s
+        m.d.side, m.d.side_step = -1, 100 - ago
+        assert past(m, 1 + 0j, (at, 0.5)) == pytest.approx(turn(tangent(at, 0.5, side)))
 
 
 def test_where_one_side_is_shut_the_other_is_taken(m: Mind) -> None:
@@ -71,8 +75,14 @@ def test_what_is_free_is_left_alone(m: Mind) -> None:
     assert past(m, 1e-7 + 0j, (1 + 0j, 0.5)) == 1e-7
     assert past(m, 1 + 0j, (1 + 0j, 0.5), speed=0.1) == 1
     assert past(m, 1 + 0j, (5 + 0j, 2.5)) == 1  # as large as that is a wall
-    assert past(m, 1 + 0j, (5 + 0j, 1.9)) != 1
-    assert m.d.side_step in (10, 100)
+    assert (m.d.side, m.d.side_step) == (0, 10)
+    assert past(m, 1 + 0j, (5 + 0j, 2.0)) != 1
+    assert (abs(m.d.side), m.d.side_step) == (1, 100)
+
+
+def test_what_is_near_has_its_tangents_too(m: Mind) -> None:
+    at = 0.9 - 0.1j
+    assert past(m, 1 + 0j, (at, 0.5)) == pytest.approx(turn(tangent(at, 0.5, 1)))
 
 
 def test_a_disc_blocks_the_way_within_its_reach_and_the_clearance() -> None:
@@ -89,17 +99,23 @@ def test_a_disc_blocks_the_way_within_its_reach_and_the_clearance() -> None:
     assert not detour.blocks(discs[0], 0.2, 1.0, 0.0)
 
 
-def test_a_row_of_five_is_passed_and_a_longer_one_has_no_way() -> None:
+@pytest.mark.parametrize("heading", [0.0, 2.5])
+def test_a_row_of_five_is_passed_and_a_longer_one_has_no_way(heading: float) -> None:
+    facing = turn(heading)
     row = [((1.2 + 0.1 * k) * turn(0.3 * k), 0.4) for k in range(6)]
     discs = np.zeros(6, safeguard.DISC)
-    for k, (at, reach) in enumerate(row):
-        safeguard.put_disc(discs, k, at.real, at.imag, 0.0, 0.0, reach, 0.1)
+
+    def past_row(count: int, side: float, way: complex = facing) -> float:
+        return float(detour.turn_past(discs, count, 0.2, way.real, way.imag, side))
+
     for side in (1, -1):
-        discs["y"] = [side * at.imag for at, _ in row]
-        found = [detour.turn_past(discs, count, 0.2, 1.0, 0.0, side) for count in (1, 2, 5, 6)]
+        for k, (at, reach) in enumerate(row):
+            at = (at if side == 1 else at.conjugate()) * facing
+            safeguard.put_disc(discs, k, at.real, at.imag, 0.0, 0.0, reach, 0.1)
+        found = [past_row(count, side) for count in (1, 2, 5, 6)]
         ends = [tangent(*row[k], 1) for k in (0, 1, 4)]
         assert found == pytest.approx([*(side * end for end in ends), 4.0])
-    assert detour.turn_past(discs, 6, 0.2, -1.0, 0.0, -1.0) == 0.0
+    assert past_row(6, -1, -facing) == 0.0
     # An edge more than 2 rad to the side is no way past.
-    discs[0].x, discs[0].y = 0.5 * math.cos(1.2), 0.5 * math.sin(1.2)
-    assert detour.turn_past(discs, 1, 0.2, 1.0, 0.0, 1.0) == 4.0
+    discs[0].x, discs[0].y = 0.5 * math.cos(heading + 1.2), 0.5 * math.sin(heading + 1.2)
+    assert past_row(1, 1) == 4.0

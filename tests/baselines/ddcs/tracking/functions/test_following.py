@@ -52,6 +52,14 @@ def test_a_team_mate_keeps_its_speed_and_turn_until_it_is_silent_for_too_long() 
     assert following.motion_of(m.f, m.s, m.d, mate) == near((0.6, short_way(heading), 20.0))
 
 
+def test_a_silence_of_just_the_timeout_is_none() -> None:
+    m = follower()
+    m.f.dt, m.d.usual_gap = 0.5, 0.6
+    for step, speed in ((37, 0.6), (36, 0.0)):  # 1.5 and 2 s
+        m.mates[0].step = step
+        assert following.motion_of(m.f, m.s, m.d, m.mates[0])[0] == near(speed)
+
+
 @pytest.mark.parametrize("frame", ["leader", "slot-frame"])
 def test_a_place_on_the_leader_is_the_difference_of_the_slots(frame: str) -> None:
     m = follower(frame)
@@ -115,13 +123,16 @@ def test_any_tracker_may_be_the_leader() -> None:
     assert found[0] == found[1]
 
 
-def test_a_follower_under_l_l_keeps_its_distances_from_two() -> None:
+@pytest.mark.parametrize(("leader", "number"), [(0, 3), (3, 0)])
+def test_a_follower_under_l_l_keeps_its_distances_from_two(leader: int, number: int) -> None:
     m = follower("slot-frame", "l-l")
+    m.d.leader = leader
+    m.mate(leader, 1 + 1j, cmath.rect(0.6, 2.0), turn=0.4, step=38, slot=0, task=FLOCKING)
     other = LEADER + (m.slot(2) - m.slot(0)) * turn(1.8)
-    m.mate(3, other, cmath.rect(0.6, THETA), turn=0.4, slot=2, task=FLOCKING)
+    m.mate(number, other, cmath.rect(0.6, THETA), turn=0.4, slot=2, task=FLOCKING)
     place = LEADER + (m.slot(3) - m.slot(0)) * turn(1.8) + 0.1 - 0.1j
     body = m.body(place, 2.2)
-    assert following.second_of(m.f, m.s, m.d, m.mates, m.slots, 1) == 3
+    assert following.second_of(m.f, m.s, m.d, m.mates, m.slots, 1) == number
     first = demand(m, body, "slot-frame", LEADER, THETA, 0.4, 0)
     second = demand(m, body, "slot-frame", other, THETA, 0.4, 2)
     gammas = [short_way(d[3] - 2.2) for d in (first, second)]
@@ -152,6 +163,8 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
     assert second(3) == 3
     assert second(4) == 2
     assert second(2) == 2
+    m.mate(4, 0j, slot=4, task=1)
+    assert second(4) == 2  # whatever those say that are not in their places
     assert second(1) == -1
     m.mates[2].slot = 2  # in line with slot 4
     assert second(4) == -1
@@ -167,6 +180,10 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
     assert second(4, own=2) == -1
     m.mates[2].slot = -1
     assert second(4) == -1
+    m.d.leader = 4
+    m.mate(0, 0j, slot=3, task=FLOCKING)
+    m.mates[2].slot = 1
+    assert second(4) == 0
     square = Mind(
         "constant", own=1, played={"follower_law": "l-l"}, num_trackers=6, formation="rows"
     )
@@ -178,6 +195,28 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
     wanted = {3: 2, 4: 3, 2: 4}[max(kept)]
     found = following.second_of(square.f, square.s, square.d, square.mates, square.slots, 1)
     assert found == wanted
+
+
+@pytest.mark.parametrize("scale", [0.2, 1.0, 5.0])
+@pytest.mark.parametrize("shift", [0j, 3 - 2j])
+def test_the_second_robot_is_the_same_wherever_and_however_large_the_formation_is(
+    scale: float, shift: complex
+) -> None:
+    m = follower("slot-frame", "l-l")
+    places = [1 + 1j, 0.2 + 0.5j, -0.6 + 0.8j, -1 + 0j]  # of the leader, the others, the own
+    for k, place in enumerate(places):
+        at = scale * place + shift
+        m.slots["x"][k], m.slots["y"][k] = at.real, at.imag
+    for number, slot in ((2, 1), (3, 2)):
+        m.mate(number, 0j, slot=slot, task=FLOCKING)
+    lines = [places[3] - place for place in places]
+    sines = [abs(np.sin(cmath.phase(lines[0] / lines[k]))) for k in (1, 2)]
+    assert sines[0] < 0.1
+    assert sines[1] > 0.5
+    m.s.least_crossing = 0.5 * 0.5
+    assert following.second_of(m.f, m.s, m.d, m.mates, m.slots, 1) == 3
+    m.s.least_crossing = 0.5 * (sines[1] + 0.05)
+    assert following.second_of(m.f, m.s, m.d, m.mates, m.slots, 1) == -1
 
 
 def test_a_silent_robot_does_not_end_the_search_for_the_second_one() -> None:

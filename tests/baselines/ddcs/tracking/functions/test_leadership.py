@@ -62,8 +62,8 @@ def test_the_nearest_to_the_target_is_found_among_those_that_work() -> None:
         m.mate(j, p)
     m.mates[4].step = 0  # silent for long
 
-    def nearest(barred: int) -> Any:
-        return leadership.nearest_tracker(m.f, m.s, m.d, m.mates, 1, 0.0, 0.0, barred)
+    def nearest(barred: int, at: complex = 0j) -> Any:
+        return leadership.nearest_tracker(m.f, m.s, m.d, m.mates, 1, at.real, at.imag, barred)
 
     assert nearest(-1) == pytest.approx((2, 0.5, 5.0))
     assert nearest(2) == pytest.approx((3, 1.0, 5.0))
@@ -72,6 +72,7 @@ def test_the_nearest_to_the_target_is_found_among_those_that_work() -> None:
     m.mate(2, 3 + 9j)
     m.mate(3, 3 + 9j)
     assert nearest(0) == pytest.approx((1, 5.0, 5.0))  # itself
+    assert nearest(0, 2 + 3j) == pytest.approx((1, 2**0.5, 2**0.5))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -134,6 +135,9 @@ def test_claims_are_adopted_and_pulses_relayed() -> None:
     m.mates[2].fresh, m.mates[2].leader, m.mates[2].term, m.mates[2].pulse = 1, 3, 6, 99
     settle(m)
     assert leading(m) == (3, 7, 20)
+    m.mates[2].fresh, m.mates[2].leader, m.mates[2].term, m.mates[2].pulse = 1, 0, 8, 99
+    settle(m)
+    assert leading(m) == (0, 8, 99)
 
 
 def test_a_leader_counts_and_the_first_one_is_appointed_at_once() -> None:
@@ -143,6 +147,10 @@ def test_a_leader_counts_and_the_first_one_is_appointed_at_once() -> None:
     m = team(leader=-1, term=0)
     settle(m)
     assert leading(m) == (1, 1, 0)
+    m = team(leader=-1, term=0)
+    m.mate(0, 4 + 0j)
+    settle(m)
+    assert leading(m) == (0, 1, 0)
 
 
 def test_the_first_tracker_may_lead_too() -> None:
@@ -152,19 +160,34 @@ def test_the_first_tracker_may_lead_too() -> None:
 
 
 def test_a_leader_hands_over_to_who_is_clearly_nearer_every_time_lag() -> None:
-    def after(step: int, x: float, **values: Any) -> int:
-        m = team(leader=1, step=step, **values)
-        for j in (0, 2, 3, 4):
+    def after(step: int, x: float, own: int = 1, nearer: int = 2, **values: Any) -> int:
+        m = team(leader=own, step=step, **values)
+        m.own = own
+        for j in range(5):
             m.mate(j, complex(-j, 1.0))
-        m.mate(2, complex(x, 0.0))
+        m.mate(nearer, complex(x, 0.0))
         settle(m)
-        assert m.d.term == (8 if m.d.leader == 2 else 7)
+        assert m.d.leader in (own, nearer)
+        assert (m.d.term, m.d.pulse) == ((8, 0) if m.d.leader == nearer else (7, 21))
         return int(m.d.leader)
+
+    for own, nearer in ((1, 0), (0, 1), (4, 3)):
+        assert after(40, 0.7, own, nearer) == nearer
 
     assert after(40, 0.7) == 2
     assert after(40, 0.5) == 1  # less than the hysteresis, 0.6 m
     assert after(45, 0.7) == 1  # not due: every second, 10 steps
     assert after(40, 0.7, known=0) == 1
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0])
+def test_the_lead_is_checked_in_every_step_at_the_least(dt: float) -> None:
+    for step in (40, 41):
+        m = team(leader=1, step=step)
+        m.s.time_lag, m.f.dt = 0.1, dt
+        m.mate(2, 4 + 0j)
+        settle(m)
+        assert m.d.leader == 2
 
 
 def test_a_silent_leader_is_replaced_after_the_patience() -> None:
@@ -180,6 +203,14 @@ def test_a_silent_leader_is_replaced_after_the_patience() -> None:
     assert after(6, usual_gap=0.1) == 3
     assert after(8, usual_gap=0.1) == 1
     assert after(6, task=SEARCHING, known=0) == 0  # the most central
+
+
+def test_a_leader_is_replaced_later_than_after_the_patience() -> None:
+    for silent, leader in ((4, 3), (5, 1)):  # 2 and 2.5 s
+        m = team(pulse_step=40 - silent, usual_gap=0.6)  # 1.5 s for a team-mate
+        m.f.dt, m.s.lead_patience = 0.5, 0.5
+        settle(m)
+        assert m.d.leader == leader
 
 
 def test_without_the_exchange_the_lead_changes_in_the_search_only() -> None:

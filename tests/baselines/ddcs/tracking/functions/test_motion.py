@@ -57,10 +57,12 @@ def test_a_lost_target_is_hunted_on_a_growing_ring(slot: int) -> None:
     far = m.body(30 + 1j, 0.2)
     way = place - (30 + 1j)
     check(tracking.hunt(m.s, m.d, 5, 30.0, 1.0, far), way / abs(way), far, 0.0)
+    m.d.age = 0.0  # the ring is a point, and this one there
+    check(tracking.hunt(m.s, m.d, 5, 2.0, 1.0, body), 0j, body, 0.0)
 
 
 @pytest.mark.parametrize("task", [CONVERGING, FLOCKING])
-@pytest.mark.parametrize("at", [-1 - 1j, 3 + 3j])
+@pytest.mark.parametrize("at", [-1 - 1j, 3 + 3j, 4 + 2j])
 def test_to_a_slot_leads_the_slot_law_and_before_it_an_intercept(task: int, at: complex) -> None:
     m = mind(task, aim_ahead=0.2, feed_forward=0.5, clearance=0.9)
     body = m.body(at, 0.2)
@@ -111,9 +113,12 @@ def pngl(m: Mind, k: float, at: complex, deviation: str) -> tuple[complex, float
 
 @pytest.mark.parametrize("deviation", ["none", "slot", "occupant"])
 @pytest.mark.parametrize("task", [CONVERGING, FLOCKING])
-def test_pngl_heads_at_k_sigma_plus_c(task: int, deviation: str) -> None:
+@pytest.mark.parametrize("slot", [None, 1.2 + 0.1j, -1.2 + 0.1j])
+def test_pngl_heads_at_k_sigma_plus_c(task: int, deviation: str, slot: complex | None) -> None:
     rng = np.random.default_rng(4)
     m = mind(task, deviation=deviation, bearing_gain=0.3, range_gain=0.7)
+    if slot:
+        m.slots["x"][3], m.slots["y"][3] = slot.real, slot.imag
     for k in (0.9, 1.0, 1.1):
         for _ in range(8):
             at, theta = TARGET + complex(*rng.normal(0, 1.5, 2)), rng.uniform(-3, 3)
@@ -140,6 +145,7 @@ def test_who_follows_has_a_leader_that_it_hears() -> None:
         m = mind(model=model, forbidden=forbidden)
         m.mate(0, 1j, step=step)
         m.mate(1, 1j)
+        m.mate(4, 1j)
         m.d.leader = leader
         return bool(tracking.follows(m.f, m.s, m.d, m.mates, 1))
 
@@ -204,6 +210,8 @@ def test_each_task_has_its_law() -> None:
     m.d.usual_age, m.d.age = 0.1, 0.36
     found, body = wanted(m)
     assert found == near(tracking.hunt(m.s, m.d, 5, at.real, at.imag, body))
+    m.f.sight = 7.9
+    assert wanted(m)[0] == found
     m.d.age = 0.34
     assert wanted(m)[0] == near(same)
     m.d.age, m.f.sight = 0.36, 8.0
@@ -228,3 +236,6 @@ def test_a_follower_goes_to_its_place_on_the_leader(task: int) -> None:
     v = steering.approach_velocity(x + 2, y - 3, vx, vy, 1e6, 1.0, 1e4)
     assert abs(complex(*v)) == pytest.approx(1.0)
     check(found, complex(*v), body, 0.0)
+    straight = m.body(-2 + 3j, cmath.phase(complex(*v)))
+    found = tracking.wanted_motion(m.f, m.s, m.d, m.mates, m.slots, 1, -2.0, 3.0, straight)
+    assert found[2:] == near((1.0, 0.0))
