@@ -15,6 +15,11 @@ PSI = 0.7
 
 
 def choose(m: Mind, at: complex, heading: float) -> int:
+    return chosen(m, at, heading)[0]
+
+
+def chosen(m: Mind, at: complex, heading: float) -> Any:
+    """The slot, and the costs that were compared."""
     n = m.n
     cost, work = np.full((n, n), np.nan), np.full((7, n + 1), np.nan)
     facing = turn(heading)
@@ -22,7 +27,7 @@ def choose(m: Mind, at: complex, heading: float) -> int:
         m.f, m.s, m.d, m.mates, m.slots, m.own, at.real, at.imag, facing.real, facing.imag,
         1.0, 2.0, cost, work,
     )  # fmt: skip
-    return int(m.d.slot)
+    return int(m.d.slot), cost
 
 
 def arrival(
@@ -73,15 +78,20 @@ def test_the_slot_is_that_of_the_least_total_arrival_time(seed: int, model: str)
             cost[row] += [1e4 * ((k == 0) != (j == heard[0])) for k in range(6)]
     _, columns = linear_sum_assignment(cost)
     wanted = columns[heard.index(2)]
-    found = choose(m, places[2], float(np.angle(headings[2])))
+    found, compared = chosen(m, places[2], float(np.angle(headings[2])))
     assert found == wanted
+    first = 1e-4 * np.array(heard)[:, None]  # of equal ones, the lower number
+    np.testing.assert_allclose(compared[: len(heard)], cost + first, atol=2e-5)
+
+
+MIDDLE = 1 + 4j
 
 
 def pair(**played: Any) -> Mind:
     """Trackers 0 and 1 of two; the slots are on either side of a resting target."""
     m = Mind("constant", own=1, played=played, num_trackers=2, formation="ring")
     m.d.step = 50
-    m.target(0j, 0j)
+    m.target(MIDDLE, 0j)
     return m
 
 
@@ -93,9 +103,9 @@ def test_the_nearer_one_keeps_a_slot_that_two_claim(own: float, mate: float, los
     for number in (0, 1):
         m = pair()
         m.own = number
-        other = m.mate(1 - number, m.slot(0) + mate * 1j, slot=0)
+        other = m.mate(1 - number, MIDDLE + m.slot(0) + mate * 1j, slot=0)
         m.d.slot = 0
-        at = m.slot(0) - own * 1j
+        at = MIDDLE + m.slot(0) - own * 1j
 
         def lost(slot: int = 0, m: Mind = m, at: complex = at) -> bool:
             return bool(slots.loses_slot(
@@ -111,41 +121,86 @@ def test_the_nearer_one_keeps_a_slot_that_two_claim(own: float, mate: float, los
         assert not lost()
 
 
+@pytest.mark.parametrize("slot", range(5))
+def test_who_loses_a_slot_of_five_takes_another(slot: int) -> None:
+    m = Mind("constant", own=3, num_trackers=5, formation="ring", played={"loyalty": 5.0})
+    m.d.step, m.d.slot = 50, slot
+    m.target(2 - 1j, 0j)
+    place = 2 - 1j + m.slot(slot)
+    m.mate(1, place - 0.35, -0.1 + 0j, slot=slot)
+    m.mates[1].speed_x = 0.0
+    assert choose(m, place + 0.5, np.pi) != slot
+
+
+def test_one_in_its_slot_need_not_turn_to_it() -> None:
+    m = pair(model="centralized")  # without a leader, who would take the first slot
+    x, y, _, _ = slots.slot_place(m.d, m.slots[0])
+    assert choose(m, complex(x, y), 1.0) == 0
+
+
 def test_who_loses_a_slot_takes_another() -> None:
     m = pair(loyalty=5.0)
     m.d.slot = 0
-    m.mate(0, m.slot(0) + 0.3j, slot=0)
+    m.mate(0, MIDDLE + m.slot(0) + 0.3j, slot=0)
     m.mates[0].heading_cos = 1.0
     # Each thinks it best to stay; this one has to go.
-    assert choose(m, m.slot(0) + 0.5j, 0.0) == 1
+    assert choose(m, MIDDLE + m.slot(0) + 0.5j, 0.0) == 1
 
 
 def test_without_radio_the_slot_is_that_of_the_number() -> None:
-    assert choose(pair(radio=False), 0j, 0.0) == 1
+    m = pair(radio=False)
+    assert choose(m, MIDDLE + m.slot(0), 0.0) == 1
 
 
-def crowd() -> Mind:
+CENTRE = 2 - 3j
+
+
+def crowd(places: int = 2) -> Mind:
     """Tracker 1 of six, each with room for two others in its observation; nobody is heard now."""
-    m = Mind("constant", own=1, num_trackers=6, num_neighbours=2, formation="ring")
+    m = Mind("constant", own=1, num_trackers=6, num_neighbours=places, formation="ring")
     m.d.step = 50
-    m.target(0j, 0j)
+    m.target(CENTRE, 0j)
     return m
 
 
-def test_a_claim_of_one_that_has_no_place_in_the_observation_is_respected() -> None:
-    m = crowd()
-    first = choose(m, m.slot(3) * 1.1, 0.0)
-    assert first == 3
-    m.mate(4, 9 + 9j, slot=3, step=3)
+@pytest.mark.parametrize("places", [2, 4])
+@pytest.mark.parametrize("slot", [3, 0])
+def test_a_claim_of_one_that_has_no_place_in_the_observation_is_respected(
+    slot: int, places: int
+) -> None:
+    m = crowd(places)
+    at = CENTRE + m.slot(slot) * 1.1
+    first = choose(m, at, 0.0)
+    assert first == slot
+    m.mate(4, 9 + 9j, slot=slot, step=3)
     m.d.slot = -1
-    assert choose(m, m.slot(3) * 1.1, 0.0) != 3
-    assert m.mates[4].slot == 3
+    assert choose(m, at, 0.0) != slot
+    assert m.mates[4].slot == slot
     # In reach of those that are listed it would be heard: the claim is void.
-    m.d.slot, m.d.horizon = -1, 0.45 + abs(m.slot(3)) * 0.1
-    assert choose(m, m.slot(3) * 1.1, 0.0) == 3
+    m.d.slot, m.d.horizon = -1, 0.45 + abs(m.slot(slot)) * 0.1
+    assert choose(m, at, 0.0) == slot
     assert m.mates[4].slot == -1
-    m.mates[4].slot, m.d.slot, m.d.horizon = 3, -1, 0.35 + abs(m.slot(3)) * 0.1
-    assert choose(m, m.slot(3) * 1.1, 0.0) != 3
+    m.mates[4].slot, m.d.slot, m.d.horizon = slot, -1, 0.35 + abs(m.slot(slot)) * 0.1
+    assert choose(m, at, 0.0) != slot
+
+
+def test_after_a_claim_the_others_count_too() -> None:
+    m = crowd()
+    at = CENTRE + m.slot(3) * 1.1
+    m.mate(2, 9 + 9j, slot=3, step=3)
+    m.mate(4, 9 + 9j, slot=2, step=3)
+    found, cost = chosen(m, at, 0.0)
+    assert found not in (3, 2)
+    assert np.isfinite(cost[:3]).all()
+    assert np.isnan(cost[3:]).all()
+    # The nearest slot's claim is void; that of the farthest one holds.
+    far = max(range(6), key=lambda k: abs(m.slot(k) - 1.1 * m.slot(3)))
+    m.d.slot, m.d.horizon = -1, 0.45 + abs(m.slot(3)) * 0.1
+    m.mates[4].slot = far
+    found, cost = chosen(m, at, 0.0)
+    assert found == 3
+    assert (m.mates[2].slot, m.mates[4].slot) == (-1, far)
+    assert (cost[1, far], cost[1, 3]) == (0.0, 1e4)
 
 
 def test_a_slot_is_an_arm_in_the_slot_frame() -> None:
@@ -163,8 +218,8 @@ def test_a_slot_counts_as_seeing_the_target_within_its_share_of_the_range() -> N
     m.d.step = 50
     m.target(0j, 0j)
     at = 1.0
-    m.slots["x"][2], m.slots["y"][2] = 2.0, 0.0  # in sight
+    m.slots["x"][2], m.slots["y"][2] = 2.3, 0.0  # in sight
     for k in (0, 1, 3, 4, 5):
         m.slots["x"][k], m.slots["y"][k] = 2.5 + 0.5 * k, 0.0  # out of sight
-    assert 2.0 < m.s.in_sight * m.f.sight < 2.5
+    assert 2.3 < m.s.in_sight * m.f.sight < 2.5
     assert choose(m, m.slot(0) + at * 0.1, 0.0) == 2

@@ -22,7 +22,7 @@ def test_the_next_task_is_that_of_section_3_1(task: int, pursues: int) -> None:
     m.d.pursues = pursues
     for known, exchanges, confirmed in itertools.product((0, 1), (0, 1, 2), (0, 1)):
         m.d.known, m.d.exchanges, m.d.confirmed = known, exchanges, confirmed
-        for error in (-1.0, 0.0, 0.1, 0.3, 0.55, 0.7, 0.95, 3.0):
+        for error in (-1.0, 0.0, 0.1, 0.3, 0.5, 0.55, 0.7, 0.95, 3.0):
             m.d.task, m.d.error = task, error
             if not known:
                 wanted = SEARCHING
