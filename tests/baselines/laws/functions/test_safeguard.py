@@ -166,10 +166,15 @@ def test_the_middle_of_a_turn_is_exact_enough() -> None:
         assert found == pytest.approx(cmath.exp(0.5j * turn), abs=1e-5)
 
 
-def test_a_velocity_is_clear_near_the_present_one_with_nothing_on_its_way() -> None:
+@pytest.mark.parametrize("theta", [0.0, 2.5])
+def test_a_velocity_is_clear_near_the_present_one_with_nothing_on_its_way(theta: float) -> None:
+    facing = cmath.rect(1.0, theta)
+
     def clear(wanted: complex, *found: Disc, speed: float = 0.6) -> bool:
+        turned = discs_of(*((at * facing, v * facing, r, m) for at, v, r, m in found))
+        way = wanted * facing
         return bool(safeguard.is_clear(
-            body_of(0.0, speed), discs_of(*found), len(found), abs(wanted), wanted.real, wanted.imag
+            body_of(theta, speed), turned, len(found), abs(wanted), way.real, way.imag
         ))  # fmt: skip
 
     far: Disc = (9 + 0j, 0j, 0.3, 0.1)
@@ -233,9 +238,61 @@ def test_in_contact_no_velocity_is_better_than_the_wanted_one() -> None:
     assert (velocity, changed) == (0.7 + 0.1j, True)
 
 
-def test_from_rest_the_directions_count_from_the_heading() -> None:
-    body = body_of(0.4, 0.0, 0.0)
-    found: list[Disc] = [(0.2 + 0.9j, -0.1 - 0.9j, 0.3, 0.3)]
+def test_what_has_no_margin_is_avoided_too() -> None:
+    body = body_of(0.0, 0.6, 0.0)
+    found: list[Disc] = [(0.9 + 0.05j, 0j, 0.3, 0.0)]
+    velocity, changed = choose(body, found, 0.8 + 0j)
+    assert changed
+    assert velocity == pytest.approx(min(choices(body, found, 0.8 + 0j), key=lambda c: c[0])[1])
+
+
+@pytest.mark.parametrize("theta", [0.0, 2.5])
+def test_one_that_can_only_stop_does(theta: float) -> None:
+    facing = cmath.rect(1.0, theta)
+    body = body_of(theta, 0.6, 0.0)
+    places = (0.53, 0.1 + 0.33j, 0.1 - 0.33j, -0.3 + 0.3j, -0.3 - 0.3j)
+    found: list[Disc] = [(place * facing, 0j, 0.3, 0.02) for place in places]
+    wanted = 0.8 * facing
+    assert min(choices(body, found, wanted), key=lambda c: c[0])[1] == 0j
+    assert choose(body, found, wanted) == (0j, True)
+
+
+def test_braking_is_judged_on_the_present_heading() -> None:
+    body = body_of(0.0, 0.6, 0.0, a=0.5)
+    found: list[Disc] = [(0.7 + 0j, 0j, 0.3, 0.02)]
+    found += [(0.3 + 0.34j * side, 0j, 0.3, 0.02) for side in (1, -1)]  # a narrow passage
+    assert choose(body, found, 0.8 + 0j) == (0j, True)
+
+
+def test_where_every_way_ends_in_contact_the_latest_is_taken() -> None:
+    rng = np.random.default_rng(0)
+    body, found = body_of(0.0, 0.3, 0.0), []
+    for angle in np.arange(8) * math.pi / 4:  # they close in from all sides
+        at = cmath.rect(rng.uniform(0.5, 1.0), angle)
+        found.append((at, -0.6 * at / abs(at), 0.3, 0.1))
+    options = choices(body, found, 0.8 + 0j)
+    least, best = min(options, key=lambda option: option[0])
+    assert least > 2.0
+    assert least < min(cost for cost, _ in options[:2]) < least + 1.0
+    velocity, changed = choose(body, found, 0.8 + 0j)
+    assert changed
+    assert velocity == pytest.approx(best)
+
+
+@pytest.mark.parametrize("theta", [0.4, -2.5])
+def test_from_rest_it_gives_way_to_the_right(theta: float) -> None:
+    facing = cmath.rect(1.0, theta)
+    found: list[Disc] = [(1.1 * facing, -0.7 * facing, 0.3, 0.3)]
+    velocity, changed = choose(body_of(theta, 0.0, 0.0), found, 0j)
+    assert changed
+    assert (velocity / facing).imag < -0.1
+
+
+@pytest.mark.parametrize("theta", [0.4, -2.5])
+def test_from_rest_the_directions_count_from_the_heading(theta: float) -> None:
+    body = body_of(theta, 0.0, 0.0)
+    away = cmath.rect(1.0, theta - 0.4)
+    found: list[Disc] = [((0.2 + 0.9j) * away, (-0.1 - 0.9j) * away, 0.3, 0.3)]
     velocity, changed = choose(body, found, 0j)
     assert changed
     _, best = min(choices(body, found, 0j), key=lambda option: option[0])

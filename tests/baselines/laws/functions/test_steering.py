@@ -10,6 +10,8 @@ import pytest
 from tests.support.minds import layout_of
 from tests.support.plain import plain
 
+from posse.scenarios.limits import OPEN_PLANE_EXTENT
+
 steering, slots = plain("laws.steering"), plain("laws.slots")
 NEVER = 1e6
 
@@ -35,6 +37,9 @@ def test_a_point_as_fast_as_the_robot_is_met_if_it_comes() -> None:
     assert steering.intercept_time(3.0, 4.0, -0.6, -0.8, 1.0) == pytest.approx(2.5)
     assert steering.intercept_time(3.0, 4.0, -0.8, 0.6, 1.0) == NEVER
     assert steering.intercept_time(3.0, 4.0, 0.6, 0.8, 1.0) == NEVER
+    assert steering.intercept_time(0.3, 0.4, 0.6, 0.8, 1.0) == NEVER
+    assert steering.intercept_time(0.3, 0.4, -0.6, -0.8, 1.0) == pytest.approx(0.25)
+    assert steering.intercept_time(3.0, 0.0, 0.0, 1.0, 1.0) == NEVER
     assert steering.intercept_time(1e4, 0.0, -1e-4, 1.0, 1.0) == NEVER
     assert steering.intercept_time(0.0, 0.0, 0.5, 0.0, 1.0) == 0.0
     assert steering.intercept_time(1e7, 0.0, 0.5, 0.0, 1.0) == NEVER
@@ -72,6 +77,10 @@ def test_the_slot_law_goes_straight_for_an_intercept(seed: int) -> None:
     fast = complex(*slots.slot_law(offset.real, offset.imag, 3.0, 4.0, 0.1, top))
     away = 3 + 4j + 0.1 * offset
     assert fast == pytest.approx(top * away / abs(away))
+    level = complex(*slots.slot_law(0.0, 1.0, 1.0, 0.0, 0.5, 1.0))
+    assert level == pytest.approx(1.0)  # as fast as the robot: its course, no nearer
+    faster = complex(*slots.slot_law(0.0, 1.0, 1.2, 0.0, 0.5, 1.0))
+    assert faster == pytest.approx((1.2 + 0.5j) / 1.3)
     tiny = complex(*slots.slot_law(4e-4, 0.0, 0.1, 0.0, 1.0, top))
     assert tiny == pytest.approx(0.1 + 4e-4 * 0.4)  # a distance counts as 1 mm, at least
 
@@ -93,6 +102,9 @@ def test_the_way_round_leads_by_the_tangent_point(heading: float) -> None:
     assert way(-2 + 0.9j, 3 + 0.85j) == pytest.approx(3 + 0.85j)
     assert way(-2 + 0.1j, -0.5 + 0.1j) == pytest.approx(-0.5 + 0.1j)  # short of the middle
     assert way(-2 + 0.1j, -3 + 0.1j) == pytest.approx(-3 + 0.1j)
+    assert way(0.5 + 0.1j, 1.2 + 0.1j) == pytest.approx(1.2 + 0.1j)  # away from the middle
+    short = way(-0.81 - 0.01j, 0.3 + 0j)
+    assert short == pytest.approx(0.8 * cmath.rect(1.0, cmath.phase(-0.81 - 0.01j) + 0.6))
     inside = way(-0.5 + 0.1j, 3 + 0j)
     assert inside == pytest.approx(0.8 * cmath.rect(1.0, cmath.phase(-0.5 + 0.1j) - 0.6))
     assert way(-0.81 - 0.01j, 3 + 0j) == pytest.approx(
@@ -142,7 +154,9 @@ def test_an_action_has_speed_from_minus_one_and_turn_rate_from_its_limit() -> No
 @pytest.mark.parametrize("name", ["field", "constant", "search"])
 def test_offsets_are_those_of_the_layout(name: str) -> None:
     layout = layout_of(name)
-    f, s = plain("laws.offsets").offsets_of(layout)[0], layout.scenario
+    record, s = plain("laws.offsets").offsets_of(layout), layout.scenario
+    assert record.shape == (1,)
+    f = record[0]
     for field, at in layout.offsets.items():
         if field in (f.dtype.names or ()) and field not in ("sonar_range",):
             assert f[field] == at
@@ -156,8 +170,7 @@ def test_offsets_are_those_of_the_layout(name: str) -> None:
     assert f.sight == pytest.approx(min(s.sensing_range, 8.0))
     walled = math.isfinite(s.arena)
     assert f.walled == walled
-    if walled:
-        assert f.area == pytest.approx(s.arena / 2)
+    assert f.area == pytest.approx(s.arena / 2 if walled else 1.4 * OPEN_PLANE_EXTENT)
     few = layout_of(name, sonar_beams=0, message_size=0, num_neighbours=0)
     f = plain("laws.offsets").offsets_of(few)[0]
     assert (f.sonar, f.neighbour_message) == (-1, -1)

@@ -218,6 +218,21 @@ def test_the_goal_is_that_cell_on_a_coarse_map_too(
     )
 
 
+@pytest.mark.parametrize("along", [1, 1j])
+def test_a_cell_where_a_team_mate_is_in_two_seconds_is_left_to_it(
+    along: complex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(searching, "GRID", 3)
+    played = {"age_weight": 0.0, "turn_weight": 0.0, "middle_weight": 0.0}
+    m = Mind("constant", own=0, sensing_range=4.0, played=played)
+    m.f.area, m.d.step = 6.0, 150
+    at = 2.2 * along
+    for speed, goal in ((0.0, 4), (1.0, 4), (2.0, 0), (3.0, 4)):  # cells are 4 m apart
+        m.mate(2, 0j, speed * along)
+        searching.choose_goal(m.f, m.s, m.d, m.mates, m.seen, 0, at.real, at.imag, 1.0, 0.0)
+        assert complex(m.d.goal_x, m.d.goal_y) == pytest.approx(goal * along, abs=1e-6)
+
+
 def test_one_in_the_middle_of_a_cell_need_not_turn_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "GRID", 3)
     m = Mind("constant", own=0, sensing_range=4.0)
