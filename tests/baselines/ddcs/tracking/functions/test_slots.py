@@ -15,7 +15,7 @@ PSI = 0.7
 
 
 def choose(m: Mind, at: complex, heading: float) -> int:
-    return chosen(m, at, heading)[0]
+    return int(chosen(m, at, heading)[0])
 
 
 def chosen(m: Mind, at: complex, heading: float) -> Any:
