@@ -24,10 +24,10 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.parametrize(
     ("case", "cases"),
     [
-        (worlds.case, 40), (calls.case, 4), (processes.case, 12), (threads.case, 3),
-        (forged.case, 50),
+        (worlds.case, 40), (calls.case, 4), (threads.case, 3), (forged.case, 50),
+        pytest.param(processes.case, 12, marks=pytest.mark.long),
     ],
-    ids=["worlds", "calls", "processes", "threads", "forged"],
+    ids=["worlds", "calls", "threads", "forged", "processes"],
 )  # fmt: skip
 def test_no_case_fails(case: Any, cases: int) -> None:
     tries, failures = campaign(case, seed=0, cases=cases)

@@ -38,6 +38,7 @@ def run(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> dict[
     return runpy.run_path(str(TUTORIALS / name), run_name="__main__")
 
 
+@pytest.mark.long
 def test_first_policy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,6 +37,7 @@ def test_the_cases_hold_what_they_are_for() -> None:
     assert (made["radio"]["state_heard_step"] > 0).any()
 
 
+@pytest.mark.long
 def test_in_the_simulator(tmp_path: Path) -> None:
     for case in CASES:
         np.savez(tmp_path / case, **play(make(case, "cpu")))  # type: ignore[arg-type]

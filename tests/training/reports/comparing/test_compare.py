@@ -188,6 +188,7 @@ def test_a_split_that_was_trained_on_is_named(
     assert "was trained on the split 'test'" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_figures_are_drawn_with_the_planner_beside(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
