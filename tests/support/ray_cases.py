@@ -228,7 +228,10 @@ def test_a_worker_of_two_nodes_and_a_node_of_three_die(
     for alive, deed in ((2, "die"), (3, "wait")):
         if deed == "wait":
             nodes.add_node(num_cpus=1)
-        assert sum(node["Alive"] for node in ray.nodes()) == alive
+        until = time.monotonic() + 30.0  # a dead node is noticed after a while
+        while sum(node["Alive"] for node in ray.nodes()) != alive:
+            assert time.monotonic() < until
+            time.sleep(0.1)
         folder = tmp_path / deed
         folder.mkdir()
         thread = removing(nodes, folder) if deed == "wait" else None
