@@ -47,7 +47,11 @@ class _Timed:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_pyfunc_call(self, pyfuncitem: pytest.Function) -> Iterator[None]:
+        gave_up = False
+
         def give_up(*_: Any) -> None:
+            nonlocal gave_up
+            gave_up = True
             raise _TooSlow
 
         name = pyfuncitem.nodeid.partition("[")[0]
@@ -57,8 +61,10 @@ class _Timed:
         signal.setitimer(signal.ITIMER_PROF, FAST_S)
         try:
             result = yield
-        except _TooSlow:
-            self.slow[name] += 1
+        except BaseException:
+            if not gave_up:
+                raise
+            self.slow[name] += 1  # hypothesis may have made another error of it
             return None
         finally:
             left, _ = signal.setitimer(signal.ITIMER_PROF, 0)
