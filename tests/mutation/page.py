@@ -8,7 +8,6 @@ After ``make mutants``, or of one of its files::
 from __future__ import annotations
 
 import argparse
-import math
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -18,19 +17,13 @@ from tests.mutation.judge import FAST_S, HUNG, SURVIVED
 from tests.mutation.mutants import Mutant
 from tests.mutation.outcomes import FOLDER, head_of, read
 
+from posse_training.reports.statistics import share
+
 PAGE: Final = Path("docs/mutation.md")
 REASONS: Final = Path(__file__).with_name("survivors.toml")
 BEGIN: Final = "<!-- figures: `python -m tests.mutation.page` writes what follows -->"
 END: Final = "<!-- end of the figures -->"
 MISSING: Final = "A test is missing."
-
-
-def interval(hits: int, tries: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share."""
-    z, share = 1.96, hits / tries
-    middle = share + z * z / (2 * tries)
-    half = z * math.sqrt(share * (1 - share) / tries + (z / (2 * tries)) ** 2)
-    return (middle - half) / (1 + z * z / tries), (middle + half) / (1 + z * z / tries)
 
 
 def name_of(mutant: Mutant) -> str:
@@ -80,15 +73,14 @@ def figures(head: dict[str, Any], outcomes: dict[Mutant, str]) -> str:
     total = len(outcomes)
     if total != (head["sample"] or head["all"]):
         raise SystemExit(f"only {total} mutants were tried yet: run `make mutants` again")
-    killed = sum(outcome != SURVIVED for outcome in outcomes.values())
-    low, high = interval(killed, total)
+    killed = share([outcome != SURVIVED for outcome in outcomes.values()])
     of_all = f"a random sample of {total} of all {head['all']:,} mutants (seed {head['seed']})"
     what = of_all if head["sample"] else f"all {total:,} mutants"
-    share = f"{killed / total:.1%} of {what} killed"
+    found = f"{killed.value:.1%} of {what} killed"
     if head["sample"]:
-        share += f"; 95 % interval of the share of all: {low:.1%} to {high:.1%}"
+        found += f"; 95 % interval of the share of all: {killed.low:.1%} to {killed.high:.1%}"
     return (
-        f"{share}. Commit `{head['commit']}`, {head['tests']} tests of at most {FAST_S:g} s.\n\n"
+        f"{found}. Commit `{head['commit']}`, {head['tests']} tests of at most {FAST_S:g} s.\n\n"
         f"{table(outcomes)}\n\n### Survivors\n\n{survivors(outcomes)}"
     )
 

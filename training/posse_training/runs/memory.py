@@ -8,12 +8,12 @@ from typing import Final
 
 from posse import ObservationLayout
 from posse_baselines.learned import Encoding
+from posse_baselines.learned.lstm import GATES
 from posse_training.errors import SettingsError
 from posse_training.runs.settings import TrainSettings
 
 _FLOAT: Final = 4  # bytes
 _OWN: Final = 16  # numbers beside the inputs in a row of a buffer: action, reward, value, ...
-_GATES: Final = 4  # of an LSTM
 _COPIES: Final = 8  # of each weight: two networks, gradients, Adam's two moments, copies for saving
 
 
@@ -30,7 +30,7 @@ def memory_needed(s: TrainSettings) -> int:
     widths = (read, *s.hidden, 2 + s.message_size)
     weights = sum(a * b for a, b in itertools.pairwise(widths))
     if s.recurrent:
-        weights += _GATES * s.lstm_size * (inputs + s.lstm_size)
+        weights += GATES * s.lstm_size * (inputs + s.lstm_size)
     worlds = s.num_worlds * trackers * 2 * layout.size
     return _FLOAT * (rows + _COPIES * weights + worlds)
 

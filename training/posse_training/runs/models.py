@@ -72,14 +72,14 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
 def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> BaseAlgorithm:
     """Return PPO, MAPPO or recurrent PPO."""
     network["optimizer_kwargs"]["eps"] = _ADAM_EPSILON
-    network |= {"net_arch": list(s.hidden)}
     rows = even_minibatch(s.rollout * env.num_envs, s.minibatch)
     kind: Any = partial(PPO, "MlpPolicy", rollout_buffer_class=FlatRolloutBuffer)
     if s.algorithm == "mappo":
         kind = partial(PPO, CentralizedCriticPolicy, rollout_buffer_class=FlatRolloutBuffer)
-        del network["net_arch"]
         network |= {"private_size": env.private_size, "hidden": s.hidden}
-    elif s.recurrent:
+    else:
+        network |= {"net_arch": list(s.hidden)}
+    if s.recurrent:
         kind = partial(SequencePPO, "MlpLstmPolicy")
         network |= {"lstm_hidden_size": s.lstm_size}
         # Whole rollouts of so many slots.
