@@ -44,7 +44,7 @@ recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose re
 fuzz: $(FULL) ## Run randomised tests in parallel, MINUTES=1 per campaign
 	$(BIN)/python -m tests.fuzz $(ONLY) --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0) $(if $(JOBS),--jobs $(JOBS))
 
-mutants: $(FULL) ## Try mutants of the laws and the DDCS (an hour for all), SAMPLE=400 SEED=1; resumes
+mutants: $(FULL) ## Try mutants of the laws and the DDCS (one to two hours for all), SAMPLE=400 SEED=1; resumes
 	$(BIN)/python -m tests.mutation $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) --jobs $(or $(JOBS),2)
 	$(BIN)/python -m tests.mutation.page
 
