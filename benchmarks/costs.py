@@ -49,7 +49,7 @@ class Settings:
     out: Path = Path("runs/bench/costs.json")
 
 
-OWN, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
+OWN, FIXED, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
 RULES = rules_for(built_in_parts())
 SUMS = sums_for(built_in_parts())
 
@@ -60,8 +60,8 @@ def one_part(  # type: ignore[no-untyped-def]
 ):
     """Execute one part of a step in every world."""
     scratch = memory[0]
-    writers = Writers(OWN, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH)
-    world.prepare(tables, scratch)
+    writers = Writers(OWN, FIXED, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH)
+    world.prepare(tables, worlds, writers, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
         w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]

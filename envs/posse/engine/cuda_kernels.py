@@ -87,7 +87,7 @@ def check_actions(
 @functools.cache
 def stepping(parts: Parts) -> Any:
     """Return the kernel that steps worlds."""
-    own, mate, reward, target_reward, empty, width, mate_width = writers_for(parts)
+    own, fixed, mate, reward, target_reward, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
 
@@ -108,10 +108,10 @@ def stepping(parts: Parts) -> Any:
             if SIMULATED:
                 scratch[:] = 0  # suppress warnings for unused lanes
             s = scratch[0]
-            writers = Writers(own, mate, reward, target_reward, empty, width, mate_width)
+            writers = Writers(own, fixed, mate, reward, target_reward, empty, width, mate_width)
             rules = Rules(draw_motion, set_goal, sees, measure)
             sums = Sums(clear_sums, add_to_sums)
-            prepare(tables, s)
+            prepare(tables, worlds, writers, s)
             over = advance_worlds(
                 e, 1, tables, worlds, actions, results, orders, rules, sums, writers, s
             )

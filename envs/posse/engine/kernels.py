@@ -46,6 +46,7 @@ from posse.rules.state import (
 from posse.scenarios import Scenario
 from posse.signals.observation.observing import (
     TOGETHER,
+    lay_out_fixed,
     observe_sonar,
     observe_target,
     observe_together,
@@ -254,9 +255,10 @@ def advance_worlds(
 
 
 @compiled
-def prepare(tables: Tables, scratch: Record) -> None:
+def prepare(tables: Tables, worlds: WorldArrays, writers: Writers, scratch: Record) -> None:
     """Write the values common to all worlds to a thread's scratch memory."""
     lay_out_constants(tables.config[0], tables.beams, scratch)
+    lay_out_fixed(tables.config[0], worlds, writers, scratch)
 
 
 def tables_of(scenario: Scenario) -> Tables:
@@ -275,7 +277,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
 
     Configuration, slots and beams of a given scenario become constants in the code.
     """
-    own_fields, mate, terms, target_terms, empty, width, mate_width = writers_for(parts)
+    own_fields, fixed, mate, terms, target_terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
     own_config, own_slots, own_beams, *_ = own or (None, None, None)
@@ -299,11 +301,11 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
             tables.target_weights,
         )
         s = scratch[0]
-        writers = Writers(own_fields, mate, terms, target_terms, empty, width, mate_width)
+        writers = Writers(own_fields, fixed, mate, terms, target_terms, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
         sums = Sums(clear_sums, add_to_sums)
         if s.prepared[0] == _ZERO:
-            prepare(used, s)
+            prepare(used, worlds, writers, s)
             s.prepared[0] = _ONE
         over = 0
         for first, end in blocks_of(thread, blocks):

@@ -97,6 +97,7 @@ _WORLD: Final = (
     ("contacts_tracker", _I), ("contacts_obstacle", _I), ("contacts_target", _I),
     ("least_gap", _F),
 )  # fmt: skip
+STEP: Final = _offset(_record(*_WORLD), "step")
 WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
 """Fields of every world, without those of declared metrics and motions."""
 
@@ -120,33 +121,34 @@ def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
     )
 
 
+FIX_STEP: Final = ("fix_step", _I)  # when it was taken; -1: none yet
 FIX_FIELDS: Final = (
-    ("fix_step", _I),  # when it was taken; -1: none yet
     ("fix_x", _F), ("fix_y", _F),  # where the target was, m; a bearing: a unit vector
     ("fix_cos", _F), ("fix_sin", _F),  # its heading; a bearing: 0
     ("fix_frame_cos", _F), ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
 )  # fmt: skip
 """A fix of the target, in the common frame: a position or a bearing, depending on the sensor
-(:mod:`posse.rules.senses.declaring`)."""
+(:mod:`posse.rules.senses.declaring`). Of a certain control step (``FIX_STEP``)."""
 
 TRACKER: Final = _record(
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
     ("max_speed", _F), ("max_turn_rate", _F),  # its own limits, from the scenario
     ("per_speed", _F), ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
-    ("broken_at", _I),  # control step at which it broke, NEVER while it works
     ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
+    ("broken_at", _I),  # control step at which it broke, NEVER while it works
     ("sensor_dead_from", _I), ("radio_dead_from", _I),  # start of outages of outage_time
     ("sees", _I),  # 1: its sensor sees the target
     ("near", _I),  # 1: something may touch it in the next step
     ("touching", _I),  # 1: it touches anything
     ("onsets", _I),  # contacts that began in this step
+    FIX_STEP,  # of its best fix
+    ("slot", _S),  # number of the slot that it occupies; -1: none
+    ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
     ("touching_trackers", _U), ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
     # its best fix of the target, from its sensor or by radio
     *FIX_FIELDS, ("fix_vx", _F), ("fix_vy", _F),  # m/s, from successive fixes
-    # inputs of score and rewards
-    ("slot", _S),  # number of the slot that it occupies; -1: none
-    ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
+    # inputs of score and rewards, with slot and could_arrive
     ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
     ("slot_progress", _F),  # decrease of slot_distance in this step
     ("start_x", _F), ("start_y", _F),
@@ -176,7 +178,7 @@ BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
     ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
     ("speed", _F), ("turn_rate", _F),
-    *FIX_FIELDS,
+    FIX_STEP, *FIX_FIELDS,
 )  # fmt: skip
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 

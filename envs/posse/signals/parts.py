@@ -24,7 +24,7 @@ from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
 from posse.scenarios import Scenario
 from posse.signals.measuring import Metric, adding, clearing
-from posse.signals.observation.columns import empty_writer, row_writer, width_of
+from posse.signals.observation.columns import empty_writer, fixed_writer, row_writer, width_of
 from posse.signals.observation.fields import FieldDeclaration
 from posse.signals.reward import RewardTerm, reward_writer, target_reward_writer, terms_for
 
@@ -68,6 +68,8 @@ class Writers(NamedTuple):
 
     own: Any
     """(c, v, s, rows): writes the own fields of eight observers."""
+    fixed: Any
+    """(c, v, s, observers): writes those of the own fields that never change to scratch memory."""
     mate: Any
     """(c, v, m, s, rows): writes the fields of a team-mate of each."""
     reward: Any
@@ -141,6 +143,7 @@ def writers_for(parts: Parts) -> Writers:
     """Return the functions that write the observations and rewards of parts."""
     return Writers(
         row_writer(parts.fields, ("c", "v")),
+        fixed_writer(parts.fields),
         row_writer(parts.mate_fields, ("c", "v", "m")),
         reward_writer(parts.reward_terms),
         target_reward_writer(parts.reward_terms),

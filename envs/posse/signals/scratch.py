@@ -5,10 +5,15 @@ from __future__ import annotations
 from typing import Final
 
 from posse.numeric import WIDTH
-from posse.rules.scratch import TEAM, Fields
+from posse.rules.scratch import ROBOTS, TEAM, Fields
 
 MOST_IN_TEAM: Final = 16
 """Largest team size for which eight worlds are observed together."""
+
+FIXED_BLOCKS: Final = 2
+"""Most blocks of eight numbers of an observation that are kept since they never change."""
+KEPT: Final[Fields] = (("fixed", WIDTH * FIXED_BLOCKS * ROBOTS),)
+"""Fixed blocks of each robot, the target last."""
 
 
 def observing(worlds: int) -> Fields:
@@ -16,9 +21,6 @@ def observing(worlds: int) -> Fields:
     # A row holds the team twice, then padding for the last block.
     row = (2 * WIDTH * MOST_IN_TEAM if worlds > 1 else 2 * TEAM) + WIDTH
     return (
-        # Eight observers.
-        ("step", WIDTH),  # control steps since the start
-        ("fix_step", WIDTH),
         # Eight team-mates, one of each observer.
         ("column", WIDTH),  # values of one column
         ("start", WIDTH),  # index in the observation at which each team-mate begins

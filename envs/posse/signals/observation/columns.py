@@ -1,7 +1,8 @@
 """Fields give columns, and a transposition writes them to the observations' rows.
 
 A column is one number of a field for eight observers. Where in an observation each belongs follows
-from the order of the declarations.
+from the order of the declarations. Eight consecutive columns that never change are transposed only
+once, into scratch memory, and copied from there.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from posse.numeric import WIDTH, FloatArray, Lanes, compiled, eight, store, transpose, written
+from posse.numeric import WIDTH, FloatArray, Lanes, compiled, eight, load, store, transpose, written
 from posse.rules.discs import natural
 from posse.signals.observation.fields import FieldDeclaration
+from posse.signals.scratch import FIXED_BLOCKS
 
 _FEW: Final = 2
 """Number of columns up to which writing single numbers is faster than a transposition."""
@@ -57,36 +59,84 @@ def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Calla
     Args:
         declarations: The fields; those about a setting may stand anywhere among them.
         parameters: ``("c", "v")``, or ``("c", "v", "m")`` for fields of a team-mate. Then comes
-            scratch memory.
+            scratch memory. Fixed blocks are read from there (:func:`fixed_writer`).
     """
-    lines, columns = [], 0
-    names: dict[str, Any] = {"np": np, "eight": eight, "block": _write_block, "one": _write_column}
+    names: dict[str, Any] = {"block": _write_block, "copy": _copy_block, "one": _write_column}
+    blocks = _blocks(declarations)
+    given, columns = _evaluation(declarations, parameters, names)
+    done = {first for first, fixed in blocks if fixed}
+    lines, written_up_to = [], 0
     for k, field in enumerate(declarations):
-        names[f"field_{k}"] = field.function
-        parts = [f"column_{columns + q}" for q in range(field.size)]
-        given = "c" if field.subject == "setting" else ", ".join(parameters)
-        lines.append(f"{', '.join(parts)} = field_{k}({given})")
-        if field.subject == "setting":
-            lines += [f"{part} = eight(np.float32({part}))" for part in parts]
-        columns += field.size
+        mine = range(columns[k], columns[k] + field.size)
+        if not all(any(first <= q < first + WIDTH for first in done) for q in mine):
+            lines += given[k]
         # As soon as there are eight, so that few have to be kept at a time.
-        for first in range(_written(columns - field.size), _written(columns), WIDTH):
-            lines.append(_block(first))
-    rest = columns % WIDTH
-    if rest > _FEW:
-        lines.append(_block(columns - WIDTH))  # some of them once more
-    else:
-        lines += [f"one(column_{k}, {k}, s, rows)" for k in range(columns - rest, columns)]
+        while blocks and blocks[0][0] + WIDTH <= mine.stop:
+            first, fixed = blocks.pop(0)
+            number = sorted(done).index(first) if fixed else 0
+            lines.append(f"copy({number}, {first}, s, rows)" if fixed else _block(first))
+            written_up_to = first + WIDTH
+    width = width_of(declarations)
+    lines += [f"one(column_{q}, {q}, s, rows)" for q in range(written_up_to, width)]
     return written("write_rows", (*parameters, "s", "rows"), lines, names)
 
 
-def _written(columns: int) -> int:
-    return columns // WIDTH * WIDTH
+def fixed_writer(declarations: Declarations) -> Callable[..., Any]:
+    """Return a compiled function (c, v, s, observers), which writes the fixed blocks of robots."""
+    names: dict[str, Any] = {"keep": _keep_block}
+    given, columns = _evaluation(declarations, ("c", "v"), names)
+    lines = []
+    for number, first in enumerate(first for first, fixed in _blocks(declarations) if fixed):
+        for k, field in enumerate(declarations):
+            if columns[k] < first + WIDTH and columns[k] + field.size > first:
+                lines += given[k]
+        lines.append(f"keep({_listed(first)}, {number}, s, observers)")
+    return written("keep_fixed", ("c", "v", "s", "observers"), lines, names)
+
+
+def _evaluation(
+    declarations: Declarations, parameters: tuple[str, ...], names: dict[str, Any]
+) -> tuple[list[list[str]], list[int]]:
+    """Return lines that compute the columns of each field, and the first of its columns.
+
+    Adds to ``names`` what the lines use.
+    """
+    names |= {"np": np, "eight": eight}
+    given, firsts, columns = [], [], 0
+    for k, field in enumerate(declarations):
+        names[f"field_{k}"] = field.function
+        parts = [f"column_{columns + q}" for q in range(field.size)]
+        arguments = "c" if field.subject == "setting" else ", ".join(parameters)
+        lines = [f"{', '.join(parts)} = field_{k}({arguments})"]
+        if field.subject == "setting":
+            lines += [f"{part} = eight(np.float32({part}))" for part in parts]
+        given.append(lines)
+        firsts.append(columns)
+        columns += field.size
+    return given, firsts
+
+
+def _blocks(declarations: Declarations) -> list[tuple[int, bool]]:
+    """Return the first column of each block of eight, and whether none of the eight changes.
+
+    The last block repeats columns rather than leaving more than ``_FEW``.
+    """
+    fixed = [d.fixed for d in declarations for _ in range(d.size)]
+    blocks: list[tuple[int, bool]] = []
+    for first in range(0, len(fixed) - WIDTH + 1, WIDTH):
+        may = sum(is_fixed for _, is_fixed in blocks) < FIXED_BLOCKS
+        blocks.append((first, may and all(fixed[first : first + WIDTH])))
+    if blocks and len(fixed) % WIDTH > _FEW:
+        blocks.append((len(fixed) - WIDTH, False))
+    return blocks
+
+
+def _listed(first: int) -> str:
+    return ", ".join(f"column_{first + q}" for q in range(WIDTH))
 
 
 def _block(first: int) -> str:
-    columns = ", ".join(f"column_{first + q}" for q in range(WIDTH))
-    return f"block({columns}, {first}, rows)"
+    return f"block({_listed(first)}, {first}, rows)"
 
 
 def empty_writer(declarations: Declarations) -> Callable[..., Any]:
@@ -128,6 +178,36 @@ def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
     if lane < rows.observers.number:
         o = rows.observations[world_of(rows.observers, lane), robot_of(rows.observers, lane)]
         store(o, _start(rows, lane) + first, row)
+
+
+@compiled
+def _copy_block(number: int, first: int, s: Any, rows: Rows) -> None:
+    """Write a fixed block, the first of its columns column ``first``."""
+    for lane in range(rows.observers.number):
+        world, robot = world_of(rows.observers, lane), robot_of(rows.observers, lane)
+        block = load(s.fixed, WIDTH * (FIXED_BLOCKS * robot + number))
+        store(rows.observations[world, robot], _start(rows, lane) + first, block)
+
+
+@compiled
+def _keep_block(
+    a: Lanes,
+    b: Lanes,
+    c: Lanes,
+    d: Lanes,
+    f: Lanes,
+    g: Lanes,
+    h: Lanes,
+    j: Lanes,
+    number: int,
+    s: Any,
+    observers: Observers,
+) -> None:
+    """Write a fixed block of robots to scratch memory."""
+    for lane, row in enumerate(transpose(a, b, c, d, f, g, h, j)):
+        if lane < observers.number:
+            robot = robot_of(observers, lane)
+            store(s.fixed, WIDTH * (FIXED_BLOCKS * robot + number), row)
 
 
 @compiled

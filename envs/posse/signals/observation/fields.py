@@ -63,6 +63,8 @@ class FieldDeclaration:
     unknown: float | None
     meaning: str
     function: Function
+    fixed: bool = False
+    """Whether its value for a robot never changes."""
 
     def of(self, scenario: Scenario) -> Field:
         """Return the field in a scenario.
@@ -104,6 +106,7 @@ def field(
     unknown: float | None = None,
     *,
     size: int = 1,
+    fixed: bool = False,
 ) -> Callable[[Function], Function]:
     """Declare a function as an observation field of its name; its docstring is the meaning.
 
@@ -113,6 +116,7 @@ def field(
         high: The greatest, likewise.
         unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
         size: Number of values that the function returns, as a tuple if more than one.
+        fixed: Its value for a robot never changes, as that of a setting.
 
     Raises:
         DeclarationError: The name is taken, the docstring is missing, or the parameters are not
@@ -129,7 +133,16 @@ def field(
         FIELDS.add(
             name,
             FieldDeclaration(
-                name, _SUBJECTS[count], size, unit, low, high, unknown, meaning, working
+                name,
+                _SUBJECTS[count],
+                size,
+                unit,
+                low,
+                high,
+                unknown,
+                meaning,
+                working,
+                fixed or count == 1,
             ),
             working,
         )

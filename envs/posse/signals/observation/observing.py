@@ -28,6 +28,17 @@ TOGETHER: Final = WIDTH
 _ZERO: Final = np.float32(0.0)
 
 
+@compiled(seldom=True)
+def lay_out_fixed(c: Record, worlds: WorldArrays, writers: Writers, s: Record) -> None:
+    """Write what never changes of each robot's observation, from world 0."""
+    n = natural(c.num_trackers)
+    for i in range(0, n, WIDTH):
+        observers = Observers(0, i, min(WIDTH, n - i), 0)
+        writers.fixed(c, view_of_trackers(c, worlds, observers, s), s, observers)
+    view = view_of_target(c, worlds.world[0], worlds.obstacle[0])
+    writers.fixed(c, view, s, Observers(0, n, 1, 0))
+
+
 @compiled
 def _observe_some(
     c: Record,

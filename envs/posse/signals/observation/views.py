@@ -21,12 +21,13 @@ from posse.numeric import (
     counts,
     eight,
     greater,
-    load,
+    load_fields,
     root,
+    transpose,
 )
 from posse.rules.contact import touches_surroundings
-from posse.rules.state import CONDITION, FIX, NEVER, POSE, WorldArrays
-from posse.signals.observation.columns import Observers, robot_of, world_of
+from posse.rules.state import CONDITION, FIX, NEVER, POSE, STEP, WorldArrays
+from posse.signals.observation.columns import Observers
 from posse.signals.observation.team import own_numbers, team_columns
 
 _ZERO: Final = np.float32(0.0)
@@ -164,27 +165,43 @@ def mate_heard(
 
 
 @compiled
+def _steps(world: Records, e: int, across: int) -> Lanes:
+    """Return the control steps of eight worlds from e on, or eight times that of world e."""
+    if across:
+        steps, _, _, _, _, _, _, _ = transpose(
+            load_fields(world[e], STEP),
+            load_fields(world[e + 1], STEP),
+            load_fields(world[e + 2], STEP),
+            load_fields(world[e + 3], STEP),
+            load_fields(world[e + 4], STEP),
+            load_fields(world[e + 5], STEP),
+            load_fields(world[e + 6], STEP),
+            load_fields(world[e + 7], STEP),
+        )
+        return counts(steps)
+    return eight(np.float32(world[e].step))
+
+
+@compiled
 def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
     """Return the view of eight trackers."""
-    e, i, count, across = observers
-    for lane in range(count):
-        to, who = world_of(observers, lane), robot_of(observers, lane)
-        s.step[lane] = np.float32(worlds.world[to].step)
-        s.fix_step[lane] = np.float32(worlds.tracker[to, who].fix_step)
+    e, i, _, across = observers
     own_x, own_y, hc, hs, speed, turn_rate, max_speed, max_turn_rate = team_columns(
         worlds.tracker, e, i, across, POSE
     )
     x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(
         worlds.tracker, e, i, across, FIX
     )
-    broken_at, _, _, _, sees, _, touching, _ = team_columns(worlds.tracker, e, i, across, CONDITION)
+    broken_at, _, _, sees, _, touching, _, fix_step = team_columns(
+        worlds.tracker, e, i, across, CONDITION
+    )
     working = choose(counts(broken_at) == np.float32(NEVER), _ONE, _ZERO)
-    dx, dy, fixed_at = x, y, load(s.fix_step, 0)
+    dx, dy, fixed_at = x, y, counts(fix_step)
     if c.fix_bearing == 0:
         dx, dy = x - own_x, y - own_y
     return View(
         own_numbers(i, across, s), own_x, own_y, hc, hs, speed, turn_rate,
-        counts(touching), working, load(s.step, 0),
+        counts(touching), working, _steps(worlds.world, e, across),
         max_speed, max_turn_rate,
         max_speed * c.per_acceleration, max_turn_rate * c.per_turn_acceleration,
         fixed_at >= _ZERO, counts(sees), fixed_at, dx, dy, root(dx * dx + dy * dy),
