@@ -27,6 +27,21 @@ from posse.numeric import choose
 def twice(c, v):
     \"\"\"Whether it moves, and the team's size.\"\"\"
     return choose(v.speed > 0.0, 1.0, -1.0), c.num_trackers
+
+
+@posse.field("1", low=0, high=40, size=20)
+def told(c):
+    \"\"\"Many settings.\"\"\"
+    return (
+        1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0,
+        11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, c.num_trackers, 20.0,
+    )
+
+
+@posse.field("m/s", low=-1, high=9, size=2, fixed=True)
+def limits(c, v):
+    \"\"\"What never changes of a robot.\"\"\"
+    return v.max_speed, v.number
 """
 PLAY = """
 import pickle
@@ -40,9 +55,9 @@ import twice
 import walls
 
 settings = dict(
-    extra_fields=("closing_speed", "wall_distance", "twice"), target_motion="agent",
+    extra_fields=("closing_speed", "wall_distance", "twice", "told", "limits"), target_motion="agent",
     reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
-    breaks=BREAKS, num_trackers=4,
+    breaks=BREAKS, num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
 )
 
 batch = posse.batch("obstacles", 11, own_kernel=OWN, **settings)
@@ -51,9 +66,9 @@ s, layout = batch.scenario, batch.layout
 plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": (), "reward_weights": {}})
 names = [field.name for field in layout.fields]
 assert [name for name in names if name not in {f.name for f in plain.layout.fields}] == [
-    "wall_distance", "twice", "closing_speed"
+    "wall_distance", "twice", "told", "limits", "closing_speed"
 ]
-assert names.index("twice") + 1 == names.index("sonar")
+assert names.index("limits") + 1 == names.index("sonar")
 assert names.index("closing_speed") + 1 == names.index("neighbour_message")
 low, high = layout.bounds()
 rng = np.random.default_rng(0)
@@ -63,6 +78,10 @@ for step in range(60):
     o, other = layout.views(observed), plain.layout.views(expected)
     for name, view in other.items():
         np.testing.assert_array_equal(o[name], view, err_msg=name)
+    assert (o["told"] == [*range(1, 19), 4, 20]).all()
+    assert (o["limits"][:, :4, 0] == np.float32(s.tracker_speeds)).all()
+    assert (o["limits"][:, 4, 0] == np.float32(s.target_speed)).all()
+    assert (o["limits"][:, :, 1] == [0, 1, 2, 3, -1]).all()
     for single, e in zip(singles, (0, 9)):
         np.testing.assert_array_equal(single[0], observed[e])
     assert ((observed >= low) & (observed <= high)).all()
