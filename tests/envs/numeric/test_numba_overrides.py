@@ -16,15 +16,16 @@ from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder,
 from numba.extending import overload
 
 from posse.numeric import UNCOMPILED, compiled, kernel
-from posse.numeric.compiler import numba_overrides
+from posse.numeric.compiler import kernel_cache, numba_overrides
 
 Floats = npt.NDArray[np.float64]
 
 OURS = [
     each
-    for each in vars(numba_overrides).values()
+    for module in (numba_overrides, kernel_cache)
+    for each in vars(module).values()
     if inspect.isclass(each)
-    and each.__module__ == numba_overrides.__name__
+    and each.__module__ == module.__name__
     and any(base.__module__.startswith("numba.") for base in each.__mro__)
 ]
 ADDED = {"__init__", "_name"}
