@@ -147,6 +147,7 @@ def play(folder: Path, own_kernel: bool, breaks: int, **changed: str) -> tuple[s
     return done.stdout, done.stderr
 
 
+@pytest.mark.long
 def test_the_examples_are_part_of_the_kernel(tmp_path: Path) -> None:
     """Of that of any scenario, which is also that of the environments and kept on disk."""
     for breaks in (0, 1):
