@@ -113,7 +113,7 @@ def test_a_function_inside_a_kernel_becomes_no_machine_code_of_its_own() -> None
     assert half(8.0) == 4.0, "Python can call it all the same"
 
 
-NOTHING = None
+NOTHING: Any = None
 
 
 def test_inlined_functions_may_hold_inner_functions_and_branches_of_other_types() -> None:
