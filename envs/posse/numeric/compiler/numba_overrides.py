@@ -1,16 +1,16 @@
 """How numba is made to compile: every private part that is overridden, and what it gains.
 
 =========================== ======================================================================
-``_InnerLibrary``           Functions are optimised only as parts of kernels: 17 s less.
-``_InnerDispatcher``        Functions are compiled once for integers of all values: 5 s less.
-``_PASSES``                 Inlined functions skip passes that change nothing in them: 3 s less.
-``_remembering``            What an operator returns for given types is found once: 5 s less.
+``_InnerLibrary``           Functions are optimised only as parts of kernels: cold start.
+``_InnerDispatcher``        Functions are compiled once for integers of all values: cold start.
+``_PASSES``                 Inlined functions skip passes that change nothing in them: cold start.
+``_remembering``            What an operator returns for given types is found once: cold start.
 ``_Library``                With :mod:`.llvm_hints`: speed 1.00, else 0.91 to 1.00.
-``_KernelLibrary``          No short loop is vectorised: 1.00, else 0.92 to 1.00; 2 s less.
+``_KernelLibrary``          No short loop is vectorised: 1.00, else 0.92 to 1.00; cold start.
 ``noalias``                 LLVM may assume that arrays do not overlap: 1.00, else 0.93 to 1.00.
 =========================== ======================================================================
 
-Seconds of processor time, of 25 to a first uncached step of ``smart``. A test checks numba for it.
+Cold start: first step of ``smart``, no cached kernels. A test checks that numba has all of this.
 """
 
 from __future__ import annotations
