@@ -55,7 +55,8 @@ import twice
 import walls
 
 settings = dict(
-    extra_fields=("closing_speed", "wall_distance", "twice", "told", "limits"), target_motion="agent",
+    extra_fields=("closing_speed", "wall_distance", "twice", "told", "limits"),
+    target_motion="agent",
     reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
     breaks=BREAKS, num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
 )
