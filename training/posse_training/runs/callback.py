@@ -16,7 +16,7 @@ from posse_baselines.learned import LearnedPolicy
 from posse_baselines.learned.policy_file import write_atomically
 from posse_training.errors import CheckpointError, DivergedError
 from posse_training.runs.display import Display
-from posse_training.runs.models import make_adviser, noise_scale
+from posse_training.runs.models import make_adviser
 from posse_training.runs.saved.checkpoint import Arrays, write_checkpoint
 from posse_training.runs.saved.curve import Point, as_csv, best_of, read_points
 from posse_training.runs.saved.export import export, make_card
@@ -136,7 +136,7 @@ class TrainingCallback(BaseCallback):
         share = min(1.0, self.model.num_timesteps / s.steps)
         limit = s.log_deviation + share * (s.final_log_deviation - s.log_deviation)
         with torch.no_grad():
-            cast("ActorCriticPolicy", policy).log_std.clamp_(max=noise_scale(s, limit))
+            cast("ActorCriticPolicy", policy).log_std.clamp_(max=limit)
 
     def _check_finite(self) -> None:
         """Raise before numbers that are not finite are evaluated or saved.

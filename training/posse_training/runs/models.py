@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any, Final
 
@@ -85,8 +84,6 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
         network |= {"lstm_hidden_size": s.lstm_size}
         # Whole rollouts of so many slots.
         rows = s.rollout * even_minibatch(env.num_envs, max(1, s.minibatch // s.rollout))
-    if s.hold_noise:
-        kind = partial(kind, use_sde=True, sde_sample_freq=s.hold_noise)
     model: BaseAlgorithm = kind(
         env,
         learning_rate=_LearningRate(s),
@@ -98,7 +95,7 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
         clip_range=s.clip,
         ent_coef=s.entropy,
         vf_coef=s.value_weight,
-        policy_kwargs={**network, "log_std_init": noise_scale(s, s.log_deviation)},
+        policy_kwargs={**network, "log_std_init": s.log_deviation},
         stats_window_size=500,
         seed=s.seed,
         device="cpu",
@@ -108,14 +105,6 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
         policy: Any = model.policy
         nn.init.zeros_(policy.action_net.weight)
     return model
-
-
-def noise_scale(s: TrainSettings, log_deviation: float) -> float:
-    """Return the networks' noise parameter at which actions deviate by at most ``log_deviation``.
-
-    Held noise is a random linear function of the last hidden layer, whose numbers lie in [-1, 1].
-    """
-    return log_deviation - 0.5 * math.log(s.hidden[-1]) if s.hold_noise else log_deviation
 
 
 def _off_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> BaseAlgorithm:

@@ -26,7 +26,6 @@ _INTEGERS: Final = {
     "minibatch": (2, 10**9),
     "rollout": (1, 10**6),
     "lstm_size": (1, _WIDEST),
-    "hold_noise": (0, 10**6),
     "epochs": (1, 1000),
     "replay": (1, 10**9),
     "learning_starts": (0, 10**12),

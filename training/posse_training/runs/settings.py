@@ -102,9 +102,6 @@ class TrainSettings:
     """Logarithm of the actions' standard deviation at the start."""
     final_log_deviation: float | None = None
     """Upper limit of that logarithm at the end; it falls linearly. Default: no limit."""
-    hold_noise: int = 0
-    """ppo and mappo: control steps for which a tracker's exploration keeps its direction, by noise
-    that is a function of the network's state (gSDE). 0: new noise in each step."""
 
     # sac and td3
     replay: int = 400_000
