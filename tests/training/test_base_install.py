@@ -60,13 +60,18 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     assert "pip install 'posse[training]'" in done.stderr.splitlines()[-1]
 
 
+COMPARE = [
+    "compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0",
+]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
         ["scenarios"],
         ["train", "--help"],
         ["ship", "--help"],
-        ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0"],
+        pytest.param(COMPARE, marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"],

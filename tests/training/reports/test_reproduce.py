@@ -65,6 +65,7 @@ def test_the_shown_run_is_the_median_one() -> None:
     assert median_world(np.array([np.nan, np.nan])) == 0
 
 
+@pytest.mark.long
 def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
     rows = reproduce(Settings(out=tmp_path, starts=8))
     written = json.loads((tmp_path / "settling.json").read_text())
