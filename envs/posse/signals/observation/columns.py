@@ -64,20 +64,21 @@ def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Calla
     names: dict[str, Any] = {"block": _write_block, "copy": _copy_block, "one": _write_column}
     blocks = _blocks(declarations)
     given, columns = _evaluation(declarations, parameters, names)
-    done = {first for first, fixed in blocks if fixed}
-    lines, written_up_to = [], 0
+    copied = {q for b in blocks if b.number is not None for q in range(b.first, b.first + WIDTH)}
+    lines: list[str] = []
+    rest = blocks[-1].first + WIDTH if blocks else 0
     for k, field in enumerate(declarations):
         mine = range(columns[k], columns[k] + field.size)
-        if not all(any(first <= q < first + WIDTH for first in done) for q in mine):
+        if not copied.issuperset(mine):
             lines += given[k]
         # As soon as there are eight, so that few have to be kept at a time.
-        while blocks and blocks[0][0] + WIDTH <= mine.stop:
-            first, fixed = blocks.pop(0)
-            number = sorted(done).index(first) if fixed else 0
-            lines.append(f"copy({number}, {first}, s, rows)" if fixed else _block(first))
-            written_up_to = first + WIDTH
-    width = width_of(declarations)
-    lines += [f"one(column_{q}, {q}, s, rows)" for q in range(written_up_to, width)]
+        while blocks and blocks[0].first + WIDTH <= mine.stop:
+            first, number = blocks.pop(0)
+            if number is None:
+                lines.append(f"block({_listed(first)}, {first}, rows)")
+            else:
+                lines.append(f"copy({number}, {first}, s, rows)")
+    lines += [f"one(column_{q}, {q}, s, rows)" for q in range(rest, width_of(declarations))]
     return written("write_rows", (*parameters, "s", "rows"), lines, names)
 
 
@@ -86,11 +87,12 @@ def fixed_writer(declarations: Declarations) -> Callable[..., Any]:
     names: dict[str, Any] = {"keep": _keep_block}
     given, columns = _evaluation(declarations, ("c", "v"), names)
     lines = []
-    for number, first in enumerate(first for first, fixed in _blocks(declarations) if fixed):
-        for k, field in enumerate(declarations):
-            if columns[k] < first + WIDTH and columns[k] + field.size > first:
-                lines += given[k]
-        lines.append(f"keep({_listed(first)}, {number}, s, observers)")
+    for first, number in _blocks(declarations):
+        if number is not None:
+            for k, field in enumerate(declarations):
+                if columns[k] < first + WIDTH and columns[k] + field.size > first:
+                    lines += given[k]
+            lines.append(f"keep({_listed(first)}, {number}, s, observers)")
     return written("keep_fixed", ("c", "v", "s", "observers"), lines, names)
 
 
@@ -116,27 +118,31 @@ def _evaluation(
     return given, firsts
 
 
-def _blocks(declarations: Declarations) -> list[tuple[int, bool]]:
-    """Return the first column of each block of eight, and whether none of the eight changes.
+class _Block(NamedTuple):
+    """Eight columns."""
 
-    The last block repeats columns rather than leaving more than ``_FEW``.
-    """
+    first: int
+    number: int | None
+    """Among the blocks that never change; None: it may change."""
+
+
+def _blocks(declarations: Declarations) -> list[_Block]:
+    """Return the blocks of columns; the last one repeats some rather than leave over ``_FEW``."""
     fixed = [d.fixed for d in declarations for _ in range(d.size)]
-    blocks: list[tuple[int, bool]] = []
+    blocks: list[_Block] = []
+    count = 0
     for first in range(0, len(fixed) - WIDTH + 1, WIDTH):
-        may = sum(is_fixed for _, is_fixed in blocks) < FIXED_BLOCKS
-        blocks.append((first, may and all(fixed[first : first + WIDTH])))
-    if blocks and len(fixed) % WIDTH > _FEW:
-        blocks.append((len(fixed) - WIDTH, False))
+        kept = count < FIXED_BLOCKS and all(fixed[first : first + WIDTH])
+        blocks.append(_Block(first, count if kept else None))
+        count += kept
+    # Columns of a block that never changes are not at hand to be repeated.
+    if blocks and blocks[-1].number is None and len(fixed) % WIDTH > _FEW:
+        blocks.append(_Block(len(fixed) - WIDTH, None))
     return blocks
 
 
 def _listed(first: int) -> str:
     return ", ".join(f"column_{first + q}" for q in range(WIDTH))
-
-
-def _block(first: int) -> str:
-    return f"block({_listed(first)}, {first}, rows)"
 
 
 def empty_writer(declarations: Declarations) -> Callable[..., Any]:
