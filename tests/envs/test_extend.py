@@ -265,6 +265,9 @@ def assert_named(done: subprocess.CompletedProcess[str], kind: str, message: str
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith(f"posse.registry.DeclarationError: {kind} "), last
     assert re.search(message, last), last
+    assert "compiling kernels" not in done.stderr, (
+        "a mistake is found before the kernel is compiled"
+    )
 
 
 UNKNOWN = {
