@@ -94,12 +94,13 @@ STYLES: Final[dict[str, Style]] = {
     "learned-field": Style(PURPLE, "<"),
     "learned-search": Style(PURPLE, (6, 1, 0), _DASHED),
     "learned-leader-loss": Style(GREEN, (3, 1, 0)),
+    "learned-duel": Style(ORANGE, (8, 1, 0), _DASHED),
     "learned-generalist": Style(RED, "*", _DASHED),
 }
 _OTHERS: Final = tuple(
     Style(colour, marker, line)
     for marker, line in (
-        (">", _SOLID), ((4, 1, 0), _DASHED), ((6, 2, 0), _SHORT), ((8, 1, 0), _DASH_DOT),
+        (">", _SOLID), ((4, 1, 0), _DASHED), ((6, 2, 0), _SHORT), ((7, 1, 0), _DASH_DOT),
         ("|", _SOLID), ((5, 0, 180), _DASHED), ((4, 1, 45), _SHORT), (".", _DOTTED),
     )
     for colour in (RED, GREEN, ORANGE, PURPLE)
