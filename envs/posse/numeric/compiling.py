@@ -18,8 +18,7 @@ import numba
 import numpy as np
 
 import posse.numeric.simd.lane_code  # noqa: F401 (registers lanes with numba)
-from posse.numeric.compiler.kernel_cache import KernelCache
-from posse.numeric.compiler.numba_overrides import CompiledFunction, KernelCompiler
+from posse.numeric.compiler.numba_overrides import CompiledFunction, KernelCache, KernelCompiler
 from posse.numeric.compiler.stamps import remember
 
 F = TypeVar("F", bound=Callable[..., Any])

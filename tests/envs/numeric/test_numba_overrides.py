@@ -16,16 +16,15 @@ from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder,
 from numba.extending import overload
 
 from posse.numeric import UNCOMPILED, compiled, kernel
-from posse.numeric.compiler import kernel_cache, numba_overrides
+from posse.numeric.compiler import numba_overrides
 
 Floats = npt.NDArray[np.float64]
 
 OURS = [
     each
-    for module in (numba_overrides, kernel_cache)
-    for each in vars(module).values()
+    for each in vars(numba_overrides).values()
     if inspect.isclass(each)
-    and each.__module__ == module.__name__
+    and each.__module__ == numba_overrides.__name__
     and any(base.__module__.startswith("numba.") for base in each.__mro__)
 ]
 ADDED = {"__init__", "_name"}
@@ -111,54 +110,6 @@ def test_a_function_inside_a_kernel_becomes_no_machine_code_of_its_own() -> None
     assert engine.is_symbol_defined(outer.fndesc.llvm_func_name)
     assert not engine.is_symbol_defined(inner.fndesc.llvm_func_name)
     assert half(8.0) == 4.0, "Python can call it all the same"
-
-
-NOTHING: Any = None
-
-
-def test_inlined_functions_may_hold_inner_functions_and_branches_of_other_types() -> None:
-    """numba needs passes for these that most functions skip."""
-
-    @compiled
-    def with_inner(x: float) -> float:
-        def double(y: float) -> float:
-            return y + y
-
-        return double(x)
-
-    @compiled
-    def with_branch(x: float) -> float:
-        return x if NOTHING is None else NOTHING.no_such_name
-
-    @kernel
-    def both(x: float) -> float:
-        return with_inner(x) + with_branch(x) + bool(x)
-
-    assert both(2.0) == 7.0
-
-
-def test_a_function_called_from_two_others_is_linked_once() -> None:
-    @compiled
-    def shared(x: float) -> float:
-        return x + 1.0
-
-    @compiled
-    def left(x: float) -> float:
-        return shared(x)
-
-    @compiled
-    def right(x: float) -> float:
-        return 2.0 * shared(x)
-
-    @kernel
-    def both(x: float) -> float:
-        return left(x) + right(x)
-
-    assert both(1.0) == 6.0
-    (form,) = both.overloads.values()  # type: ignore[attr-defined]
-    linked = form.library._linking_libraries
-    (used,) = shared.inner.overloads.values()  # type: ignore[attr-defined]
-    assert linked.count(used.library) == 1
 
 
 def test_no_garbage_is_collected_while_a_kernel_is_compiled() -> None:

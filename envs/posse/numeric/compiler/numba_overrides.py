@@ -1,13 +1,16 @@
-"""How numba is made to compile: every private part that is overridden, and what it gains.
+"""Every use of numba's private parts, and what each one gains.
 
 =========================== ======================================================================
-``_InnerLibrary``           Functions are optimised only as parts of kernels: cold start.
-``_InnerDispatcher``        Functions are compiled once for integers of all values: cold start.
-``_PASSES``                 Inlined functions skip passes that change nothing in them: cold start.
-``_remembering``            What an operator returns for given types is found once: cold start.
-``_Library``                With :mod:`.llvm_hints`: speed 1.00, else 0.91 to 1.00.
-``_KernelLibrary``          No short loop is vectorised: 1.00, else 0.92 to 1.00; cold start.
+``_InnerLibrary``           A function inlined into a kernel becomes machine code only as a part of
+                            the kernel, not separately as well: cold start 14 s, else 20 s.
+``_InnerDispatcher``        A function is compiled once for all integers that it is called with,
+                            not for each constant and each width: cold start 14 s, else 19 s.
+``_Library``                Loops of unknown length are not unrolled, and rarely called functions
+                            not inlined (:mod:`.llvm_hints`): speed 1.00, else 0.91 to 1.00.
+``_KernelLibrary``          Adjacent operations are vectorised, short loops are not; one round of
+                            LLVM's passes, not two: 1.00, else 0.92 to 1.00; cold start 2 s less.
 ``noalias``                 LLVM may assume that arrays do not overlap: 1.00, else 0.93 to 1.00.
+``KernelCache``             Warm start 0.6 s; numba's own cache goes stale and reads damaged files.
 =========================== ======================================================================
 
 Cold start: first step of ``smart``, no cached kernels. A test checks that numba has all of this.
@@ -15,68 +18,47 @@ Cold start: first step of ``smart``, no cached kernels. A test checks that numba
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import pickle
 from collections.abc import Callable
-from types import CodeType, SimpleNamespace
-from typing import Any, Final
+from types import SimpleNamespace
+from typing import Any
 
-from numba.core import typed_passes as typed
-from numba.core import untyped_passes as untyped
+from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
 
-from posse.numeric.compiler import collector, llvm_hints
+from posse.numeric.compiler import collector, kernel_files
 from posse.numeric.compiler.function_type import FunctionType, widest
-
-_PASSES: Final = (
-    untyped.TranslateByteCode, untyped.FixupArgs, untyped.IRProcessing, untyped.DeadBranchPrune,
-    untyped.GenericRewrites, untyped.ReconstructSSA, typed.NopythonTypeInference,
-    typed.PreLowerStripPhis, typed.InlineOverloads, typed.NativeLowering, typed.NoPythonBackend,
-)  # fmt: skip
+from posse.numeric.compiler.llvm_hints import forbid_runtime_unrolling, keep_out_of_line
+from posse.numeric.compiler.stamps import Stamp
 
 
 class _Library(JITCodeLibrary):
-    """LLVM code with hints, and of everything that it calls."""
+    """LLVM code with hints."""
 
     def add_ir_module(self, ir_module: Any) -> None:
-        llvm_hints.forbid_runtime_unrolling(ir_module)
-        llvm_hints.keep_out_of_line(ir_module)
+        forbid_runtime_unrolling(ir_module)
+        keep_out_of_line(ir_module)
         super().add_ir_module(ir_module)
-
-    def add_linking_library(self, library: Any) -> None:
-        if library not in self._linking_libraries:
-            super().add_linking_library(library)
-            for each in library._linking_libraries if isinstance(library, _InnerLibrary) else ():
-                self.add_linking_library(each)
 
 
 class _InnerLibrary(_Library):
-    """LLVM code of one function, not optimised, without what it calls."""
+    """LLVM code that is only linked into kernels, where it is optimised."""
 
-    def add_llvm_module(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-        for function in ll_module.functions:
-            if not function.is_declaration:
-                function.linkage = "linkonce_odr"  # a kernel drops what it has inlined
-        self._final_module = ll_module
+    def _optimize_final_module(self) -> None:
+        pass
 
-    def add_linking_library(self, library: Any) -> None:
-        self._linking_libraries.append(library)
-
-    def finalize(self) -> None:
-        self._finalized = True
+    def _finalize_final_module(self) -> None:
+        self._finalized = True  # without LLVM's engine, which would generate machine code
 
     @property
     def codegen(self) -> Any:
         # numba would register the function's globals here, which requires machine code.
         return SimpleNamespace(set_env=lambda name, environment: None)
-
-
-class _KernelLibrary(_Library):
-    def _optimize_final_module(self) -> None:
-        manager = self._codegen._module_pass_manager
-        passes, builder = manager(loop_vectorize=False, slp_vectorize=True)
-        passes.run(self._final_module, builder)
 
 
 class _Compiler(CompilerBase):
@@ -94,24 +76,12 @@ class _Compiler(CompilerBase):
 class _InnerCompiler(_Compiler):
     library = _InnerLibrary
 
-    def define_pipelines(self) -> list[Any]:
-        (manager,) = super().define_pipelines()
-        if not any(isinstance(each, CodeType) for each in self.state.func_id.code.co_consts):
-            manager.passes = [(each, each.__name__) for each in _PASSES]
-            manager.finalize()
-        return [manager]
 
-
-def _remembering(resolve: Callable[..., Any]) -> Callable[..., Any]:
-    found: dict[Any, Any] = {}
-
-    def look_up(function: Any, args: Any, kws: Any) -> Any:
-        if kws or isinstance(function, str):  # "static_getitem" takes values, not types
-            return resolve(function, args, kws)
-        key = function, tuple(args)
-        return found[key] if key in found else found.setdefault(key, resolve(*key, kws))
-
-    return look_up
+class _KernelLibrary(_Library):
+    def _optimize_final_module(self) -> None:
+        manager = self._codegen._module_pass_manager
+        passes, builder = manager(loop_vectorize=False, slp_vectorize=True)
+        passes.run(self._final_module, builder)
 
 
 class KernelCompiler(_Compiler):
@@ -119,15 +89,12 @@ class KernelCompiler(_Compiler):
 
     library = _KernelLibrary
 
-    @collector.paused()  # numba's many live objects would be traversed again and again
-    def compile_extra(self, func: Any) -> Any:  # noqa: D102 (numba's)
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
         self.state.flags.noalias = True
-        types = self.state.typingctx
-        types.resolve_function_type = _remembering(resolve := types.resolve_function_type)
-        try:
-            return super().compile_extra(func)
-        finally:
-            types.resolve_function_type = resolve
+
+    # numba's many live objects would be traversed again and again.
+    compile_extra = collector.paused()(CompilerBase.compile_extra)
 
 
 class CompiledFunction(CPUDispatcher):
@@ -147,3 +114,35 @@ class _InnerDispatcher(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
         named = {name: widest(kind) for name, kind in kws.items()}
         return super().get_call_template(tuple(map(widest, args)), named)
+
+
+class KernelCache(NullCache):
+    """Cache in which numba looks a kernel up before compiling, and stores it afterwards."""
+
+    def __init__(self, *stamped: Any) -> None:
+        self._stamped = stamped
+        self.before_compiling: Callable[[], None] = lambda: None
+
+    @functools.cached_property
+    def _stamp(self) -> Stamp:
+        return Stamp(*self._stamped)  # lazily: a kernel may call functions defined below it
+
+    def _name(self, sig: Any, codegen: Any) -> str:
+        return self._stamp.hexdigest(str(sig), *map(str, codegen.magic_tuple()))
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return a kernel for these types, or None."""
+        with contextlib.suppress(Exception):  # after any error, compile
+            kept = kernel_files.read(self._name(sig, target_context.codegen()))
+            signature, parts = pickle.loads(kept) if kept is not None else (None, ())  # noqa: S301
+            if signature == sig:
+                return CompileResult._rebuild(target_context, *parts)
+        self.before_compiling()
+        kernel_files.announce()
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store a kernel for these types."""
+        with contextlib.suppress(Exception):
+            if self._stamp.holds() and not data.library.has_dynamic_globals:
+                kernel_files.write(self._name(sig, data.codegen), dumps((sig, data._reduce())))
