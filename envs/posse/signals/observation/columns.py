@@ -84,7 +84,7 @@ def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Calla
 
 def fixed_writer(declarations: Declarations) -> Callable[..., Any]:
     """Return a compiled function (c, v, s, observers), which writes the fixed blocks of robots."""
-    names: dict[str, Any] = {"keep": _keep_block}
+    names: dict[str, Any] = {"keep": _keep_block, "transpose": transpose}
     given, columns = _evaluation(declarations, ("c", "v"), names)
     lines = []
     for first, number in _blocks(declarations):
@@ -92,7 +92,7 @@ def fixed_writer(declarations: Declarations) -> Callable[..., Any]:
             for k, field in enumerate(declarations):
                 if columns[k] < first + WIDTH and columns[k] + field.size > first:
                     lines += given[k]
-            lines.append(f"keep({_listed(first)}, {number}, s, observers)")
+            lines.append(f"keep(transpose({_listed(first)}), {number}, s, observers)")
     return written("keep_fixed", ("c", "v", "s", "observers"), lines, names)
 
 
@@ -196,21 +196,9 @@ def _copy_block(number: int, first: int, s: Any, rows: Rows) -> None:
 
 
 @compiled
-def _keep_block(
-    a: Lanes,
-    b: Lanes,
-    c: Lanes,
-    d: Lanes,
-    f: Lanes,
-    g: Lanes,
-    h: Lanes,
-    j: Lanes,
-    number: int,
-    s: Any,
-    observers: Observers,
-) -> None:
-    """Write a fixed block of robots to scratch memory."""
-    for lane, row in enumerate(transpose(a, b, c, d, f, g, h, j)):
+def _keep_block(block: tuple[Lanes, ...], number: int, s: Any, observers: Observers) -> None:
+    """Write a fixed block, eight numbers for each robot, to scratch memory."""
+    for lane, row in enumerate(block):
         if lane < observers.number:
             robot = robot_of(observers, lane)
             store(s.fixed, WIDTH * (FIXED_BLOCKS * robot + number), row)
