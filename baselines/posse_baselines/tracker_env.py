@@ -119,7 +119,7 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         over = world.advance()
         self._observations = world.observations[None].copy()  # policies may keep observations
         info: dict[str, Any] = {
-            "score": world.score,
+            "score": world.score(),
             "reward_terms": world.name_terms(*world.terms[self.number].tolist()),
             "metrics": world.no_metrics.copy(),
             "working": bool(world.working()[self.number]),

@@ -143,14 +143,16 @@ class TeamEnv(OneAgentEnv):
         world.actions.by_row(action)
         over = world.advance()
         info: dict[str, Any] = {
-            "score": world.score,
+            "score": world.score(),
             # An array by rows already; name_terms(*rows) would take longer.
             "reward_terms": dict(zip(world.batch.term_names, world.terms.T.copy())),  # noqa: B905
             "metrics": world.no_metrics.copy(),
         }
         if self._breakable:
             info["working"] = world.working()
-        terminated, truncated, info = self._end(over, info)
+        terminated = truncated = False
+        if over or self._flat_infos or self.render_mode is not None:
+            terminated, truncated, info = self._end(over, info)
         rewards = world.rewards.tolist()
         return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
 
@@ -215,7 +217,7 @@ class SoloEnv(TeamEnv):
         world.actions.by_agent({"tracker_0": action})
         over = world.advance()
         info: dict[str, Any] = {
-            "score": world.score,
+            "score": world.score(),
             "reward_terms": world.name_terms(*world.terms[0].tolist()),
             "metrics": world.no_metrics.copy(),
         }

@@ -183,7 +183,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             world.check_running()
         world.actions.by_agent(actions)
         over = world.advance()
-        score, name_terms, metrics = world.score, world.name_terms, world.no_metrics.copy()
+        score, name_terms, metrics = world.score(), world.name_terms, world.no_metrics.copy()
         infos: _Infos = {
             agent: {"score": score, "reward_terms": name_terms(*values), "metrics": metrics}
             # No strict=True: equal lengths, in the hot path.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -44,6 +44,7 @@ class SingleWorld:
         actions: Reader of the actions for :attr:`advance`.
         advance: Performs a control step with the last actions read; returns 1 at the end of the
             episode, after which :meth:`end` must be called.
+        score: Returns the score of the current step.
         observations: (rows, F) of the last step; the next one overwrites them.
         rewards: (rows,) of the last step, likewise.
         no_metrics: Every metric by name, all 0: those of a step that does not end the episode.
@@ -89,7 +90,7 @@ class SingleWorld:
 
     def _prepare(self) -> None:
         # Created once: creating a view takes longer than reading it.
-        self._score = self.batch.worlds["score"]
+        self.score: Callable[[], float] = self.batch.worlds["score"].item
         self.name_terms = namer(self.batch.term_names)
         rows = self.batch.observation_shape[:2]
         acting = agent_names(self.scenario)[: rows[1]]
@@ -106,7 +107,7 @@ class SingleWorld:
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (
-            "_score",
+            "score",
             "name_terms",
             "actions",
             "_written",
@@ -126,12 +127,6 @@ class SingleWorld:
     def no_terms(self) -> dict[str, float]:
         """Reward terms by name, all 0: those of a reset."""
         return dict.fromkeys(self.batch.term_names, 0.0)
-
-    @property
-    def score(self) -> float:
-        """Score of the current step."""
-        score: float = self._score.item()
-        return score
 
     @property
     def state_layout(self) -> StateLayout:

@@ -11,8 +11,11 @@ import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
+from llvmlite.binding import ModuleRef
 from numba.core.codegen import JITCPUCodegen
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, Flags
+from numba.core.compiler_machinery import PassManager
+from numba.core.typing.context import BaseContext
 from numba.extending import overload
 
 from posse.numeric import UNCOMPILED, compiled, kernel
@@ -27,7 +30,7 @@ OURS = [
     and each.__module__ == numba_overrides.__name__
     and any(base.__module__.startswith("numba.") for base in each.__mro__)
 ]
-ADDED = {"__init__", "_name"}
+ADDED = {"__init__"}
 OVERRIDES = [
     (each, name)
     for each in OURS
@@ -41,6 +44,8 @@ CALLED = [
     (CompileResult, "_rebuild"),
     (JITCPUCodegen, "magic_tuple"),
     (JITCPUCodegen, "_module_pass_manager"),
+    (BaseContext, "resolve_function_type"),
+    (ModuleRef, "link_in"),
     (Flags, "noalias"),
     (Flags, "forceinline"),
 ]
@@ -69,6 +74,24 @@ def test_numba_still_has_what_is_overridden(ours: type, name: str) -> None:
         f"{ours.__name__} overrides: see {numba_overrides.__name__} for what it buys, and drop it "
         "or follow numba"
     )
+
+
+def test_numba_still_has_the_passes_that_are_skipped() -> None:
+    ran: list[str] = []
+
+    def listed(manager: Any, index: int, each: Any, state: Any) -> None:
+        ran.append(each.name())
+        run(manager, index, each, state)
+
+    run = PassManager._runPass
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PassManager, "_runPass", listed)
+        numba.njit(lambda x: x)(1.0)
+        assert {"ir_legalization", "nopython_rewrites"} < set(ran), "numba renamed a pass"
+        ran.clear()
+        kernel(lambda x: x)(1.0)
+        assert not {"ir_legalization", "nopython_rewrites"} & set(ran)
+        assert "native_lowering" in ran
 
 
 @pytest.mark.parametrize(("theirs", "name"), CALLED)
@@ -110,6 +133,81 @@ def test_a_function_inside_a_kernel_becomes_no_machine_code_of_its_own() -> None
     assert engine.is_symbol_defined(outer.fndesc.llvm_func_name)
     assert not engine.is_symbol_defined(inner.fndesc.llvm_func_name)
     assert half(8.0) == 4.0, "Python can call it all the same"
+
+
+NOTHING: Any = None
+
+
+def test_a_function_may_hold_inner_functions_and_branches_of_other_types() -> None:
+    """With fewer of numba's passes than usual."""
+
+    @compiled
+    def with_inner(x: float) -> float:
+        def double(y: float) -> float:
+            return y + y
+
+        return double(x)
+
+    @compiled
+    def with_branch(x: float) -> float:
+        return x if NOTHING is None else NOTHING.no_such_name
+
+    @kernel
+    def both(x: float) -> float:
+        return with_inner(x) + with_branch(x) + bool(x)
+
+    assert both(2.0) == 7.0
+
+
+@pytest.mark.parametrize(
+    "decorate", [kernel, compiled, numba.njit], ids=["kernel", "compiled", "njit"]
+)
+def test_a_function_is_linked_with_all_that_it_calls(decorate: Any) -> None:
+    """Also where numba itself links, in functions of a user and those called from Python."""
+
+    @compiled
+    def lowest(x: float) -> float:
+        return x + 1.0
+
+    @compiled
+    def left(x: float) -> float:
+        return lowest(x) * max(x, 2.0)
+
+    @compiled(seldom=True)
+    def right(x: float) -> float:
+        return 2.0 * lowest(x)
+
+    @compiled
+    def middle(x: float) -> float:
+        return left(x) + right(x)
+
+    def both(x: float) -> float:
+        return middle(x) - left(x)
+
+    outer = decorate(both)
+    assert outer(1.0) == 4.0
+    assert middle(1.0) == 8.0, "inner functions can be called from Python, too"
+    if decorate is kernel:
+        (form,) = outer.overloads.values()
+        (used,) = lowest.inner.overloads.values()  # type: ignore[attr-defined]
+        assert list(form.library.inlined).count(used.library) == 1
+
+
+def test_a_wrong_call_is_refused_each_time() -> None:
+    """What numba has found for a call is kept; an error is not."""
+
+    @compiled
+    def half(x: float) -> float:
+        return 0.5 * x
+
+    @kernel
+    def wrong(x: float) -> float:
+        return half(x, x)  # type: ignore[call-arg]
+
+    for _ in range(2):
+        with pytest.raises(numba.TypingError, match="half"):
+            wrong(1.0)
+    assert half(3.0) == 1.5
 
 
 def test_no_garbage_is_collected_while_a_kernel_is_compiled() -> None:

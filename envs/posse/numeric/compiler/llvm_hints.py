@@ -5,6 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 
+def add_hints(module: Any) -> None:
+    """Add all hints to a module."""
+    forbid_runtime_unrolling(module)
+    keep_out_of_line(module)
+
+
 def forbid_runtime_unrolling(module: Any) -> None:
     """Mark every loop, so that LLVM does not unroll those of unknown length.
 
@@ -32,3 +38,10 @@ def keep_out_of_line(module: Any) -> None:
     for function in module.functions:
         if function.blocks and "alwaysinline" not in function.attributes:
             function.attributes.add("noinline")
+
+
+def drop_if_inlined(module: Any) -> None:
+    """Let LLVM drop the functions of a parsed module wherever all their calls are inlined."""
+    for function in module.functions:
+        if not function.is_declaration:
+            function.linkage = "linkonce_odr"

@@ -1,26 +1,21 @@
 """Every use of numba's private parts, and what each one gains.
 
-=========================== ======================================================================
-``_InnerLibrary``           A function inlined into a kernel becomes machine code only as a part of
-                            the kernel, not separately as well: cold start 14 s, else 20 s.
-``_InnerDispatcher``        A function is compiled once for all integers that it is called with,
-                            not for each constant and each width: cold start 14 s, else 19 s.
-``_Library``                Loops of unknown length are not unrolled, and rarely called functions
-                            not inlined (:mod:`.llvm_hints`): speed 1.00, else 0.91 to 1.00.
-``_KernelLibrary``          Adjacent operations are vectorised, short loops are not; one round of
-                            LLVM's passes, not two: 1.00, else 0.92 to 1.00; cold start 2 s less.
-``noalias``                 LLVM may assume that arrays do not overlap: 1.00, else 0.93 to 1.00.
-``KernelCache``             Warm start 0.6 s; numba's own cache goes stale and reads damaged files.
-=========================== ======================================================================
+==================== ===============================================================================
+``_InnerLibrary``    A function inlined into a kernel is optimised only there: 16 s less.
+``_Library``         It is linked once: 2 s less. With :mod:`.llvm_hints`: 1.00, else 0.91.
+``skipped``          Passes that change nothing in our functions: 1 s less.
+``remembering``      The types of a call are looked up once in a kernel: 4 s less.
+``_InnerDispatcher`` A function is compiled once for all integers, not for each constant: 9 s.
+``_KernelLibrary``   No short loop is vectorised: 1.00, else 0.92 to 1.00. One round of passes: 3 s.
+``noalias``          LLVM may assume that arrays do not overlap: 1.00, else 0.93 to 1.00.
+``KernelCache``      Warm start 0.6 s; numba's own cache goes stale and reads damaged files.
+==================== ===============================================================================
 
-Cold start: first step of ``smart``, no cached kernels. A test checks that numba has all of this.
+Seconds less to the first step of ``smart`` with nothing cached, now 17 to 24; 1.00: throughput.
 """
 
 from __future__ import annotations
 
-import contextlib
-import functools
-import pickle
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -31,34 +26,58 @@ from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
-from posse.numeric.compiler import collector, kernel_files
 from posse.numeric.compiler.function_type import FunctionType, widest
-from posse.numeric.compiler.llvm_hints import forbid_runtime_unrolling, keep_out_of_line
-from posse.numeric.compiler.stamps import Stamp
+from posse.numeric.compiler.kernel_store import KernelStore
+from posse.numeric.compiler.llvm_hints import add_hints, drop_if_inlined
+from posse.numeric.compiler.sparing import paused_collector, remembering, wrapped
 
 
 class _Library(JITCodeLibrary):
-    """LLVM code with hints."""
+    """LLVM code with hints; whatever an inlined function calls is linked to it, too."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.inlined: dict[_InnerLibrary, None] = {}  # each once, callees included
 
     def add_ir_module(self, ir_module: Any) -> None:
-        forbid_runtime_unrolling(ir_module)
-        keep_out_of_line(ir_module)
+        add_hints(ir_module)
         super().add_ir_module(ir_module)
+
+    def add_linking_library(self, library: Any) -> None:
+        if isinstance(library, _InnerLibrary):
+            self.inlined |= {library: None} | library.inlined
+            for each in library._linking_libraries:
+                self.add_linking_library(each)
+        elif library not in self._linking_libraries:
+            super().add_linking_library(library)
+
+    def finalize(self) -> None:
+        for each in self.inlined:
+            self._final_module.link_in(each._final_module, preserve=True)
+        super().finalize()
 
 
 class _InnerLibrary(_Library):
-    """LLVM code that is only linked into kernels, where it is optimised."""
+    """LLVM code of one function, which is optimised where it is linked."""
 
-    def _optimize_final_module(self) -> None:
-        pass
+    def add_llvm_module(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+        drop_if_inlined(ll_module)
+        self._final_module = ll_module
 
-    def _finalize_final_module(self) -> None:
-        self._finalized = True  # without LLVM's engine, which would generate machine code
+    def finalize(self) -> None:
+        self._finalized = True
 
-    @property
-    def codegen(self) -> Any:
-        # numba would register the function's globals here, which requires machine code.
-        return SimpleNamespace(set_env=lambda name, environment: None)
+    def _get_module_for_linking(self) -> Any:
+        module = self._final_module.clone()  # for numba's libraries, which do not use "inlined"
+        for each in self.inlined:
+            module.link_in(each._final_module, preserve=True)
+        for each in self._linking_libraries:
+            module.link_in(each._get_module_for_linking(), preserve=True)
+        return module
+
+    # numba would register the function's globals here, which requires machine code.
+    codegen: Any = SimpleNamespace(set_env=lambda name, environment: None)
 
 
 class _Compiler(CompilerBase):
@@ -70,7 +89,10 @@ class _Compiler(CompilerBase):
         state = self.state
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        manager = DefaultPassBuilder.define_nopython_pipeline(state)
+        skipped = "ir_legalization", "nopython_rewrites"
+        manager.passes = [each for each in manager.passes if each[0]._name not in skipped]
+        return [manager]
 
 
 class _InnerCompiler(_Compiler):
@@ -89,12 +111,11 @@ class KernelCompiler(_Compiler):
 
     library = _KernelLibrary
 
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
+    def compile_extra(self, func: Any) -> Any:  # noqa: D102 (numba's)
         self.state.flags.noalias = True
-
-    # numba's many live objects would be traversed again and again.
-    compile_extra = collector.paused()(CompilerBase.compile_extra)
+        types = self.state.typingctx
+        with paused_collector(), wrapped(types, "resolve_function_type", remembering):
+            return super().compile_extra(func)
 
 
 class CompiledFunction(CPUDispatcher):
@@ -116,33 +137,13 @@ class _InnerDispatcher(CPUDispatcher):
         return super().get_call_template(tuple(map(widest, args)), named)
 
 
-class KernelCache(NullCache):
-    """Cache in which numba looks a kernel up before compiling, and stores it afterwards."""
+class KernelCache(KernelStore, NullCache):
+    """What numba asks for a kernel before compiling it, and gives it to afterwards."""
 
-    def __init__(self, *stamped: Any) -> None:
-        self._stamped = stamped
-        self.before_compiling: Callable[[], None] = lambda: None
+    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: D102 (numba's)
+        target = target_context.codegen().magic_tuple()
+        return self.load(sig, target, lambda *parts: CompileResult._rebuild(target_context, *parts))
 
-    @functools.cached_property
-    def _stamp(self) -> Stamp:
-        return Stamp(*self._stamped)  # lazily: a kernel may call functions defined below it
-
-    def _name(self, sig: Any, codegen: Any) -> str:
-        return self._stamp.hexdigest(str(sig), *map(str, codegen.magic_tuple()))
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return a kernel for these types, or None."""
-        with contextlib.suppress(Exception):  # after any error, compile
-            kept = kernel_files.read(self._name(sig, target_context.codegen()))
-            signature, parts = pickle.loads(kept) if kept is not None else (None, ())  # noqa: S301
-            if signature == sig:
-                return CompileResult._rebuild(target_context, *parts)
-        self.before_compiling()
-        kernel_files.announce()
-        return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Store a kernel for these types."""
-        with contextlib.suppress(Exception):
-            if self._stamp.holds() and not data.library.has_dynamic_globals:
-                kernel_files.write(self._name(sig, data.codegen), dumps((sig, data._reduce())))
+    def save_overload(self, sig: Any, data: Any) -> None:  # noqa: D102 (numba's)
+        if not data.library.has_dynamic_globals:
+            self.save(sig, data.codegen.magic_tuple(), lambda: dumps((sig, data._reduce())))
