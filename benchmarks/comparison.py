@@ -32,6 +32,7 @@ SCENARIOS = tuple(n for n in posse.scenario_names() if not n.startswith(("paper"
 """In `duel` the target plays too: ``posse league`` makes its table."""
 SCRIPTED = ("ddcs-tuned", "ddcs-distributed", "ddcs-centralized", "pngl-l-phi-tuned", "pngl-l-phi")
 """The first is the baseline of the differences."""
+KEPT = Path(__file__).with_name("training_seeds")
 MARK = "<!-- `make results` writes what follows -->"
 END = "<!-- the end of what `make results` writes -->"
 FIRST = ("scenarios", "profile")
@@ -43,7 +44,8 @@ class Settings:
     """Command-line arguments."""
 
     groups: tuple[str, ...] = ()
-    """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals that include seeds."""
+    """LABEL=FILE,FILE,...: training seeds of a learned policy, for intervals that include seeds;
+    default: those in benchmarks/training_seeds."""
     scenarios: tuple[str, ...] = SCENARIOS
     """Scenarios."""
     episodes: int = 500
@@ -67,9 +69,8 @@ THEIR_COMMANDS: Final = (
     "settings that have become defaults of a scenario since."
 )
 ANOTHER_TRAINING: Final = (
-    f"The difference to `{SCRIPTED[0]}`, with training seeds and worlds resampled. Only the best "
-    "seed of each policy is shipped: to repeat this section, train the others with the commands "
-    "above, and name all files in `SEEDS`."
+    f"The difference to `{SCRIPTED[0]}`, with training seeds and worlds resampled. The policies of "
+    "all training seeds are in `benchmarks/training_seeds`; the best one of each is shipped."
 )
 TABLES: Final = (
     "Brackets are 95 % intervals. **Bold**: the best team that does not read the state. †: trained "
@@ -141,8 +142,9 @@ def report(
         lines.append("")
     lines += drawn(name for name in figures if name not in FIRST)
     lines += training_seeds(cards)
-    if settings.groups:
-        lines += ["", *over_training_seeds(settings, found)]
+    groups = settings.groups or kept_seeds()
+    if groups:
+        lines += ["", *over_training_seeds(settings, groups, found)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -202,7 +204,15 @@ def training_seeds(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return [*lines, "```"]
 
 
-def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
+def kept_seeds() -> tuple[str, ...]:
+    """Return the policies of all training seeds that ``posse ship --keep`` has kept, by name."""
+    files: dict[str, list[str]] = {}
+    for path in sorted(KEPT.glob("*.safetensors")):
+        files.setdefault(path.stem.rpartition("-")[0], []).append(str(path))
+    return tuple(f"{name}={','.join(paths)}" for name, paths in files.items())
+
+
+def over_training_seeds(settings: Settings, groups: Sequence[str], found: Comparison) -> list[str]:
     """Return the differences with training seeds resampled as well as worlds."""
     lines = [
         "## Another training, other worlds",
@@ -212,7 +222,7 @@ def over_training_seeds(settings: Settings, found: Comparison) -> list[str]:
         "| scenario | policy | training seeds | difference |",
         "|---|---|---|---|",
     ]
-    for group in read_contenders(settings.groups):
+    for group in read_contenders(groups):
         card: Mapping[str, Any] = group.policies[0].card  # type: ignore[union-attr]
         trained = {part["name"] for part in card["scenarios"]}
         for scenario in (name for name in settings.scenarios if name in trained):

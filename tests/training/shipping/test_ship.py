@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -80,6 +81,28 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(
     assert replay(shipped, check) == [play["score"] for play in check["plays"]]
     assert str(runs[0].parent) not in path.with_suffix(".json").read_text()
     assert path.stat().st_mode & 0o044 == 0o044
+
+
+def test_a_run_that_learned_nothing_is_not_shipped(
+    runs: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its best policy is that of step 0; it stays on record, and may be kept."""
+    first = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
+    best = LearnedPolicy.from_file(first).card["seed"]
+    copies = tuple(Path(shutil.copytree(run, tmp_path / f"run-{run.name}")) for run in runs)
+    path = copies[best - 1] / "best.safetensors"
+    policy = LearnedPolicy.from_file(path)
+    policy.with_card({**policy.card, "steps": 0}).save(path)
+    kept = tmp_path / "kept"
+    card = LearnedPolicy.from_file(
+        ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path, keep=kept))
+    ).card
+    assert card["seed"] != best
+    assert [run["steps"] for run in card["training_seeds"]][best - 1] == 0
+    names = {f"learned-trial-{seed}" for seed in (1, 2, 3)}
+    assert {file.stem for file in kept.iterdir()} == names
+    again = LearnedPolicy.from_file(kept / f"learned-trial-{best}.safetensors")
+    assert (again.network.weights[0] == policy.network.weights[0]).all()
 
 
 def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Path) -> None:

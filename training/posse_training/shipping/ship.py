@@ -53,6 +53,8 @@ class Settings:
     """Validation worlds of each scenario and team size to compare the seeds on."""
     out: Path = SHIPPED
     """Folder to write to; default: the package's own."""
+    keep: Path | None = None
+    """Folder in which to keep the best policy of every run too, as NAME-SEED."""
 
 
 def ship(settings: Settings) -> Path:
@@ -68,7 +70,10 @@ def ship(settings: Settings) -> Path:
     trained = _one_training(settings.runs)
     policies = [LearnedPolicy.from_file(run / "best.safetensors") for run in settings.runs]
     plays = [_play(policy, trained[0], settings.worlds) for policy in policies]
-    best = int(np.argmax([play["safe_score"].mean() for play in plays]))
+    # A run may end where it began, as the policy that it corrects or copies: that is none to ship.
+    learned = [policy.card["steps"] > 0 for policy in policies]
+    scores = [play["safe_score"].mean() for play in plays]
+    best = int(np.argmax(np.where(learned if any(learned) else True, scores, -np.inf)))
     card = {
         **policies[best].card,
         "name": settings.name,
@@ -92,6 +97,10 @@ def ship(settings: Settings) -> Path:
     card["check"] = make_check(policies[best], trained[0].scenarios)
     path = settings.out / f"{settings.name}.safetensors"
     _save(policies[best].with_card(card), path)
+    if settings.keep is not None:
+        settings.keep.mkdir(parents=True, exist_ok=True)
+        for run, policy in zip(trained, policies, strict=True):
+            _save(policy, settings.keep / f"{settings.name}-{run.seed}.safetensors")
     return path
 
 

@@ -1,9 +1,10 @@
 """``make train-shipped``: train every team that ships.
 
-    python -m posse_training.shipping.train_all --seeds 1 2 3
+    python -m posse_training.shipping.train_all
 
-trains with the default settings of each scenario, one run after another. Finished runs are skipped,
-an interrupted one resumes. To use more cores, start it several times with different ``--only``.
+trains with the default settings of each scenario, one run after another: three training seeds each,
+five for ``smart`` and ``field``. Finished runs are skipped, an interrupted one resumes. To use more
+cores, start it several times with different ``--only``.
 """
 
 from __future__ import annotations
@@ -34,12 +35,16 @@ ALGORITHMS: Final = {
 """Scenarios with a learned team of their own, ``learned-SCENARIO``, and how it is trained."""
 
 
+SEEDS: Final = {"smart": 5, "field": 5}
+"""Number of training seeds, 3 for the other scenarios."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """Arguments of ``python -m posse_training.shipping.train_all``."""
 
-    seeds: tuple[int, ...] = (1, 2, 3)
-    """Training seeds."""
+    seeds: tuple[int, ...] = ()
+    """Training seeds; default: 1 to 3, for smart and field 1 to 5."""
     only: tuple[str, ...] = tuple(ALGORITHMS)
     """Scenarios to train on."""
     folder: Path = Path("runs/shipped")
@@ -66,8 +71,9 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
             seed=seed,
             folder=settings.folder / f"{name}-{seed}",
         )
-        for seed in settings.seeds
+        for seed in settings.seeds or range(1, 1 + max(SEEDS.values()))
         for name in settings.only
+        if settings.seeds or seed <= SEEDS.get(name, 3)
     ]
 
 
