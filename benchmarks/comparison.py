@@ -70,7 +70,7 @@ THEIR_COMMANDS: Final = (
 )
 ANOTHER_TRAINING: Final = (
     f"The difference to `{SCRIPTED[0]}`, with training seeds and worlds resampled. The policies of "
-    "all training seeds are in `benchmarks/training_seeds`; the best one of each is shipped."
+    "all training seeds are in `benchmarks/training_seeds`."
 )
 TABLES: Final = (
     "Brackets are 95 % intervals. **Bold**: the best team that does not read the state. †: trained "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import gymnasium
@@ -9,6 +10,8 @@ import numpy as np
 import pettingzoo
 import pytest
 from gymnasium.error import ResetNeeded
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.support.adapters import f32
 
 import posse
@@ -119,6 +122,29 @@ BAD_ACTIONS: list[tuple[Any, str]] = [
     (None, r"tracker_3 must be real numbers, got None"),
     ([[0], [0, 1]], r"tracker_3 is not an array"),
 ]
+
+
+@given(
+    number=st.integers(0, 37 * 5 * 2 - 1),
+    value=st.sampled_from([math.nan, math.inf, -math.inf, 1.00001, -1.00001, 3.0]),
+    later=st.integers(0, 37 * 5 * 2 - 1),
+)
+def test_the_first_bad_action_is_named_wherever_it_stands(
+    number: int, value: float, later: int
+) -> None:
+    """Also beyond the last whole block of actions that are checked at once."""
+    batch = posse.batch("constant", 37)
+    batch.reset(seed=8)
+    actions = np.zeros((37, 5, 2), np.float32)
+    actions.reshape(-1)[[max(number, later), number]] = 2.0, value
+    e, i, k = np.unravel_index(number, actions.shape)
+    with pytest.raises(ValueError, match=rf"actions\[{e}, {i}, {k}\] = "):
+        batch.step(actions)
+    actions.reshape(-1)[[max(number, later), number]] = 0.5, math.copysign(1 + 5e-7, value)
+    twin = posse.batch("constant", 37)
+    twin.reset(seed=8)
+    mine = batch.step(actions)[0]
+    np.testing.assert_array_equal(mine, twin.step(actions.clip(-1, 1))[0])
 
 
 @pytest.mark.parametrize(("action", "message"), BAD_ACTIONS)
