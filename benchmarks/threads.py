@@ -26,6 +26,7 @@ from rich.table import Table
 
 import posse
 import posse.engine.stepping
+import posse.numeric.threads
 from posse.numeric import run_threads
 from posse.numeric.threads import divide
 from posse_baselines import begin, load
@@ -97,7 +98,11 @@ def evaluated(s: Settings, worlds: int) -> Callable[[], object]:
 def rate(step: Callable[[], object], seconds: float, pool: bool) -> float:
     """Return steps per second, with the pool or with our own threads."""
     chosen = pooled if pool else run_threads
-    with mock.patch.object(posse.engine.stepping, "run_threads", chosen):
+    with (
+        mock.patch.object(posse.engine.stepping, "run_threads", chosen),
+        # Used by scripted policies, through over_worlds.
+        mock.patch.object(posse.numeric.threads, "run_threads", chosen),
+    ):
         step()
         count, started = 0, time.perf_counter()
         while time.perf_counter() - started < seconds:

@@ -22,12 +22,13 @@ def observing(worlds: int) -> Fields:
     row = (2 * WIDTH * MOST_IN_TEAM if worlds > 1 else 2 * TEAM) + WIDTH
     return (
         # Eight team-mates, one of each observer.
-        ("column", WIDTH),  # values of one column
+        ("column", 2 * WIDTH),  # values of one or two columns
         ("start", WIDTH),  # index in the observation at which each team-mate begins
         ("filled", WIDTH),  # number of team-mates that the observer knows of
         # A team that is observed as a whole.
         ("distance", WIDTH * MOST_IN_TEAM),  # of each team-mate, m
         ("place", WIDTH * MOST_IN_TEAM),  # number of nearer team-mates
+        ("steps", WIDTH),  # control steps of each observer's world
         # The team.
         ("team_x", row),
         ("team_y", row),

@@ -61,12 +61,17 @@ def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Calla
         parameters: ``("c", "v")``, or ``("c", "v", "m")`` for fields of a team-mate. Then comes
             scratch memory. Fixed blocks are read from there (:func:`fixed_writer`).
     """
-    names: dict[str, Any] = {"block": _write_block, "copy": _copy_block, "one": _write_column}
+    names: dict[str, Any] = {
+        "block": _write_block, "copy": _copy_block, "one": _write_column, "keep": store,
+        "WIDTH": WIDTH,
+    }  # fmt: skip
     blocks = _blocks(declarations)
     given, columns = _evaluation(declarations, parameters, names)
     copied = {q for b in blocks if b.number is not None for q in range(b.first, b.first + WIDTH)}
     lines: list[str] = []
+    width = width_of(declarations)
     rest = blocks[-1].first + WIDTH if blocks else 0
+    last_block: int | None = None
     for k, field in enumerate(declarations):
         mine = range(columns[k], columns[k] + field.size)
         if not copied.issuperset(mine):
@@ -74,11 +79,18 @@ def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Calla
         # As soon as there are eight, so that few have to be kept at a time.
         while blocks and blocks[0].first + WIDTH <= mine.stop:
             first, number = blocks.pop(0)
-            if number is None:
-                lines.append(f"block({_listed(first)}, {first}, rows)")
-            else:
+            if number is not None:
                 lines.append(f"copy({number}, {first}, s, rows)")
-    lines += [f"one(column_{q}, {q}, s, rows)" for q in range(rest, width_of(declarations))]
+            elif blocks or rest == width:
+                lines.append(f"block({_listed(first)}, {first}, 0, s, rows)")
+            else:
+                last_block = first
+    if last_block is not None:
+        # With the columns after it, so that the rows' places are computed only once.
+        lines += [f"keep(s.column, WIDTH * {q - rest}, column_{q})" for q in range(rest, width)]
+        lines.append(f"block({_listed(last_block)}, {last_block}, {width - rest}, s, rows)")
+    else:
+        lines += [f"one(column_{q}, {q}, s, rows)" for q in range(rest, width)]
     return written("write_rows", (*parameters, "s", "rows"), lines, names)
 
 
@@ -163,27 +175,32 @@ def _write_block(
     h: Lanes,
     j: Lanes,
     first: int,
+    more: int,
+    s: Any,
     rows: Rows,
 ) -> None:
-    """Write eight columns, the first of them column ``first``."""
+    """Write eight columns, the first of them column ``first``, and ``more`` from scratch memory."""
     a, b, c, d, f, g, h, j = transpose(a, b, c, d, f, g, h, j)
     # Not in a loop: which of a tuple is meant would be looked up at run time.
-    _write_row(a, 0, first, rows)
-    _write_row(b, 1, first, rows)
-    _write_row(c, 2, first, rows)
-    _write_row(d, 3, first, rows)
-    _write_row(f, 4, first, rows)
-    _write_row(g, 5, first, rows)
-    _write_row(h, 6, first, rows)
-    _write_row(j, 7, first, rows)
+    _write_row(a, 0, first, more, s, rows)
+    _write_row(b, 1, first, more, s, rows)
+    _write_row(c, 2, first, more, s, rows)
+    _write_row(d, 3, first, more, s, rows)
+    _write_row(f, 4, first, more, s, rows)
+    _write_row(g, 5, first, more, s, rows)
+    _write_row(h, 6, first, more, s, rows)
+    _write_row(j, 7, first, more, s, rows)
 
 
 @compiled
-def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
-    """Write eight numbers of one observer, if there are so many observers."""
+def _write_row(row: Lanes, lane: int, first: int, more: int, s: Any, rows: Rows) -> None:
+    """Write eight numbers of one observer and ``more``, if there are so many observers."""
     if lane < rows.observers.number:
         o = rows.observations[world_of(rows.observers, lane), robot_of(rows.observers, lane)]
-        store(o, _start(rows, lane) + first, row)
+        start = _start(rows, lane) + first
+        store(o, start, row)
+        for q in range(more):
+            o[start + WIDTH + q] = s.column[WIDTH * q + lane]
 
 
 @compiled

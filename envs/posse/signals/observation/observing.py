@@ -17,8 +17,7 @@ from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
 from posse.signals.observation.columns import Observers, Rows
 from posse.signals.observation.mates import observe_mates, observe_trackers
-from posse.signals.observation.team import lay_out_team
-from posse.signals.observation.views import view_of_target, view_of_trackers
+from posse.signals.observation.views import lay_out_observers, view_of_target, view_of_trackers
 from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
 
@@ -32,6 +31,7 @@ _ZERO: Final = np.float32(0.0)
 def lay_out_fixed(c: Record, worlds: WorldArrays, writers: Writers, s: Record) -> None:
     """Write what never changes of each robot's observation, from world 0."""
     n = natural(c.num_trackers)
+    lay_out_observers(worlds, 0, 0, s)
     for i in range(0, n, WIDTH):
         observers = Observers(0, i, min(WIDTH, n - i), 0)
         writers.fixed(c, view_of_trackers(c, worlds, observers, s), s, observers)
@@ -71,16 +71,13 @@ def observe_together(
 ) -> None:
     """Write the observations of ``count`` worlds, at most eight, without the sonar."""
     n = natural(c.num_trackers)
-    observes_team = c.perfect_radio != 0 and c.neighbours > 0
     if count == TOGETHER and n <= MOST_IN_TEAM:
-        if observes_team:
-            lay_out_team(worlds.tracker, first, 1, s)
+        lay_out_observers(worlds, first, 1, s)
         for i in range(n):
             _observe_some(c, worlds, first, i, WIDTH, 1, writers, s, observations)
         return
     for e in range(first, first + count):
-        if observes_team:
-            lay_out_team(worlds.tracker, e, 0, s)
+        lay_out_observers(worlds, e, 0, s)
         for i in range(0, n, WIDTH):
             _observe_some(c, worlds, e, i, min(WIDTH, n - i), 0, writers, s, observations)
 

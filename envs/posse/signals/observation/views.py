@@ -21,14 +21,17 @@ from posse.numeric import (
     counts,
     eight,
     greater,
+    load,
     load_fields,
     root,
+    store,
     transpose,
 )
 from posse.rules.contact import touches_surroundings
+from posse.rules.discs import natural
 from posse.rules.state import CONDITION, FIX, NEVER, POSE, STEP, WorldArrays
 from posse.signals.observation.columns import Observers
-from posse.signals.observation.team import own_numbers, team_columns
+from posse.signals.observation.team import lay_out_team, own_numbers, stride_of, team_columns
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -165,30 +168,32 @@ def mate_heard(
 
 
 @compiled
-def _steps(world: Records, e: int, across: int) -> Lanes:
-    """Return the control steps of eight worlds from e on, or eight times that of world e."""
+def lay_out_observers(worlds: WorldArrays, e: int, across: int, s: Record) -> None:
+    """Write the team's rows of world e, or of eight worlds, and their control steps."""
+    lay_out_team(worlds.tracker, e, across, s)
     if across:
         steps, _, _, _, _, _, _, _ = transpose(
-            load_fields(world[e], STEP),
-            load_fields(world[e + 1], STEP),
-            load_fields(world[e + 2], STEP),
-            load_fields(world[e + 3], STEP),
-            load_fields(world[e + 4], STEP),
-            load_fields(world[e + 5], STEP),
-            load_fields(world[e + 6], STEP),
-            load_fields(world[e + 7], STEP),
+            load_fields(worlds.world[e], STEP),
+            load_fields(worlds.world[e + 1], STEP),
+            load_fields(worlds.world[e + 2], STEP),
+            load_fields(worlds.world[e + 3], STEP),
+            load_fields(worlds.world[e + 4], STEP),
+            load_fields(worlds.world[e + 5], STEP),
+            load_fields(worlds.world[e + 6], STEP),
+            load_fields(worlds.world[e + 7], STEP),
         )
-        return counts(steps)
-    return eight(np.float32(world[e].step))
+        store(s.steps, 0, counts(steps))
+    else:
+        store(s.steps, 0, eight(np.float32(worlds.world[e].step)))
 
 
 @compiled
 def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
-    """Return the view of eight trackers."""
+    """Return the view of eight trackers; requires :func:`lay_out_observers`."""
     e, i, _, across = observers
-    own_x, own_y, hc, hs, speed, turn_rate, max_speed, max_turn_rate = team_columns(
-        worlds.tracker, e, i, across, POSE
-    )
+    at = natural(stride_of(across) * i)
+    own_x, own_y = load(s.team_x, at), load(s.team_y, at)
+    _, _, _, _, _, _, max_speed, max_turn_rate = team_columns(worlds.tracker, e, i, across, POSE)
     x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(
         worlds.tracker, e, i, across, FIX
     )
@@ -200,8 +205,9 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
     if c.fix_bearing == 0:
         dx, dy = x - own_x, y - own_y
     return View(
-        own_numbers(i, across, s), own_x, own_y, hc, hs, speed, turn_rate,
-        counts(touching), working, _steps(worlds.world, e, across),
+        own_numbers(i, across, s), own_x, own_y, load(s.team_cos, at), load(s.team_sin, at),
+        load(s.team_speed, at), load(s.team_turn_rate, at),
+        counts(touching), working, load(s.steps, 0),
         max_speed, max_turn_rate,
         max_speed * c.per_acceleration, max_turn_rate * c.per_turn_acceleration,
         fixed_at >= _ZERO, counts(sees), fixed_at, dx, dy, root(dx * dx + dy * dy),
