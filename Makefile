@@ -10,8 +10,9 @@ BASE := $(VENV)/base.stamp
 FULL := $(VENV)/full.stamp
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 INSTALL := install --no-compile --constraint
-# pip compiles modules on one core; this does on all. One module of torch is for another Python.
-COMPILE := python -m compileall -qq -j 0 -x /tests/
+# pip compiles modules on one core; this does on all. Left out is what the tests hardly import: others' tests,
+# torch's compiler, and tools. One module of torch is for another Python.
+COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|sqlalchemy|debugpy|mypy|mypyc|pip|setuptools)/'
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone.

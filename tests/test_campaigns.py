@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.parametrize(
     ("case", "cases"),
     [
-        (worlds.case, 40), (calls.case, 4), (threads.case, 3), (forged.case, 50),
+        (worlds.case, 15), (calls.case, 2), (threads.case, 3), (forged.case, 50),
         pytest.param(processes.case, 12, marks=pytest.mark.long),
     ],
     ids=["worlds", "calls", "threads", "forged", "processes"],

@@ -99,6 +99,7 @@ def play(folder: Path, loss: str, **changed: str) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
+@pytest.mark.long
 def test_the_examples_are_part_of_the_kernel(tmp_path: Path) -> None:
     """Which is kept on disk."""
     for loss in ("0.0", "0.1"):

@@ -7,6 +7,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import pytest
 from rich.console import Console
 from safetensors.numpy import load_file
 
@@ -15,6 +16,11 @@ from posse_training.runs.saved.checkpoint import read_checkpoint
 
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "recurrent-ppo", "sac", "td3")
+ALGORITHM_CASES = [
+    pytest.param(name, marks=() if name in ("ppo", "mappo") else pytest.mark.long)
+    for name in ALGORITHMS
+]
+"""The algorithms as cases of tests; the slow ones run with the long tests."""
 
 
 def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings:

@@ -74,7 +74,10 @@ COMPARE = [
         pytest.param(COMPARE, marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
-        ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"],
+        pytest.param(
+            ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"],
+            marks=pytest.mark.long,
+        ),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
     ],
     ids=lambda arguments: " ".join(arguments[:2]),

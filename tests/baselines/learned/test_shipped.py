@@ -92,7 +92,14 @@ def test_a_shipped_file_has_all_that_it_needs(path: Path) -> None:
     assert problems_of(path) == []
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=() if path.stem == "learned-smart" else pytest.mark.long)
+        for path in FILES
+    ],
+    ids=lambda path: path.stem,
+)
 def test_a_shipped_policy_scores_what_its_card_says(path: Path) -> None:
     policy = LearnedPolicy.from_file(path)
     check = policy.card["check"]

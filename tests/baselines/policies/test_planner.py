@@ -25,6 +25,7 @@ def actions_of(planner: Planner, batch: posse.Batch, steps: int) -> NDArray[np.f
     return np.stack([next(played).actions for _ in range(steps)])
 
 
+@pytest.mark.long
 def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
     metrics = play(posse.batch("constant", 10, split="train"), Planner(QUICK))
     assert metrics["safe_score"].mean() >= 0.9 * metrics["bound"].mean()

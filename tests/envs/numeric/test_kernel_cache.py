@@ -229,6 +229,7 @@ def test_a_kernel_is_compiled_once_and_again_when_a_helper_in_another_file_chang
     assert (back.answer, back.hits) == (6.0, 1), "the first version is still filed under its stamp"
 
 
+@pytest.mark.long
 def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(
     herd: Herd, tmp_path: Path
 ) -> None:
@@ -249,6 +250,7 @@ def test_kernels_with_other_constants_are_not_taken_for_each_other(
         assert (run.answer, run.hits) == (number + 1, hits)
 
 
+@pytest.mark.long
 def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_stamp(
     herd: Herd, tmp_path: Path
 ) -> None:
@@ -266,6 +268,7 @@ def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_st
     assert (kernels_after.answer, kernels_after.hits) == (9.0, 0)
 
 
+@pytest.mark.long
 def test_an_edit_of_a_room_without_kernels_recompiles_nothing(herd: Herd, tmp_path: Path) -> None:
     """Edits of rendering and adapters keep kernels; an edit of a rule does not."""
     copy = tmp_path / "posse"
@@ -412,6 +415,7 @@ def test_damaged_files_are_compiled_again(tmp_path: Path) -> None:
     assert sum(counts.values()) == 5
 
 
+@pytest.mark.long
 def test_files_not_used_for_longest_are_dropped_and_nothing_else(
     herd: Herd, tmp_path: Path
 ) -> None:

@@ -162,7 +162,7 @@ VALUES = st.one_of(
 )  # fmt: skip
 
 
-@hypothesis.settings(derandomize=True, max_examples=400, deadline=None)
+@hypothesis.settings(derandomize=True, max_examples=200, deadline=None)
 @given(
     name=st.sampled_from(posse.scenario_names()),
     overrides=st.dictionaries(
@@ -225,7 +225,7 @@ def wide_settings(draw: st.DrawFn) -> dict[str, Any]:
 
 @hypothesis.settings(
     derandomize=True,
-    max_examples=200,
+    max_examples=100,
     deadline=None,
     suppress_health_check=[hypothesis.HealthCheck.filter_too_much],
 )

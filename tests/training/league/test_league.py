@@ -71,6 +71,7 @@ def die_at(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, call: int) ->
     monkeypatch.setattr(owner, name, dying)
 
 
+@pytest.mark.long
 def test_a_killed_league_ends_as_one_that_was_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -129,6 +129,7 @@ class TestTrainingSeeds:
         mine, theirs = np.array([[1.0, 4.0], [2.0, 4.0]]), np.array([[0.0, 4.0], [2.0, 5.0]])
         assert improvement(mine, theirs).value == pytest.approx((1 + 0 + 1 + 0.5 + 4 * 0.25) / 8)
 
+    @pytest.mark.long
     def test_the_truth_is_in_as_often_as_is_said(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(statistics, "RESAMPLES", 300)
         rng = np.random.default_rng(9)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.runs import ADVISED, ALGORITHMS, BELIEVING, assert_equal, numbers, quiet, small
+from tests.support.runs import ADVISED, BELIEVING, assert_equal, numbers, quiet, small
 
 from posse_training.runs import TrainSettings
 from posse_training.runs import callback as module
@@ -24,10 +24,14 @@ from posse_training.runs.train import resume, train
 @pytest.mark.parametrize(
     ("algorithm", "changes"),
     [
-        *((name, {}) for name in ALGORITHMS),
+        ("ppo", {}),
+        *(
+            pytest.param(name, {}, marks=pytest.mark.long)
+            for name in ("mappo", "recurrent-ppo", "sac", "td3")
+        ),
         ("mappo", ADVISED),
         ("ppo", BELIEVING),
-        ("recurrent-ppo", BELIEVING),
+        pytest.param("recurrent-ppo", BELIEVING, marks=pytest.mark.long),
     ],
 )
 def test_a_training_that_was_cut_ends_where_it_would_have(

@@ -56,7 +56,7 @@ class Killed(BaseException):
     pass
 
 
-@pytest.mark.parametrize("recurrent", [False, True])
+@pytest.mark.parametrize("recurrent", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.parametrize("side", ["target", "trackers"])
 def test_a_killed_run_resumes_bit_for_bit(
     side: str, recurrent: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

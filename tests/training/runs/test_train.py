@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
-from tests.support.runs import ADVISED, ALGORITHMS, BELIEVING, assert_equal, numbers, quiet, small
+from tests.support.runs import (
+    ADVISED,
+    ALGORITHM_CASES,
+    BELIEVING,
+    assert_equal,
+    numbers,
+    quiet,
+    small,
+)
 
 from posse_baselines import PolicyError, load
 from posse_baselines.learned import LearnedPolicy
@@ -24,7 +32,7 @@ from posse_training.runs.saved.checkpoint import read_checkpoint
 from posse_training.runs.train import resume, steps_made, train
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ALGORITHM_CASES)
 def test_two_trainings_from_one_seed_agree_exactly(tmp_path: Path, algorithm: str) -> None:
     for name in "ab":
         train(small(tmp_path / name, algorithm), console=quiet())

@@ -69,6 +69,7 @@ for worlds, settings in (
 """
 
 
+@pytest.mark.long
 def test_the_largest_worlds_fit_their_memory() -> None:
     """Compiled code does not check array bounds; plain Python does."""
     done = subprocess.run(

@@ -126,6 +126,7 @@ def alive(pid: int) -> bool:
     return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
 
 
+@pytest.mark.long
 def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
     settings = Settings(
         (f"{BAD}Sleeps", "idle"), ("constant", "smart"), episodes=1, out=tmp_path / "out",

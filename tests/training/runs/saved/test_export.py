@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.runs import ALGORITHMS, quiet, small
+from tests.support.runs import ALGORITHM_CASES, quiet, small
 
 import posse
 from posse_baselines.learned import LearnedPolicy
@@ -16,7 +16,7 @@ from posse_training.runs.saved.model_state import restore_model
 from posse_training.runs.train import train
 
 
-@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ALGORITHM_CASES)
 def test_what_is_exported_acts_as_the_model_does(tmp_path: Path, algorithm: str) -> None:
     settings = small(tmp_path, algorithm)
     train(settings, console=quiet())
