@@ -24,6 +24,7 @@ from posse_training.sb3.vec_env import TeamVecEnv
 _ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": QuickTanh, "relu": nn.ReLU}
 _ADAM_EPSILON: Final = 1e-5  # the default of stable-baselines3's PPO
 _EXPLORATION: Final = 0.1  # standard deviation of the noise on td3's actions
+_ENTROPY: Final = "auto_0.01"  # of sac: from 1, rewards of 0.1 a step count for nothing at first
 
 
 def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVecEnv:
@@ -110,7 +111,11 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
 def _off_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> BaseAlgorithm:
     """Return SAC or TD3."""
     shape = env.action_shape
-    noise = NormalActionNoise(np.zeros(shape), np.full(shape, _EXPLORATION))
+    exploring: dict[str, Any] = (
+        {"ent_coef": _ENTROPY}
+        if s.algorithm == "sac"
+        else {"action_noise": NormalActionNoise(np.zeros(shape), np.full(shape, _EXPLORATION))}
+    )
     return (SAC if s.algorithm == "sac" else TD3)(
         "MlpPolicy",
         env,
@@ -120,7 +125,7 @@ def _off_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> B
         batch_size=s.minibatch,
         gamma=s.discount,
         gradient_steps=s.gradients,
-        action_noise=noise if s.algorithm == "td3" else None,
+        **exploring,
         policy_kwargs={**network, "net_arch": list(s.hidden)},
         seed=s.seed,
         device="cpu",
