@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from posse.rendering import layers, selected
+from posse.rendering.content.scene import Scene
 from posse.rendering.layers import Drawing, leader_mark
 from posse.rendering.legend import tasks_of
-from posse.rendering.scene import Scene
 from posse.rendering.style import (
     BROKEN,
     CONTACT,

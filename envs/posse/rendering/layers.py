@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from posse.rendering.camera import Camera
-from posse.rendering.history import Flash, Mark
-from posse.rendering.scene import Floats, Scene
-from posse.rendering.sight import area_in_sight
+from posse.rendering.content.history import Flash, Mark
+from posse.rendering.content.scene import Floats, Scene
+from posse.rendering.content.sight import area_in_sight
+from posse.rendering.content.view import View
 from posse.rendering.style import (
     BROKEN,
     CONTACT,
@@ -37,7 +38,6 @@ from posse.rendering.style import (
     mix,
     pale,
 )
-from posse.rendering.view import View
 
 if TYPE_CHECKING:
     from posse.rendering.canvas import Canvas

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from posse.rendering.content.scene import Scene
 from posse.rendering.layers import leader_mark
-from posse.rendering.scene import Scene
 from posse.rendering.style import FAINT_INK, INK, PAPER, TASK_COLOURS, TASKS, TRACKER_RIM
 
 if TYPE_CHECKING:

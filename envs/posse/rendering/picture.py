@@ -9,12 +9,12 @@ import numpy as np
 
 from posse.rendering import layers, selected
 from posse.rendering.camera import Camera, Points
-from posse.rendering.history import History
+from posse.rendering.content.history import History
+from posse.rendering.content.scene import Scene
+from posse.rendering.content.view import View
 from posse.rendering.layers import Drawing
 from posse.rendering.legend import FOOTER, HEADER, footer, header, note
-from posse.rendering.scene import Scene
 from posse.rendering.style import PAPER
-from posse.rendering.view import View
 
 if TYPE_CHECKING:
     from posse.rendering.canvas import Canvas

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.rendering.camera import Camera
-from posse.rendering.history import History
+from posse.rendering.content.history import History
+from posse.rendering.content.scene import Scene, read_scene
 from posse.rendering.picture import action_of, draw_picture, viewport_of
-from posse.rendering.scene import Scene, read_scene
 from posse.rendering.style import DESIGN_SIZE
 from posse.scenarios import Scenario
 

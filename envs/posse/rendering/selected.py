@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from posse.rendering.content.scene import Floats
 from posse.rendering.layers import Drawing
-from posse.rendering.scene import Floats
 from posse.rendering.style import FAINT_INK, GROUND, INK, LINK, PAPER, TARGET, mix
 
 _GHOST_FADES: Final = 10.0  # s

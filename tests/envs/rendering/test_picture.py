@@ -13,13 +13,13 @@ import posse
 from posse.rendering import layers
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, pixels
-from posse.rendering.history import History
+from posse.rendering.content.history import History
+from posse.rendering.content.scene import Scene, read_scene
+from posse.rendering.content.view import View
 from posse.rendering.key import UNEXPLAINED, legend_of
 from posse.rendering.legend import tasks_of
 from posse.rendering.picture import LAYERS, action_of, draw_world
-from posse.rendering.scene import Scene, read_scene
 from posse.rendering.style import GROUND, LINK, TARGET, TASK_COLOURS, TRACKER
-from posse.rendering.view import View
 
 Frame = npt.NDArray[np.uint8]
 BOX = (0, 0, 640, 480)

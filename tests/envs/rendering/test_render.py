@@ -19,8 +19,8 @@ from tests.support.drawing import (
 
 import posse
 from posse.rendering.camera import Camera
+from posse.rendering.content.scene import read_scene
 from posse.rendering.renderer import Renderer
-from posse.rendering.scene import read_scene
 from posse.rendering.style import SLOT_FILLED, TARGET, TRACKER
 
 

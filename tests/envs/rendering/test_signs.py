@@ -16,8 +16,8 @@ from tests.support.drawing import (
     worlds,
 )
 
+from posse.rendering.content.scene import read_scene
 from posse.rendering.renderer import Renderer
-from posse.rendering.scene import read_scene
 from posse.rendering.style import CONTACT, INK, LINK, TASK_COLOURS, TRACKER
 
 

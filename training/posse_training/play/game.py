@@ -10,9 +10,9 @@ import pygame
 from posse import Scenario, ScenarioError
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas
+from posse.rendering.content.view import View
 from posse.rendering.picture import action_of, draw_picture, viewport_of
 from posse.rendering.style import FAINT_INK, GRID, INK, PAPER, TARGET
-from posse.rendering.view import View
 from posse_baselines import Policy, PolicyError
 from posse_training.errors import SettingsError
 from posse_training.play.round import Round

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from posse import Batch, Scenario
-from posse.rendering.history import History
-from posse.rendering.scene import Scene, read_scene
+from posse.rendering.content.history import History
+from posse.rendering.content.scene import Scene, read_scene
 from posse_baselines import Policy, begin
 from posse_training.play.session import points_of
 from posse_training.play.steering import Wheel

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from posse.rendering.camera import Camera
-from posse.rendering.scene import Scene
+from posse.rendering.content.scene import Scene
 from posse_training.viewer.drawing import step_at
 from posse_training.viewer.layout import Layout, contains
 from posse_training.viewer.state import Command

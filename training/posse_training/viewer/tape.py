@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from posse import Batch, Scenario
 from posse.numeric import FloatArray
-from posse.rendering.history import History
-from posse.rendering.scene import Scene, read_scene
+from posse.rendering.content.history import History
+from posse.rendering.content.scene import Scene, read_scene
 from posse_baselines import Policy, begin
 from posse_baselines.playing import check_moves_all
 

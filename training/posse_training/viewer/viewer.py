@@ -12,10 +12,10 @@ import pygame
 from posse import Scenario, ScenarioError
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas
-from posse.rendering.history import History
+from posse.rendering.content.history import History
+from posse.rendering.content.view import View
 from posse.rendering.key import legend_of
 from posse.rendering.picture import action_of, draw_picture, viewport_of
-from posse.rendering.view import View
 from posse_baselines import Policy, PolicyError, Target, against, load
 from posse_training.viewer.drawing import (
     draw_help,

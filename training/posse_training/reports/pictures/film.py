@@ -15,10 +15,10 @@ from posse import Batch, Scenario, get_scenario
 from posse.numeric import FloatArray
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, pixels
-from posse.rendering.history import History
+from posse.rendering.content.history import History
+from posse.rendering.content.scene import Scene, read_scene
 from posse.rendering.picture import Box, action_of, draw_picture, viewport_of
 from posse.rendering.renderer import LEAST_SIZE
-from posse.rendering.scene import Scene, read_scene
 from posse.rendering.style import DESIGN_SIZE, GRID
 from posse_baselines.playing import check_moves_all
 from posse_baselines.policy import Annotations, Memory, Policy, begin

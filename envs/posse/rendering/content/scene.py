@@ -12,7 +12,7 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from posse.numeric import BoolArray
-from posse.rendering.knowledge import Knowledge, read_knowledge
+from posse.rendering.content.knowledge import Knowledge, read_knowledge
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario
 from posse.scenarios.formation import slot_offsets
@@ -101,7 +101,7 @@ def read_scene(
         world: Its index in the batch.
         annotations: Internal values of a policy, (E, N) integers each: ``"task"``, and
             ``"leader"``, the number of each tracker's leader (-1: none); what
-            :func:`posse.rendering.knowledge.read_knowledge` reads. Other names are ignored.
+            :func:`posse.rendering.content.knowledge.read_knowledge` reads. Other names are ignored.
         observations: (E, rows, F) of the present state, for the sonar.
 
     Raises:

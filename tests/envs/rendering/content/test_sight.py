@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 
 import posse
+from posse.rendering.content.sight import area_in_sight
 from posse.rendering.renderer import Renderer
-from posse.rendering.sight import area_in_sight
 from posse.rendering.style import SENSING
 
 Floats = npt.NDArray[np.float64]

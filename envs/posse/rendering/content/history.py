@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.rendering.scene import Floats, Scene
+from posse.rendering.content.scene import Floats, Scene
 
 _TRAIL_TIME: Final = 6.0  # s
 _MARK_TIME: Final = 0.2  # s, between two marks of a trail

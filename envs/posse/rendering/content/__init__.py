@@ -1,0 +1,1 @@
+"""What a frame shows, read from a batch; nothing is drawn here."""
