@@ -13,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from posse_training.reports.pictures.palette import BLUE, GREEN, ORANGE, PURPLE, RED, SKY
 from posse_training.reports.pictures.parts import legend, note
-from posse_training.reports.pictures.style import RC, WIDTH, looks_of, marker_of
+from posse_training.reports.pictures.style import RC, WIDTH, Style, marker_of
 from posse_training.reports.statistics import mean
 from posse_training.runs.defaults import default_settings
 
@@ -28,6 +29,15 @@ COLUMNS: Final = (
     "scenario", "algorithm", "steps", "seeds", "safe score [least, greatest seed]",
     "worlds with contact", "area under the curve", "steps/s",
 )  # fmt: skip
+LOOKS: Final = {
+    "ppo": Style(BLUE, "o"),
+    "mappo": Style(SKY, "s", (0, (5, 2))),
+    "recurrent-ppo": Style(GREEN, "^"),
+    "ppo-imitation": Style(ORANGE, "D", (0, (3, 1.5))),
+    "sac": Style(RED, "v"),
+    "td3": Style(PURPLE, "X", (0, (5, 1, 1, 1))),
+}
+"""Each algorithm in a colour of its own."""
 
 Run = dict[str, Any]
 
@@ -80,7 +90,7 @@ def draw(groups: dict[tuple[str, str], list[Run]]) -> None:
     """Draw the curves over steps and over time: mean of the seeds, and their range."""
     scenarios = list(dict.fromkeys(scenario for scenario, _ in groups))
     algorithms = sorted({algorithm for _, algorithm in groups})
-    looks = looks_of(algorithms)
+    looks = {algorithm: LOOKS[algorithm] for algorithm in algorithms}
     figure = Figure(figsize=(WIDTH, 1.2 + 2.2 * len(scenarios)), layout="constrained")
     axes = list(figure.subplots(len(scenarios), 2, squeeze=False, sharey="row").flat)
     for (scenario, algorithm), runs in groups.items():
@@ -92,8 +102,9 @@ def draw(groups: dict[tuple[str, str], list[Run]]) -> None:
         axes[k + 1].set(xlabel="time, min")
         axes[k].set_xscale("log")
         axes[k + 1].set_xscale("log")
-    counts = sorted({len(runs) for runs in groups.values()})
-    seeds = f"{' to '.join(map(str, counts))} training seeds; band: their range"
+    counts = [len(runs) for runs in groups.values()]
+    most = "" if min(counts) == max(counts) else f" to {max(counts)}"
+    seeds = f"{min(counts)}{most} training seeds; band: their range"
     worlds = default_settings(own=False).evaluate_worlds
     note(figure, f"{worlds:,} worlds of the validation split; {seeds}")
     legend(figure, algorithms, looks)

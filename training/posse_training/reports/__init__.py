@@ -1,4 +1,4 @@
-"""Evaluation and comparison of policies."""
+"""Evaluations and comparisons."""
 
 from __future__ import annotations
 
