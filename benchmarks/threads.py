@@ -37,7 +37,7 @@ class Settings:
     """Command-line arguments."""
 
     scenario: str = "smart"
-    worlds: tuple[int, ...] = (1024, 4096, 16384)
+    worlds: tuple[int, ...] = (500, 1024, 4096, 16384)
     threads: int = 2
     pairs: int = 30
     """Pairs of runs of each figure."""

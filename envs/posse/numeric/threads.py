@@ -34,6 +34,7 @@ END: Final = 2  # world after the last
 _BLOCKS_EACH: Final = 16
 _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it saves
 _LOOKS: Final = 400_000  # turns of a spin, some tenths of a millisecond
+_SOON: Final = 5e-4  # s; a worker that waited longer blocks at once the next time
 _PAUSE: Final = 10_000  # turns until the caller's kernel has released Python's lock
 _ENDED: Final = 2**62
 _LEVELS: Final = 12  # exceptions within some microseconds that a step survives
@@ -162,9 +163,14 @@ class _Worker:
 
 def _serve(tasks: Any, results: Any, given: Any, done: Any, looks: int) -> None:
     """Execute tasks until one is None. Holds no reference to the worker, so it can be freed."""
+    waited = 0.0
     for count in itertools.count(1):
-        _spin(done, given, count, looks, _PAUSE)  # counts the last task, without Python's lock
+        # Where tasks come seldom, a spin would take the core from a network's threads.
+        worth = looks if waited < _SOON else 0
+        began = time.perf_counter()
+        _spin(done, given, count, worth, _PAUSE)  # counts the last task, without Python's lock
         task = tasks.get()
+        waited = time.perf_counter() - began
         if task is None:
             break
         try:
