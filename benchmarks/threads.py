@@ -27,8 +27,7 @@ from rich.table import Table
 import posse
 import posse.engine.stepping
 import posse.numeric.threads
-from posse.numeric import run_threads
-from posse.numeric.threads import divide
+from posse.numeric import divide, run_threads
 from posse_baselines import begin, load
 
 

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 import posse.numeric
-from posse.numeric.threads import END
+from posse.numeric.blocks import END
 
 _ROOMS = ("posse_baselines.laws", "posse_baselines.ddcs")
 

@@ -5,6 +5,7 @@ distribution of work over threads. It depends on no other room, and every room m
 """
 
 from posse.numeric.arrays import BoolArray, FloatArray, OwnArrays, Record, Records
+from posse.numeric.blocks import Blocks, blocks_of, divide, worlds_of
 from posse.numeric.compiling import (
     UNCOMPILED,
     checked_before_compiling,
@@ -34,16 +35,7 @@ from posse.numeric.simd.lanes import (
     tagged,
     transpose,
 )
-from posse.numeric.threads import (
-    MOST_THREADS,
-    Blocks,
-    blocks_of,
-    divide,
-    over_worlds,
-    run_threads,
-    threads_for,
-    worlds_of,
-)
+from posse.numeric.threads import MOST_THREADS, over_worlds, run_threads, threads_for
 from posse.numeric.written import written
 
 __all__ = [

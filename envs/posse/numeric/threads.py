@@ -1,4 +1,4 @@
-"""Distribution of worlds over threads, which claim blocks of worlds in compiled code.
+"""Calls of a compiled function in several threads, which share the worlds.
 
 Waiters spin briefly, then block: waking a blocked thread can take longer than a step of a thousand
 worlds, and handing over Python's lock longer than a step of a hundred.
@@ -13,25 +13,17 @@ import os
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any, Final, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from posse.numeric.compiling import UNCOMPILED, compiled, kernel
+from posse.numeric.blocks import Blocks, divide
+from posse.numeric.compiling import UNCOMPILED, kernel
 from posse.numeric.simd import atomics
-from posse.numeric.simd.lanes import WIDTH
 
 T = TypeVar("T")
-Blocks = npt.NDArray[np.int64]
-"""Unclaimed worlds: a row for each thread, (threads, 16)."""
-
-NEXT: Final = 0  # first world of the next block; first in its row, for atomics
-SIZE: Final = 1  # worlds of a block; 0: one thread and one block
-END: Final = 2  # world after the last
-_BLOCKS_EACH: Final = 16
 _SERIAL_BELOW: Final = 2048  # robots; below, a second thread costs more than it saves
 _LOOKS: Final = 400_000  # turns of a spin, some tenths of a millisecond
 _SOON: Final = 5e-4  # s; a worker that waited longer blocks at once the next time
@@ -40,41 +32,6 @@ _ENDED: Final = 2**62
 _LEVELS: Final = 12  # exceptions within some microseconds that a step survives
 MOST_THREADS: Final = len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
 """Most threads that :func:`over_worlds` uses: the number of cores available to the process."""
-
-
-@functools.lru_cache(maxsize=64)
-def divide(num_worlds: int, threads: int) -> Blocks:
-    """Return unclaimed blocks of worlds; those for one thread are never modified."""
-    # Multiples of eight where possible, since eight worlds are observed together.
-    grain = WIDTH if num_worlds >= threads * _BLOCKS_EACH * WIDTH // 2 else 1
-    edges = [num_worlds * k // (threads * grain) * grain for k in range(threads)] + [num_worlds]
-    blocks = np.zeros((threads, 16), np.int64)  # no two threads' rows share a cache line
-    blocks[:, NEXT], blocks[:, END] = edges[:-1], edges[1:]
-    if threads > 1:
-        blocks[:, SIZE] = max(1, num_worlds // (threads * _BLOCKS_EACH * grain)) * grain
-    return blocks
-
-
-@compiled
-def blocks_of(thread: int, blocks: Blocks) -> Iterator[tuple[int, int]]:
-    """Claim and yield blocks (first world, end); the thread's own first, which are cached."""
-    if blocks[0, SIZE] == 0:
-        yield 0, blocks[0, END]
-    else:
-        for k in range(len(blocks)):
-            row = blocks[(thread + k) % len(blocks)]
-            while row[NEXT] < row[END]:
-                first = atomics.add(row, row[SIZE])
-                if first < row[END]:
-                    yield first, min(first + row[SIZE], row[END])
-
-
-@compiled
-def worlds_of(thread: int, blocks: Blocks) -> Iterator[int]:
-    """Yield the worlds of :func:`blocks_of`, one by one."""
-    for first, end in blocks_of(thread, blocks):
-        for e in range(first, end):  # noqa: UP028 (compiled code knows no yield from)
-            yield e
 
 
 @kernel

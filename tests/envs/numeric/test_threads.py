@@ -16,7 +16,8 @@ import pytest
 from tests.fuzz.interrupts import campaign
 
 import posse
-from posse.numeric import Blocks, kernel, run_threads, threads, worlds_of
+from posse.numeric import Blocks, divide, kernel, run_threads, threads, worlds_of
+from posse.numeric.blocks import END, NEXT, SIZE
 
 
 @kernel
@@ -106,16 +107,16 @@ def test_a_thread_begins_with_worlds_of_its_own() -> None:
 @pytest.mark.parametrize(("worlds", "wanted"), [(1024, 2), (1000, 3), (8192, 8), (513, 4)])
 def test_blocks_of_many_worlds_are_eights(worlds: int, wanted: int) -> None:
     """Eight are observed together; only the end of all may be less."""
-    blocks = threads.divide(worlds, wanted)
-    assert (blocks[:, threads.NEXT] % 8 == 0).all()
-    assert (blocks[:, threads.SIZE] % 8 == 0).all()
-    np.testing.assert_array_equal(blocks[1:, threads.NEXT], blocks[:-1, threads.END])
-    assert blocks[-1, threads.END] == worlds
+    blocks = divide(worlds, wanted)
+    assert (blocks[:, NEXT] % 8 == 0).all()
+    assert (blocks[:, SIZE] % 8 == 0).all()
+    np.testing.assert_array_equal(blocks[1:, NEXT], blocks[:-1, END])
+    assert blocks[-1, END] == worlds
 
 
 def test_no_block_is_taken_twice_however_many_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "_BLOCKS_EACH", 20_000)
-    threads.divide.cache_clear()
+    monkeypatch.setattr("posse.numeric.blocks._BLOCKS_EACH", 20_000)
+    divide.cache_clear()
     worlds = 100_003
     try:
         for _ in range(30):
@@ -123,7 +124,7 @@ def test_no_block_is_taken_twice_however_many_want_it(monkeypatch: pytest.Monkey
             assert sum(run_threads(ledger.work, worlds, 4)) == worlds
             assert (ledger.times == 1).all()
     finally:
-        threads.divide.cache_clear()
+        divide.cache_clear()
 
 
 @pytest.mark.parametrize("thread_that_fails", [0, 1])
