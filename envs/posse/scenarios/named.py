@@ -99,6 +99,8 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="duel",
+            version=2,
+            target_speed=0.8,
             target_motion="smart",
             tracker_turn_rate=1.5,
             target_turn_rate=1.5,

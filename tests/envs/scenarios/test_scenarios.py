@@ -24,7 +24,7 @@ VERSIONS = {
     "radio": 1,
     "leader-loss": 1,
     "field": 2,
-    "duel": 1,
+    "duel": 2,
     "paper-centralized": 1,
     "paper-distributed": 1,
 }
