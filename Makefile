@@ -71,7 +71,7 @@ bench-costs: $(FULL) ## Measure the time of each part of a step, and how it scal
 bench-training: $(FULL) ## Measure throughput and time shares of PPO training
 	$(BIN)/python benchmarks/training.py
 
-algorithms: $(FULL) ## Train the field's algorithms and write docs/algorithms.md (hours); resumes
+algorithms: $(FULL) $(RECIPES)/recipes.stamp ## Train the field's algorithms and write docs/algorithms.md (hours); resumes
 	$(BIN)/python benchmarks/algorithms.py
 
 bench-peers: $(FULL) ## Compare throughput with other simulators

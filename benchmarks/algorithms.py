@@ -10,6 +10,7 @@ result is kept in benchmarks/algorithms. Writes the table and the figure of docs
 from __future__ import annotations
 
 import json
+import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -29,6 +30,9 @@ from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import resume, train
 
 OFF_POLICY: Final = ("sac", "td3")
+BENCHMARL: Final = ("qmix",)
+"""Learned by BenchMARL in an environment of its own, off policy as well."""
+BENCHMARL_PYTHON: Final = Path(".venv-recipes/bin/python")
 CHANGES: Final[dict[str, dict[str, Any]]] = {
     "ppo": {},
     "mappo": {"algorithm": "mappo"},
@@ -45,13 +49,13 @@ TEST_SEED: Final = 7
 class Settings:
     """Command-line arguments."""
 
-    algorithms: tuple[str, ...] = tuple(CHANGES)
+    algorithms: tuple[str, ...] = (*CHANGES, *BENCHMARL)
     scenarios: tuple[str, ...] = ("smart", "radio", "field")
     seeds: tuple[int, ...] = (1, 2, 3)
     steps: int = 10_000_000
     """Steps of training; a step is one control step of one tracker."""
     off_policy_steps: int = 1_000_000
-    """The same for sac and td3, whose steps take longer."""
+    """The same for sac, td3 and qmix, whose steps take longer."""
     worlds: int = 500
     """Worlds of the split ``test`` that the last policy plays."""
     folder: Path = Path("runs/algorithms")
@@ -93,6 +97,29 @@ def result_of(run: TrainSettings, algorithm: str, worlds: int) -> dict[str, Any]
     }
 
 
+def train_here(s: Settings, algorithm: str, scenario: str, seed: int, console: Console) -> str:
+    """Train with the package's own trainer, or go on with that; return the result as JSON."""
+    run = settings_of(s, algorithm, scenario, seed)
+    if (run.run_folder / SETTINGS).is_file():
+        resume(run.run_folder, console=console)
+    else:
+        train(run, console=console)
+    return json.dumps(result_of(run, algorithm, s.worlds), indent=1) + "\n"
+
+
+def train_in_benchmarl(s: Settings, algorithm: str, scenario: str, seed: int) -> str:
+    """Train with BenchMARL, from the start; return the result as JSON."""
+    out = s.folder / f"{algorithm}-{scenario}-{seed}" / "result.json"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    subprocess.run(
+        [str(BENCHMARL_PYTHON), str(Path(__file__).with_name("algorithms_benchmarl.py")),
+         algorithm, scenario, "--seed", str(seed), "--steps", str(s.off_policy_steps),
+         "--worlds", str(s.worlds), "--out", str(out)],
+        check=True,
+    )  # fmt: skip
+    return out.read_text(encoding="utf-8")
+
+
 def main() -> None:
     """Train what is left, and write the page."""
     s = tyro.cli(Settings, description=__doc__)
@@ -101,16 +128,17 @@ def main() -> None:
     for seed in s.seeds:
         for scenario in s.scenarios:
             for algorithm in s.algorithms if not s.page_only else ():
-                run = settings_of(s, algorithm, scenario, seed)
-                kept = RESULTS / f"{run.run_folder.name}.json"
+                kept = RESULTS / f"{algorithm}-{scenario}-{seed}.json"
                 if kept.is_file():
                     continue
                 console.print(kept.stem, style="bold")
-                if (run.run_folder / SETTINGS).is_file():
-                    resume(run.run_folder, console=console)
+                if algorithm not in BENCHMARL:
+                    text = train_here(s, algorithm, scenario, seed, console)
+                elif BENCHMARL_PYTHON.is_file():
+                    text = train_in_benchmarl(s, algorithm, scenario, seed)
                 else:
-                    train(run, console=console)
-                text = json.dumps(result_of(run, algorithm, s.worlds), indent=1) + "\n"
+                    console.print(f"left out: no {BENCHMARL_PYTHON} (make recipes)")
+                    continue
                 kept.write_text(text, encoding="utf-8")
     write_page(console)
 

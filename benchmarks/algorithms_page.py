@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from posse_training.reports.pictures.palette import BLUE, GREEN, ORANGE, PURPLE, RED, SKY
+from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY
 from posse_training.reports.pictures.parts import legend, note
 from posse_training.reports.pictures.style import RC, WIDTH, Style, marker_of
 from posse_training.reports.statistics import mean
@@ -35,6 +35,7 @@ LOOKS: Final = {
     "recurrent-ppo": Style(GREEN, "^"),
     "ppo-imitation": Style(ORANGE, "D", (0, (3, 1.5))),
     "sac": Style(RED, "v"),
+    "qmix": Style(GREY, "P", (0, (1, 1))),
     "td3": Style(PURPLE, "X", (0, (5, 1, 1, 1))),
 }
 """Each algorithm in a colour of its own."""

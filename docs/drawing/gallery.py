@@ -123,7 +123,7 @@ def main() -> None:
             )  # fmt: skip
             write_replay(replay, MEDIA / "replays" / f"{name}-lost.html")
         if name == "duel":
-            write(name, f"-{EVADER}", ("ddcs-tuned", "learned-smart"), shown, EVADER)
+            write(name, f"-{EVADER}", ("ddcs-tuned", "learned-duel"), shown, EVADER)
         file = MEDIA / "scenarios" / f"{name}.png"
         picture(name, shown).save(file, optimize=True)
         print(f"{name:18s} {path.stat().st_size:8,} {file.stat().st_size:8,} bytes", flush=True)
