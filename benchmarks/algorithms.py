@@ -69,9 +69,15 @@ def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainS
     base = default_settings(scenario, changes.pop("algorithm", "ppo"), own=False)
     steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
     return replace(
-        base, **changes, seed=seed, steps=steps, evaluate_every=steps // 20, tensorboard=False,
-        beside=None, folder=s.folder / f"{algorithm}-{scenario}-{seed}",
-    )  # fmt: skip
+        base,
+        **changes,
+        seed=seed,
+        steps=steps,
+        evaluate_every=steps // 20,
+        tensorboard=False,
+        beside=None,
+        folder=s.folder / f"{algorithm}-{scenario}-{seed}",
+    )
 
 
 def result_of(run: TrainSettings, algorithm: str, worlds: int) -> dict[str, Any]:
@@ -112,11 +118,22 @@ def train_in_benchmarl(s: Settings, algorithm: str, scenario: str, seed: int) ->
     out = s.folder / f"{algorithm}-{scenario}-{seed}" / "result.json"
     out.parent.mkdir(parents=True, exist_ok=True)
     subprocess.run(
-        [str(BENCHMARL_PYTHON), str(Path(__file__).with_name("algorithms_benchmarl.py")),
-         algorithm, scenario, "--seed", str(seed), "--steps", str(s.off_policy_steps),
-         "--worlds", str(s.worlds), "--out", str(out)],
+        [
+            str(BENCHMARL_PYTHON),
+            str(Path(__file__).with_name("algorithms_benchmarl.py")),
+            algorithm,
+            scenario,
+            "--seed",
+            str(seed),
+            "--steps",
+            str(s.off_policy_steps),
+            "--worlds",
+            str(s.worlds),
+            "--out",
+            str(out),
+        ],
         check=True,
-    )  # fmt: skip
+    )
     return out.read_text(encoding="utf-8")
 
 

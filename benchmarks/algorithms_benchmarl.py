@@ -141,17 +141,25 @@ class Curve(Callback):
         scenario, done = self.settings.scenario, self.experiment.n_iters_performed
         frames = done * self.experiment.config.off_policy_collected_frames_per_batch
         results = evaluate(
-            self.policy(), scenario, default_settings(own=False).evaluate_worlds, VALIDATION_SEED,
-            split="validation", progress=False,
-        )  # fmt: skip
+            self.policy(),
+            scenario,
+            default_settings(own=False).evaluate_worlds,
+            VALIDATION_SEED,
+            split="validation",
+            progress=False,
+        )
         safe: Estimate = mean(results["safe_score"])
-        self.points.append({
-            "steps": frames * get_scenario(scenario).num_trackers,
-            "seconds": time.perf_counter() - self.started,
-            "safe_score": safe.value, "low": safe.low, "high": safe.high,
-            "score": float(results["score"].mean()),
-            "contact_free": float(results["contact_free"].mean()),
-        })  # fmt: skip
+        self.points.append(
+            {
+                "steps": frames * get_scenario(scenario).num_trackers,
+                "seconds": time.perf_counter() - self.started,
+                "safe_score": safe.value,
+                "low": safe.low,
+                "high": safe.high,
+                "score": float(results["score"].mean()),
+                "contact_free": float(results["contact_free"].mean()),
+            }
+        )
 
 
 def main() -> None:
@@ -160,11 +168,7 @@ def main() -> None:
     scenario, learning = get_scenario(s.scenario), default_settings(s.scenario, "td3", own=False)
     task = EncodedTask(
         name=s.scenario.upper().replace("-", "_"),
-        config={
-            "scenario": s.scenario,
-            "split": "train",
-            "reward_weights": learning.reward_weights,
-        },
+        config={"scenario": s.scenario, "split": "train", "reward_weights": learning.reward_weights},
     )
     frames = s.steps // scenario.num_trackers
     config = ExperimentConfig.get_from_yaml()
@@ -175,27 +179,29 @@ def main() -> None:
     config.evaluation, config.loggers, config.create_json = False, [], False
     config.save_folder = str(s.out.parent)
     curve = Curve(s, ITERATIONS // EVALUATIONS)
-    network = MlpConfig(
-        num_cells=list(learning.hidden), activation_class=nn.ReLU, layer_class=nn.Linear
-    )
+    network = MlpConfig(num_cells=list(learning.hidden), activation_class=nn.ReLU, layer_class=nn.Linear)
     experiment = Experiment(
-        task, ALGORITHMS[s.algorithm].get_from_yaml(), network, seed=s.seed, config=config,
-        callbacks=[curve],
-    )  # fmt: skip
+        task, ALGORITHMS[s.algorithm].get_from_yaml(), network, seed=s.seed, config=config, callbacks=[curve]
+    )
     experiment.run()
     curve.add()
     results = evaluate(curve.policy(), scenario, s.worlds, TEST_SEED, split="test", progress=False)
     result = {
-        "algorithm": s.algorithm, "scenario": s.scenario, "version": scenario.version,
-        "seed": s.seed, "steps": frames * scenario.num_trackers, "commit": commit(),
+        "algorithm": s.algorithm,
+        "scenario": s.scenario,
+        "version": scenario.version,
+        "seed": s.seed,
+        "steps": frames * scenario.num_trackers,
+        "commit": commit(),
         "curve": curve.points,
         "test": {
-            "seed": TEST_SEED, "worlds": s.worlds,
+            "seed": TEST_SEED,
+            "worlds": s.worlds,
             "safe_score": mean(results["safe_score"]).to_dict(),
             "score": float(results["score"].mean()),
             "contact_free": float(results["contact_free"].mean()),
         },
-    }  # fmt: skip
+    }
     s.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 

@@ -26,9 +26,15 @@ PAGE: Final = ROOT / "docs" / "algorithms.md"
 FIGURE: Final = ROOT / "docs" / "media" / "algorithms.svg"
 MARK: Final = "<!-- table -->"
 COLUMNS: Final = (
-    "scenario", "algorithm", "steps", "seeds", "safe score [least, greatest seed]",
-    "worlds with contact", "area under the curve", "steps/s",
-)  # fmt: skip
+    "scenario",
+    "algorithm",
+    "steps",
+    "seeds",
+    "safe score [least, greatest seed]",
+    "worlds with contact",
+    "area under the curve",
+    "steps/s",
+)
 LOOKS: Final = {
     "ppo": Style(BLUE, "o"),
     "mappo": Style(SKY, "s", (0, (5, 2))),
@@ -80,9 +86,7 @@ def grouped(runs: Sequence[Run]) -> dict[tuple[str, str], list[Run]]:
 
     def place(item: tuple[tuple[str, str], list[Run]]) -> tuple[int, float]:
         (scenario, _), members = item
-        return order.index(scenario), -mean(
-            [m["test"]["safe_score"]["value"] for m in members]
-        ).value
+        return order.index(scenario), -mean([m["test"]["safe_score"]["value"] for m in members]).value
 
     return dict(sorted(groups.items(), key=place))
 

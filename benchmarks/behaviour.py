@@ -34,10 +34,16 @@ EDGES: Final = np.linspace(-SPAN, SPAN, 49)
 """Edges of the cells in which positions are counted, m."""
 SCRIPT, REFERENCE = "ddcs-tuned", "planner"
 ROWS: Final = (
-    "safe score", "contact-free", "settling time, s", "trackers' speed, m/s",
-    "trackers' turn rate, either way, rad/s", "distance from the nearest slot, m",
-    "of it behind the slot, m", "target's turn rate, either way, rad/s", "darts per episode",
-)  # fmt: skip
+    "safe score",
+    "contact-free",
+    "settling time, s",
+    "trackers' speed, m/s",
+    "trackers' turn rate, either way, rad/s",
+    "distance from the nearest slot, m",
+    "of it behind the slot, m",
+    "target's turn rate, either way, rad/s",
+    "darts per episode",
+)
 
 
 @dataclass(frozen=True)
@@ -66,9 +72,7 @@ class Behaviour:
 def look(name: str, scenario: str, worlds: int, s: Settings) -> Behaviour:
     """Play a team, and return what it did."""
     policy = load(name)
-    batch = posse.batch(
-        scenario, worlds, seed=s.seed, split=s.split, message_size=policy.message_size
-    )
+    batch = posse.batch(scenario, worlds, seed=s.seed, split=s.split, message_size=policy.message_size)
     scene, trackers, world = batch.scenario, batch.arrays.tracker, batch.worlds
     slots = np.array(slot_offsets(scene))
     observations = batch.reset()
@@ -118,10 +122,7 @@ def beside(trackers: Any, world: Any, slots: npt.NDArray[np.float64]) -> tuple[A
     ahead = (dx * cos + dy * sin)[..., None] - slots[:, 0]
     left = (dy * cos - dx * sin)[..., None] - slots[:, 1]
     nearest = np.hypot(ahead, left).argmin(-1)[..., None]
-    return (
-        np.take_along_axis(ahead, nearest, -1)[..., 0],
-        np.take_along_axis(left, nearest, -1)[..., 0],
-    )
+    return (np.take_along_axis(ahead, nearest, -1)[..., 0], np.take_along_axis(left, nearest, -1)[..., 0])
 
 
 def draw(found: dict[str, Behaviour], scenario: str, s: Settings, path: Path) -> None:
@@ -132,12 +133,14 @@ def draw(found: dict[str, Behaviour], scenario: str, s: Settings, path: Path) ->
         for axis, (name, behaviour) in zip(axes, found.items(), strict=True):
             share = behaviour.density / behaviour.density.sum()
             axis.imshow(
-                share, origin="lower", extent=(-SPAN, SPAN, -SPAN, SPAN), cmap="Greys",
-                vmax=float(np.quantile(share, 0.999)), interpolation="nearest",
-            )  # fmt: skip
-            axis.add_patch(
-                Circle((0, 0), scene.tolerance, fill=False, edgecolor=INK, linewidth=1.2)
+                share,
+                origin="lower",
+                extent=(-SPAN, SPAN, -SPAN, SPAN),
+                cmap="Greys",
+                vmax=float(np.quantile(share, 0.999)),
+                interpolation="nearest",
             )
+            axis.add_patch(Circle((0, 0), scene.tolerance, fill=False, edgecolor=INK, linewidth=1.2))
             axis.plot(0, 0, "+", color=NOTE)
             axis.set(title=name, xlabel="to the left of the slot, m", xlim=(SPAN, -SPAN))
             axis.set_aspect("equal")
@@ -145,8 +148,7 @@ def draw(found: dict[str, Behaviour], scenario: str, s: Settings, path: Path) ->
         worlds = ", ".join(f"{name} {each.worlds}" for name, each in found.items())
         note(
             figure,
-            f"{scenario} v{scene.version}, {s.split} split, seed {s.seed}, "
-            f"worlds: {worlds}; after {s.after:g} s",
+            f"{scenario} v{scene.version}, {s.split} split, seed {s.seed}, worlds: {worlds}; after {s.after:g} s",
         )
         figure.savefig(path, metadata={"Date": None})
 
@@ -167,14 +169,17 @@ def main() -> None:
         draw(found, scenario, s, picture)
         caption = f"Trackers relative to their nearest slot on {scenario}; circle: its tolerance."
         lines += [
-            f"### {scenario}", "", f"![{caption}](media/{picture.name})", "", f"*{caption}*", "",
+            f"### {scenario}",
+            "",
+            f"![{caption}](media/{picture.name})",
+            "",
+            f"*{caption}*",
+            "",
             "| | " + " | ".join(f"`{name}`" for name in found) + " |",
             "|---" * (1 + len(found)) + "|",
-        ]  # fmt: skip
+        ]
         for row in ROWS:
-            lines.append(
-                f"| {row} | " + " | ".join(f"{b.means[row]:.2f}" for b in found.values()) + " |"
-            )
+            lines.append(f"| {row} | " + " | ".join(f"{b.means[row]:.2f}" for b in found.values()) + " |")
         lines.append("")
         print(f"{scenario} done", flush=True)
     fill(s.page, "\n".join(lines))

@@ -127,9 +127,7 @@ def rllib(settings: Settings, runners: int) -> dict[str, Any]:
     register_env("posse", lambda s: ParallelPettingZooEnv(posse.parallel_env(settings.scenario)))
     config = PPOConfig().environment("posse").env_runners(num_env_runners=runners)
     config.multi_agent(policies={"tracker"}, policy_mapping_fn=lambda agent, _: "tracker")
-    config.training(
-        train_batch_size=settings.steps, minibatch_size=min(500, settings.steps), num_epochs=4
-    )
+    config.training(train_batch_size=settings.steps, minibatch_size=min(500, settings.steps), num_epochs=4)
     algorithm = config.build_algo()
     # RLlib's own timers are moving averages, in which the first iteration outweighs all others.
     learning, update = Stopwatch(), algorithm.learner_group.update

@@ -87,11 +87,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     found = compare(
         CompareSettings(
-            (*SCRIPTED, *learned), settings.scenarios, settings.episodes, settings.seed,
-            settings.split, settings.rows, sweeps=("all",), replays=0,
-            sweep_episodes=settings.sweep_episodes, planner_episodes=settings.planner_episodes,
+            (*SCRIPTED, *learned),
+            settings.scenarios,
+            settings.episodes,
+            settings.seed,
+            settings.split,
+            settings.rows,
+            sweeps=("all",),
+            replays=0,
+            sweep_episodes=settings.sweep_episodes,
+            planner_episodes=settings.planner_episodes,
         )
-    )  # fmt: skip
+    )
     media = settings.page.parent / "media"
     media.mkdir(exist_ok=True)
     drawn = [path for path in found.figures if path.suffix == ".svg"]
@@ -112,9 +119,7 @@ def fill(page: Path, block: str) -> None:
     page.write_text(f"{before}{MARK}\n\n{block}\n{END}{after}", encoding="utf-8")
 
 
-def report(
-    settings: Settings, found: Comparison, learned: Sequence[str], figures: Sequence[str]
-) -> str:
+def report(settings: Settings, found: Comparison, learned: Sequence[str], figures: Sequence[str]) -> str:
     """Return the part of the page between its marks."""
     cards: dict[str, Mapping[str, Any]] = {name: load(name).card for name in learned}  # type: ignore[attr-defined]
     versions = ", ".join(f"`{n}` {posse.get_scenario(n).version}" for n in settings.scenarios)
@@ -124,15 +129,7 @@ def report(
         f"{min(settings.planner_episodes, settings.episodes):,}), seed {settings.seed}. Versions "
         f"of the scenarios: {versions}."
     )
-    lines = [
-        made,
-        "",
-        "## Results",
-        "",
-        *drawn(name for name in figures if name in FIRST),
-        TABLES,
-        "",
-    ]
+    lines = [made, "", "## Results", "", *drawn(name for name in figures if name in FIRST), TABLES, ""]
     trained = made_for(cards)
     for pivot in pivots(found):
         lines += [f"### {pivot.title}", "", pivot.meaning, "", *pivot_table(pivot, trained), ""]
@@ -152,12 +149,7 @@ def drawn(figures: Iterable[str]) -> list[str]:
     """Return figures with their captions."""
     lines = []
     for name in figures:
-        lines += [
-            f"![{CAPTIONS[name]}](media/comparison-{name}.svg)",
-            "",
-            f"*{CAPTIONS[name]}*",
-            "",
-        ]
+        lines += [f"![{CAPTIONS[name]}](media/comparison-{name}.svg)", "", f"*{CAPTIONS[name]}*", ""]
     return lines
 
 

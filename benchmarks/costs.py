@@ -30,9 +30,15 @@ from posse.signals.observation import observing
 from posse.signals.parts import Writers, built_in_parts, rules_for, sums_for, writers_for
 
 PARTS = (
-    "motion", "positions and distances of discs", "contact", "target sensor and radio", "score",
-    "metrics", "reward", "observations",
-)  # fmt: skip
+    "motion",
+    "positions and distances of discs",
+    "contact",
+    "target sensor and radio",
+    "score",
+    "metrics",
+    "reward",
+    "observations",
+)
 
 
 @dataclass(frozen=True)
@@ -86,9 +92,7 @@ def one_part(  # type: ignore[no-untyped-def]
             observing.observe_sonar(c, t, scratch, observations[e], WIDTH)
             begun = e % observing.TOGETHER + 1
             if begun == observing.TOGETHER or e == len(worlds.world) - 1:
-                observing.observe_together(
-                    c, worlds, e + 1 - begun, begun, writers, scratch, observations
-                )
+                observing.observe_together(c, worlds, e + 1 - begun, begun, writers, scratch, observations)
 
 
 def best(call: Callable[[], object], seconds: float) -> float:
@@ -150,12 +154,9 @@ def main() -> None:
     figures: dict[str, Any] = {"machine": machine.describe()}
     figures["parts"] = {name: parts(name, s.seconds) for name in s.scenarios}
     figures["team_size"] = {
-        n: whole("smart", max(1, 4096 // n), s.seconds, num_trackers=n, formation="ring")
-        for n in s.team_sizes
+        n: whole("smart", max(1, 4096 // n), s.seconds, num_trackers=n, formation="ring") for n in s.team_sizes
     }
-    figures["obstacles"] = {
-        m: whole("obstacles", 1024, s.seconds, num_obstacles=m, arena=40.0) for m in s.obstacles
-    }
+    figures["obstacles"] = {m: whole("obstacles", 1024, s.seconds, num_obstacles=m, arena=40.0) for m in s.obstacles}
     figures["worlds"] = {e: whole("smart", e, s.seconds) for e in s.worlds}
     figures["cores_busy_with_other_work"] = others.cores(time.process_time() - own)
     console = Console()

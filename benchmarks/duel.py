@@ -65,10 +65,14 @@ def trained(scenario: dict[str, Any], s: Settings, folder: Path) -> Target:
         else:
             values = default_settings("smart", side="target").to_dict()
             changed = {
-                "steps": s.steps, "seed": s.seed, "overrides": scenario, "against": s.team,
-                "folder": str(folder), "evaluate_every": max(1, s.steps // 4),
+                "steps": s.steps,
+                "seed": s.seed,
+                "overrides": scenario,
+                "against": s.team,
+                "folder": str(folder),
+                "evaluate_every": max(1, s.steps // 4),
                 "tensorboard": False,
-            }  # fmt: skip
+            }
             train(TrainSettings.from_dict({**values, **changed}))
     return load_target(folder / BEST)
 

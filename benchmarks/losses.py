@@ -40,20 +40,24 @@ class Settings:
 
 VARIATIONS: Final[dict[str, dict[str, Any]]] = {
     "sight at any distance": {"sensing_range": math.inf},
-    "a radio without range, loss and delay": {
-        "radio_range": math.inf, "radio_loss": 0.0, "radio_delay": 0,
-    },
+    "a radio without range, loss and delay": {"radio_range": math.inf, "radio_loss": 0.0, "radio_delay": 0},
     "no noise": {"range_noise": 0.0, "bearing_noise": 0.0},
     "no outages": {"sensor_outages": 0.0, "radio_outages": 0.0},
     "sight, radio, noise and outages at once": {
-        "sensing_range": math.inf, "radio_range": math.inf, "radio_loss": 0.0, "radio_delay": 0,
-        "range_noise": 0.0, "bearing_noise": 0.0, "velocity_smoothing": 0.0,
-        "sensor_outages": 0.0, "radio_outages": 0.0,
+        "sensing_range": math.inf,
+        "radio_range": math.inf,
+        "radio_loss": 0.0,
+        "radio_delay": 0,
+        "range_noise": 0.0,
+        "bearing_noise": 0.0,
+        "velocity_smoothing": 0.0,
+        "sensor_outages": 0.0,
+        "radio_outages": 0.0,
     },
     "nobody breaks": {"breaks": 0},
     "no obstacles": {"num_obstacles": 0},
     "a target that drives straight on": {"target_motion": "constant"},
-}  # fmt: skip
+}
 """Settings of the scenario that take away one difficulty each, or all that hide the target."""
 
 

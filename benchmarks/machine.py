@@ -65,8 +65,6 @@ def _busy_seconds() -> float:
         first = STAT.read_text(encoding="ascii").split("\n", 1)[0]
     except OSError:
         return 0.0
-    times = [
-        int(number) for number in first.split()[1:9]
-    ]  # the following columns are already included in others
+    times = [int(number) for number in first.split()[1:9]]  # the following columns are already included in others
     ticks = sum(times) - times[IDLE] - times[IO_WAIT]
     return ticks / os.sysconf("SC_CLK_TCK")

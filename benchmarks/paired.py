@@ -66,9 +66,8 @@ class Version:
 
     def __init__(self, root: Path) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, str(WORKER), str(root)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
+            [sys.executable, str(WORKER), str(root)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
 
     def time(self, case: Case, seconds: float) -> float:
         """Return the time of a step in one run, s."""
@@ -123,9 +122,12 @@ def main() -> None:
     for case, found in ratios.items():
         name = case.scenario if case.kind == "batch" else case.kind
         table.add_row(
-            name, f"{case.worlds:,}", case.kernel, str(case.threads),
+            name,
+            f"{case.worlds:,}",
+            case.kernel,
+            str(case.threads),
             f"{statistics.median(found):.2f} [{min(found):.2f}, {max(found):.2f}]",
-        )  # fmt: skip
+        )
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(describe())
     console.print(table)

@@ -60,9 +60,7 @@ def of_team(case: dict[str, Any]) -> Step:
     return step
 
 
-KINDS: dict[str, Callable[[dict[str, Any]], Step]] = {
-    "batch": of_batch, "pettingzoo": of_pettingzoo, "team": of_team,
-}  # fmt: skip
+KINDS: dict[str, Callable[[dict[str, Any]], Step]] = {"batch": of_batch, "pettingzoo": of_pettingzoo, "team": of_team}
 
 
 def fastest(step: Step, seconds: float) -> float:

@@ -130,9 +130,12 @@ class Runner:
         # One thread means one core for every simulator; JAX ignores other settings.
         self._process = subprocess.Popen(
             ["taskset", "-c", ",".join(map(str, cores)), *command],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
-            text=True, env=environment,
-        )  # fmt: skip
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+            env=environment,
+        )
 
     def __enter__(self) -> Runner:
         return self
@@ -172,9 +175,7 @@ class Runner:
         answer = self.ask(sample=True)
         busy = answer["processor_seconds"]
         return Sample(
-            answer["steps"] / answer["seconds"],
-            answer["steps"] / max(busy, 1e-9),
-            watch.cores(busy) > UNDISTURBED,
+            answer["steps"] / answer["seconds"], answer["steps"] / max(busy, 1e-9), watch.cores(busy) > UNDISTURBED
         )
 
 
@@ -198,10 +199,9 @@ def install(name: str) -> None:
     subprocess.run([sys.executable, "-m", "venv", str(ENVIRONMENTS / name)], check=True)
     python = str(ENVIRONMENTS / name / "bin" / "python")
     subprocess.run(
-        [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
-         "--requirement", str(requirements)],
+        [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", str(requirements)],
         check=True,
-    )  # fmt: skip
+    )
     stamp.write_text(digest, encoding="ascii")
 
 
@@ -219,20 +219,32 @@ def ocean_source() -> None:
     (ENVIRONMENTS / ".gitignore").write_text("*\n", encoding="ascii")
     with tempfile.TemporaryDirectory() as scratch:
         subprocess.run(
-            [sys.executable, "-m", "pip", "download", "--quiet", "--no-clean", "--no-deps",
-             "--no-build-isolation", "--no-binary", ":all:", "--dest", scratch,
-             f"pufferlib=={PUFFERLIB}"],
-            env={**os.environ, "TMPDIR": scratch}, capture_output=True, check=False,
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-m",
+                "pip",
+                "download",
+                "--quiet",
+                "--no-clean",
+                "--no-deps",
+                "--no-build-isolation",
+                "--no-binary",
+                ":all:",
+                "--dest",
+                scratch,
+                f"pufferlib=={PUFFERLIB}",
+            ],
+            env={**os.environ, "TMPDIR": scratch},
+            capture_output=True,
+            check=False,
+        )
         found = list(Path(scratch).rglob("ocean/target/target.h"))
         if not found:
             raise RuntimeError("no target.h in PufferLib's source distribution")
         shutil.copy(found[0], directory)
 
 
-def measure(
-    runner: Runner, row: Row, yardstick: Runner, yardstick_agents: int, patience: Patience
-) -> None:
+def measure(runner: Runner, row: Row, yardstick: Runner, yardstick_agents: int, patience: Patience) -> None:
     """Take the samples of one row, each immediately after a sample of mpe2."""
     while len(row.samples) < SAMPLES:
         began = time.perf_counter()
@@ -312,18 +324,15 @@ def prepare(peers: list[Peer]) -> tuple[list[Peer], dict[str, str]]:
 def main() -> None:
     """Measure, then write the results and the page of the manual."""
     parser = argparse.ArgumentParser(description="Throughput compared with other simulators.")
+    parser.add_argument("--only", nargs="+", metavar="WORD", help="only peers whose names contain this word")
     parser.add_argument(
-        "--only", nargs="+", metavar="WORD", help="only peers whose names contain this word"
-    )
-    parser.add_argument(
-        "--patience", type=float, default=120.0, metavar="S",
+        "--patience",
+        type=float,
+        default=120.0,
+        metavar="S",
         help="time limit for repeating samples with other load, s (default 120)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--page",
-        action="store_true",
-        help="write the page from the last results, without measuring",
     )
+    parser.add_argument("--page", action="store_true", help="write the page from the last results, without measuring")
     arguments = parser.parse_args()
     if arguments.page:
         write_page(json.loads(RESULTS.read_text(encoding="utf-8")), PAGE)

@@ -16,17 +16,14 @@ CONTENTS = {
         "metric, automatic resets; open plane, no occlusion, radio without loss"
     ),
     "posse, own kernel": (
-        "the same worlds, stepped by a kernel compiled for this scenario (`own_kernel=True`) and "
-        "cached on disk"
+        "the same worlds, stepped by a kernel compiled for this scenario (`own_kernel=True`) and cached on disk"
     ),
     "posse, field": (
         "as `posse`, with 6 occluding obstacles, walls, short and noisy sensing, a radio with "
         "range, delay and loss, faults and outages"
     ),
     "posse, PettingZoo": "as `posse`, one world, through PettingZoo's parallel interface",
-    "mpe2 simple_tag": (
-        "5 adversaries, 1 agent, 2 obstacles: forces, soft contacts, positions of all others"
-    ),
+    "mpe2 simple_tag": ("5 adversaries, 1 agent, 2 obstacles: forces, soft contacts, positions of all others"),
     "PettingZoo pursuit": "5 pursuers, 1 evader on a grid; an image of 7 x 7 x 3 each",
     "Gymnasium CartPole": "one cart with a pole; a reference for what numpy reaches",
     "VMAS simple_tag, 10 substeps": "as mpe2's, with VMAS's 10 substeps; episodes never end",
@@ -37,8 +34,7 @@ CONTENTS = {
         "2 physics steps; jit, vmap, scan; episodes never end"
     ),
     "PufferLib Ocean target": (
-        "5 agents, 1 goal: motion and positions of all others; C, including the loop over steps "
-        "and worlds; no contacts"
+        "5 agents, 1 goal: motion and positions of all others; C, including the loop over steps and worlds; no contacts"
     ),
 }
 
@@ -160,7 +156,5 @@ def _contents(rows: list[Row]) -> str:
         sizes = [str(row["agents"]), str(row["observation"])]
         body.append([name, CONTENTS[name], *sizes, versions])
     return _lines(
-        ["simulator", "world", "agents", "observation size", "versions"],
-        ["---", "---", "---:", "---:", "---"],
-        body,
+        ["simulator", "world", "agents", "observation size", "versions"], ["---", "---", "---:", "---:", "---"], body
     )

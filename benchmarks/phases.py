@@ -59,9 +59,8 @@ def causes(batch: posse.Batch, policy: Policy, memory: Any) -> npt.NDArray[np.in
 def shares(policy: Policy, s: Settings) -> npt.NDArray[np.float64]:
     """Return the share of working trackers for each cause and part of the time, (4, PARTS)."""
     batch = posse.batch(
-        s.scenario, s.worlds, seed=s.seed, split=s.split, message_size=policy.message_size,
-        autoreset="disabled",
-    )  # fmt: skip
+        s.scenario, s.worlds, seed=s.seed, split=s.split, message_size=policy.message_size, autoreset="disabled"
+    )
     horizon = batch.scenario.horizon
     counts = np.zeros((len(CAUSES), PARTS))
     for step, played in enumerate(rollout(batch, policy)):

@@ -28,10 +28,19 @@ from posse_training.reports.statistics import Estimate, mean, share
 SCENARIOS = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))
 PLANNER = "planner"
 POLICIES = (
-    "pursuit", "pngl-l-phi", "pngl", "deviated-pursuit", "velocity-pursuit",
-    "pngl-l-phi-tuned", "ddcs-centralized-pursuit", "ddcs-centralized", "ddcs-centralized-l-l",
-    "ddcs-distributed", "ddcs-tuned", PLANNER,
-)  # fmt: skip
+    "pursuit",
+    "pngl-l-phi",
+    "pngl",
+    "deviated-pursuit",
+    "velocity-pursuit",
+    "pngl-l-phi-tuned",
+    "ddcs-centralized-pursuit",
+    "ddcs-centralized",
+    "ddcs-centralized-l-l",
+    "ddcs-distributed",
+    "ddcs-tuned",
+    PLANNER,
+)
 ABLATIONS = (
     ("leader-loss", "ddcs-centralized-no-exchange"),
     ("search", "ddcs-no-radio"),
@@ -39,9 +48,7 @@ ABLATIONS = (
     ("field", "ddcs-no-radio"),
 )
 
-DRAWN = (
-    "pngl-l-phi", "pngl-l-phi-tuned", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned", PLANNER
-)  # fmt: skip
+DRAWN = ("pngl-l-phi", "pngl-l-phi-tuned", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned", PLANNER)
 """Policies of the figure: those that reach a safe score of 0.4 on most scenarios."""
 FIGURE = "results-scenarios.svg"
 
@@ -76,20 +83,24 @@ def main() -> None:
     results = {}
     for scenario, policy in sorted(plays, key=lambda play: SCENARIOS.index(play[0])):
         result = evaluate(
-            policy, scenario, settings.worlds(policy), settings.seed, split=settings.split,
-            progress=False,
-        )  # fmt: skip
+            policy, scenario, settings.worlds(policy), settings.seed, split=settings.split, progress=False
+        )
         result.write(settings.rows / f"{scenario}-{policy}.csv")
         keep(policy, load(policy), result)
         results[scenario, policy] = result
         print(f"{scenario:12s} {policy:30s} {mean(result['safe_score'])}", flush=True)
     straight = {
         policy: evaluate(
-            policy, "smart", settings.worlds(policy), settings.seed, split=settings.split,
-            progress=False, target_motion="constant",
+            policy,
+            "smart",
+            settings.worlds(policy),
+            settings.seed,
+            split=settings.split,
+            progress=False,
+            target_motion="constant",
         )
         for policy in ("ddcs-distributed", PLANNER)
-    }  # fmt: skip
+    }
     settings.page.write_text(page(settings, results, straight))
     draw(results, settings.page.parent / "media" / FIGURE)
 
@@ -105,11 +116,7 @@ def draw(results: Mapping[tuple[str, str], Results], path: Path) -> None:
         scores(plays, looks_of(DRAWN)).savefig(path, metadata={"Date": None})
 
 
-def page(
-    settings: Settings,
-    results: dict[tuple[str, str], Results],
-    straight: dict[str, Results],
-) -> str:
+def page(settings: Settings, results: dict[tuple[str, str], Results], straight: dict[str, Results]) -> str:
     """Return the page; ``straight`` has results of ``smart`` with a target that moves straight."""
     made = (
         f"Made by `make results` at commit `{commit()}`: {settings.episodes:,} worlds of the "
@@ -147,9 +154,7 @@ def page(
                     percent(share(result.settled)),
                     cell(mean(result["settling_time"]), 1),
                     percent(share(np.isfinite(result["detection_time"]))),
-                    percent(share(np.isfinite(result["recovery_time"])))
-                    if result.scenario.breaks
-                    else "",
+                    percent(share(np.isfinite(result["recovery_time"]))) if result.scenario.breaks else "",
                 )
             )
             + " |"
@@ -165,35 +170,22 @@ def page(
     ]
     for name, play in straight.items():
         constant, smart = play["safe_score"], results["smart", name]["safe_score"]
-        lines.append(
-            f"| `{name}` | {cell(mean(constant))} | {cell(mean(smart))} "
-            f"| {cell(mean(constant - smart))} |"
-        )
+        lines.append(f"| `{name}` | {cell(mean(constant))} | {cell(mean(smart))} | {cell(mean(constant - smart))} |")
     return "\n".join(lines) + "\n"
 
 
 def pivot(results: dict[tuple[str, str], Results]) -> list[str]:
     """Return a table of safe scores, policies by scenarios."""
-    lines = [
-        "Safe score:",
-        "",
-        f"| | {' | '.join(SCENARIOS)} |",
-        "|---" * (1 + len(SCENARIOS)) + "|",
-    ]
+    lines = ["Safe score:", "", f"| | {' | '.join(SCENARIOS)} |", "|---" * (1 + len(SCENARIOS)) + "|"]
     for policy in POLICIES:
         cells = (cell(mean(results[scenario, policy]["safe_score"])) for scenario in SCENARIOS)
         lines.append(f"| `{policy}` | {' | '.join(cells)} |")
     return lines
 
 
-def ranked(
-    results: dict[tuple[str, str], Results],
-) -> list[tuple[tuple[str, str], Results]]:
+def ranked(results: dict[tuple[str, str], Results]) -> list[tuple[tuple[str, str], Results]]:
     """Return the results sorted by scenario, then by safe score in descending order."""
-    return sorted(
-        results.items(),
-        key=lambda item: (SCENARIOS.index(item[0][0]), -item[1]["safe_score"].mean()),
-    )
+    return sorted(results.items(), key=lambda item: (SCENARIOS.index(item[0][0]), -item[1]["safe_score"].mean()))
 
 
 def cell(estimate: Estimate, digits: int = 3) -> str:

@@ -82,15 +82,12 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
     """
     rows = []
     kinds = itertools.product(
-        (False, True),
-        settings.worlds or (1, 32, 1024, 4096, 16384),
-        sorted({1, os.cpu_count() or 1}),
+        (False, True), settings.worlds or (1, 32, 1024, 4096, 16384), sorted({1, os.cpu_count() or 1})
     )
     for own_kernel, count, threads in kinds:
         batch = posse.batch(
-            settings.scenario, count, num_threads=threads, own_kernel=own_kernel,
-            **dict[str, Any](settings.overrides),
-        )  # fmt: skip
+            settings.scenario, count, num_threads=threads, own_kernel=own_kernel, **dict[str, Any](settings.overrides)
+        )
         observations = batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
@@ -132,9 +129,7 @@ def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
     limit = bandwidth(settings.seconds)
     rows = []
     for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
-        batch: Any = posse.batch(
-            settings.scenario, count, device="cuda", **dict[str, Any](settings.overrides)
-        )
+        batch: Any = posse.batch(settings.scenario, count, device="cuda", **dict[str, Any](settings.overrides))
         batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
@@ -173,9 +168,7 @@ def report_gpu(settings: Settings) -> None:
         "batches": rows,
     }
     table = Table(title=f"{settings.scenario} on {figures['device']}")
-    for column in (
-        "worlds", "million agent-steps/s [range]", "waiting for each", "share of bandwidth"
-    ):  # fmt: skip
+    for column in ("worlds", "million agent-steps/s [range]", "waiting for each", "share of bandwidth"):
         table.add_column(column, justify="right")
     for row in rows:
         median, low, high = (x / 1e6 for x in row["agent_steps"])
@@ -197,9 +190,7 @@ def interfaces(settings: Settings) -> dict[str, list[float]]:
     parallel = posse.parallel_env(settings.scenario, horizon=15_000)
     parallel.reset(seed=0)
     rng = np.random.default_rng(0)
-    actions = {
-        agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents
-    }
+    actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents}
 
     def step() -> None:
         parallel.step(actions)
@@ -286,10 +277,7 @@ def beside_others(settings: Settings) -> dict[str, dict[str, dict[str, float]]]:
                     process.wait()
             rounds.append({name: beside[name].beside(alone[name]) for name in work})
         shares[str(count)] = {
-            name: {
-                kind: statistics.median(r[name][kind] for r in rounds)
-                for kind in ("share", "of_the_processor")
-            }
+            name: {kind: statistics.median(r[name][kind] for r in rounds) for kind in ("share", "of_the_processor")}
             for name in work
         }
     return shares
@@ -302,9 +290,8 @@ def first_steps() -> dict[str, float]:
         for name in ("cold", "warm"):
             started = time.perf_counter()
             subprocess.run(
-                [sys.executable, "-c", FIRST_STEP],
-                check=True, env={**os.environ, "POSSE_CACHE_DIR": folder},
-            )  # fmt: skip
+                [sys.executable, "-c", FIRST_STEP], check=True, env={**os.environ, "POSSE_CACHE_DIR": folder}
+            )
             seconds[name] = time.perf_counter() - started
     return seconds
 
@@ -332,12 +319,8 @@ def main() -> None:
         figures["first_step_seconds"] = first_steps()
     console = Console()
     length, size = rows[0]["observation_length"], rows[0]["bytes_a_world"]
-    table = Table(
-        title=f"{settings.scenario}: {length} floats an observation, {size} bytes a world"
-    )
-    for column in (
-        "kernel", "worlds", "threads", "million agent-steps/s [range]", "times a plain copy"
-    ):  # fmt: skip
+    table = Table(title=f"{settings.scenario}: {length} floats an observation, {size} bytes a world")
+    for column in ("kernel", "worlds", "threads", "million agent-steps/s [range]", "times a plain copy"):
         table.add_column(column, justify="right")
     for row in rows:
         median, low, high = (x / 1e6 for x in row["agent_steps"])

@@ -118,15 +118,10 @@ def main() -> None:
     for name, make in kinds.items():
         for worlds in s.worlds:
             step = make(s, worlds)
-            pairs = [
-                (rate(step, s.seconds, False), rate(step, s.seconds, True)) for _ in range(s.pairs)
-            ]
+            pairs = [(rate(step, s.seconds, False), rate(step, s.seconds, True)) for _ in range(s.pairs)]
             own, pool = (statistics.median(side) for side in zip(*pairs, strict=True))
             low, middle, high = statistics.quantiles([b / a for a, b in pairs], n=4)
-            table.add_row(
-                name, f"{worlds:,}", f"{own:,.0f}", f"{pool:,.0f}",
-                f"{middle:.2f} [{low:.2f}, {high:.2f}]",
-            )  # fmt: skip
+            table.add_row(name, f"{worlds:,}", f"{own:,.0f}", f"{pool:,.0f}", f"{middle:.2f} [{low:.2f}, {high:.2f}]")
     Console(width=None if sys.stdout.isatty() else 120).print(table)
 
 

@@ -84,9 +84,15 @@ def time_to_beat(steps: int, seed: int, threads: int) -> str:
     """
     with tempfile.TemporaryDirectory() as folder:
         settings = replace(
-            default_settings("smart"), steps=steps, seed=seed, threads=threads, beside=None,
-            folder=Path(folder, "run"), evaluate_every=steps // 10, tensorboard=False,
-        )  # fmt: skip
+            default_settings("smart"),
+            steps=steps,
+            seed=seed,
+            threads=threads,
+            beside=None,
+            folder=Path(folder, "run"),
+            evaluate_every=steps // 10,
+            tensorboard=False,
+        )
         wanted = validate(settings, load("ddcs-tuned"))["safe_score"]
         train(settings, console=Console(file=StringIO()))
         with Path(folder, "run", "curve.csv").open(newline="") as lines:
@@ -108,10 +114,17 @@ def main() -> None:
     seconds: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder, timed(seconds):
         settings = TrainSettings(
-            scenario="smart", algorithm="ppo", steps=s.steps, threads=s.threads, beside=None,
-            folder=Path(folder, "run"), evaluate_every=10 * s.steps, tensorboard=False,
-            checkpoint_every=10 * s.steps, evaluate_worlds=1,
-        )  # fmt: skip
+            scenario="smart",
+            algorithm="ppo",
+            steps=s.steps,
+            threads=s.threads,
+            beside=None,
+            folder=Path(folder, "run"),
+            evaluate_every=10 * s.steps,
+            tensorboard=False,
+            checkpoint_every=10 * s.steps,
+            evaluate_worlds=1,
+        )
         learn = PPO.learn
         whole: list[float] = []
 

@@ -24,11 +24,14 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.parametrize(
     ("case", "cases"),
     [
-        (worlds.case, 15), (calls.case, 2), (threads.case, 3), (forged.case, 50),
+        (worlds.case, 15),
+        (calls.case, 2),
+        (threads.case, 3),
+        (forged.case, 50),
         pytest.param(processes.case, 12, marks=pytest.mark.long),
     ],
     ids=["worlds", "calls", "threads", "forged", "processes"],
-)  # fmt: skip
+)
 def test_no_case_fails(case: Any, cases: int) -> None:
     tries, failures = campaign(case, seed=0, cases=cases)
     assert failures == []
@@ -37,9 +40,10 @@ def test_no_case_fails(case: Any, cases: int) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("case", "first"), [(kills.case, 0), (full_disk.case, 3), (together.case, 6)],
+    ("case", "first"),
+    [(kills.case, 0), (full_disk.case, 3), (together.case, 6)],
     ids=["kills", "full_disk", "together"],
-)  # fmt: skip
+)
 def test_no_case_of_commands_fails(case: Any, first: int) -> None:
     """Case k runs command k modulo their number: together, each of them once."""
     assert len(COMMANDS) <= 9
@@ -52,8 +56,11 @@ def test_campaigns_run_by_one_command_that_keeps_their_figures(tmp_path: Path) -
     figures = tmp_path / "runs" / "figures.json"
     done = subprocess.run(
         [sys.executable, "-m", "tests.fuzz", "worlds", "--cases", "2", "--figures", str(figures)],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     row = json.loads(figures.read_text())["worlds"]
     assert (row["tries"], row["failures"], row["seed"]) == (2, 0, 0)
@@ -67,9 +74,8 @@ def test_every_campaign_has_a_module_that_plays_alone() -> None:
 
 def test_a_campaign_that_is_not_there_is_named() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "tests.fuzz", "wrlds"],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-m", "tests.fuzz", "wrlds"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2
     assert "no campaign 'wrlds'; there are: worlds, calls" in done.stderr
 

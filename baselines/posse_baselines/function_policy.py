@@ -17,9 +17,7 @@ Function = Callable[[FloatArray], npt.ArrayLike]
 class FunctionPolicy(BasePolicy):
     """What :func:`from_function` returns."""
 
-    def __init__(
-        self, function: Function, name: str, message_size: int, discrete_actions: bool
-    ) -> None:
+    def __init__(self, function: Function, name: str, message_size: int, discrete_actions: bool) -> None:
         self.name = name
         self.message_size = message_size
         self._function = function
@@ -54,11 +52,7 @@ class FunctionPolicy(BasePolicy):
 
 
 def from_function(
-    function: Function,
-    *,
-    name: str | None = None,
-    message_size: int = 0,
-    discrete_actions: bool = False,
+    function: Function, *, name: str | None = None, message_size: int = 0, discrete_actions: bool = False
 ) -> FunctionPolicy:
     """Return a policy that calls a function, for all that takes a policy.
 

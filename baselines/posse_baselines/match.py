@@ -67,8 +67,7 @@ class Match(BasePolicy):
         moves = np.asarray(moves)
         if moves.shape[:2] != (len(actions), 1) or moves.shape[-1] < 2:
             raise PolicyError(
-                f"target {self._target_name!r} returned actions of shape {moves.shape}, wanted "
-                f"{(len(actions), 1, 2)}"
+                f"target {self._target_name!r} returned actions of shape {moves.shape}, wanted {(len(actions), 1, 2)}"
             )
         whole = np.zeros((len(actions), observations.shape[1], actions.shape[2]), np.float32)
         whole[:, :-1] = actions

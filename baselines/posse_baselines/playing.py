@@ -70,15 +70,11 @@ def rollout(batch: Batch, policy: Policy, *, seed: int | None = None) -> Iterato
         yield Played(actions, observations, rewards, terminated, truncated, infos, memory)
         if batch.autoreset == "disabled" and ended.any():
             if not ended.all():
-                raise PolicyError(
-                    "episodes of this batch end at different steps: play it with an autoreset mode"
-                )
+                raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
             return
 
 
-def play(
-    batch: Batch, policy: Policy, *, seed: int | None = None
-) -> dict[str, npt.NDArray[np.float64]]:
+def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, npt.NDArray[np.float64]]:
     """Play one episode in every world and return its metrics by name, (E,) each.
 
     Raises:
@@ -111,18 +107,11 @@ def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:
     wanted = [f"tracker_{i}" for i in range(len(names))]
     if not names or set(names) != set(wanted):
         raise PolicyError(
-            f"observations of {sorted(observations)} are not those of a team: "
-            "tracker_0, tracker_1, ... without a gap"
+            f"observations of {sorted(observations)} are not those of a team: tracker_0, tracker_1, ... without a gap"
         )
     return np.stack([np.asarray(observations[name], np.float32) for name in wanted])[None]
 
 
-def split_agents(
-    actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]
-) -> dict[str, FloatArray]:
+def split_agents(actions: FloatArray, agents: Sequence[str] | Mapping[str, Any]) -> dict[str, FloatArray]:
     """Return actions (1, N, 2 + m) by name, for the trackers among ``agents``."""
-    return {
-        name: actions[0, int(name.removeprefix("tracker_"))]
-        for name in agents
-        if name.startswith("tracker_")
-    }
+    return {name: actions[0, int(name.removeprefix("tracker_"))] for name in agents if name.startswith("tracker_")}

@@ -14,10 +14,7 @@ from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuned import from_file
 
-_FILES: Final[dict[str, Callable[[Path], Policy]]] = {
-    ".safetensors": LearnedPolicy.from_file,
-    ".json": from_file,
-}
+_FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPolicy.from_file, ".json": from_file}
 """Readers of policy files, by suffix."""
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
@@ -53,9 +50,7 @@ def load(policy: str | Path) -> Policy:
     """
     found = load_any(policy)
     if getattr(found, "side", "trackers") == "target":
-        raise PolicyError(
-            f"{_short(str(policy))} is the policy of a target: give it as target=, or --target"
-        )
+        raise PolicyError(f"{_short(str(policy))} is the policy of a target: give it as target=, or --target")
     return found
 
 
@@ -68,8 +63,7 @@ def load_any(policy: str | Path) -> Policy:
     text = str(policy)
     if not 0 < len(text) <= _LONGEST or "\0" in text:
         raise PolicyError(
-            f"{_short(text)} cannot be a policy: a name or path has 1 to {_LONGEST} characters and "
-            "no NUL"
+            f"{_short(text)} cannot be a policy: a name or path has 1 to {_LONGEST} characters and no NUL"
         )
     if text in SCRIPTED:
         return SCRIPTED[text]()
@@ -157,17 +151,12 @@ def from_module(text: str) -> Any:
         PolicyError: The module or the attribute cannot be found, or fails.
     """
     if not _MODULE.fullmatch(text):
-        raise PolicyError(
-            f"{_short(text)} names no class: write package.module:Class, for example "
-            "my_policies:Circle"
-        )
+        raise PolicyError(f"{_short(text)} names no class: write package.module:Class, for example my_policies:Circle")
     module_name, _, attribute = text.partition(":")
     try:
         module = importlib.import_module(module_name)
     except Exception as error:  # whatever the module's code raises
-        raise PolicyError(
-            f"cannot import {module_name!r} of policy {_short(text)}: {_describe(error)}"
-        ) from error
+        raise PolicyError(f"cannot import {module_name!r} of policy {_short(text)}: {_describe(error)}") from error
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
         near = difflib.get_close_matches(attribute, names, n=3)

@@ -86,8 +86,7 @@ def load_target(target: str | Path | Target) -> Target:
     near = difflib.get_close_matches(text[:100], names, n=3, cutoff=0.5)
     hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
     raise PolicyError(
-        f"unknown target {text!r:.120}{hint}; targets are: {', '.join(names)}, a file, or "
-        '"package.module:Class"'
+        f'unknown target {text!r:.120}{hint}; targets are: {", ".join(names)}, a file, or "package.module:Class"'
     )
 
 
@@ -105,8 +104,7 @@ def _from_code(text: str) -> Target:
     missing = [m for m in ("begin", "act", "restart") if not callable(getattr(made, m, None))]
     if missing:
         raise PolicyError(
-            f"{text!r:.120} is not the policy of a target: it lacks {', '.join(missing)}, as "
-            "posse.TargetPolicy says"
+            f"{text!r:.120} is not the policy of a target: it lacks {', '.join(missing)}, as posse.TargetPolicy says"
         )
     name = getattr(made, "name", None)
     return Target(name if isinstance(name, str) else text, AGENT, made)

@@ -71,9 +71,7 @@ class TrackerEnv(OwnArrays, OneAgentEnv):
         settings = fitting(settings, self.teammates, number)
         self.number = number
         self._flat_infos = flat_infos
-        self._open(
-            settings, render_mode=render_mode, seed=seed, split=split, first_world=first_world
-        )
+        self._open(settings, render_mode=render_mode, seed=seed, split=split, first_world=first_world)
         self.observation_space: spaces.Box = box(self.layout.bounds())
         # Scenario by which the action is read: without messages if it has no message part.
         spoken = self.scenario.replace(message_size=0) if silent else self.scenario
@@ -146,13 +144,9 @@ def fitting(scenario: Scenario, teammates: Policy, number: int) -> Scenario:
             "use posse.parallel_env(..., target='agent')"
         )
     if scenario.num_trackers < 2:
-        raise ScenarioError(
-            f"num_trackers={scenario.num_trackers} leaves no team-mates: use posse/Solo-v0"
-        )
+        raise ScenarioError(f"num_trackers={scenario.num_trackers} leaves no team-mates: use posse/Solo-v0")
     if number not in range(scenario.num_trackers):
-        raise ValueError(
-            f"number={number!r} is not in the team: trackers are 0 to {scenario.num_trackers - 1}"
-        )
+        raise ValueError(f"number={number!r} is not in the team: trackers are 0 to {scenario.num_trackers - 1}")
     return scenario.replace(message_size=max(scenario.message_size, teammates.message_size))
 
 

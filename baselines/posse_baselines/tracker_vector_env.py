@@ -68,9 +68,7 @@ class TrackerVectorEnv(TeamVectorEnv):
             self._memory = self.teammates.restart(self._memory, np.array(mask, np.bool_))
         return result
 
-    def step(
-        self, actions: Any
-    ) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
+    def step(self, actions: Any) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
         """Advance every world by one control step; see :meth:`TeamVectorEnv.step`."""
         result = super().step(actions)
         if self.autoreset_mode == AutoresetMode.NEXT_STEP:
@@ -100,9 +98,7 @@ class TrackerVectorEnv(TeamVectorEnv):
     def _shape_of_motions(self) -> tuple[int, ...]:
         return self.num_envs, 2 if self._silent else self.batch.action_shape[2]
 
-    def _fitting(
-        self, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
-    ) -> Scenario:
+    def _fitting(self, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
         return fitting(shortened(scenario, horizon, overrides), self.teammates, self.number)
 
     def _spaces(self, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:

@@ -28,9 +28,7 @@ class Tunable:
     above: str = ""
 
 
-def number(
-    default: float, unit: str, low: float, high: float, *, tune: bool = False, above: str = ""
-) -> Any:
+def number(default: float, unit: str, low: float, high: float, *, tune: bool = False, above: str = "") -> Any:
     """Declare a numeric field of a settings class, allowed in [low, high].
 
     Args:
@@ -59,10 +57,13 @@ def tunables(settings: Any) -> tuple[Tunable, ...]:
     """Return the tunable fields of a settings object, with its values as defaults."""
     return tuple(
         Tunable(
-            field.name, getattr(settings, field.name),
-            field.metadata["low"], field.metadata["high"], field.metadata["unit"],
+            field.name,
+            getattr(settings, field.name),
+            field.metadata["low"],
+            field.metadata["high"],
+            field.metadata["unit"],
             field.metadata["above"],
         )
         for field in dataclasses.fields(settings)
         if field.metadata.get("tunable")
-    )  # fmt: skip
+    )

@@ -9,9 +9,7 @@ from serve import ACTION_SETS, Built, serve
 
 def build(worlds: int, variant: str) -> Built:
     """Return a batch with automatic resets."""
-    envs = gymnasium.make_vec(
-        "CartPole-v1", num_envs=worlds, vectorization_mode="vector_entry_point"
-    )
+    envs = gymnasium.make_vec("CartPole-v1", num_envs=worlds, vectorization_mode="vector_entry_point")
     envs.reset(seed=0)
     actions = np.random.default_rng(0).integers(0, 2, (ACTION_SETS, worlds))
 

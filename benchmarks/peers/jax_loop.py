@@ -40,9 +40,9 @@ def build(
     """
     key = jax.random.key(0)
     key, reset_key, action_key = jax.random.split(key, 3)
-    actions = jax.jit(
-        lambda k: jax.vmap(lambda one: draw_actions(one, worlds))(jax.random.split(k, ACTION_SETS))
-    )(action_key)
+    actions = jax.jit(lambda k: jax.vmap(lambda one: draw_actions(one, worlds))(jax.random.split(k, ACTION_SETS)))(
+        action_key
+    )
     observations, state = jax.jit(jax.vmap(env.reset))(jax.random.split(reset_key, worlds))
     chunk = max(1, min(256, 8192 // worlds))
 
@@ -52,9 +52,7 @@ def build(
         key, state, _, returns = carry
         key, step_key = jax.random.split(key)
         now = jax.tree.map(lambda a: a[k % ACTION_SETS], actions)
-        observations, state, rewards = jax.vmap(step)(
-            jax.random.split(step_key, worlds), state, now
-        )
+        observations, state, rewards = jax.vmap(step)(jax.random.split(step_key, worlds), state, now)
         returns = jax.tree.map(jnp.add, returns, rewards)
         return (key, state, observations, returns), None
 
@@ -63,10 +61,7 @@ def build(
         return jax.lax.scan(one_step, carry, jnp.arange(chunk))[0]
 
     shapes = jax.eval_shape(
-        jax.vmap(step),
-        jax.random.split(key, worlds),
-        state,
-        jax.tree.map(lambda a: a[0], actions),
+        jax.vmap(step), jax.random.split(key, worlds), state, jax.tree.map(lambda a: a[0], actions)
     )[2]
     returns = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
     carry = (key, state, observations, returns)

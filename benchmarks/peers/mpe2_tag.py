@@ -15,10 +15,7 @@ def build(worlds: int, variant: str) -> Built:
     env.reset(seed=0)
     agents = env.possible_agents
     rng = np.random.default_rng(0)
-    actions = [
-        {agent: rng.uniform(0, 1, 5).astype(np.float32) for agent in agents}
-        for _ in range(ACTION_SETS)
-    ]
+    actions = [{agent: rng.uniform(0, 1, 5).astype(np.float32) for agent in agents} for _ in range(ACTION_SETS)]
 
     def run(steps: int) -> None:
         for k in range(steps):

@@ -24,12 +24,22 @@ def library() -> Path:
     path = SOURCE / "worlds.so"
     subprocess.run(
         [
-            "cc", "-O3", "-march=native", "-DNDEBUG", "-w", "-shared", "-fPIC",
-            f"-I{HERE / 'ocean'}", f"-I{SOURCE}", str(HERE / "ocean" / "worlds.c"),
-            "-lm", "-o", str(path),
+            "cc",
+            "-O3",
+            "-march=native",
+            "-DNDEBUG",
+            "-w",
+            "-shared",
+            "-fPIC",
+            f"-I{HERE / 'ocean'}",
+            f"-I{SOURCE}",
+            str(HERE / "ocean" / "worlds.c"),
+            "-lm",
+            "-o",
+            str(path),
         ],
         check=True,
-    )  # fmt: skip
+    )
     return path
 
 

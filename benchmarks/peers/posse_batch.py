@@ -17,9 +17,7 @@ def build(worlds: int, variant: str) -> Built:
     """Return a batch with one thread per available core."""
     scenario, _, own_kernel = variant.partition(", ")
     threads = len(os.sched_getaffinity(0))
-    batch = posse.batch(
-        scenario, worlds, seed=0, num_threads=threads, own_kernel=own_kernel == "own kernel"
-    )
+    batch = posse.batch(scenario, worlds, seed=0, num_threads=threads, own_kernel=own_kernel == "own kernel")
     draws = np.random.default_rng(0).uniform(-1, 1, (ACTION_SETS, *batch.action_shape))
     actions = draws.astype(np.float32)
     batch.reset()

@@ -74,11 +74,7 @@ def serve(build: Callable[[int, str], Built], *packages: str) -> None:
             began = time.perf_counter()
             built.run(steps)
             seconds = time.perf_counter() - began
-            answer = {
-                "steps": steps,
-                "seconds": seconds,
-                "processor_seconds": _processor_seconds() - processor,
-            }
+            answer = {"steps": steps, "seconds": seconds, "processor_seconds": _processor_seconds() - processor}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
 

@@ -48,20 +48,14 @@ GALLERY: Final = {
     "search": Shown(("pngl-l-phi", "ddcs-distributed"), picture=24.0),
     "obstacles": Shown(("ddcs-distributed", "learned-obstacles")),
     "radio": Shown(("ddcs-distributed", "learned-radio"), picture=10.0),
-    "leader-loss": Shown(
-        ("ddcs-centralized-no-exchange", "pngl-l-phi"), seconds=30.0, picture=20.0
-    ),
+    "leader-loss": Shown(("ddcs-centralized-no-exchange", "pngl-l-phi"), seconds=30.0, picture=20.0),
     "field": Shown(("ddcs-distributed", "learned-field"), picture=26.0),
     "duel": Shown(("ddcs-distributed", "learned-smart"), picture=18.0),
     "paper-centralized": Shown(("pngl-l-phi", "ddcs-centralized"), seconds=8.0, picture=4.0),
     "paper-distributed": Shown(("pngl", "ddcs-distributed"), seconds=8.0, picture=4.0),
 }
 
-LOST: Final = {
-    "smart": ("ddcs-tuned", 12),
-    "field": ("ddcs-tuned", 17),
-    "leader-loss": ("pngl-l-phi-tuned", 26),
-}
+LOST: Final = {"smart": ("ddcs-tuned", 12), "field": ("ddcs-tuned", 17), "leader-loss": ("pngl-l-phi-tuned", 26)}
 """Of each scenario a tuned team, and the validation world where the planner is most ahead of it."""
 
 
@@ -95,14 +89,11 @@ def others(scenario: str, shown: Shown) -> list[tuple[str, ...]]:
     return [OTHERS, *(tuple(rest[k : k + SIDE_BY_SIDE]) for k in starts)]
 
 
-def write(
-    scenario: str, suffix: str, teams: tuple[str, ...], shown: Shown, target: str | None = None
-) -> Path:
+def write(scenario: str, suffix: str, teams: tuple[str, ...], shown: Shown, target: str | None = None) -> Path:
     """Write a replay of teams in a scenario's world."""
     replay = record(
-        list(teams), scenario, target=target, seed=SEED, world=shown.world,
-        seconds=shown.seconds, observations=False,
-    )  # fmt: skip
+        list(teams), scenario, target=target, seed=SEED, world=shown.world, seconds=shown.seconds, observations=False
+    )
     return write_replay(replay, MEDIA / "replays" / f"{scenario}{suffix}.html")
 
 
@@ -117,10 +108,7 @@ def main() -> None:
                 write(name, f"-others-{number}" if number > 1 else "-others", teams, shown)
         if name in LOST:
             team, world = LOST[name]
-            replay = record(
-                [team, "planner"], name, seed=SEED, world=world, split="validation",
-                observations=False,
-            )  # fmt: skip
+            replay = record([team, "planner"], name, seed=SEED, world=world, split="validation", observations=False)
             write_replay(replay, MEDIA / "replays" / f"{name}-lost.html")
         if name == "duel":
             write(name, f"-{EVADER}", ("ddcs-tuned", "learned-duel"), shown, EVADER)

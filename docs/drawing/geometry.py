@@ -17,20 +17,12 @@ _RADIUS: Final = 0.16
 _TEXT: Final = 11
 
 
-def robot(
-    axes: Axes, at: Point, heading: float, colour: str, name: str, nose: float = 0.75
-) -> None:
+def robot(axes: Axes, at: Point, heading: float, colour: str, name: str, nose: float = 0.75) -> None:
     """Draw a robot with an arrow along its heading."""
     axes.add_patch(Circle(at, _RADIUS, fc="w", ec=colour, lw=1.6, zorder=4))
     tip = ahead(at, heading, nose)
-    axes.add_patch(
-        FancyArrowPatch(
-            at, tip, arrowstyle="-|>", mutation_scale=10, color=colour, lw=1.3, zorder=3
-        )
-    )
-    axes.text(
-        at[0], at[1] - 0.42, name, ha="center", va="center", color=colour, size=_TEXT, zorder=5
-    )
+    axes.add_patch(FancyArrowPatch(at, tip, arrowstyle="-|>", mutation_scale=10, color=colour, lw=1.3, zorder=3))
+    axes.text(at[0], at[1] - 0.42, name, ha="center", va="center", color=colour, size=_TEXT, zorder=5)
 
 
 def ahead(at: Point, heading: float, distance: float) -> Point:
@@ -49,9 +41,7 @@ def line(axes: Axes, start: Point, end: Point, label: str = "", style: str = "--
 
 def angle(axes: Axes, at: Point, low: float, high: float, size: float, label: str) -> None:
     """Draw the arc from one direction (rad) to another, anticlockwise, with its name."""
-    axes.add_patch(
-        Arc(at, 2 * size, 2 * size, theta1=math.degrees(low), theta2=math.degrees(high), lw=1.0)
-    )
+    axes.add_patch(Arc(at, 2 * size, 2 * size, theta1=math.degrees(low), theta2=math.degrees(high), lw=1.0))
     _note(axes, ahead(at, (low + high) / 2, size + 0.24), label)
 
 
@@ -135,9 +125,13 @@ def l_l(axes: Axes) -> None:
     line(axes, point, second, "l_k")
     line(axes, follower, point, style="-")
     angle(
-        axes, point, math.atan2(first[1] - point[1], first[0] - point[0]),
-        math.atan2(second[1] - point[1], second[0] - point[0]), 0.55, "",
-    )  # fmt: skip
+        axes,
+        point,
+        math.atan2(first[1] - point[1], first[0] - point[0]),
+        math.atan2(second[1] - point[1], second[0] - point[0]),
+        0.55,
+        "",
+    )
     _note(axes, (point[0] + 0.95, point[1] + 0.75), "γ_k - γ_i")
     axes.plot(*point, "o", ms=5, color=TRACKER, zorder=6)
     robot(axes, follower, own, TRACKER, "follower j", 1.25)
@@ -154,12 +148,12 @@ def slot_law(axes: Axes) -> None:
     offset, velocity = (1.25, 0.51), (0.35, 0.95)
     total = (offset[0] + velocity[0], offset[1] + velocity[1])
     for start, end, colour in (
-        (tracker, offset, TRACKER), (offset, total, OTHER), (tracker, total, TARGET),
+        (tracker, offset, TRACKER),
+        (offset, total, OTHER),
+        (tracker, total, TARGET),
         (slot, (slot[0] + velocity[0], slot[1] + velocity[1]), OTHER),
-    ):  # fmt: skip
-        arrow = FancyArrowPatch(
-            start, end, arrowstyle="-|>", mutation_scale=10, color=colour, shrinkA=0, shrinkB=0
-        )
+    ):
+        arrow = FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=10, color=colour, shrinkA=0, shrinkB=0)
         axes.add_patch(arrow)
     _note(axes, (0.95, 0.14), "k e")
     _note(axes, (1.72, 0.95), "v_s")

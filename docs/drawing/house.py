@@ -94,32 +94,40 @@ def draw() -> None:
             package, _, name = room.partition(".")
             axes.add_patch(
                 FancyBboxPatch(
-                    (x, y), width, HEIGHT, boxstyle="round,pad=0.02",
-                    facecolor=COLOURS[package], edgecolor="#334455", linewidth=0.9,
+                    (x, y),
+                    width,
+                    HEIGHT,
+                    boxstyle="round,pad=0.02",
+                    facecolor=COLOURS[package],
+                    edgecolor="#334455",
+                    linewidth=0.9,
                 )
-            )  # fmt: skip
+            )
             purpose = textwrap.shorten(purpose_of(room), int(width * 26), placeholder=" ...")
             purpose = textwrap.fill(purpose, int(width * 13.5))
             axes.text(x + 0.1, y + HEIGHT - 0.1, name, va="top", fontsize=10, fontweight="bold")
             axes.text(
-                x + width - 0.1, y + HEIGHT - 0.12, size_of(room),
-                ha="right", va="top", fontsize=7.5, color="#445566",
-            )  # fmt: skip
+                x + width - 0.1, y + HEIGHT - 0.12, size_of(room), ha="right", va="top", fontsize=7.5, color="#445566"
+            )
             axes.text(x + 0.1, y + HEIGHT - 0.34, purpose, va="top", fontsize=8)
             if inner := rooms_in(room):
                 axes.text(
-                    x + width - 0.1, y + 0.06, f"contains {inner}",
-                    ha="right", va="bottom", fontsize=7.5, color="#445566",
-                )  # fmt: skip
+                    x + width - 0.1,
+                    y + 0.06,
+                    f"contains {inner}",
+                    ha="right",
+                    va="bottom",
+                    fontsize=7.5,
+                    color="#445566",
+                )
         if PACKAGE_BEGINS.get(row):
             axes.text(-0.15, y + HEIGHT, PACKAGE_BEGINS[row], ha="right", va="top", fontsize=11)
     bottom = -STEP * (len(LINES) - 1)
     axes.add_patch(
         FancyArrowPatch(
-            (WIDTH + 0.35, HEIGHT), (WIDTH + 0.35, bottom),
-            arrowstyle="-|>", mutation_scale=16, color="#334455",
+            (WIDTH + 0.35, HEIGHT), (WIDTH + 0.35, bottom), arrowstyle="-|>", mutation_scale=16, color="#334455"
         )
-    )  # fmt: skip
+    )
     axes.text(WIDTH + 0.5, bottom / 2, "imports", rotation=270, va="center", fontsize=10)
     axes.set_xlim(-2.1, WIDTH + 0.9)
     axes.set_ylim(bottom - 0.1, HEIGHT + 0.1)

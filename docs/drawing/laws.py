@@ -44,22 +44,17 @@ class Law:
 
 LAWS: Final = (
     Law("velocity-pursuit", "velocity-pursuit", geometry.pursuit, "range"),
-    Law(
-        "deviated-pursuit", "deviated-pursuit",
-        lambda axes: geometry.pursuit(axes, deviated=True), "slot",
-    ),
+    Law("deviated-pursuit", "deviated-pursuit", lambda axes: geometry.pursuit(axes, deviated=True), "slot"),
     Law("pngl", "pngl", geometry.navigation, "slot"),
     Law("l-phi", "pngl-l-phi", geometry.l_phi, "slot"),
     Law("l-l", "ddcs-centralized-l-l", geometry.l_l, "slot"),
     Law("slot", "ddcs-distributed", geometry.slot_law, "slot"),
-)  # fmt: skip
+)
 
 
 def draw(law: Law) -> Figure:
     """Draw a law."""
-    scenario = posse.get_scenario(
-        "accelerating", horizon=round(SECONDS / 0.1), start_distance=(2.0, 4.0)
-    )
+    scenario = posse.get_scenario("accelerating", horizon=round(SECONDS / 0.1), start_distance=(2.0, 4.0))
     run = record(law.policy, scenario, 1, SEED)
     figure, (left, middle, right) = plt.subplots(
         1, 3, figsize=(10, 3.7), layout="constrained", width_ratios=(1.0, 1.15, 1.0)

@@ -30,9 +30,7 @@ class _Arguments:
 def run(notebook: Any) -> None:
     """Execute a notebook in a folder of its own; what failed is raised."""
     with tempfile.TemporaryDirectory() as folder:
-        client = NotebookClient(
-            notebook, timeout=1800, resources={"metadata": {"path": folder}}, record_timing=False
-        )
+        client = NotebookClient(notebook, timeout=1800, resources={"metadata": {"path": folder}}, record_timing=False)
         client.execute()
     for cell in notebook.cells:
         for output in cell.get("outputs", ()):

@@ -42,9 +42,7 @@ Frame = npt.NDArray[np.uint8]
 
 def median_world() -> int:
     """Return the world with the median difference of the teams' safe scores."""
-    first, second = (
-        evaluate(name, SCENARIO, WORLDS, SEED, progress=False)["safe_score"] for name in TEAMS
-    )
+    first, second = (evaluate(name, SCENARIO, WORLDS, SEED, progress=False)["safe_score"] for name in TEAMS)
     for name, scores in zip(TEAMS, (first, second), strict=True):
         print(f"{name}: mean safe score of {WORLDS} worlds {scores.mean():.3f}")
     print(f"{TEAMS[1]} has the higher one in {(second > first).sum()}")
@@ -65,13 +63,9 @@ def strip(replay: Replay) -> Frame:
         axes.set_ylim(-0.05, 1.08)
         axes.set_yticks((0, 1))
         axes.set_ylabel("score")
-        axes.set_xticks(
-            ticks := np.arange(START, START + SECONDS + 1, 5), [f"{t:g} s" for t in ticks]
-        )
+        axes.set_xticks(ticks := np.arange(START, START + SECONDS + 1, 5), [f"{t:g} s" for t in ticks])
         axes.tick_params(labelsize=8)
-        axes.legend(
-            ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.92), frameon=False, fontsize=8
-        )
+        axes.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.92), frameon=False, fontsize=8)
         drawn = io.BytesIO()
         figure.savefig(drawn, format="png")
         plt.close(figure)
@@ -92,23 +86,26 @@ def main() -> None:
     """Make the film."""
     mpl.use("Agg")
     world = median_world()
-    replay = record(
-        list(TEAMS), SCENARIO, seed=SEED, world=world, seconds=START + SECONDS, observations=False
-    )
+    replay = record(list(TEAMS), SCENARIO, seed=SEED, world=world, seconds=START + SECONDS, observations=False)
     filmed = slice(round(START / STEP), None)
     for player in replay.players:
         score = player.columns["score"].values[filmed].mean()
         touches = sum(event.kind == "contact" for event in player.events)
-        print(
-            f"world {world}, {player.name}: mean score in the film {score:.2f}, contacts {touches}"
-        )
+        print(f"world {world}, {player.name}: mean score in the film {score:.2f}, contacts {touches}")
     below = strip(replay)
     with tempfile.TemporaryDirectory() as folder:
         options: dict[str, Any] = {"start": START, "size": (WIDTH, HEIGHT)}
         path = film(
-            [(name, load(name)) for name in TEAMS], SCENARIO, path=Path(folder) / "film.gif",
-            seed=SEED, world=world, seconds=SECONDS, speed=SPEED, every=EVERY, **options,
-        )  # fmt: skip
+            [(name, load(name)) for name in TEAMS],
+            SCENARIO,
+            path=Path(folder) / "film.gif",
+            seed=SEED,
+            world=world,
+            seconds=SECONDS,
+            speed=SPEED,
+            every=EVERY,
+            **options,
+        )
         above = frames(path)
     joined = []
     for number, frame in enumerate(above):

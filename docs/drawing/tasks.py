@@ -14,9 +14,11 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
 PLACES: Final = {
-    "searching": (0.0, 0.0), "converging": (4.6, 1.8), "flocking": (4.6, -1.8),
+    "searching": (0.0, 0.0),
+    "converging": (4.6, 1.8),
+    "flocking": (4.6, -1.8),
     "leader exchange": (9.2, 0.0),
-}  # fmt: skip
+}
 STAGES: Final = ("converging", "flocking")
 ARROWS: Final = (  # from, to, bend, why, where that is written
     ("searching", "converging", -0.12, "target seen\nor reported", (1.75, 1.75)),
@@ -38,25 +40,31 @@ def draw() -> None:
         for name, (x, y) in PLACES.items():
             axes.add_patch(
                 FancyBboxPatch(
-                    (x - 0.85, y - 0.3), 1.7, 0.6, boxstyle="round,pad=0.1",
-                    fc="#e3edf5", ec="#334455", zorder=3,
+                    (x - 0.85, y - 0.3), 1.7, 0.6, boxstyle="round,pad=0.1", fc="#e3edf5", ec="#334455", zorder=3
                 )
-            )  # fmt: skip
+            )
             axes.text(x, y, name, ha="center", va="center", fontweight="bold", zorder=4)
         for start, end, bend, why, at in ARROWS:
             axes.add_patch(
                 FancyArrowPatch(
-                    PLACES[start], PLACES[end], connectionstyle=f"arc3,rad={bend}",
-                    arrowstyle="-|>", mutation_scale=14, color="#334455",
+                    PLACES[start],
+                    PLACES[end],
+                    connectionstyle=f"arc3,rad={bend}",
+                    arrowstyle="-|>",
+                    mutation_scale=14,
+                    color="#334455",
                     shrinkA=34 if {start, end} == set(STAGES) else 62,
                     shrinkB=34 if {start, end} == set(STAGES) else 62,
                 )
-            )  # fmt: skip
+            )
             axes.text(*at, why, ha="center", va="center", fontsize=9)
         axes.text(
-            4.6, -3.1, "converging, flocking, leader exchange → searching: no fix of the target "
-            "for target_lost_after", ha="center", fontsize=9,
-        )  # fmt: skip
+            4.6,
+            -3.1,
+            "converging, flocking, leader exchange → searching: no fix of the target for target_lost_after",
+            ha="center",
+            fontsize=9,
+        )
         axes.set_xlim(-1.2, 10.4)
         axes.set_ylim(-3.3, 2.6)
         axes.axis("off")

@@ -45,10 +45,7 @@ def settings(scenario: str) -> str:
         if field.name == "name" or given == default:
             continue
         setting = own.settings()[field.name]
-        rows.append(
-            (code(field.name), code(value(given)), code(value(default)), setting.unit,
-             setting.meaning)
-        )  # fmt: skip
+        rows.append((code(field.name), code(value(given)), code(value(default)), setting.unit, setting.meaning))
     if not rows:
         return "All settings have their defaults.\n"
     return table(("setting", "here", "default", "unit", "meaning"), rows)
@@ -68,11 +65,14 @@ def observation_fields(scenario: str) -> str:
     rows = [
         (
             code(field.name) + (" (of each team-mate)" if field.of_neighbour else ""),
-            field.size, field.unit, f"[{field.low:.4g}, {field.high:.4g}]",
-            "" if field.unknown is None else f"{field.unknown:g}", field.meaning,
+            field.size,
+            field.unit,
+            f"[{field.low:.4g}, {field.high:.4g}]",
+            "" if field.unknown is None else f"{field.unknown:g}",
+            field.meaning,
         )
         for field in posse.observation_fields(scenario)
-    ]  # fmt: skip
+    ]
     return table(("field", "numbers", "unit", "range", "unknown", "meaning"), rows)
 
 

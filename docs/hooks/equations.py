@@ -12,9 +12,7 @@ from typing import Final
 from latex2mathml.converter import convert
 
 _FUNCTION: Final = re.compile(r"(\\(?:sin|cos))(?![a-z(])")
-_MARKED: Final = re.compile(
-    r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</(?:span|div)>', re.DOTALL
-)
+_MARKED: Final = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</(?:span|div)>', re.DOTALL)
 
 
 def typeset(page: str) -> str:

@@ -109,33 +109,24 @@ def leaderboard() -> str:
             rank += not result.reads_state
             rows.append(
                 (
-                    "" if result.reads_state else rank, _name(result),
-                    _whole(mean(result.column("safe_score"))), _contact_free(result),
-                    f"{result.worlds:,}", result.seed, code((result.commit or "")[:7]),
+                    "" if result.reads_state else rank,
+                    _name(result),
+                    _whole(mean(result.column("safe_score"))),
+                    _contact_free(result),
+                    f"{result.worlds:,}",
+                    result.seed,
+                    code((result.commit or "")[:7]),
                     replay_link(result),
                 )
-            )  # fmt: skip
-        header = (
-            "",
-            "team",
-            "safe score [95 %]",
-            "contact-free",
-            "worlds",
-            "seed",
-            "commit",
-            "replay",
-        )
+            )
+        header = ("", "team", "safe score [95 %]", "contact-free", "worlds", "seed", "commit", "replay")
         parts.append(f"### {scenario}\n\n" + (table(header, rows) if rows else "No results yet.\n"))
     return "\n".join(parts)
 
 
 def _name(result: ResultFile) -> str:
     name = html.escape(result.label).replace("|", "&#124;").replace("`", "&#96;")
-    shown = (
-        f'<code class="team">{name}</code>'
-        if result.label == result.policy
-        else f"<span>{name}</span>"
-    )
+    shown = f'<code class="team">{name}</code>' if result.label == result.policy else f"<span>{name}</span>"
     return shown + (" (reference)" if result.reads_state else "")
 
 

@@ -15,11 +15,7 @@ arguments = parser.parse_args()
 # A scenario is a value: start from a named one and change fields. Invalid values raise an error
 # that states the valid range.
 night = posse.get_scenario("obstacles").replace(
-    name="night",
-    version=1,
-    sensing_range=3.0,
-    radio_range=6.0,
-    num_trackers=4,
+    name="night", version=1, sensing_range=3.0, radio_range=6.0, num_trackers=4
 )
 
 # Every environment accepts it instead of a name.
@@ -30,8 +26,6 @@ print(f"{len(observations)} trackers, {len(observations['tracker_0'])} numbers e
 # A useful benchmark leaves a gap between the best scripted team and the bound, and the planner,
 # which reads the full state, should score clearly higher than the others.
 for policy in ("pursuit", "ddcs-distributed", "planner"):
-    results = evaluate(
-        policy, night, arguments.episodes, seed=0, split="validation", progress=False
-    )
+    results = evaluate(policy, night, arguments.episodes, seed=0, split="validation", progress=False)
     share = results["score"].mean() / results["bound"].mean()
     print(f"{policy:18s} score {results.estimate('score')}, {share:.2f} of the bound")

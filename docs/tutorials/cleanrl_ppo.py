@@ -35,10 +35,7 @@ torch.set_num_threads(1)
 # --- the environments: each has N agents, so a rollout has envs x N columns -----------------------
 # A small reward for holding a slot and a larger one for approaching it keep returns near 1.
 weights = {"slot": 0.1, "progress": 0.5, "contact": -0.2}
-envs = [
-    posse.parallel_env(args.scenario, first_world=k, reward_weights=weights)
-    for k in range(args.envs)
-]
+envs = [posse.parallel_env(args.scenario, first_world=k, reward_weights=weights) for k in range(args.envs)]
 agents = envs[0].possible_agents
 inputs = envs[0].observation_space(agents[0]).shape[0]
 outputs = envs[0].action_space(agents[0]).shape[0]
@@ -106,9 +103,7 @@ while done < args.steps:
         log_probabilities[t] = choice.log_prob(action).sum(-1)
         rows, bounded = [], action.clamp(-1, 1).numpy().reshape(len(envs), len(agents), outputs)
         for k, env in enumerate(envs):
-            row, reward, terminated, truncated, infos = env.step(
-                dict(zip(agents, bounded[k], strict=True))
-            )
+            row, reward, terminated, truncated, infos = env.step(dict(zip(agents, bounded[k], strict=True)))
             mine = slice(k * len(agents), (k + 1) * len(agents))
             rewards[t, mine] = torch.tensor([reward[a] for a in agents])
             # A truncated episode is bootstrapped from its last observation.

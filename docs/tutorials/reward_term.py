@@ -23,10 +23,7 @@ env.reset(seed=1)
 for _ in range(arguments.steps):
     # The first tracker drives straight, the others in circles.
     rewards, infos = env.step(
-        {
-            agent: np.array([1.0, 0.0 if agent == "tracker_0" else 1.0], np.float32)
-            for agent in env.agents
-        }
+        {agent: np.array([1.0, 0.0 if agent == "tracker_0" else 1.0], np.float32) for agent in env.agents}
     )[1::3]
 
 # Terms are reported unscaled, by name; the reward is their weighted sum.

@@ -56,9 +56,13 @@ def batch(
     side = "target" if team_policy is None else "team"
     settings = with_agent(get_scenario(scenario, **overrides), inside, side)
     arguments: dict[str, Any] = {
-        "seed": seed, "split": split, "first_world": first_world, "autoreset": autoreset,
-        "num_threads": num_threads, "own_kernel": own_kernel,
-    }  # fmt: skip
+        "seed": seed,
+        "split": split,
+        "first_world": first_world,
+        "autoreset": autoreset,
+        "num_threads": num_threads,
+        "own_kernel": own_kernel,
+    }
     if inside is not None and device == "cpu":
         moves_target = team_policy is None
         return PairedBatch(settings, num_worlds, inside, moves_target=moves_target, **arguments)
@@ -79,9 +83,7 @@ def _batch_class(device: str) -> type[Batch]:
     raise ValueError(f"unknown device {shown(device)}; devices are: cpu, cuda")
 
 
-def observation_fields(
-    scenario: str | Scenario = "constant", **overrides: Any
-) -> tuple[Field, ...]:
+def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
     """Return the fields of a scenario's observation, in order: name, size, unit, range, ..."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
 

@@ -62,9 +62,7 @@ class Registry(Mapping[str, T], Generic[T]):
         """Return the error for an invalid declaration."""
         return DeclarationError(f"{self.kind} {place_of(function)}: {reason}")
 
-    def check_parameters(
-        self, function: Function, allowed: tuple[str, ...], least: int | None = None
-    ) -> None:
+    def check_parameters(self, function: Function, allowed: tuple[str, ...], least: int | None = None) -> None:
         """Check a function's parameter names: all of ``allowed``, or at least the first few.
 
         Args:
@@ -98,10 +96,7 @@ class Registry(Mapping[str, T], Generic[T]):
             KeyError: An unknown name; the message suggests similar ones.
         """
         added = dict.fromkeys(names)
-        return (
-            *self.built_in(),
-            *(self[name] for name in added if name not in self or not self.is_built_in(name)),
-        )
+        return (*self.built_in(), *(self[name] for name in added if name not in self or not self.is_built_in(name)))
 
     def unknown(self, name: object) -> str:
         """Return the message for an unknown name."""

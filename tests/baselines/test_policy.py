@@ -88,10 +88,7 @@ def test_every_policy_plays_every_team(name: str, settings: dict[str, Any]) -> N
     assert done[0].dtype == np.float32
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.long if n == "planner" else ()) for n in NAMES],
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long if n == "planner" else ()) for n in NAMES])
 def test_a_world_plays_alike_alone_and_in_a_batch(name: str) -> None:
     policy = load(name)
     many = batch_for(policy, "field", 600, seed=4)  # so many that threads share them
@@ -248,9 +245,7 @@ def test_a_parallel_environment_is_played_as_a_batch_of_one() -> None:
     batch = batch_for(policy, "constant", 1)
     rows = batch.reset()[0]
     agents = ["tracker_3", "target_0", "tracker_0", "tracker_1", "tracker_4", "tracker_2"]
-    observations = {name: rows[int(name[-1])] for name in agents if name.startswith("tracker")} | {
-        "target_0": rows[0]
-    }
+    observations = {name: rows[int(name[-1])] for name in agents if name.startswith("tracker")} | {"target_0": rows[0]}
     stacked = stack_agents(observations)
     np.testing.assert_array_equal(stacked[0], rows)
     actions, _ = policy.act(stacked, policy.begin(batch.layout, 1))

@@ -50,9 +50,7 @@ def test_a_file_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
         load(path)
 
 
-@pytest.mark.parametrize(
-    "text", [":x", "x:", ":", "a..b:C", ".a:C", "a:b:c", "a b:C", "a:1", "é:-"]
-)
+@pytest.mark.parametrize("text", [":x", "x:", ":", "a..b:C", ".a:C", "a:b:c", "a b:C", "a:1", "é:-"])
 def test_text_that_names_no_class(text: str) -> None:
     with pytest.raises(PolicyError, match="names no class: write"):
         load(text)
@@ -109,9 +107,7 @@ class Grudging(Whole):
         ("Grudging", "OSError: not today"),
     ],
 )
-def test_a_class_that_makes_no_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, message: str
-) -> None:
+def test_a_class_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, message: str) -> None:
     (tmp_path / "made_up_policies.py").write_text(MODULE)
     monkeypatch.syspath_prepend(str(tmp_path))
     assert load("made_up_policies:Whole").name == "whole"

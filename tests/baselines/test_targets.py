@@ -10,16 +10,7 @@ import pytest
 from tests.support.learned import any_policy, target_for
 
 import posse
-from posse_baselines import (
-    BasePolicy,
-    Match,
-    PolicyError,
-    against,
-    load,
-    load_target,
-    play,
-    target_names,
-)
+from posse_baselines import BasePolicy, Match, PolicyError, against, load, load_target, play, target_names
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 

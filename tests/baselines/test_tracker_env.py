@@ -17,10 +17,7 @@ SHORT: dict[str, Any] = {"horizon": 40}
 @pytest.mark.parametrize("scenario", ["constant", "obstacles", "field"])
 @pytest.mark.parametrize("discrete", [False, True])
 def test_it_passes_gymnasiums_check(scenario: str, discrete: bool) -> None:
-    env = gymnasium.make(
-        "posse/Tracker-v0", scenario=scenario, discrete_actions=discrete,
-        teammates="pursuit", **SHORT,
-    )  # fmt: skip
+    env = gymnasium.make("posse/Tracker-v0", scenario=scenario, discrete_actions=discrete, teammates="pursuit", **SHORT)
     check_env(env.unwrapped, skip_render_check=True)
 
 

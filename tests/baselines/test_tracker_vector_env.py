@@ -16,10 +16,16 @@ from posse import ScenarioError
 
 NAME, E = "posse/Tracker-v0", 3
 SETTINGS: dict[str, Any] = {
-    "scenario": "radio", "num_trackers": 3, "number": 1, "horizon": 14, "settle_time": 0.5,
-    "terminate_on_contact": True, "start_distance": (1.0, 4.0), "breaks": 1,
+    "scenario": "radio",
+    "num_trackers": 3,
+    "number": 1,
+    "horizon": 14,
+    "settle_time": 0.5,
+    "terminate_on_contact": True,
+    "start_distance": (1.0, 4.0),
+    "breaks": 1,
     "break_window": (0.2, 0.4),
-}  # fmt: skip
+}
 
 
 def vector(**settings: Any) -> Any:
@@ -54,9 +60,7 @@ def test_it_agrees_with_gymnasiums_own(mode: AutoresetMode, kind: dict[str, bool
         ends += ended.sum()
         if mode is AutoresetMode.DISABLED and ended.any():
             options = {"reset_mask": ended}
-            assert same(
-                ours.reset(options=options), theirs.reset(options={"reset_mask": ended.copy()})
-            )
+            assert same(ours.reset(options=options), theirs.reset(options={"reset_mask": ended.copy()}))
     assert ends >= 2 * E
 
 

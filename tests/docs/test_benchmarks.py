@@ -19,11 +19,14 @@ def figures_of(command: str, folder: Path) -> Any:
     script, *arguments = command.split()
     paths = [str(ROOT / root) for root in ("envs", "baselines", "training")]
     done = subprocess.run(
-        [sys.executable, str(ROOT / "benchmarks" / script), *arguments, "--seconds", "0.01",
-         "--out", "figures.json"],
-        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+        [sys.executable, str(ROOT / "benchmarks" / script), *arguments, "--seconds", "0.01", "--out", "figures.json"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads((folder / "figures.json").read_text())
 

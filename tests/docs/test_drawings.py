@@ -53,9 +53,15 @@ def test_a_picture_shows_the_episode(laws: ModuleType) -> None:
     policy = load(law.policy)
     steps = round(laws.SECONDS / 0.1)
     batch = posse.batch(
-        "accelerating", 1, seed=laws.SEED, split="test", autoreset="disabled", horizon=steps,
-        start_distance=(2.0, 4.0), message_size=policy.message_size,
-    )  # fmt: skip
+        "accelerating",
+        1,
+        seed=laws.SEED,
+        split="test",
+        autoreset="disabled",
+        horizon=steps,
+        start_distance=(2.0, 4.0),
+        message_size=policy.message_size,
+    )
     play(batch, policy)
     ends = np.array([np.asarray(line.get_xydata())[-1] for line in middle.get_lines()])
     for x, y in zip(batch.state["tracker_x"][0], batch.state["tracker_y"][0], strict=True):

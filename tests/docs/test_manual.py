@@ -21,9 +21,13 @@ import posse
 
 ROOT = Path(__file__).parents[2]
 MODULES = (
-    "posse", "posse_baselines", "posse_training", "posse_training.cluster",
-    "posse_training.replay", "posse_training.leaderboard",
-)  # fmt: skip
+    "posse",
+    "posse_baselines",
+    "posse_training",
+    "posse_training.cluster",
+    "posse_training.replay",
+    "posse_training.leaderboard",
+)
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
 
 
@@ -39,9 +43,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if not folder.exists():
             done = subprocess.run(
                 [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", partial],
-                cwd=ROOT, capture_output=True, text=True,
+                cwd=ROOT,
+                capture_output=True,
+                text=True,
                 env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
-            )  # fmt: skip
+            )
             assert done.returncode == 0, done.stdout + done.stderr
             partial.rename(folder)
     return folder

@@ -40,9 +40,11 @@ def test_the_notebook_runs(tmp_path: Path) -> None:
     short = {"POSSE_NOTEBOOK_STEPS": "1000", "POSSE_NOTEBOOK_EPISODES": "2"}
     done = subprocess.run(
         [sys.executable, DOCS / "drawing" / "notebook.py", "--out", out],
-        capture_output=True, text=True, timeout=600,
+        capture_output=True,
+        text=True,
+        timeout=600,
         env={**os.environ, **short, **{name: str(tmp_path) for name in HOMES}},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     cells = json.loads(out.read_text(encoding="utf-8"))["cells"]
     text = [json.dumps(cell.get("outputs", "")) for cell in cells]

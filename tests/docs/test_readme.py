@@ -43,9 +43,7 @@ def test_the_package_index_gets_absolute_links() -> None:
     home = settings["project"]["urls"]["Repository"]
     raw = home.replace("github.com", "raw.githubusercontent.com")
     text = README
-    for each in settings["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"][
-        "substitutions"
-    ]:
+    for each in settings["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]["substitutions"]:
         text = re.sub(each["pattern"], each["replacement"], text)
     links = re.findall(r"\]\(([^)]+)\)", text)
     assert all(link.startswith("https://") for link in links)

@@ -36,16 +36,23 @@ def put(folder: Path, label: str, safe: float, **changes: object) -> None:
     rng = np.random.default_rng(len(label))
     score = np.clip(rng.normal(safe, 0.05, WORLDS), 0, 1).round(6)
     free = (rng.uniform(size=WORLDS) < 0.75).astype(float)
-    rows = {
-        "safe_score": tuple(score.tolist()),
-        "score": tuple(score.tolist()),
-        "contact_free": tuple(free.tolist()),
-    }
+    rows = {"safe_score": tuple(score.tolist()), "score": tuple(score.tolist()), "contact_free": tuple(free.tolist())}
     result = ResultFile(
-        label=label, policy_kind="code", policy="a.b:C", policy_sha256=None, reads_state=False,
-        scenario="smart", scenario_version=1, split="test", seed=2026, posse_version="0.1.0",
-        commit="932670c6b288", machine="m", replay=None, rows=rows,
-    )  # fmt: skip
+        label=label,
+        policy_kind="code",
+        policy="a.b:C",
+        policy_sha256=None,
+        reads_state=False,
+        scenario="smart",
+        scenario_version=1,
+        split="test",
+        seed=2026,
+        posse_version="0.1.0",
+        commit="932670c6b288",
+        machine="m",
+        replay=None,
+        rows=rows,
+    )
     kept = dataclasses.replace(result, **changes)  # type: ignore[arg-type]
     write_result(kept, folder / f"{abs(hash((label, safe)))}.json")
 
@@ -53,9 +60,7 @@ def put(folder: Path, label: str, safe: float, **changes: object) -> None:
 def lines(text: str, scenario: str) -> list[list[str]]:
     part = text.split(f"### {scenario}\n")[1].split("###")[0]
     return [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in part.splitlines()
-        if line.startswith("|")
+        [cell.strip() for cell in line.strip("|").split("|")] for line in part.splitlines() if line.startswith("|")
     ][2:]
 
 
@@ -66,9 +71,7 @@ def test_teams_are_ranked_by_the_safe_score(standings: ModuleType, tmp_path: Pat
     put(tmp_path, "all-knowing", 0.9, reads_state=True)
     rows = lines(standings.leaderboard(), "smart")
     assert [row[0] for row in rows] == ["", "1", "2", "3"]
-    assert [row[1] for row in rows[1:]] == [
-        f"<span>{n}</span>" for n in ("first", "second", "third")
-    ]
+    assert [row[1] for row in rows[1:]] == [f"<span>{n}</span>" for n in ("first", "second", "third")]
     assert "all-knowing</span> (reference)" in rows[0][1]
     value, low, high = (float(n) for n in re.findall(r"[\d.]+", rows[1][2]))
     assert low < value < high
@@ -84,9 +87,7 @@ def free_of(label: str) -> list[float]:
     return [float(value < 0.75) for value in rng.uniform(size=WORLDS)]
 
 
-def test_every_row_in_the_repository_has_a_replay(
-    standings: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_row_in_the_repository_has_a_replay(standings: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(standings, "FOLDER", DOCS.parent / "benchmarks" / "leaderboard")
     found = standings.results()
     assert len(found) > 100

@@ -203,59 +203,42 @@ FIELD_MISTAKES = {
     "no docstring": ({"docstring": ""}, r"own \(main.py:5\): its docstring.* is missing"),
     "other parameters": ({"parameters": "c, w"}, r"own \(main.py:5\): its parameters are \(c, w\)"),
     "a bound that is not finite": (
-        {"declaration": '"1", 0, lambda s: s.arena'}, r"own \(main.py:5\): high=inf .*not a finite",
+        {"declaration": '"1", 0, lambda s: s.arena'},
+        r"own \(main.py:5\): high=inf .*not a finite",
     ),
-    "bounds the wrong way round": (
-        {"declaration": '"1", 1, 0'}, r"own \(main.py:5\): low=1 is above high=0",
-    ),
+    "bounds the wrong way round": ({"declaration": '"1", 1, 0'}, r"own \(main.py:5\): low=1 is above high=0"),
     "a bound that fails": (
         {"declaration": '"1", 0, lambda s: s.sped'},
         r"own \(main.py:5\): high .*no attribute 'sped'",
     ),
     "no number": ({"declaration": '"1", 0, 1, size=0'}, r"own \(main.py:5\): size=0"),
-    "an unknown field": (
-        {"line": "return v.sped"},
-        r"own \(main.py:5\): line 8: v has no field 'sped'; it has speed",
-    ),
-    "a wrong type": (
-        {"line": 'return "north"'}, r"own \(main.py:5\): line 5: it returns .*, not a number",
-    ),
+    "an unknown field": ({"line": "return v.sped"}, r"own \(main.py:5\): line 8: v has no field 'sped'; it has speed"),
+    "a wrong type": ({"line": 'return "north"'}, r"own \(main.py:5\): line 5: it returns .*, not a number"),
     "too few numbers": (
         {"declaration": '"1", 0, 1, size=2'},
         r"own \(main.py:5\): line 5: it returns Lanes, not 2 numbers",
     ),
-    "what the compiler cannot do": (
-        {"line": "return np.linalg.eigvals(v.x)"}, r"own \(main.py:5\): line 8: ",
-    ),
-}  # fmt: skip
+    "what the compiler cannot do": ({"line": "return np.linalg.eigvals(v.x)"}, r"own \(main.py:5\): line 8: "),
+}
 TERM_MISTAKES = {
     "a name that is taken": ({"name": "slot"}, r"slot \(main.py:4\).*'slot' is taken by slot \("),
     "no docstring": ({"docstring": ""}, r"own \(main.py:4\): its docstring.* is missing"),
     "other parameters": ({"parameters": "t"}, r"own \(main.py:4\): its parameters are \(t\), not"),
-    "an unknown field": (
-        {"line": "return t.sped"}, r"own \(main.py:4\): line 7: t has no field 'sped'; it has",
-    ),
-    "a wrong type": (
-        {"line": "return t.x, t.y"}, r"own \(main.py:4\): line 4: it returns .*, not a number",
-    ),
-}  # fmt: skip
+    "an unknown field": ({"line": "return t.sped"}, r"own \(main.py:4\): line 7: t has no field 'sped'; it has"),
+    "a wrong type": ({"line": "return t.x, t.y"}, r"own \(main.py:4\): line 4: it returns .*, not a number"),
+}
 
 
 @pytest.mark.parametrize("mistake", FIELD_MISTAKES)
 def test_a_mistake_in_a_field_names_the_function_and_the_line(mistake: str, tmp_path: Path) -> None:
-    parts = {
-        "declaration": '"1", 0, 1', "parameters": "c, v", "docstring": '"""Mistaken."""',
-        "line": "return v.x",
-    }  # fmt: skip
+    parts = {"declaration": '"1", 0, 1', "parameters": "c, v", "docstring": '"""Mistaken."""', "line": "return v.x"}
     changed, message = FIELD_MISTAKES[mistake]
     assert_named(run(tmp_path, FIELD.format(**{**parts, **changed})), "observation field", message)
 
 
 @pytest.mark.parametrize("mistake", TERM_MISTAKES)
 def test_a_mistake_in_a_term_names_the_function_and_the_line(mistake: str, tmp_path: Path) -> None:
-    parts = {
-        "name": "own", "parameters": "c, w, t", "docstring": '"""Mistaken."""', "line": "return 1",
-    }  # fmt: skip
+    parts = {"name": "own", "parameters": "c, w, t", "docstring": '"""Mistaken."""', "line": "return 1"}
     changed, message = TERM_MISTAKES[mistake]
     assert_named(run(tmp_path, TERM.format(**{**parts, **changed})), "reward term", message)
 
@@ -265,19 +248,16 @@ def assert_named(done: subprocess.CompletedProcess[str], kind: str, message: str
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith(f"posse.registry.DeclarationError: {kind} "), last
     assert re.search(message, last), last
-    assert "compiling kernels" not in done.stderr, (
-        "a mistake is found before the kernel is compiled"
-    )
+    assert "compiling kernels" not in done.stderr, "a mistake is found before the kernel is compiled"
 
 
 UNKNOWN = {
-    "extra_fields=['wall_distnce']":
-        "unknown observation field 'wall_distnce' (did you mean 'wall_distance'?)",
+    "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'?)",
     "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
     "extra_fields=['speed']": "'speed' is in every observation: leave it out",
     "extra_fields=['wall_distance'] * 2": "'wall_distance' is there twice",
     "extra_fields=[1]": "extra_fields=[1] is not possible: it must be a tuple of names",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("settings", UNKNOWN)

@@ -130,9 +130,7 @@ posse.batch("constant", 1, target_motion="own").reset()
 MISTAKES = {
     "a name that is taken": ({"declaration": '"smart"'}, r"own \(main.py:4\).*'smart' is taken by"),
     "no docstring": ({"docstring": ""}, r"own \(main.py:4\): its docstring.* is missing"),
-    "another parameter": (
-        {"more": ", team"}, r"own \(main.py:4\): its parameters are \(c, w, team\), not \(c, w, tr",
-    ),
+    "another parameter": ({"more": ", team"}, r"own \(main.py:4\): its parameters are \(c, w, team\), not \(c, w, tr"),
     "an unknown field": (
         {"line": "w.goal_cos = w.headig_cos"},
         r"own \(main.py:4\): line 7: w has no field 'headig_cos'; it has heading_cos",
@@ -141,14 +139,12 @@ MISTAKES = {
         {"declaration": '"own", memory=[posse.Memory("speed", "1", 0, 1, "?")]'},
         r"own \(main.py:4\): a world has a field 'speed'",
     ),
-    "a wrong type": (
-        {"line": 'w.goal_cos = "north"'}, r"own \(main.py:4\): line 7: .*to float32",
-    ),
+    "a wrong type": ({"line": 'w.goal_cos = "north"'}, r"own \(main.py:4\): line 7: .*to float32"),
     "what the compiler cannot do": (
         {"line": 'w.goal_cos = float(open("x").read())'},
         r"own \(main.py:4\): line 7: Untyped global name 'open'",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
@@ -194,7 +190,7 @@ OTHERS = {
         'posse.batch("constant", 1, metrics=["scor"])',
         r"unknown metric 'scor' \(did you mean 'score'",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("mistake", OTHERS)

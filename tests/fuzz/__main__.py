@@ -46,9 +46,8 @@ def play_apart(name: str, chosen: argparse.Namespace) -> dict[str, Any]:
     began = time.monotonic()
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, check=False,
-            timeout=60 * chosen.minutes + GRACE_S,
-        )  # fmt: skip
+            command, capture_output=True, text=True, check=False, timeout=60 * chosen.minutes + GRACE_S
+        )
         outcome = json.loads(done.stdout.rstrip().rpartition("\n")[2])
     except subprocess.TimeoutExpired:
         outcome = {"tries": 0, "failures": ["the campaign hangs"]}
@@ -88,8 +87,7 @@ def main() -> None:
         sys.stdout.write("".join(f"{name}: {failure}\n" for failure in row["failures"]))
         row["failures"] = len(row["failures"])
         table.append(
-            f"{name:14} {row['tries']:9,} {row['failures']:8,} {row['minutes']:7} {row['seed']:5}  "
-            f"{row['commit']}"
+            f"{name:14} {row['tries']:9,} {row['failures']:8,} {row['minutes']:7} {row['seed']:5}  {row['commit']}"
         )
     sys.stdout.write("\n".join([*table, ""]))
     before = json.loads(chosen.figures.read_text()) if chosen.figures.exists() else {}

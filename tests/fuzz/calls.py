@@ -99,14 +99,15 @@ class Calls(RuleBasedStateMachine):
 def case(seed: int, number: int) -> None:
     """Play some sequences of calls."""
     run_state_machine_as_test(
-        seeded(random.Random(f"{seed} {number}").randrange(2**32))(
-            type("Calls", (Calls,), {})
-        ),
+        seeded(random.Random(f"{seed} {number}").randrange(2**32))(type("Calls", (Calls,), {})),
         settings=settings(
-            max_examples=EXAMPLES, stateful_step_count=30, deadline=None, database=None,
+            max_examples=EXAMPLES,
+            stateful_step_count=30,
+            deadline=None,
+            database=None,
             suppress_health_check=list(HealthCheck),
         ),
-    )  # fmt: skip
+    )
 
 
 if __name__ == "__main__":

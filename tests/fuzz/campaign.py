@@ -12,9 +12,7 @@ Case = Callable[[int, int], None]
 """Plays the case of a seed and a number; raises where something is wrong."""
 
 
-def campaign(
-    case: Case, seed: int, first: int = 0, cases: int = 10**9, seconds: float = 1e9
-) -> tuple[int, list[str]]:
+def campaign(case: Case, seed: int, first: int = 0, cases: int = 10**9, seconds: float = 1e9) -> tuple[int, list[str]]:
     """Play cases from ``first`` on; return how many, and what failed."""
     failures = []
     end, number = time.monotonic() + seconds, first

@@ -64,8 +64,7 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
         _of_cases("calls"),
     ),
     "threads": Campaign(
-        "8 Python threads at once, each with a batch, a policy or an environment of its own",
-        _of_cases("threads"),
+        "8 Python threads at once, each with a batch, a policy or an environment of its own", _of_cases("threads")
     ),
     "processes": Campaign(
         "an environment in mid-episode is pickled (in or out of band), forked, or sent to a "
@@ -73,8 +72,7 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
         _of_cases("processes"),
     ),
     "interrupts": Campaign(
-        "a step of 4,096 worlds is interrupted at a random moment, once or many times in a row",
-        _interrupts,
+        "a step of 4,096 worlds is interrupted at a random moment, once or many times in a row", _interrupts
     ),
     "kernel_cache": Campaign("files of a cache are damaged, and its kernels called", _kernel_cache),
     "forged": Campaign(
@@ -89,10 +87,7 @@ CAMPAIGNS: Final[dict[str, Campaign]] = {
         _of_cases("kills"),
     ),
     "full_disk": Campaign(
-        "the same, on a disk with too little room (tmpfs, or a limit on file sizes)",
-        _of_cases("full_disk"),
+        "the same, on a disk with too little room (tmpfs, or a limit on file sizes)", _of_cases("full_disk")
     ),
-    "together": Campaign(
-        "two processes write the same at once, or one soon after the other", _of_cases("together")
-    ),
+    "together": Campaign("two processes write the same at once, or one soon after the other", _of_cases("together")),
 }

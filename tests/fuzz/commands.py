@@ -32,11 +32,7 @@ Arguments = Callable[[Path], list[str]]
 
 def contents(folder: Path) -> dict[str, bytes]:
     """Return every file below a folder, by path; none where there is no folder."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 @dataclass(frozen=True)
@@ -175,10 +171,26 @@ def _sound_run(folder: Path) -> None:
 
 def _tuning(folder: Path) -> list[str]:
     return [
-        "tune", "pngl-l-phi", "--scenario", "constant", "--generations", "3", "--population", "4",
-        "--worlds", "2", "--validation-worlds", "4", "--every", "1",
-        "--only", "navigation_constant", "gain", "--out", str(folder / "run"),
-    ]  # fmt: skip
+        "tune",
+        "pngl-l-phi",
+        "--scenario",
+        "constant",
+        "--generations",
+        "3",
+        "--population",
+        "4",
+        "--worlds",
+        "2",
+        "--validation-worlds",
+        "4",
+        "--every",
+        "1",
+        "--only",
+        "navigation_constant",
+        "gain",
+        "--out",
+        str(folder / "run"),
+    ]
 
 
 def _left_by_tuning(folder: Path) -> bytes:
@@ -198,13 +210,44 @@ def _sound_tuning(folder: Path) -> None:
 
 def _league(folder: Path) -> list[str]:
     return [
-        "league", "--scenario", "smart", "--generations", "1", "--teams", "idle",
-        "--target-steps", "160", "--team-steps", "320", "--response-steps", "160",
-        "--episodes", "2", "--responses", "none",
-        "--overrides", "horizon", "40", "settle_time", "1.0", "num_trackers", "2",
-        "--training", "num_worlds", "4", "rollout", "20", "minibatch", "32", "epochs", "1",
-        "evaluate_worlds", "2", "--folder", str(folder / "league"),
-    ]  # fmt: skip
+        "league",
+        "--scenario",
+        "smart",
+        "--generations",
+        "1",
+        "--teams",
+        "idle",
+        "--target-steps",
+        "160",
+        "--team-steps",
+        "320",
+        "--response-steps",
+        "160",
+        "--episodes",
+        "2",
+        "--responses",
+        "none",
+        "--overrides",
+        "horizon",
+        "40",
+        "settle_time",
+        "1.0",
+        "num_trackers",
+        "2",
+        "--training",
+        "num_worlds",
+        "4",
+        "rollout",
+        "20",
+        "minibatch",
+        "32",
+        "epochs",
+        "1",
+        "evaluate_worlds",
+        "2",
+        "--folder",
+        str(folder / "league"),
+    ]
 
 
 def _left_by_league(folder: Path) -> dict[str, Any]:
@@ -237,9 +280,19 @@ def _sound_league(folder: Path) -> None:
 
 def _comparison(policies: str) -> Arguments:
     return lambda folder: [
-        "compare", *policies.split(), "--scenarios", "constant", "smart", "--episodes", "3",
-        "--out", str(folder / "out"), "--no-figures", "--planner-episodes", "0",
-    ]  # fmt: skip
+        "compare",
+        *policies.split(),
+        "--scenarios",
+        "constant",
+        "smart",
+        "--episodes",
+        "3",
+        "--out",
+        str(folder / "out"),
+        "--no-figures",
+        "--planner-episodes",
+        "0",
+    ]
 
 
 def _left_by_comparison(folder: Path) -> Any:
@@ -253,9 +306,15 @@ def _left_by_comparison(folder: Path) -> Any:
 
 def _replay(policy: str) -> Arguments:
     return lambda folder: [
-        "replay", policy, "--scenario", "constant", "--seconds", "5",
-        "--out", str(folder / "page.html"),
-    ]  # fmt: skip
+        "replay",
+        policy,
+        "--scenario",
+        "constant",
+        "--seconds",
+        "5",
+        "--out",
+        str(folder / "page.html"),
+    ]
 
 
 def _left_by_replay(folder: Path) -> Any:
@@ -295,21 +354,15 @@ def _code() -> Path:
 
 COMMANDS: Final[dict[str, Command]] = {
     "train ppo": Command(
-        _training("ppo", tensorboard=True), _resumed("ppo", tensorboard=True),
-        _left_by_training, _sound_run,
+        _training("ppo", tensorboard=True), _resumed("ppo", tensorboard=True), _left_by_training, _sound_run
     ),
     "train sac": Command(_training("sac"), _resumed("sac"), _left_by_training, _sound_run),
     "league": Command(_league, _league, _left_by_league, _sound_league),
     "tune": Command(_tuning, _tuning, _left_by_tuning, _sound_tuning),
     "compare": Command(
-        _comparison("pursuit idle"), _comparison("pursuit idle"), _left_by_comparison,
-        old=_comparison("idle"),
+        _comparison("pursuit idle"), _comparison("pursuit idle"), _left_by_comparison, old=_comparison("idle")
     ),
-    "replay": Command(
-        _replay("pursuit"), _replay("pursuit"), _left_by_replay, _sound_page, old=_replay("idle")
-    ),
-    "policy file": Command(
-        _saved("field"), _saved("field"), _left_by_saving, _sound_policy, old=_saved("smart")
-    ),
+    "replay": Command(_replay("pursuit"), _replay("pursuit"), _left_by_replay, _sound_page, old=_replay("idle")),
+    "policy file": Command(_saved("field"), _saved("field"), _left_by_saving, _sound_policy, old=_saved("smart")),
     "kernel cache": Command(_kernels, _kernels, lambda folder: None, never_fails=True),
-}  # fmt: skip
+}

@@ -46,10 +46,7 @@ def compile_kernels(cache: str, code: str) -> int:
     return int(answers != RIGHT)
 
 
-CALLS: Final[dict[str, Callable[..., int]]] = {
-    "save-policy": save_policy,
-    "compile-kernels": compile_kernels,
-}
+CALLS: Final[dict[str, Callable[..., int]]] = {"save-policy": save_policy, "compile-kernels": compile_kernels}
 
 
 @dataclass(frozen=True)
@@ -72,9 +69,7 @@ class Running:
         handle, name = tempfile.mkstemp()
         os.close(handle)
         self._log = Path(name)
-        self._process: Any = CONTEXT.Process(
-            target=_call, args=(arguments, name, file_limit), daemon=False
-        )
+        self._process: Any = CONTEXT.Process(target=_call, args=(arguments, name, file_limit), daemon=False)
         self._process.start()
 
     def kill(self) -> None:

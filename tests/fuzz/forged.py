@@ -49,11 +49,37 @@ IMPORTED: Final = ("import", PLANTED)
 OF_KERNELS: Final = ("numba", "posse", "copyreg", "numpy", "builtins", "types", "llvmlite")
 """Modules that the kernel cache names, which is code."""
 VALUES: Final[tuple[Any, ...]] = (
-    None, True, "", "x", "\0", "x" * 5000, 0, -1, 1, 2, 255, 2**31, 2**63, 10**400, 0.5, -1.5,
-    1e300, float("nan"), float("inf"), [], {}, [[]], [1, 2], {"a": 1}, [0.5] * 1000,
+    None,
+    True,
+    "",
+    "x",
+    "\0",
+    "x" * 5000,
+    0,
+    -1,
+    1,
+    2,
+    255,
+    2**31,
+    2**63,
+    10**400,
+    0.5,
+    -1.5,
+    1e300,
+    float("nan"),
+    float("inf"),
+    [],
+    {},
+    [[]],
+    [1, 2],
+    {"a": 1},
+    [0.5] * 1000,
     f"{PLANTED}:Planted",
-    "../../planted", "/etc/passwd", "planner", "ddcs-distributed",
-)  # fmt: skip
+    "../../planted",
+    "/etc/passwd",
+    "planner",
+    "ddcs-distributed",
+)
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:
@@ -101,9 +127,7 @@ def forged(value: Any, rng: random.Random) -> Any:
         else:
             old = inner[place[-1]]
             numeric = isinstance(old, (int, float)) and rng.random() < 0.5
-            inner[place[-1]] = (
-                old * rng.choice((-1, 2, 0.5, 10**6)) if numeric else rng.choice(VALUES)
-            )
+            inner[place[-1]] = old * rng.choice((-1, 2, 0.5, 10**6)) if numeric else rng.choice(VALUES)
         if isinstance(inner, dict) and rng.random() < 0.1:
             inner[rng.choice(("", "x" * 5000, "new"))] = rng.choice(VALUES)
     return made
@@ -121,9 +145,7 @@ def forged_arrays(arrays: dict[str, Any], rng: random.Random) -> dict[str, Any]:
         made[name] = array.astype(rng.choice((np.float64, np.int64, np.uint8, np.float16)))
     elif way == 3 and array.size:
         flat = array.reshape(-1)
-        extreme: tuple[Any, ...] = (
-            (np.nan, np.inf, 3e38, -3e38, 0) if array.dtype.kind == "f" else (0, 1, -1)
-        )
+        extreme: tuple[Any, ...] = (np.nan, np.inf, 3e38, -3e38, 0) if array.dtype.kind == "f" else (0, 1, -1)
         with np.errstate(all="ignore"):
             flat[rng.randrange(flat.size)] = np.array(rng.choice(extreme)).astype(array.dtype)
         made[name] = flat.reshape(array.shape)
@@ -162,9 +184,7 @@ def _plays(policy: LearnedPolicy) -> None:
 
 def a_policy(folder: Path, rng: random.Random) -> None:
     path = folder / "mine.safetensors"
-    whole = rng.choice(
-        (any_policy(), policy_for(posse.ObservationLayout(posse.get_scenario("smart")), "plain"))
-    )
+    whole = rng.choice((any_policy(), policy_for(posse.ObservationLayout(posse.get_scenario("smart")), "plain")))
     whole.save(path)
     if rng.random() < 0.4:
         path.write_bytes(damaged(path.read_bytes(), rng))
@@ -245,22 +265,19 @@ def a_page(folder: Path, rng: random.Random) -> None:
 
 
 KINDS: Final[tuple[Callable[[Path, random.Random], None], ...]] = (
-    a_policy, a_policy, a_page, some_settings, a_checkpoint,
-)  # fmt: skip
+    a_policy,
+    a_policy,
+    a_page,
+    some_settings,
+    a_checkpoint,
+)
 
 
 @functools.cache
 def _watched() -> list[str]:
     """Return a list to which whatever a file must not cause is added, from now on."""
     seen: list[str] = []
-    bad = (
-        "os.system",
-        "os.exec",
-        "os.posix_spawn",
-        "os.spawn",
-        "subprocess.Popen",
-        "pickle.find_class",
-    )
+    bad = ("os.system", "os.exec", "os.posix_spawn", "os.spawn", "subprocess.Popen", "pickle.find_class")
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
         harmless = event == "pickle.find_class" and arguments[0].startswith(OF_KERNELS)

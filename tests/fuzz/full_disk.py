@@ -38,9 +38,8 @@ def small_disk() -> Path | None:
         return None
     root = tempfile.mkdtemp()
     done = subprocess.run(
-        [mount, "-t", "tmpfs", "-o", f"size={DISK},mode=0700", "tmpfs", root],
-        capture_output=True, check=False,
-    )  # fmt: skip
+        [mount, "-t", "tmpfs", "-o", f"size={DISK},mode=0700", "tmpfs", root], capture_output=True, check=False
+    )
     if done.returncode:
         Path(root).rmdir()
         return None

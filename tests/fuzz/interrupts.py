@@ -65,9 +65,7 @@ def interrupted_step(batch: posse.Batch, actions: Floats, timer: Any) -> bool:
     return False
 
 
-def campaign(
-    seed: int, cases: int = 10**9, seconds: float = 10**9
-) -> tuple[Counter[str], list[str]]:
+def campaign(seed: int, cases: int = 10**9, seconds: float = 10**9) -> tuple[Counter[str], list[str]]:
     """Play cases from a seed, until there were enough; return how many ended how, and failures."""
     rng = random.Random(seed)
     batch = posse.batch("smart", WORLDS, seed=seed, num_threads=2)

@@ -109,10 +109,20 @@ def swap(path: Path, rng: random.Random) -> None:
 
 
 DAMAGES = (
-    flip_bits, flip_bits, flip_bits, flip_a_bit_of_the_head, truncate, truncate_to_the_head,
-    overwrite, overwrite_a_block, lengthen, remove, replace_by_a_directory, replace_by_a_pipe,
+    flip_bits,
+    flip_bits,
+    flip_bits,
+    flip_a_bit_of_the_head,
+    truncate,
+    truncate_to_the_head,
+    overwrite,
+    overwrite_a_block,
+    lengthen,
+    remove,
+    replace_by_a_directory,
+    replace_by_a_pipe,
     replace_by_a_link,
-)  # fmt: skip
+)
 
 
 def damage(cache: Path, seed: int, case: int) -> tuple[str, int]:
@@ -236,9 +246,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first case, to play one again")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        counts, failures = campaign(
-            Path(folder), chosen.seed, chosen.first, seconds=60 * chosen.minutes
-        )
+        counts, failures = campaign(Path(folder), chosen.seed, chosen.first, seconds=60 * chosen.minutes)
     sys.stdout.write("\n".join([*failures, f"{sum(counts.values())} cases: {dict(counts)}", ""]))
     sys.exit(bool(failures))
 

@@ -104,10 +104,7 @@ def case(seed: int, number: int) -> None:
     batch = posse.Batch(s, WORLDS, seed=rng.randrange(2**63), num_threads=1)
     low, high = (bound.astype(np.float64) for bound in batch.layout.bounds())
     _judge_observations(batch.reset(), low, high)
-    team = Team(
-        batch, number, crowds=rng.random() < 0.5, stays=rng.choice((4.0, 10.0)),
-        leaves=rng.choice((0.0, 4.0)),
-    )  # fmt: skip
+    team = Team(batch, number, crowds=rng.random() < 0.5, stays=rng.choice((4.0, 10.0)), leaves=rng.choice((0.0, 4.0)))
     reach = np.array([*s.tracker_speeds, s.target_speed]) * s.control_step
     turn = np.array([*s.tracker_turn_rates, s.target_turn_rate]) * s.control_step
     for _ in range(STEPS):

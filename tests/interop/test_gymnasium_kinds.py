@@ -51,19 +51,13 @@ def test_infos_of_agents_keep_their_keys_and_types() -> None:
 
 def flat(info: dict[str, Any]) -> dict[str, Any]:
     """Return an info with nested names joined, written out for the two names that are nested."""
-    nested = {
-        f"{name}/{key}": value
-        for name in ("reward_terms", "metrics")
-        for key, value in info[name].items()
-    }
+    nested = {f"{name}/{key}": value for name in ("reward_terms", "metrics") for key, value in info[name].items()}
     return {k: v for k, v in info.items() if not isinstance(v, dict)} | nested
 
 
 @pytest.mark.parametrize("name", ["posse/Team-v0", "posse/Tracker-v0", "posse/Solo-v0"])
 def test_flat_infos_hold_the_same(name: str) -> None:
-    env, other = (
-        gymnasium.make(name, scenario="smart", flat_infos=told, **SHORT) for told in (False, True)
-    )
+    env, other = (gymnasium.make(name, scenario="smart", flat_infos=told, **SHORT) for told in (False, True))
     infos = [(env.reset(seed=1)[1], other.reset(seed=1)[1])]
     for _ in range(4):
         action = np.zeros(env.action_space.shape or (), np.float32)
@@ -78,11 +72,17 @@ def test_flat_infos_hold_the_same(name: str) -> None:
 def test_flat_infos_of_many_worlds_hold_the_same(name: str, autoreset: str) -> None:
     env, other = (
         gymnasium.make_vec(
-            name, 3, vectorization_mode="vector_entry_point", scenario="smart", seed=1,
-            autoreset=autoreset, flat_infos=told, **SHORT,
+            name,
+            3,
+            vectorization_mode="vector_entry_point",
+            scenario="smart",
+            seed=1,
+            autoreset=autoreset,
+            flat_infos=told,
+            **SHORT,
         )
         for told in (False, True)
-    )  # fmt: skip
+    )
     infos = [(env.reset()[1], other.reset()[1])]
     for _ in range(4):
         action = np.zeros(env.action_space.shape or (), np.float32)

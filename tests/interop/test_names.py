@@ -20,7 +20,7 @@ SINGLE = (TeamEnv, SoloEnv, TeamParallelEnv, TrackerEnv)
 VECTORS = (TeamVectorEnv, SoloVectorEnv, TrackerVectorEnv, PosseEnv, posse.batch)
 OWN: dict[str, set[str]] = {
     # The engine, where nothing is left to chance, and TorchRL's keys for all of an environment.
-    "seed": {"batch"},
+    "seed": {"batch"}
 }
 """Parameters whose default differs on purpose, and where."""
 
@@ -38,16 +38,12 @@ def test_a_parameter_has_one_default_everywhere() -> None:
     defaults: dict[str, dict[Any, list[str]]] = {}
     for made in (*SINGLE, *VECTORS):
         for name, parameter in parameters(made).items():
-            if parameter.kind is not inspect.Parameter.VAR_KEYWORD and name not in (
-                "num_envs", "num_worlds", "self",
-            ):  # fmt: skip
+            if parameter.kind is not inspect.Parameter.VAR_KEYWORD and name not in ("num_envs", "num_worlds", "self"):
                 if name == "autoreset" and parameter.default is None:
                     continue  # next_step, which autoreset_mode may overrule
                 if made.__name__ in OWN.get(name, ()):
                     continue
-                defaults.setdefault(name, {}).setdefault(parameter.default, []).append(
-                    made.__name__
-                )
+                defaults.setdefault(name, {}).setdefault(parameter.default, []).append(made.__name__)
     differing = {name: found for name, found in defaults.items() if len(found) > 1}
     assert not differing
     assert {"scenario", "discrete_actions", "split", "first_world"} <= set(defaults)
@@ -80,9 +76,7 @@ def test_autoreset_has_the_names_of_the_batch() -> None:
     for name in ("next_step", "same_step", "disabled"):
         env = TeamVectorEnv("constant", 2, autoreset=name)
         assert env.batch.autoreset == name
-        assert TeamVectorEnv("constant", 2, autoreset_mode=env.autoreset_mode).batch.autoreset == (
-            name
-        )
+        assert TeamVectorEnv("constant", 2, autoreset_mode=env.autoreset_mode).batch.autoreset == (name)
     with pytest.raises(ValueError, match=r"unknown autoreset mode 'never'.*'next_step'"):
         TeamVectorEnv("constant", autoreset="never")
     with pytest.raises(ValueError, match="give one"):

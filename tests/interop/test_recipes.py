@@ -23,9 +23,13 @@ def run(name: str, folder: Path, python: Path | str = sys.executable) -> str:
     paths = [str(RECIPES), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
     done = subprocess.run(
         [str(python), "-W", "ignore", str(RECIPES / f"{name}.py")],
-        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy"},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 

@@ -42,17 +42,13 @@ def run(file: Path, head: dict[str, object], mutants: list[Mutant], jobs: int) -
         begin(file, {**head, "tests": len(times)})
     with ThreadPoolExecutor(jobs) as pool:
         outcomes = pool.map(lambda m: judge(m.module, m.code(), times), missing)
-        for mutant, outcome in track(
-            zip(missing, outcomes, strict=True), "mutants", total=len(missing)
-        ):
+        for mutant, outcome in track(zip(missing, outcomes, strict=True), "mutants", total=len(missing)):
             append(file, mutant, outcome)
 
 
 def main() -> None:
     """Read the command line and try the mutants."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.mutation", description=(__doc__ or "").partition("\n")[0]
-    )
+    parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--sample", type=int, default=0, help="mutants in the sample; 0: all")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--jobs", type=int, default=1, help="processes at once")

@@ -17,21 +17,47 @@ SOURCES: Final = Path("baselines")
 FOLDERS: Final = ("posse_baselines/laws", "posse_baselines/ddcs")
 
 _BINARY: Final = (
-    "Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "FloorDiv_Mul", "Mod_Mul", "Pow_Mul",
-    "BitAnd_BitOr", "BitOr_BitAnd", "LShift_RShift", "RShift_LShift",
-)  # fmt: skip
+    "Add_Sub",
+    "Sub_Add",
+    "Mul_Div",
+    "Div_Mul",
+    "FloorDiv_Mul",
+    "Mod_Mul",
+    "Pow_Mul",
+    "BitAnd_BitOr",
+    "BitOr_BitAnd",
+    "LShift_RShift",
+    "RShift_LShift",
+)
 _COMPARISONS: Final = (
-    "Lt_LtE", "Lt_GtE", "LtE_Lt", "LtE_Gt", "Gt_GtE", "Gt_LtE", "GtE_Gt", "GtE_Lt",
-    "Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is",
-)  # fmt: skip
+    "Lt_LtE",
+    "Lt_GtE",
+    "LtE_Lt",
+    "LtE_Gt",
+    "Gt_GtE",
+    "Gt_LtE",
+    "GtE_Gt",
+    "GtE_Lt",
+    "Eq_NotEq",
+    "NotEq_Eq",
+    "Is_IsNot",
+    "IsNot_Is",
+)
 OPERATORS: Final = (
     *(f"core/ReplaceBinaryOperator_{name}" for name in _BINARY),
     *(f"core/ReplaceComparisonOperator_{name}" for name in _COMPARISONS),
-    "core/ReplaceUnaryOperator_Delete_USub", "core/ReplaceUnaryOperator_Delete_Not",
-    "core/AddNot", "core/ReplaceAndWithOr", "core/ReplaceOrWithAnd", "core/ReplaceTrueWithFalse",
-    "core/ReplaceFalseWithTrue", "core/ReplaceBreakWithContinue", "core/ReplaceContinueWithBreak",
-    "core/ZeroIterationForLoop", "core/NumberReplacer",
-)  # fmt: skip
+    "core/ReplaceUnaryOperator_Delete_USub",
+    "core/ReplaceUnaryOperator_Delete_Not",
+    "core/AddNot",
+    "core/ReplaceAndWithOr",
+    "core/ReplaceOrWithAnd",
+    "core/ReplaceTrueWithFalse",
+    "core/ReplaceFalseWithTrue",
+    "core/ReplaceBreakWithContinue",
+    "core/ReplaceContinueWithBreak",
+    "core/ZeroIterationForLoop",
+    "core/NumberReplacer",
+)
 """One or two replacements of each operator, where cosmic-ray's full set has up to eleven."""
 
 _DATA: Final = ("number", "tuned", "choice")
@@ -86,9 +112,7 @@ def _left_out(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
             nodes.append(node.annotation)
         elif isinstance(node, ast.Call) and getattr(node.func, "id", "") in _DATA:
             nodes.append(node)
-    return [
-        ((n.lineno, n.col_offset), (n.end_lineno or n.lineno, n.end_col_offset or 0)) for n in nodes
-    ]
+    return [((n.lineno, n.col_offset), (n.end_lineno or n.lineno, n.end_col_offset or 0)) for n in nodes]
 
 
 def mutants_of(path: str) -> Iterator[Mutant]:

@@ -26,9 +26,14 @@ pytestmark = pytest.mark.skipif(
 def run(*command: str | Path, cwd: Path, **environment: str) -> str:
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
     done = subprocess.run(
-        [str(part) for part in command], cwd=cwd, capture_output=True, text=True, timeout=900,
-        check=False, env={**kept, **environment},
-    )  # fmt: skip
+        [str(part) for part in command],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=900,
+        check=False,
+        env={**kept, **environment},
+    )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     return done.stdout
 
@@ -49,17 +54,24 @@ def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     programs = folder / "venv" / "bin"
     wheel = next(built.glob("*.whl"))
     run(
-        sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet",
-        "-c", ROOT / "constraints.txt", wheel, cwd=folder,
-    )  # fmt: skip
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        programs / "python",
+        "install",
+        "--quiet",
+        "-c",
+        ROOT / "constraints.txt",
+        wheel,
+        cwd=folder,
+    )
     return programs
 
 
 def tracked(*folders: str) -> set[str]:
     """Return the files of the repository under some folders, or those of the tree without git."""
-    found = subprocess.run(
-        ["git", "ls-files", "--", *folders], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    found = subprocess.run(["git", "ls-files", "--", *folders], cwd=ROOT, capture_output=True, text=True, check=True)
     return {line for line in found.stdout.splitlines() if (ROOT / line).exists()}
 
 

@@ -15,10 +15,16 @@ import pytest
 
 LIST = Path(__file__).with_name("public_interface.txt")
 MODULES = (
-    "posse", "posse_baselines", "posse_baselines.learned", "posse_training",
-    "posse_training.cluster", "posse_training.datasets", "posse_training.replay",
-    "posse_training.sb3", "posse_training.torchrl",
-)  # fmt: skip
+    "posse",
+    "posse_baselines",
+    "posse_baselines.learned",
+    "posse_training",
+    "posse_training.cluster",
+    "posse_training.datasets",
+    "posse_training.replay",
+    "posse_training.sb3",
+    "posse_training.torchrl",
+)
 
 
 def described(name: str, thing: Any) -> list[str]:

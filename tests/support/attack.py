@@ -33,9 +33,7 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "parallel": lambda: posse.parallel_env(**SHORT),
     "turns": lambda: posse.env(**SHORT),
     "team": lambda: gymnasium.make(TEAM, disable_env_checker=True, **SHORT).unwrapped,
-    "solo": lambda: (
-        gymnasium.make(SOLO, disable_env_checker=True, **{**SHORT, "num_trackers": 1}).unwrapped
-    ),
+    "solo": lambda: gymnasium.make(SOLO, disable_env_checker=True, **{**SHORT, "num_trackers": 1}).unwrapped,
     "team vector": lambda: _vector(TEAM),
     "solo vector": lambda: _vector(SOLO),
     "torchrl": _torchrl,
@@ -103,10 +101,29 @@ class Subject:
             yield bad.set(("agents", "action"), torch.full((2, 2, 2), 1j))
             return
         yield from (
-            "x", LONG_NAME, "\0", object(), 5, 10**5000, 1j, [[1], [2, 3]], [10**400, 0], {"a": 1},
-            {5: 2}, {LONG_NAME: [0, 0]}, {10**5000: 1}, np.full((3, 3), object()), np.array(None),
-            [np.nan, 0.0], [1e300, 0.0], b"ab", b"\0", np.zeros(2, "M8[s]"), slice(3), print,
-        )  # fmt: skip
+            "x",
+            LONG_NAME,
+            "\0",
+            object(),
+            5,
+            10**5000,
+            1j,
+            [[1], [2, 3]],
+            [10**400, 0],
+            {"a": 1},
+            {5: 2},
+            {LONG_NAME: [0, 0]},
+            {10**5000: 1},
+            np.full((3, 3), object()),
+            np.array(None),
+            [np.nan, 0.0],
+            [1e300, 0.0],
+            b"ab",
+            b"\0",
+            np.zeros(2, "M8[s]"),
+            slice(3),
+            print,
+        )
         if self.kind == "parallel":
             good = self.good_action(np.random.default_rng(0))
             for value in (LONG_NAME, 10**5000, [10**400, 0], [[1], [2, 3]], object(), [0.0, 2.0]):
@@ -116,10 +133,7 @@ class Subject:
     def held(self) -> list[Any]:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""
         batch, env = self.batch, self.env
-        kept: list[Any] = [
-            {name: array.copy() for name, array in batch.state.items()},
-            [batch.seed, batch._started],
-        ]
+        kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}, [batch.seed, batch._started]]
         if self.kind in ("parallel", "turns", "team", "solo"):
             world = env.unwrapped._world
             kept.append([world.running, world._started, world._seeded])
@@ -133,31 +147,76 @@ class Subject:
             kept.append(env._seed)
         if self.kind == "turns":
             inner = env.env
-            names = ("agents", "agent_selection", "rewards", "terminations", "truncations", "infos",
-                     "_cumulative_rewards", "_actions", "_observations")  # fmt: skip
-            kept.append(
-                [env._has_reset, {n: copy.deepcopy(getattr(inner, n, None)) for n in names}]
+            names = (
+                "agents",
+                "agent_selection",
+                "rewards",
+                "terminations",
+                "truncations",
+                "infos",
+                "_cumulative_rewards",
+                "_actions",
+                "_observations",
             )
+            kept.append([env._has_reset, {n: copy.deepcopy(getattr(inner, n, None)) for n in names}])
         return kept
 
 
 BAD_SEEDS: tuple[Any, ...] = (
-    -1, 2**63, 10**5000, -(10**5000), 1.0, True, "1", "\0", LONG_NAME, [1], 1j, np.float64(1),
-    np.array([1, 2]), object(), b"1",
-)  # fmt: skip
+    -1,
+    2**63,
+    10**5000,
+    -(10**5000),
+    1.0,
+    True,
+    "1",
+    "\0",
+    LONG_NAME,
+    [1],
+    1j,
+    np.float64(1),
+    np.array([1, 2]),
+    object(),
+    b"1",
+)
 BAD_OPTIONS: tuple[Any, ...] = (
-    5, "abc", [1], True, object(), {LONG_NAME: 1}, {5: 1}, {"\0": 1}, {10**5000: 1},
+    5,
+    "abc",
+    [1],
+    True,
+    object(),
+    {LONG_NAME: 1},
+    {5: 1},
+    {"\0": 1},
+    {10**5000: 1},
     *(
         {name: pose}
         for name in ("tracker_pose", "target_pose")
         for pose in (
-            "x", LONG_NAME, 5, 1j, object(), {"a": 1}, {}, [], [[1, 2], [3]], [object()] * 3,
-            [1j] * 3, ["1", "2", "3"], [None] * 3, [10**5000, 0, 0], [True] * 3, [np.nan, 0, 0],
-            [1e300, 0, 0], np.zeros((0, 3)), np.zeros(3, "M8[s]"), np.zeros((2, 3), complex),
+            "x",
+            LONG_NAME,
+            5,
+            1j,
+            object(),
+            {"a": 1},
+            {},
+            [],
+            [[1, 2], [3]],
+            [object()] * 3,
+            [1j] * 3,
+            ["1", "2", "3"],
+            [None] * 3,
+            [10**5000, 0, 0],
+            [True] * 3,
+            [np.nan, 0, 0],
+            [1e300, 0, 0],
+            np.zeros((0, 3)),
+            np.zeros(3, "M8[s]"),
+            np.zeros((2, 3), complex),
             b"abc",
         )
     ),
-)  # fmt: skip
+)
 
 
 def unchanged(before: Any, after: Any) -> bool:

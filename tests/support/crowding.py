@@ -54,9 +54,7 @@ class Team:
         leaves: For how long it then keeps away, s.
     """
 
-    def __init__(
-        self, batch: posse.Batch, seed: int, *, crowds: bool, stays: float, leaves: float
-    ) -> None:
+    def __init__(self, batch: posse.Batch, seed: int, *, crowds: bool, stays: float, leaves: float) -> None:
         n, step = batch.scenario.num_trackers, batch.scenario.control_step
         self.batch = batch
         self.rng = np.random.default_rng(seed)
@@ -79,9 +77,7 @@ class Team:
         bearing = np.angle((goal - trackers) / headings(batch, "tracker"))
         actions = self.rng.uniform(-1, 1, batch.action_shape)
         actions[:, :n, 0] = 1.0
-        actions[:, :n, 1] = np.clip(
-            bearing / (s.control_step * np.array(s.tracker_turn_rates)), -1, 1
-        )
+        actions[:, :n, 1] = np.clip(bearing / (s.control_step * np.array(s.tracker_turn_rates)), -1, 1)
         observations, rewards, *_ = batch.step(actions)
         self.step += 1
         return observations, rewards

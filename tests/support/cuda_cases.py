@@ -76,17 +76,21 @@ def run_in_simulator(tests: Path, **environment: str) -> None:
     """Run a file of tests with numba's simulator of a GPU in plain Python."""
     done = subprocess.run(
         [
-            sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
             # numpy warns about the integer overflow that the random draws use.
-            "-W", "ignore:overflow encountered:RuntimeWarning",
+            "-W",
+            "ignore:overflow encountered:RuntimeWarning",
             str(tests),
         ],
-        env={
-            **os.environ,
-            "NUMBA_ENABLE_CUDASIM": "1",
-            "NUMBA_DISABLE_JIT": "1",
-            **environment,
-        },
-        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1", **environment},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr

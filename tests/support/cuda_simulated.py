@@ -72,9 +72,7 @@ def test_with_autoreset_disabled_the_caller_resets(where: str) -> None:
     assert on_host(as_cuda(device).truncated).tolist() == [False, True, False]
     with pytest.raises(ResetNeeded, match="end of world 1"):
         device.step(actions)
-    assert_same(
-        device.reset(options={"reset_mask": ~mask}), cpu.reset(options={"reset_mask": ~mask})
-    )
+    assert_same(device.reset(options={"reset_mask": ~mask}), cpu.reset(options={"reset_mask": ~mask}))
     assert_same(device.step(actions)[0], cpu.step(actions)[0])
 
 
@@ -125,9 +123,7 @@ def test_actions_may_lie_on_the_device() -> None:
     one.reset()
     other.reset()
     actions = actions_for(one, 0)
-    np.testing.assert_array_equal(
-        on_host(one.step(cuda.to_device(actions))[0]), on_host(other.step(actions)[0])
-    )
+    np.testing.assert_array_equal(on_host(one.step(cuda.to_device(actions))[0]), on_host(other.step(actions)[0]))
     with pytest.raises(ValueError, match="float64 of shape"):
         one.step(cuda.to_device(actions.astype(np.float64)))
     with pytest.raises(ValueError, match=r"shape \(3, 5, 1\), wanted"):
@@ -167,10 +163,7 @@ def test_a_step_that_does_not_wait_is_the_same_step() -> None:
 
 def test_start_poses_snapshots_and_pickles() -> None:
     device, cpu = make("smart", "cuda"), make("smart", "cpu")
-    poses: dict[str, Any] = {
-        "target_pose": (0.5, 0.0, 1.0),
-        "tracker_pose": [(i, 2.0, 0.1) for i in range(5)],
-    }
+    poses: dict[str, Any] = {"target_pose": (0.5, 0.0, 1.0), "tracker_pose": [(i, 2.0, 0.1) for i in range(5)]}
     assert_same(device.reset(options=poses), cpu.reset(options=poses))
     with pytest.raises(ValueError, match="overlap"):
         device.reset(options={**poses, "target_pose": (0.0, 2.0, 0.0)})

@@ -65,18 +65,13 @@ class Forks:
 
     def __init__(self, modules: tuple[str, ...], options: tuple[str, ...] = ()) -> None:
         self._parent = subprocess.Popen(
-            [sys.executable, *options, "-c", PARENT, *modules],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
+            [sys.executable, *options, "-c", PARENT, *modules], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
         assert self._answer() == "ready"
         atexit.register(self._end)
 
     def run(
-        self,
-        code: str,
-        folder: Path,
-        environment: Mapping[str, str] = os.environ,
-        file: str | None = None,
+        self, code: str, folder: Path, environment: Mapping[str, str] = os.environ, file: str | None = None
     ) -> subprocess.CompletedProcess[str]:
         """Run code in a new process.
 
@@ -89,15 +84,16 @@ class Forks:
         assert self._parent.stdin is not None
         with tempfile.TemporaryDirectory() as output:
             task = {
-                "code": code, "folder": str(folder), "environment": dict(environment),
-                "output": output, "file": file,
-            }  # fmt: skip
+                "code": code,
+                "folder": str(folder),
+                "environment": dict(environment),
+                "output": output,
+                "file": file,
+            }
             self._parent.stdin.write(json.dumps(task) + "\n")
             self._parent.stdin.flush()
             status = int(self._answer())
-            printed, errors = (
-                (Path(output) / name).read_text(encoding="utf-8") for name in ("stdout", "stderr")
-            )
+            printed, errors = ((Path(output) / name).read_text(encoding="utf-8") for name in ("stdout", "stderr"))
         return subprocess.CompletedProcess([code], status, printed, errors)
 
     def _answer(self) -> str:

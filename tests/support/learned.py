@@ -12,9 +12,7 @@ import posse
 from posse_baselines.learned import LSTM, Encoding, LearnedPolicy, Network
 
 
-def network_for(
-    inputs: int, outputs: int = 2, seed: int = 0, *, cells: int = 0, **changes: Any
-) -> Network:
+def network_for(inputs: int, outputs: int = 2, seed: int = 0, *, cells: int = 0, **changes: Any) -> Network:
     """A network of arbitrary weights; with a recurrent layer of so many cells, if there are any."""
     generator = np.random.default_rng(seed)
     sizes = (cells or inputs, 24, 16, outputs)
@@ -37,9 +35,7 @@ def network_for(
     return replace(network, **changes)
 
 
-def policy_for(
-    layout: posse.ObservationLayout, kind: str = "slots", **changes: Any
-) -> LearnedPolicy:
+def policy_for(layout: posse.ObservationLayout, kind: str = "slots", **changes: Any) -> LearnedPolicy:
     encoding = Encoding.of(layout, kind)
     return LearnedPolicy(network_for(encoding.size, **changes), encoding, {"name": "mine"})
 
@@ -58,9 +54,7 @@ def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides:
     return batch, observations
 
 
-def target_for(
-    scenario: posse.Scenario, name: str = "evading", seed: int = 0, cells: int = 0
-) -> LearnedPolicy:
+def target_for(scenario: posse.Scenario, name: str = "evading", seed: int = 0, cells: int = 0) -> LearnedPolicy:
     """A policy of arbitrary weights that moves the target."""
     encoding = Encoding.of(posse.ObservationLayout(scenario.replace(message_size=0)), "plain")
     card = {"name": name, "side": "target"}

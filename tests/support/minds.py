@@ -26,11 +26,7 @@ class Mind:
     """A tracker: ``f`` offsets, ``s`` settings, ``d`` its memory, ``mates``, ``slots``, ``o``."""
 
     def __init__(
-        self,
-        scenario: str = "field",
-        own: int = 1,
-        played: dict[str, Any] | None = None,
-        **world: Any,
+        self, scenario: str = "field", own: int = 1, played: dict[str, Any] | None = None, **world: Any
     ) -> None:
         self.layout, self.own = layout_of(scenario, **world), own
         settings = plain("ddcs.settings").Settings(**(played or {}))
@@ -70,9 +66,7 @@ class Mind:
             setattr(mate, name, value)
         return mate
 
-    def target(
-        self, position: complex, velocity: complex = 0j, psi: float = 0.0, **values: Any
-    ) -> None:
+    def target(self, position: complex, velocity: complex = 0j, psi: float = 0.0, **values: Any) -> None:
         """The estimate of the target, known now."""
         d = self.d
         d.known, d.now_x, d.now_y = 1, position.real, position.imag

@@ -118,9 +118,7 @@ def test_a_killed_driver_resumes(nodes: Nodes, local: Results, tmp_path: Path) -
     assert begun(tmp_path) == 9
     (tmp_path / "go").touch()
     policy = Watched(tmp_path, 4, "wait")
-    found = evaluate(
-        policy, "smart", EPISODES, ray=Cluster(work=tmp_path / "work", worlds=WORLDS), **SHORT
-    )
+    found = evaluate(policy, "smart", EPISODES, ray=Cluster(work=tmp_path / "work", worlds=WORLDS), **SHORT)
     same(found, local)
     assert begun(tmp_path) == 9 + 1
 
@@ -131,9 +129,7 @@ def test_an_error_of_a_policy_says_where(nodes: Nodes, tmp_path: Path) -> None:
         evaluate(policy, "smart", 3, ray=Cluster(work=tmp_path / "work"), **SHORT)
 
 
-def test_commands_give_the_same_files(
-    nodes: Nodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_commands_give_the_same_files(nodes: Nodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     commands = {
         "compare idle pursuit --scenarios smart constant --episodes 3 --sweep-episodes 0 "
@@ -146,14 +142,12 @@ def test_commands_give_the_same_files(
         "tune ddcs-distributed --generations 1 --population 4 --worlds 2 --validation-worlds 4 "
         "--only gain --out {}/tune": ("tuned.json",),
         "train --seeds 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None "
-        "--advise None --imitate None --encoding plain --no-tensorboard --folder {}/train": (
-            "seed-1/settings.json",
-        ),
+        "--advise None --imitate None --encoding plain --no-tensorboard --folder {}/train": ("seed-1/settings.json",),
         "league --scenario smart --generations 1 --teams idle pursuit --target-steps 16 "
         "--team-steps 16 --response-steps 16 --episodes 2 --overrides horizon 20 settle_time 0.5 "
         "num_trackers 2 --training num_worlds 2 rollout 8 evaluate_worlds 1 imitate_rounds 1 "
         "--folder {}/league": ("matrix.csv", "summary.json"),
-    }  # fmt: skip
+    }
     for command, files in commands.items():
         name = command.split("{}/")[1]
         for place in ("here", "there"):
@@ -163,9 +157,7 @@ def test_commands_give_the_same_files(
             one, other = (tmp_path / place / name / file for place in ("here", "there"))
             assert filecmp.cmp(one, other, shallow=False), file
         assert not list((tmp_path / "there").glob(".*.work"))
-    for run in (
-        "train/seed-1", "league/generation-01/target", "league/responses/target-to-trackers-1",
-    ):  # fmt: skip
+    for run in ("train/seed-1", "league/generation-01/target", "league/responses/target-to-trackers-1"):
         here, there = (load_file(tmp_path / p / run / LAST) for p in ("here", "there"))
         assert here.keys() == there.keys()
         assert all(np.array_equal(array, there[name]) for name, array in here.items()), run
@@ -191,9 +183,13 @@ def removing(nodes: Nodes, folder: Path) -> threading.Thread:
 def cells(folder: Path, team: str, ray: bool) -> list[Cell]:
     """What two teams, one of them given, score against a target: three shards each."""
     settings = LeagueSettings(
-        scenario="smart", teams=("idle", team), targets=("smart",), episodes=3 * WORLDS,
-        overrides={"horizon": 20, "settle_time": 0.5}, folder=folder / "league",
-    )  # fmt: skip
+        scenario="smart",
+        teams=("idle", team),
+        targets=("smart",),
+        episodes=3 * WORLDS,
+        overrides={"horizon": 20, "settle_time": 0.5},
+        folder=folder / "league",
+    )
     settings.path.mkdir(parents=True)
     pairs = [(a, b) for a in founders(settings, TEAM) for b in founders(settings, TARGET)]
     if not ray:
@@ -203,9 +199,7 @@ def cells(folder: Path, team: str, ray: bool) -> list[Cell]:
         return CrossPlay(settings, ClusterWork(settings, quiet(), cluster, backend)).cells(pairs)
 
 
-def test_a_league_goes_on_when_a_worker_or_a_node_dies(
-    nodes: Nodes, league_folder: Path, tmp_path: Path
-) -> None:
+def test_a_league_goes_on_when_a_worker_or_a_node_dies(nodes: Nodes, league_folder: Path, tmp_path: Path) -> None:
     """Of three nodes two are left."""
     expected = cells(tmp_path / "here", "pursuit", ray=False)
     for deed in ("die", "wait"):
@@ -221,9 +215,7 @@ def test_a_league_goes_on_when_a_worker_or_a_node_dies(
             assert replace(one, team="") == replace(other, team="")
 
 
-def test_a_worker_of_two_nodes_and_a_node_of_three_die(
-    nodes: Nodes, local: Results, tmp_path: Path
-) -> None:
+def test_a_worker_of_two_nodes_and_a_node_of_three_die(nodes: Nodes, local: Results, tmp_path: Path) -> None:
     """The last test: it leaves two nodes."""
     for alive, deed in ((2, "die"), (3, "wait")):
         if deed == "wait":

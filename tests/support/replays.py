@@ -21,9 +21,14 @@ ATTACK: Final = (
 def short(scenario: str = "field", observations: bool = True) -> Replay:
     """Two players on one world with every kind of fault and noise, 20 s."""
     return record(
-        ["ddcs-distributed", "pursuit"], scenario, seed=3, world=1, seconds=20,
-        observations=observations, num_trackers=4,
-    )  # fmt: skip
+        ["ddcs-distributed", "pursuit"],
+        scenario,
+        seed=3,
+        world=1,
+        seconds=20,
+        observations=observations,
+        num_trackers=4,
+    )
 
 
 @cache

@@ -16,7 +16,11 @@ def compared(out: Path, label: str = HOSTILE, *, replays: int = 2) -> Comparison
     """Compare three policies in three worlds, one of them under a label."""
     return compare(
         Settings(
-            ("pursuit", f"{label}=ddcs-distributed", "idle"), ("constant",), episodes=3, out=out,
-            planner_episodes=0, replays=replays,
+            ("pursuit", f"{label}=ddcs-distributed", "idle"),
+            ("constant",),
+            episodes=3,
+            out=out,
+            planner_episodes=0,
+            replays=replays,
         )
-    )  # fmt: skip
+    )

@@ -17,8 +17,7 @@ from posse_training.runs.saved.checkpoint import read_checkpoint
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "recurrent-ppo", "sac", "td3")
 ALGORITHM_CASES = [
-    pytest.param(name, marks=() if name in ("ppo", "mappo") else pytest.mark.long)
-    for name in ALGORITHMS
+    pytest.param(name, marks=() if name in ("ppo", "mappo") else pytest.mark.long) for name in ALGORITHMS
 ]
 """The algorithms as cases of tests; the slow ones run with the long tests."""
 

@@ -8,16 +8,7 @@ from pathlib import Path
 
 import pytest
 
-EXTRA = (
-    "torch",
-    "stable_baselines3",
-    "sb3_contrib",
-    "tensordict",
-    "torchrl",
-    "tensorboard",
-    "moviepy",
-    "wandb",
-)
+EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "moviepy", "wandb")
 BLOCKED = f"""
 import sys
 
@@ -33,17 +24,14 @@ sys.meta_path.insert(0, Blocker())
 def run(code: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Run code in a process in which no package of an extra can be imported."""
     return subprocess.run(
-        [sys.executable, "-c", f"{BLOCKED}\n{code}", *arguments],
-        capture_output=True, text=True, check=False, cwd=cwd,
-    )  # fmt: skip
+        [sys.executable, "-c", f"{BLOCKED}\n{code}", *arguments], capture_output=True, text=True, check=False, cwd=cwd
+    )
 
 
 MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
-@pytest.mark.parametrize(
-    "arguments", [["train"], ["train", "--scenario", "smart"], ["train", "--resume", "somewhere"]]
-)
+@pytest.mark.parametrize("arguments", [["train"], ["train", "--scenario", "smart"], ["train", "--resume", "somewhere"]])
 def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> None:
     done = run(MAIN, *arguments, cwd=tmp_path)
     assert done.returncode == 2
@@ -60,9 +48,7 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     assert "pip install 'posse[training]'" in done.stderr.splitlines()[-1]
 
 
-COMPARE = [
-    "compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0",
-]  # fmt: skip
+COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0"]
 
 
 @pytest.mark.parametrize(
@@ -75,8 +61,7 @@ COMPARE = [
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         pytest.param(
-            ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"],
-            marks=pytest.mark.long,
+            ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"], marks=pytest.mark.long
         ),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
     ],

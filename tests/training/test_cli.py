@@ -76,9 +76,7 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         (["compare", "pursuit", "--episodes", "0"], "episodes=0"),
     ],
 )
-def test_mistakes_are_named(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mistakes_are_named(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(arguments) == 2
     assert message in capsys.readouterr().err
 

@@ -19,20 +19,20 @@ from posse_training.replay.page import read_replay
 def ship(folder: Path) -> None:
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "slots")
     network = Network(
-        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
-        (np.zeros((2, encoding.size), np.float32),), (np.ones(2, np.float32),), "tanh", "clip",
-    )  # fmt: skip
-    LearnedPolicy(network, encoding, {"name": demo.LEARNED}).save(
-        folder / f"{demo.LEARNED}.safetensors"
+        np.zeros(encoding.size, np.float32),
+        np.ones(encoding.size, np.float32),
+        5.0,
+        (np.zeros((2, encoding.size), np.float32),),
+        (np.ones(2, np.float32),),
+        "tanh",
+        "clip",
     )
+    LearnedPolicy(network, encoding, {"name": demo.LEARNED}).save(folder / f"{demo.LEARNED}.safetensors")
 
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_it_ends_with_scripted_beside_learned_where_one_is_shipped(
-    learned: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    learned: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shipped = tmp_path / "shipped"
     shipped.mkdir()

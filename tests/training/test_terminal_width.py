@@ -32,19 +32,24 @@ LONG = "a-policy-with-a-very-long-name-such-as-a-file-in-a-folder-has/of-one-hun
 def test_a_comparison() -> None:
     of = Estimate(-0.123, -0.456, -0.789, 9)
     row = {
-        "scenario": "paper-centralized", "seeds": 3, "safe_score": of, "of_planner": 0.42,
-        "score": of, "contact_free": Estimate(1.0, 1.0, 1.0, 9), "bound": of, "settled": of,
-        "difference": of, "improvement": Estimate(0.875, 0.1, 0.9, 9),
-    }  # fmt: skip
+        "scenario": "paper-centralized",
+        "seeds": 3,
+        "safe_score": of,
+        "of_planner": 0.42,
+        "score": of,
+        "contact_free": Estimate(1.0, 1.0, 1.0, 9),
+        "bound": of,
+        "settled": of,
+        "difference": of,
+        "improvement": Estimate(0.875, 0.1, 0.9, 9),
+    }
     rows = [{**row, "policy": policy} for policy in (LONG, "ddcs-centralized-no-exchange")]
 
     class Worlds:
         seed, split, episodes = 7, "validation", 1_000_000
         target: ClassVar[str | None] = None
 
-    text = on_a_terminal(
-        table(Comparison("ddcs-centralized-no-exchange", rows=rows), Worlds, WIDTH)
-    )
+    text = on_a_terminal(table(Comparison("ddcs-centralized-no-exchange", rows=rows), Worlds, WIDTH))
     for policy in ("ddcs-centralized", "-no-exchange"):
         holds(text, policy)
     lines = text.splitlines()
@@ -55,9 +60,7 @@ def test_a_comparison() -> None:
 
 
 @pytest.mark.parametrize("name", [[], ["field"], ["paper-distributed"]])
-def test_scenarios(
-    name: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scenarios(name: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", str(WIDTH))
     assert main(["scenarios", *name]) == 0
     text = capsys.readouterr().out
@@ -79,19 +82,21 @@ def test_the_demo() -> None:
 
 def test_the_papers_experiments() -> None:
     row = {
-        "policy": "ddcs-centralized-no-exchange", "model": "centralized", "starts": 1000,
-        "paper_settling_time": 10.5, "settling_time_quartiles": [10.5, 11.5, 12.5],
-        "settled": 1000, "in_slots": 1000,
-    }  # fmt: skip
+        "policy": "ddcs-centralized-no-exchange",
+        "model": "centralized",
+        "starts": 1000,
+        "paper_settling_time": 10.5,
+        "settling_time_quartiles": [10.5, 11.5, 12.5],
+        "settled": 1000,
+        "in_slots": 1000,
+    }
     text = on_a_terminal(settling_times([row], Settings(starts=1000)))
     holds(text, "[quartiles]", "centralized", "11.5 [10.5, 12.5]", "ddcs-centralized-no-exchange")
     holds(text, "1,000 starts of paper-distributed v1, test split, seed 7")
 
 
 def test_a_tuning(tmp_path: Path) -> None:
-    settings = TuneSettings(
-        policy="ddcs-centralized-no-exchange", scenario="paper-distributed", out=tmp_path
-    )
+    settings = TuneSettings(policy="ddcs-centralized-no-exchange", scenario="paper-distributed", out=tmp_path)
     knobs = tunable("ddcs-distributed")
     found = {knob.name: knob.high for knob in knobs}
     point = {"generation": 3, "score": 0.5, "low": 0.4, "high": 0.6, "settings": found}
@@ -106,15 +111,16 @@ def test_a_tuning(tmp_path: Path) -> None:
 def test_a_training() -> None:
     settings = TrainSettings(
         scenario="constant,accelerating,smart,search,obstacles,radio,leader-loss,field",
-        imitate="ddcs-distributed", imitate_rounds=6, steps=1_000_000, beside="ddcs-tuned",
-    )  # fmt: skip
+        imitate="ddcs-distributed",
+        imitate_rounds=6,
+        steps=1_000_000,
+        beside="ddcs-tuned",
+    )
     display = TrainDisplay(settings, Console(width=WIDTH, file=io.StringIO()))
     display.copying(2, 0.0125)
     text = on_a_terminal(display._render())
     holds(text, "copying ddcs-distributed: 2 of 6 rounds, squared error 0.0125", "0 of 1,000,000")
-    holds(
-        text, "ppo on constant,accelerating,smart,search,obstacles,radio,leader-loss,field, seed 1"
-    )
+    holds(text, "ppo on constant,accelerating,smart,search,obstacles,radio,leader-loss,field, seed 1")
     display.beside(0.65)
     display.begin(0, 1_048_576, [])
     for k in range(1, 61):

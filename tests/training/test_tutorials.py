@@ -39,14 +39,9 @@ def run(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> dict[
 
 
 @pytest.mark.long
-def test_first_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_first_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "run"
-    left = run(
-        "first_policy.py", monkeypatch,
-        "--steps", 1000, "--folder", folder, "--episodes", 2,
-    )  # fmt: skip
+    left = run("first_policy.py", monkeypatch, "--steps", 1000, "--folder", folder, "--episodes", 2)
     policy = load(folder / "best.safetensors")
     assert policy.name == "smart-ppo-1"
     assert left["file"] == folder / "best.safetensors"
@@ -81,8 +76,10 @@ def test_reward_term() -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", str(TUTORIALS / "reward_term.py"), "--steps", "5"],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     lines = re.findall(rf"(\w+): steady (\d), reward {NUMBER} = {NUMBER}", done.stdout)
     assert [steady for _, steady, *_ in lines] == ["1", "0", "0", "0", "0"]
@@ -90,14 +87,9 @@ def test_reward_term() -> None:
     assert float(lines[0][2]) == pytest.approx(0.1, abs=0.005)
 
 
-def test_one_tracker(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_tracker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "one.zip"
-    left = run(
-        "one_tracker.py", monkeypatch,
-        "--steps", 64, "--rollout", 64, "--episodes", 1, "--file", file,
-    )  # fmt: skip
+    left = run("one_tracker.py", monkeypatch, "--steps", 64, "--rollout", 64, "--episodes", 1, "--file", file)
     assert file.is_file()
     weights = [model.policy.state_dict() for model in (left["model"], left["learned"])]
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
@@ -107,14 +99,9 @@ def test_one_tracker(
     assert float(found[1]) > 0.4
 
 
-def test_cleanrl_ppo(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_cleanrl_ppo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "deep" / "ppo.safetensors"
-    left = run(
-        "cleanrl_ppo.py", monkeypatch,
-        "--steps", 6200, "--envs", 2, "--rollout", 620, "--file", file,
-    )  # fmt: skip
+    left = run("cleanrl_ppo.py", monkeypatch, "--steps", 6200, "--envs", 2, "--rollout", 620, "--file", file)
     shown = capsys.readouterr().out
     assert re.search(rf"6,200 steps  score {NUMBER}  reward", shown)  # an episode has ended
     numbers = load_file(file)

@@ -77,9 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _usage() -> str:
     lines = [f"  {name:<11} {command.summary}" for name, command in COMMANDS.items()]
-    return "\n".join(
-        ["usage: posse COMMAND ...", "", *lines, "", "posse COMMAND --help lists its arguments"]
-    )
+    return "\n".join(["usage: posse COMMAND ...", "", *lines, "", "posse COMMAND --help lists its arguments"])
 
 
 def _user_errors() -> tuple[type[Exception], ...]:

@@ -25,9 +25,7 @@ from posse_training.reports.pictures.film import film
 from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")
-POLICIES: Final = (
-    "random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned",
-)  # fmt: skip
+POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned")
 LEARNED: Final = "learned-smart"
 """Plays the scenario that it was trained on, if it is shipped."""
 UNCOMPILED: Final = ("random", "idle")
@@ -55,26 +53,27 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
     policies = {name: load(name) for _, name in plays}
     results: dict[tuple[str, str], Results] = {}
     films: dict[str, Future[Path]] = {}
-    with (
-        ProcessPoolExecutor(1, get_context("spawn"), initializer=_mute) as helper,
-        progress_bar() as bar,
-    ):
+    with ProcessPoolExecutor(1, get_context("spawn"), initializer=_mute) as helper, progress_bar() as bar:
         compiled = helper.submit(compile_policies, list(policies.values()))
         task = bar.add_task("compiling, then playing", total=len(plays))
         for k, (scenario, name) in enumerate(plays):
             if name not in UNCOMPILED:
                 compiled.result()
             bar.update(task, description=f"{name} on {scenario}")
-            results[scenario, name] = evaluate(
-                policies[name], scenario, episodes, SEED, progress=False
-            )
+            results[scenario, name] = evaluate(policies[name], scenario, episodes, SEED, progress=False)
             bar.advance(task)
             if k + 1 == len(plays) or plays[k + 1][0] != scenario:
                 names = shown(scenario, results)
                 films[f"{' beside '.join(names)} on {scenario}"] = helper.submit(
-                    film, [(n, policies[n]) for n in names], scenario, seed=SEED, world=0,
-                    path=FOLDER / f"{scenario}.gif", split="test", seconds=seconds,
-                )  # fmt: skip
+                    film,
+                    [(n, policies[n]) for n in names],
+                    scenario,
+                    seed=SEED,
+                    world=0,
+                    path=FOLDER / f"{scenario}.gif",
+                    split="test",
+                    seconds=seconds,
+                )
         bar.update(task, description="filming")
         paths = {title: made.result() for title, made in films.items()}
         bar.update(task, description="writing the replay page")
@@ -85,9 +84,8 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
     for title, path in paths.items():
         console.print(f"{title}: {path}", markup=False, soft_wrap=True)
     console.print(
-        f"{' beside '.join(names)} on {SCENARIOS[-1]}, to open in a browser: {page}",
-        markup=False, soft_wrap=True,
-    )  # fmt: skip
+        f"{' beside '.join(names)} on {SCENARIOS[-1]}, to open in a browser: {page}", markup=False, soft_wrap=True
+    )
     console.print(f"total time: {time.perf_counter() - started:.0f} s")
 
 

@@ -47,9 +47,17 @@ class MissingExtraError(ImportError):
 
 
 OWN: Final = (
-    SettingsError, RunFolderError, CheckpointError, DivergedError, ComparisonError,
-    TrainedSplitError, TimeLimitError, ResultFileError, ClusterError, MissingExtraError,
-)  # fmt: skip
+    SettingsError,
+    RunFolderError,
+    CheckpointError,
+    DivergedError,
+    ComparisonError,
+    TrainedSplitError,
+    TimeLimitError,
+    ResultFileError,
+    ClusterError,
+    MissingExtraError,
+)
 """All errors of this module."""
 
 
@@ -64,6 +72,5 @@ def require(extra: str, *packages: str) -> None:
             importlib.import_module(package)
         except ImportError as error:
             raise MissingExtraError(
-                f"{package} cannot be imported ({error}). Install what this needs: "
-                f"pip install 'posse[{extra}]'"
+                f"{package} cannot be imported ({error}). Install what this needs: pip install 'posse[{extra}]'"
             ) from error

@@ -26,9 +26,8 @@ class LiveDisplay(ABC):
     def __enter__(self) -> Self:
         if self._console.is_terminal:
             self._live = Live(
-                get_renderable=self._render, console=self._console, refresh_per_second=4,
-                transient=self._transient,
-            )  # fmt: skip
+                get_renderable=self._render, console=self._console, refresh_per_second=4, transient=self._transient
+            )
             self._live.start()
         return self
 

@@ -11,9 +11,7 @@ _MARGIN: Final = 0.1
 """Room below the lowest value, as a share of the range."""
 
 
-def sparkline(
-    scores: Sequence[float], line: float | None = None, *, width: int = 40, height: int = 4
-) -> list[str]:
+def sparkline(scores: Sequence[float], line: float | None = None, *, width: int = 40, height: int = 4) -> list[str]:
     """Return the latest scores as bars, row by row from the top; the line is dashed.
 
     The rows span the lowest to the highest value, and state both, and the line's where it is drawn.

@@ -47,9 +47,7 @@ _ZERO: Final = np.float32(0.0)
 
 
 @compiled
-def soft(
-    x: float, y: float, heading_c: float, heading_s: float, scale: float, out: FloatArray
-) -> None:
+def soft(x: float, y: float, heading_c: float, heading_s: float, scale: float, out: FloatArray) -> None:
     """Write a vector of the common frame (m) relative to the tracker, its length scaled."""
     by = 1.0 / (length(x, y) + scale)
     out[0] = by * (x * heading_c + y * heading_s)

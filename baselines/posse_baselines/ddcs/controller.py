@@ -70,10 +70,7 @@ def plan(
             begin_search(f, d, seen)
     else:
         if d.slot < 0 or d.step % max(1, round(s.replan_time / f.dt)) == 0:
-            choose_slot(
-                f, s, d, mates, slots, own, x, y, hc, hs, body.max_speed, body.max_omega,
-                cost, work,
-            )  # fmt: skip
+            choose_slot(f, s, d, mates, slots, own, x, y, hc, hs, body.max_speed, body.max_omega, cost, work)
         note_error(f, s, d, mates, slots, own, x, y)
     d.task = next_task(s, d)
     if d.task == SEARCHING or d.slot < 0:
@@ -142,11 +139,5 @@ def decide_all(
     for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
             d, o, body = minds[e, i], observations[e, i], bodies[thread]
-            plan(
-                f, s, slots, outermost, d, mates[e, i], seen[e, i], o, costs[thread],
-                work[thread], body,
-            )  # fmt: skip
-            carry_out(
-                f, s, slots, d, mates[e, i], o, beams, discs[thread], body, plays[thread],
-                actions[e, i],
-            )  # fmt: skip
+            plan(f, s, slots, outermost, d, mates[e, i], seen[e, i], o, costs[thread], work[thread], body)
+            carry_out(f, s, slots, d, mates[e, i], o, beams, discs[thread], body, plays[thread], actions[e, i])

@@ -67,9 +67,18 @@ def propose_all(
     for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
             plan(
-                f, s, slots, outermost, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                costs[thread], work[thread], bodies[thread],
-            )  # fmt: skip
+                f,
+                s,
+                slots,
+                outermost,
+                minds[e, i],
+                mates[e, i],
+                seen[e, i],
+                observations[e, i],
+                costs[thread],
+                work[thread],
+                bodies[thread],
+            )
             write_proposal(minds[e, i], bodies[thread], proposals[e, i])
 
 
@@ -97,10 +106,7 @@ def correct_all(
             d, o, body = minds[e, i], observations[e, i], bodies[thread]
             feel_body(f, o, body)
             correct(d, body, float(corrections[e, i, 0]), float(corrections[e, i, 1]))
-            carry_out(
-                f, s, slots, d, mates[e, i], o, beams, discs[thread], body, plays[thread],
-                actions[e, i],
-            )  # fmt: skip
+            carry_out(f, s, slots, d, mates[e, i], o, beams, discs[thread], body, plays[thread], actions[e, i])
 
 
 @kernel
@@ -120,7 +126,4 @@ def write_beliefs(
     f, s = offsets[0], settings[0]
     for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
-            write_belief(
-                f, s, slots, minds[e, i], mates[e, i], seen[e, i], observations[e, i],
-                beliefs[e, i],
-            )  # fmt: skip
+            write_belief(f, s, slots, minds[e, i], mates[e, i], seen[e, i], observations[e, i], beliefs[e, i])

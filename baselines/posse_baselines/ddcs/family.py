@@ -12,11 +12,7 @@ _CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame":
 
 FAMILY: Final[dict[str, Settings]] = {
     "pngl-l-phi": Settings(
-        model="centralized",
-        navigation_constant=1.1,
-        deviation="occupant",
-        follower_frame="slot-frame",
-        **_PURSUIT,
+        model="centralized", navigation_constant=1.1, deviation="occupant", follower_frame="slot-frame", **_PURSUIT
     ),
     "pngl": Settings(deviation="slot", spread=0.1, **_PURSUIT),
     "deviated-pursuit": Settings(deviation="slot", **_PURSUIT),

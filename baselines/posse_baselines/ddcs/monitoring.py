@@ -29,11 +29,7 @@ def carry_on(
         time = 1.0 + s.way_memory * (1.0 - math.exp((1.0 - time) / s.way_memory))
     turned = turn * s.turn_memory * (1.0 - math.exp(-time / s.turn_memory))
     middle = theta + 0.5 * turned
-    return (
-        x + speed * time * math.cos(middle),
-        y + speed * time * math.sin(middle),
-        wrap(theta + turned),
-    )
+    return (x + speed * time * math.cos(middle), y + speed * time * math.sin(middle), wrap(theta + turned))
 
 
 @compiled

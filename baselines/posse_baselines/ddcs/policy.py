@@ -23,14 +23,7 @@ from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.heading import BODY
 from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.laws.safeguard import DISC, PLAYS
-from posse_baselines.policy import (
-    Annotations,
-    BasePolicy,
-    Memory,
-    check_fits,
-    check_observations,
-    message_size_of,
-)  # fmt: skip
+from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of
 
 _MOST_DISCS: Final = 32
 
@@ -91,12 +84,16 @@ class DDCS(OwnArrays, BasePolicy):
         n = scenario.num_trackers
         limited = math.isfinite(scenario.sensing_range)
         memory = _Minds(
-            layout, settings_record(self.settings_for(scenario)), offsets_of(layout),
-            slot_records(scenario), beam_directions(scenario),
+            layout,
+            settings_record(self.settings_for(scenario)),
+            offsets_of(layout),
+            slot_records(scenario),
+            beam_directions(scenario),
             max(math.hypot(x, y) for x, y in slot_offsets(scenario)),
-            np.zeros((num_worlds, n), MIND), np.zeros((num_worlds, n, n), MATE),
+            np.zeros((num_worlds, n), MIND),
+            np.zeros((num_worlds, n, n), MATE),
             np.zeros((num_worlds, n, GRID * GRID if limited else 0), np.uint16),
-        )  # fmt: skip
+        )
         return self.restart(memory, np.ones(num_worlds, np.bool_))
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -119,19 +116,19 @@ class DDCS(OwnArrays, BasePolicy):
         actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
         parts = MOST_THREADS
         work = (
-            np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)), m.beams,
-            np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
+            np.empty((parts, n, n)),
+            np.empty((parts, WORK_ROWS, n + 1)),
+            m.beams,
+            np.empty((parts, _MOST_DISCS), DISC),
+            np.empty(parts, BODY),
             np.empty(parts, PLAYS),
-        )  # fmt: skip
+        )
         over_worlds(
             decide_all,
-            (
-                m.offsets, m.settings, m.slots, m.outermost, m.minds, m.mates, m.seen,
-                observations, *work, actions,
-            ),
+            (m.offsets, m.settings, m.slots, m.outermost, m.minds, m.mates, m.seen, observations, *work, actions),
             num_worlds,
             n,
-        )  # fmt: skip
+        )
         return actions, m
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -148,18 +145,25 @@ class DDCS(OwnArrays, BasePolicy):
         over_worlds(
             propose_all,
             (
-                m.offsets, m.settings, m.slots, m.outermost, m.minds, m.mates, m.seen,
-                observations, np.empty((parts, n, n)), np.empty((parts, WORK_ROWS, n + 1)),
-                np.empty(parts, BODY), proposals,
+                m.offsets,
+                m.settings,
+                m.slots,
+                m.outermost,
+                m.minds,
+                m.mates,
+                m.seen,
+                observations,
+                np.empty((parts, n, n)),
+                np.empty((parts, WORK_ROWS, n + 1)),
+                np.empty(parts, BODY),
+                proposals,
             ),
             num_worlds,
             n,
-        )  # fmt: skip
+        )
         return proposals, m
 
-    def carry_out(
-        self, observations: FloatArray, memory: Memory, corrections: FloatArray
-    ) -> tuple[FloatArray, Memory]:
+    def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
 
         Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
@@ -173,13 +177,22 @@ class DDCS(OwnArrays, BasePolicy):
         over_worlds(
             correct_all,
             (
-                m.offsets, m.settings, m.slots, m.minds, m.mates, observations, m.beams,
-                np.empty((parts, _MOST_DISCS), DISC), np.empty(parts, BODY),
-                np.empty(parts, PLAYS), np.ascontiguousarray(corrections, np.float32), actions,
+                m.offsets,
+                m.settings,
+                m.slots,
+                m.minds,
+                m.mates,
+                observations,
+                m.beams,
+                np.empty((parts, _MOST_DISCS), DISC),
+                np.empty(parts, BODY),
+                np.empty(parts, PLAYS),
+                np.ascontiguousarray(corrections, np.float32),
+                actions,
             ),
             num_worlds,
             n,
-        )  # fmt: skip
+        )
         return actions, m
 
     @property
@@ -198,12 +211,10 @@ class DDCS(OwnArrays, BasePolicy):
         beliefs = np.empty((num_worlds, n, BELIEF_SIZE), np.float32)
         over_worlds(
             write_beliefs,
-            (
-                m.offsets, m.settings, m.slots, m.minds, m.mates, m.seen, observations, beliefs,
-            ),
+            (m.offsets, m.settings, m.slots, m.minds, m.mates, m.seen, observations, beliefs),
             num_worlds,
             n,
-        )  # fmt: skip
+        )
         return beliefs
 
     def annotations(self, memory: Memory) -> Annotations:

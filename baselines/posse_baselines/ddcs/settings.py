@@ -18,10 +18,18 @@ FOLLOWER_LAWS: Final = ("l-phi", "l-l")
 FOLLOWER_FRAMES: Final = ("leader", "slot-frame")
 TASK_NAMES: Final = ("searching", "converging", "flocking", "exchange")
 TRANSITIONS: Final = (
-    "searching>converging", "searching>flocking", "converging>searching", "converging>flocking",
-    "converging>exchange", "flocking>searching", "flocking>converging", "flocking>exchange",
-    "exchange>searching", "exchange>converging", "exchange>flocking",
-)  # fmt: skip
+    "searching>converging",
+    "searching>flocking",
+    "converging>searching",
+    "converging>flocking",
+    "converging>exchange",
+    "flocking>searching",
+    "flocking>converging",
+    "flocking>exchange",
+    "exchange>searching",
+    "exchange>converging",
+    "exchange>flocking",
+)
 """Changes of the task that can be forbidden, for ablations."""
 NO_EXCHANGE: Final = ("converging>exchange", "flocking>exchange")
 
@@ -207,21 +215,15 @@ class Settings:
                     raise ValueError(f"{field.name}={value!r} is unknown; known: {known}")
             elif "low" in meta and not meta["low"] <= value <= meta["high"]:
                 unit = f" {meta['unit']}" if meta["unit"] else ""
-                raise ValueError(
-                    f"{field.name}={value!r} must lie in [{meta['low']:g}, {meta['high']:g}]{unit}"
-                )
+                raise ValueError(f"{field.name}={value!r} must lie in [{meta['low']:g}, {meta['high']:g}]{unit}")
         for transition in self.forbidden:
             if transition not in TRANSITIONS:
-                raise ValueError(
-                    f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}"
-                )
+                raise ValueError(f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}")
         for field in dataclasses.fields(self):
             if near := field.metadata.get("above"):
                 low, high = getattr(self, near), getattr(self, field.name)
                 if not low < high:
-                    raise ValueError(
-                        f"{near}={low!r} must be below {field.name}={high!r}: a hysteresis"
-                    )
+                    raise ValueError(f"{near}={low!r} must be below {field.name}={high!r}: a hysteresis")
 
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""

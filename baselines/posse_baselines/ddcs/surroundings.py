@@ -20,9 +20,7 @@ _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other exp
 
 
 @compiled
-def wall_explains(
-    f: Record, x: float, y: float, beam_x: float, beam_y: float, reading: float
-) -> bool:
+def wall_explains(f: Record, x: float, y: float, beam_x: float, beam_y: float, reading: float) -> bool:
     """Return whether a wall explains a sonar reading (m)."""
     for k in range(4):
         nx, ny = wall_normal(k)
@@ -39,14 +37,7 @@ def wall_explains(
 
 @compiled
 def is_explained(
-    f: Record,
-    discs: Records,
-    robots: int,
-    x: float,
-    y: float,
-    beam_x: float,
-    beam_y: float,
-    reading: float,
+    f: Record, discs: Records, robots: int, x: float, y: float, beam_x: float, beam_y: float, reading: float
 ) -> bool:
     """Return whether a known object explains a sonar reading (m).
 
@@ -69,22 +60,12 @@ def is_explained(
 @compiled
 def wall_normal(k: int) -> tuple[float, float]:
     """Return the outward normal of one of the four walls."""
-    return (
-        1.0 if k == 0 else (-1.0 if k == 1 else 0.0),
-        1.0 if k == 2 else (-1.0 if k == 3 else 0.0),
-    )
+    return (1.0 if k == 0 else (-1.0 if k == 1 else 0.0), 1.0 if k == 2 else (-1.0 if k == 3 else 0.0))
 
 
 @compiled
 def slot_in_beam(
-    f: Record,
-    d: Record,
-    slots: Records,
-    x: float,
-    y: float,
-    beam_x: float,
-    beam_y: float,
-    reading: float,
+    f: Record, d: Record, slots: Records, x: float, y: float, beam_x: float, beam_y: float, reading: float
 ) -> int:
     """Return the slot whose occupant would give this echo, or -1.
 
@@ -171,7 +152,5 @@ def surround(
         # Its position within the beam is unknown: a disc that fills most of the beam.
         wide = min(0.5, 0.4 * (reading + radius))
         away = reading + radius + wide
-        count = put_disc(
-            discs, count, away * beam_x, away * beam_y, 0.0, 0.0, wide + radius, s.echo_margin
-        )
+        count = put_disc(discs, count, away * beam_x, away * beam_y, 0.0, 0.0, wide + radius, s.echo_margin)
     return count

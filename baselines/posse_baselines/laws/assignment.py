@@ -27,8 +27,14 @@ def assign(cost: FloatArray, rows: int, columns: int, work: FloatArray) -> None:
     """
     # Rows and columns count from 1 here; 0 means none.
     answer, row_price, column_price, row_of, path, slack, done = (
-        work[0], work[1], work[2], work[3], work[4], work[5], work[6],
-    )  # fmt: skip
+        work[0],
+        work[1],
+        work[2],
+        work[3],
+        work[4],
+        work[5],
+        work[6],
+    )
     for j in range(columns + 1):
         column_price[j] = 0.0
         row_of[j] = 0.0

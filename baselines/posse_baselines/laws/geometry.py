@@ -49,9 +49,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 @compiled
-def line_of_sight(
-    tracker_x: float, tracker_y: float, target_x: float, target_y: float
-) -> tuple[float, float]:
+def line_of_sight(tracker_x: float, tracker_y: float, target_x: float, target_y: float) -> tuple[float, float]:
     """Return the range r (m, >= 0) and the angle σ (rad, (-π, π]) from tracker to target.
 
     Where the two coincide, σ is 0.
@@ -69,11 +67,7 @@ def deviation(theta: float, sigma: float) -> float:
 
 @compiled
 def bearing_rate(
-    r: float,
-    target_speed: float,
-    target_delta: float,
-    tracker_speed: float,
-    tracker_delta: float,
+    r: float, target_speed: float, target_delta: float, tracker_speed: float, tracker_delta: float
 ) -> float:
     """Return dσ/dt (rad/s), the turn rate of the line of sight: (4).
 

@@ -32,9 +32,7 @@ MIN_COSINE: Final = 0.6
 
 
 @compiled
-def lawful_heading(
-    sigma: float, navigation_constant: float, wanted_sigma: float, wanted_theta: float
-) -> float:
+def lawful_heading(sigma: float, navigation_constant: float, wanted_sigma: float, wanted_theta: float) -> float:
     """Return the heading (rad, (-π, π]) that obeys the law, ``K σ + c``: (5).
 
     c = ``wanted_theta - K wanted_sigma``; both 0 make it the paper's (5).

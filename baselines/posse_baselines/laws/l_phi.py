@@ -72,9 +72,7 @@ def point_velocity(along: float, across: float, gamma: float) -> tuple[float, fl
 
 
 @compiled
-def held_command(
-    ahead: float, across: float, point_offset: float, dt: float
-) -> tuple[float, float]:
+def held_command(ahead: float, across: float, point_offset: float, dt: float) -> tuple[float, float]:
     """Return (v_j, ω_j) that, held for dt (s), move the control point as its velocity asks.
 
     The robot moves on an arc. It ends with the control point where (``ahead``, ``across``), m/s,

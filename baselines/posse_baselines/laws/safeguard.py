@@ -26,10 +26,7 @@ _SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed
 # From straight ahead outwards, alternating left and right; all directions at all speeds.
 _DIRECTIONS: Final = 16
 _TURNS: Final = np.array(
-    [
-        (1 if k % 2 else -1) * ((k + 1) // 2) * 2.0 * math.pi / _DIRECTIONS
-        for k in range(_DIRECTIONS)
-    ]
+    [(1 if k % 2 else -1) * ((k + 1) // 2) * 2.0 * math.pi / _DIRECTIONS for k in range(_DIRECTIONS)]
 )
 _TURN_COS: Final = np.cos(_TURNS)
 _TURN_SIN: Final = np.sin(_TURNS)
@@ -62,9 +59,7 @@ DISC: Final[np.dtype[Any]] = np.dtype(
 )
 """An object to avoid, relative to the tracker."""
 
-_BY_DIRECTION: Final = (
-    "error", "omega", "cos", "sin", "middle_cos", "middle_sin", "goal_cos", "goal_sin", "ahead",
-)  # fmt: skip
+_BY_DIRECTION: Final = ("error", "omega", "cos", "sin", "middle_cos", "middle_sin", "goal_cos", "goal_sin", "ahead")
 _BY_PLAY: Final = ("speed", "x", "y", "danger", "going")
 PLAYS: Final[np.dtype[Any]] = np.dtype(
     (
@@ -85,14 +80,7 @@ _PLANET: Final = 1000.0  # radius of the disc that stands for a wall, m
 
 @compiled
 def put_disc(
-    discs: Records,
-    count: int,
-    x: float,
-    y: float,
-    speed_x: float,
-    speed_y: float,
-    reach: float,
-    margin: float,
+    discs: Records, count: int, x: float, y: float, speed_x: float, speed_y: float, reach: float, margin: float
 ) -> int:
     """Add a disc to a list of ``count``, unless it is full; return the new count."""
     if count >= len(discs):
@@ -104,13 +92,7 @@ def put_disc(
 
 @compiled
 def put_wall(
-    discs: Records,
-    count: int,
-    distance: float,
-    normal_x: float,
-    normal_y: float,
-    radius: float,
-    margin: float,
+    discs: Records, count: int, distance: float, normal_x: float, normal_y: float, radius: float, margin: float
 ) -> int:
     """Add a wall at ``distance`` (m) along its outward normal, as a very large disc."""
     away = distance - radius + _PLANET
@@ -258,14 +240,7 @@ def play_all(body: Record, discs: Records, count: int, p: Record) -> None:
 
 
 @compiled
-def is_clear(
-    body: Record,
-    discs: Records,
-    count: int,
-    speed: float,
-    speed_x: float,
-    speed_y: float,
-) -> bool:
+def is_clear(body: Record, discs: Records, count: int, speed: float, speed_x: float, speed_y: float) -> bool:
     """Return whether a velocity is trivially safe: near the current one, and nothing ahead.
 
     Avoids the simulation, which a team in formation rarely needs.

@@ -22,9 +22,7 @@ def rotate(x: float, y: float, cosine: float, sine: float) -> tuple[float, float
 
 
 @compiled
-def slot_velocity(
-    speed_x: float, speed_y: float, frame_rate: float, arm_x: float, arm_y: float
-) -> tuple[float, float]:
+def slot_velocity(speed_x: float, speed_y: float, frame_rate: float, arm_x: float, arm_y: float) -> tuple[float, float]:
     """Return the velocity (m/s) of a slot on an arm (m) that turns at ``frame_rate`` (rad/s)."""
     return speed_x - frame_rate * arm_y, speed_y + frame_rate * arm_x
 
@@ -43,12 +41,7 @@ def slot_heading(
 
 @compiled
 def slot_law(
-    offset_x: float,
-    offset_y: float,
-    slot_speed_x: float,
-    slot_speed_y: float,
-    gain: float,
-    max_speed: float,
+    offset_x: float, offset_y: float, slot_speed_x: float, slot_speed_y: float, gain: float, max_speed: float
 ) -> tuple[float, float]:
     """Return the tracker's wanted velocity (x, y) in m/s, no faster than ``max_speed``.
 

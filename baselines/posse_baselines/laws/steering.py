@@ -80,9 +80,7 @@ def approach_velocity(
 
 
 @compiled
-def way_round(
-    from_x: float, from_y: float, to_x: float, to_y: float, clearance: float
-) -> tuple[float, float]:
+def way_round(from_x: float, from_y: float, to_x: float, to_y: float, clearance: float) -> tuple[float, float]:
     """Return the next waypoint from one position to another around the origin (m).
 
     The goal itself if the straight path keeps ``clearance`` from the origin; else the tangent point
@@ -143,9 +141,7 @@ def meeting_velocity(
 
 
 @compiled
-def write_motion(
-    action: FloatArray, speed: float, omega: float, max_speed: float, max_omega: float
-) -> None:
+def write_motion(action: FloatArray, speed: float, omega: float, max_speed: float, max_omega: float) -> None:
     """Write the first two numbers of an action (2 + m,), clipped to [-1, 1]."""
     action[0] = clip(2.0 * speed / max_speed - 1.0, -1.0, 1.0)
     action[1] = clip(omega / max_omega, -1.0, 1.0)

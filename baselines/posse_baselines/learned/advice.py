@@ -54,9 +54,7 @@ class GuardedAdviser(Adviser, Protocol):
         """
         ...
 
-    def carry_out(
-        self, observations: FloatArray, memory: Memory, corrections: FloatArray
-    ) -> tuple[FloatArray, Memory]:
+    def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return actions (E, N, 2 + m) for wanted velocities plus corrections (E, N, 2)."""
         ...
 
@@ -75,9 +73,7 @@ class BelievingAdviser(GuardedAdviser, Protocol):
         ...
 
 
-def check_adviser(
-    name: str, policy: Policy, correction: str = "motion", *, believes: bool = False
-) -> Adviser:
+def check_adviser(name: str, policy: Policy, correction: str = "motion", *, believes: bool = False) -> Adviser:
     """Return a policy as an adviser.
 
     Args:
@@ -91,14 +87,9 @@ def check_adviser(
             the correction or the belief needs.
     """
     if correction not in CORRECTIONS:
-        raise PolicyError(
-            f"correction={correction!r:.80} is unknown; corrections are: {', '.join(CORRECTIONS)}"
-        )
+        raise PolicyError(f"correction={correction!r:.80} is unknown; corrections are: {', '.join(CORRECTIONS)}")
     if policy.reads_state:
-        raise PolicyError(
-            f"{name!r} cannot be an adviser: it reads the state of the worlds, which no tracker "
-            "observes"
-        )
+        raise PolicyError(f"{name!r} cannot be an adviser: it reads the state of the worlds, which no tracker observes")
     if not isinstance(policy, Adviser):
         raise PolicyError(f"{name!r} cannot be an adviser: it has no method arrays(memory)")
     if correction == "velocity" and not isinstance(policy, GuardedAdviser):
@@ -136,9 +127,7 @@ class Advising:
         PolicyError: An adviser without what the correction or the belief needs.
     """
 
-    def __init__(
-        self, adviser: Adviser, correction: str = "motion", *, believes: bool = False
-    ) -> None:
+    def __init__(self, adviser: Adviser, correction: str = "motion", *, believes: bool = False) -> None:
         self.adviser = check_adviser(adviser.name, adviser, correction, believes=believes)
         self.correction = correction
         self.inputs = MOTION
@@ -151,9 +140,7 @@ class Advising:
         """Return the length of a proposal."""
         return MOTION if self.correction == "velocity" else MOTION + message_size_of(layout)
 
-    def ask(
-        self, observations: FloatArray, memory: Memory
-    ) -> tuple[FloatArray, FloatArray, Memory]:
+    def ask(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, FloatArray, Memory]:
         """Return proposals (E, N, p), the network's further inputs (E, N, k), and the memory."""
         if self._guarded is None or self.correction == "motion":
             proposals, memory = self.adviser.act(observations, memory)
@@ -203,9 +190,7 @@ class Advice:
 
     def actions(self, outputs: FloatArray) -> FloatArray:
         """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2)."""
-        actions, self._memory = self._advising.answer(
-            self._observations, self.proposals, outputs, self._memory
-        )
+        actions, self._memory = self._advising.answer(self._observations, self.proposals, outputs, self._memory)
         return actions
 
     def restart(self, observations: FloatArray, mask: BoolArray) -> None:

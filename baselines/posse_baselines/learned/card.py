@@ -37,12 +37,9 @@ def check_card(card: Any) -> tuple[str, tuple[str, ...]]:
     name = card.get("name", "learned")
     if not isinstance(name, str) or not 1 <= len(name) <= LONGEST_NAME or not name.isprintable():
         raise PolicyError(
-            f"the name on its card, {name!r:.80}, must be a text of 1 to {LONGEST_NAME} printable "
-            "characters"
+            f"the name on its card, {name!r:.80}, must be a text of 1 to {LONGEST_NAME} printable characters"
         )
     splits = card.get("trained_splits", ("train",))
     if not isinstance(splits, (list, tuple)) or any(split not in SPLITS for split in splits):
-        raise PolicyError(
-            f"trained_splits={splits!r:.80} on its card must be a list of {', '.join(SPLITS)}"
-        )
+        raise PolicyError(f"trained_splits={splits!r:.80} on its card must be a list of {', '.join(SPLITS)}")
     return name, tuple(splits)

@@ -6,16 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import (
-    MOST_THREADS,
-    Blocks,
-    FloatArray,
-    OwnArrays,
-    compiled,
-    kernel,
-    over_worlds,
-    worlds_of,
-)
+from posse.numeric import MOST_THREADS, Blocks, FloatArray, OwnArrays, compiled, kernel, over_worlds, worlds_of
 from posse_baselines.learned.encoding import Columns, Encoding
 from posse_baselines.learned.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
 

@@ -60,9 +60,7 @@ class Encoding:
     fields: tuple[EncodedField, ...]
 
     @classmethod
-    def of(
-        cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None
-    ) -> Encoding:
+    def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> Encoding:
         """Return the encoding that reads every field of a layout.
 
         Args:
@@ -79,8 +77,7 @@ class Encoding:
         if not 0 <= places <= MOST_NEIGHBOURS:
             raise PolicyError(f"neighbours={places} must lie in [0, {MOST_NEIGHBOURS}]")
         fields = tuple(
-            EncodedField(f.name, f.size, f.unit, float(f.unknown or 0), f.of_neighbour)
-            for f in layout.fields
+            EncodedField(f.name, f.size, f.unit, float(f.unknown or 0), f.of_neighbour) for f in layout.fields
         )
         return cls(kind, places, fields)
 
@@ -139,9 +136,7 @@ class Encoding:
             )
             kind, neighbours = str(values["kind"]), int(values["neighbours"])
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise PolicyError(
-                f"the description of the policy's inputs is damaged: {error!s:.200}"
-            ) from error
+            raise PolicyError(f"the description of the policy's inputs is damaged: {error!s:.200}") from error
         if (
             kind not in KINDS
             or not 0 <= neighbours <= MOST_NEIGHBOURS

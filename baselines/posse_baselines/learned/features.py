@@ -36,14 +36,39 @@ SCRATCH: Final = MOST * (4 + 64)
 """Scratch memory of :func:`write_features`, in float32 numbers."""
 
 _NAMES: Final = (
-    "speed", "turn_rate", "max_speed", "max_turn_rate", "target_known", "target_seen", "target_age",
-    "target_range", "target_bearing", "target_heading", "target_frame", "target_velocity",
-    "neighbour_number", "number",
-)  # fmt: skip
+    "speed",
+    "turn_rate",
+    "max_speed",
+    "max_turn_rate",
+    "target_known",
+    "target_seen",
+    "target_age",
+    "target_range",
+    "target_bearing",
+    "target_heading",
+    "target_frame",
+    "target_velocity",
+    "neighbour_number",
+    "number",
+)
 (
-    _SPEED, _TURN, _MAX_SPEED, _MAX_TURN, _KNOWN, _SEEN, _AGE, _RANGE, _BEARING, _HEADING, _FRAME,
-    _VELOCITY, _MATE, _NUMBER, _STRIDE, _PLACES,
-) = range(16)  # fmt: skip
+    _SPEED,
+    _TURN,
+    _MAX_SPEED,
+    _MAX_TURN,
+    _KNOWN,
+    _SEEN,
+    _AGE,
+    _RANGE,
+    _BEARING,
+    _HEADING,
+    _FRAME,
+    _VELOCITY,
+    _MATE,
+    _NUMBER,
+    _STRIDE,
+    _PLACES,
+) = range(16)
 
 Offsets = npt.NDArray[np.int64]
 
@@ -57,8 +82,7 @@ def feature_tables(layout: ObservationLayout) -> tuple[Offsets, FloatArray]:
     missing = [name for name in _NAMES if name not in layout.offsets]
     if missing:
         raise PolicyError(
-            f"the observations of scenario {layout.scenario.name!r} lack {missing[0]!r}, which "
-            "the policy needs"
+            f"the observations of scenario {layout.scenario.name!r} lack {missing[0]!r}, which the policy needs"
         )
     offsets = [layout.offsets[name] for name in _NAMES] + [layout.stride, layout.neighbours]
     slots = np.array(slot_offsets(layout.scenario), np.float32)
@@ -84,9 +108,7 @@ def _slot_y(slots: FloatArray, s: int, y: np.float32, c: np.float32, n: np.float
 
 
 @compiled
-def write_features(
-    row: FloatArray, at: Offsets, slots: FloatArray, scratch: FloatArray, out: FloatArray
-) -> None:
+def write_features(row: FloatArray, at: Offsets, slots: FloatArray, scratch: FloatArray, out: FloatArray) -> None:
     """Write the features of one observation (F,) to ``out`` (NUM_FEATURES,).
 
     ``at`` and ``slots`` come from :func:`feature_tables`; ``scratch`` is (SCRATCH,).

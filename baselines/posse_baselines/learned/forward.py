@@ -22,9 +22,7 @@ _HALF: Final = np.float32(0.5)
 
 
 @compiled
-def _layer(
-    x: FloatArray, size: int, weights: FloatArray, biases: FloatArray, count: int, y: FloatArray
-) -> None:
+def _layer(x: FloatArray, size: int, weights: FloatArray, biases: FloatArray, count: int, y: FloatArray) -> None:
     """Write biases + weights x to y; weights lie input by input."""
     for j in range(count):
         y[j] = biases[j]
@@ -49,12 +47,7 @@ def _sigmoid(x: np.float32) -> np.float32:
 
 @compiled
 def _remember(
-    x: FloatArray,
-    size: int,
-    weights: FloatArray,
-    biases: FloatArray,
-    gates: FloatArray,
-    state: FloatArray,
+    x: FloatArray, size: int, weights: FloatArray, biases: FloatArray, gates: FloatArray, state: FloatArray
 ) -> None:
     """Advance the state (2, cells) of an LSTM (:mod:`posse_baselines.learned.lstm`) by inputs x."""
     h, c = state[0], state[1]

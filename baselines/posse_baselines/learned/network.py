@@ -89,9 +89,7 @@ class Network(OwnArrays):
             if array.dtype != np.float32 or not np.isfinite(array).all():
                 raise PolicyError("a network's numbers must be finite float32")
         if not 0 < self.limit <= LARGEST:
-            raise PolicyError(
-                f"limit={self.limit} of the normalised inputs must be above 0, at most {LARGEST:g}"
-            )
+            raise PolicyError(f"limit={self.limit} of the normalised inputs must be above 0, at most {LARGEST:g}")
         if (np.abs(self.mean) > LARGEST).any():
             raise PolicyError(f"the input means must lie within ±{LARGEST:g}")
         self._check_reach()
@@ -99,8 +97,7 @@ class Network(OwnArrays):
     def _check_shapes(self) -> None:
         if self.mean.ndim != 1 or self.scale.shape != self.mean.shape:
             raise PolicyError(
-                f"input statistics of shapes {self.mean.shape} and {self.scale.shape}: both must "
-                "be (inputs,)"
+                f"input statistics of shapes {self.mean.shape} and {self.scale.shape}: both must be (inputs,)"
             )
         size = self.inputs
         if self.lstm is not None:

@@ -22,20 +22,9 @@ from posse_baselines.learned.features import SCRATCH
 from posse_baselines.learned.forward import act
 from posse_baselines.learned.lstm import LSTM
 from posse_baselines.learned.network import LSTM_TENSORS, Network
-from posse_baselines.learned.policy_file import (
-    read_policy_file,
-    write_atomically,
-    write_policy_file,
-)
+from posse_baselines.learned.policy_file import read_policy_file, write_atomically, write_policy_file
 from posse_baselines.policies.scripted import SCRIPTED
-from posse_baselines.policy import (
-    Annotations,
-    BasePolicy,
-    Memory,
-    PolicyError,
-    check_observations,
-    message_size_of,
-)
+from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations, message_size_of
 
 FORMATS: Final = (1, 2, 3)
 """Formats of policy files. 2: with a correction, or a belief, that format 1 does not know. 3: with
@@ -85,18 +74,12 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         network.check()
         if adviser is None and encoding.believes:
             raise PolicyError("a policy that reads an adviser's belief needs an adviser")
-        self._advising = (
-            None if adviser is None else Advising(adviser, correction, believes=encoding.believes)
-        )
+        self._advising = None if adviser is None else Advising(adviser, correction, believes=encoding.believes)
         size = encoding.size + (0 if self._advising is None else self._advising.inputs)
         if network.inputs != size:
-            raise PolicyError(
-                f"the network takes {network.inputs} numbers, its encoding gives {size}"
-            )
+            raise PolicyError(f"the network takes {network.inputs} numbers, its encoding gives {size}")
         if network.outputs < MOTION:
-            raise PolicyError(
-                f"the network gives {network.outputs} numbers, an action has {MOTION} or more"
-            )
+            raise PolicyError(f"the network gives {network.outputs} numbers, an action has {MOTION} or more")
         self.network = network
         self.encoding = encoding
         self._set_card(card)
@@ -155,17 +138,12 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             proposals, inputs, m.adviser = self._advising.ask(observations, m.adviser)
         over_worlds(
             act,
-            (
-                observations, *m.encoder.tables, np.ascontiguousarray(inputs),
-                *self._numbers, scratch, m.states, actions,
-            ),
+            (observations, *m.encoder.tables, np.ascontiguousarray(inputs), *self._numbers, scratch, m.states, actions),
             m.num_worlds,
             robots,
-        )  # fmt: skip
+        )
         if self._advising is not None:
-            actions, m.adviser = self._advising.answer(
-                observations, proposals, actions[..., :MOTION], m.adviser
-            )
+            actions, m.adviser = self._advising.answer(observations, proposals, actions[..., :MOTION], m.adviser)
         return actions, m
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -233,9 +211,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
 
     @classmethod
-    def _from_parts(
-        cls, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]
-    ) -> LearnedPolicy:
+    def _from_parts(cls, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]) -> LearnedPolicy:
         if description["format"] not in FORMATS:
             raise PolicyError(
                 f"its format is {description['format']!r:.80}, this version reads "
@@ -254,17 +230,18 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         )
         encoding = Encoding.from_dict(description["encoding"])
         return cls(
-            network, encoding, description["card"], _adviser(description.get("adviser")),
+            network,
+            encoding,
+            description["card"],
+            _adviser(description.get("adviser")),
             str(description.get("correction", "motion")),
-        )  # fmt: skip
+        )
 
 
 def _lstm(memory: Any, tensors: Mapping[str, FloatArray]) -> LSTM | None:
     """Return the recurrent layer of a file, if it has one."""
     if memory not in MEMORIES:
-        raise PolicyError(
-            f"its memory {memory!r:.80} is unknown: install the version that wrote it"
-        )
+        raise PolicyError(f"its memory {memory!r:.80} is unknown: install the version that wrote it")
     if memory is None:
         return None
     return LSTM(**{name: tensors[f"lstm.{name}"] for name in LSTM_TENSORS})
@@ -276,7 +253,6 @@ def _adviser(name: str | None) -> Adviser | None:
         return None
     if name not in SCRIPTED:
         raise PolicyError(
-            f"its adviser {name!r:.80} is none of {', '.join(SCRIPTED)}: install the version that "
-            "wrote it"
+            f"its adviser {name!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
         )
     return check_adviser(name, SCRIPTED[name]())

@@ -81,9 +81,7 @@ def _is_at(file: IO[bytes], path: Path) -> bool:
         return False
 
 
-def write_policy_file(
-    path: Path, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]
-) -> None:
+def write_policy_file(path: Path, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]) -> None:
     """Write a policy file, replacing one of that name.
 
     Raises:
@@ -107,9 +105,7 @@ def read_policy_file(path: Path) -> tuple[dict[str, FloatArray], Any]:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
             metadata = file.metadata() or {}
     except (SafetensorError, OSError, TypeError, ValueError) as error:
-        raise PolicyError(
-            f"{path} is damaged, truncated, or not a policy file: {error!s:.200}"
-        ) from error
+        raise PolicyError(f"{path} is damaged, truncated, or not a policy file: {error!s:.200}") from error
     text = metadata.get(_KEY)
     if text is None:
         raise PolicyError(f"{path} is a safetensors file, but holds no policy of posse")

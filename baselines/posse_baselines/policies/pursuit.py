@@ -9,25 +9,9 @@ from typing import Final
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import (
-    Blocks,
-    FloatArray,
-    OwnArrays,
-    Record,
-    Records,
-    compiled,
-    kernel,
-    over_worlds,
-    worlds_of,
-)
+from posse.numeric import Blocks, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, worlds_of
 from posse_baselines.laws.offsets import offsets_of
-from posse_baselines.policy import (
-    BasePolicy,
-    Memory,
-    check_fits,
-    check_observations,
-    message_size_of,
-)
+from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
 
 _KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
 _STOP: Final = 0.9  # distance from the target at which it stops, m
@@ -86,13 +70,7 @@ def pursue(f: Record, o: FloatArray, action: FloatArray) -> None:
 
 
 @kernel
-def pursue_all(
-    offsets: Records,
-    observations: FloatArray,
-    actions: FloatArray,
-    thread: int,
-    blocks: Blocks,
-) -> None:
+def pursue_all(offsets: Records, observations: FloatArray, actions: FloatArray, thread: int, blocks: Blocks) -> None:
     """Write the actions of a thread's worlds."""
     f = offsets[0]
     for e in worlds_of(thread, blocks):

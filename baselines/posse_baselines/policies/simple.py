@@ -9,13 +9,7 @@ import numpy as np
 from posse import ObservationLayout
 from posse.numeric import FloatArray, kernel
 from posse.rules import mix
-from posse_baselines.policy import (
-    BasePolicy,
-    Memory,
-    check_fits,
-    check_observations,
-    message_size_of,
-)
+from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
 
 _ONE: Final = np.float32(1.0)
 _SHIFT: Final = np.uint64(40)

@@ -60,14 +60,10 @@ def read_tuned(path: Path) -> TunedFile:
     policy, scenario = card.get("policy"), card.get("scenario")
     if not isinstance(policy, str) or policy not in FAMILY:
         raise PolicyError(
-            f"{path} has settings of policy={policy!r:.80}; policies with settings are: "
-            f"{', '.join(FAMILY)}"
+            f"{path} has settings of policy={policy!r:.80}; policies with settings are: {', '.join(FAMILY)}"
         )
     if not isinstance(scenario, str) or not 1 <= len(scenario) <= 100 or not scenario.isprintable():
-        raise PolicyError(
-            f"{path} has scenario={scenario!r:.80}: it must be a text of 1 to 100 printable "
-            "characters"
-        )
+        raise PolicyError(f"{path} has scenario={scenario!r:.80}: it must be a text of 1 to 100 printable characters")
     values = _checked(path, policy, card.get("settings"))
     try:
         settings = FAMILY[policy].replace(**values)
@@ -91,8 +87,5 @@ def _checked(path: Path, policy: str, values: Any) -> dict[str, float]:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not t.low <= value <= t.high:
             unit = f" {t.unit}" if t.unit else ""
-            raise PolicyError(
-                f"{path} has {name}={value!r:.80}: it must be a number in "
-                f"[{t.low:g}, {t.high:g}]{unit}"
-            )
+            raise PolicyError(f"{path} has {name}={value!r:.80}: it must be a number in [{t.low:g}, {t.high:g}]{unit}")
     return {name: float(value) for name, value in values.items()}

@@ -43,15 +43,12 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
         ScenarioError: ``discrete`` with messages, which are not discrete.
     """
     if not isinstance(discrete, bool):
-        raise ScenarioError(
-            f"discrete_actions={shown(discrete)} is not possible: it is True or False"
-        )
+        raise ScenarioError(f"discrete_actions={shown(discrete)} is not possible: it is True or False")
     if not discrete:
         return spaces.Box(-1.0, 1.0, (2 + scenario.message_size,), np.float32)
     if scenario.message_size:
         raise ScenarioError(
-            f"discrete_actions=True cannot encode messages of message_size="
-            f"{scenario.message_size}: unset one of them"
+            f"discrete_actions=True cannot encode messages of message_size={scenario.message_size}: unset one of them"
         )
     return spaces.Discrete(len(MOTIONS))
 
@@ -68,9 +65,7 @@ class ActionReader:
         read: The last actions, (1, rows, 2 + m) float32; always the same array.
     """
 
-    def __init__(
-        self, scenario: Scenario, discrete: bool, agents: Sequence[str] | None = None
-    ) -> None:
+    def __init__(self, scenario: Scenario, discrete: bool, agents: Sequence[str] | None = None) -> None:
         self._scenario = scenario
         self._agents = agent_names(scenario) if agents is None else list(agents)
         self._discrete = discrete
@@ -78,9 +73,7 @@ class ActionReader:
         self._shape = (rows,) if discrete else (rows, 2 + scenario.message_size)
         self.read: FloatArray = np.zeros((1, rows, 2 + scenario.message_size), np.float32)
         self._plane: FloatArray = self.read[0]
-        self._rows = [
-            (a, memoryview(row)) for a, row in zip(self._agents, self._plane, strict=True)
-        ]
+        self._rows = [(a, memoryview(row)) for a, row in zip(self._agents, self._plane, strict=True)]
         self._first_bad = self._first_bad_of_all
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -167,9 +160,7 @@ class ActionReader:
         wanted = "iu" if self._discrete else "fiu"
         if array.dtype.kind not in wanted:
             kind = "a whole number" if self._discrete else "real numbers"
-            raise ValueError(
-                f"action of {agent} must be {kind}, got {shown(action)} ({array.dtype})"
-            )
+            raise ValueError(f"action of {agent} must be {kind}, got {shown(action)} ({array.dtype})")
         if array.shape != self._shape[1:]:
             raise ValueError(f"action of {agent} has shape {array.shape}, wanted {self._shape[1:]}")
         return array if self._discrete else to_float32(array)
@@ -180,9 +171,7 @@ class ActionReader:
             outside = (array < 0) | (array >= len(MOTIONS))
             if outside.any():
                 i = int(outside.argmax())
-                raise ValueError(
-                    f"action of {agents[i]} is {array[i]}, outside 0 to {len(MOTIONS) - 1}"
-                )
+                raise ValueError(f"action of {agents[i]} is {array[i]}, outside 0 to {len(MOTIONS) - 1}")
             motions: FloatArray = MOTIONS[array][None]
             return motions
         kernel = to_float32(np.ascontiguousarray(array))[None]

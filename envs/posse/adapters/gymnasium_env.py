@@ -77,15 +77,18 @@ class TeamEnv(OneAgentEnv):
         self._flat_infos = flat_infos
         fitting = with_agent(self.fitting_scenario(scenario, None, overrides), target_policy)
         self._open(
-            fitting, render_mode=render_mode, discrete_actions=discrete_actions,
-            seed=seed, split=split, first_world=first_world, target_policy=target_policy,
-        )  # fmt: skip
+            fitting,
+            render_mode=render_mode,
+            discrete_actions=discrete_actions,
+            seed=seed,
+            split=split,
+            first_world=first_world,
+            target_policy=target_policy,
+        )
         self.observation_space, self.action_space = self.spaces_of(self.scenario, discrete_actions)
 
     @classmethod
-    def fitting_scenario(
-        cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
-    ) -> Scenario:
+    def fitting_scenario(cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
         """Return the scenario with overrides and ``horizon`` steps per episode.
 
         Raises:
@@ -94,9 +97,7 @@ class TeamEnv(OneAgentEnv):
         return _with_scripted_target(scenario, horizon, overrides)
 
     @classmethod
-    def spaces_of(
-        cls, scenario: Scenario, discrete_actions: bool
-    ) -> tuple[spaces.Box, spaces.Space[Any]]:
+    def spaces_of(cls, scenario: Scenario, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:
         """Return the spaces of observations and actions."""
         n = scenario.num_trackers
         low, high = ObservationLayout(scenario).bounds()
@@ -169,9 +170,7 @@ class SoloEnv(TeamEnv):
     """
 
     @classmethod
-    def fitting_scenario(
-        cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
-    ) -> Scenario:
+    def fitting_scenario(cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
         """Return the scenario with one tracker.
 
         Raises:
@@ -192,9 +191,7 @@ class SoloEnv(TeamEnv):
         return _with_scripted_target(scenario, horizon, {**overrides, "num_trackers": 1})
 
     @classmethod
-    def spaces_of(
-        cls, scenario: Scenario, discrete_actions: bool
-    ) -> tuple[spaces.Box, spaces.Space[Any]]:
+    def spaces_of(cls, scenario: Scenario, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:
         """Return the spaces of observations and actions."""
         bounds = ObservationLayout(scenario).bounds()
         return box(bounds), single_action_space(scenario, discrete_actions)
@@ -234,9 +231,7 @@ def solo_options(options: dict[str, Any] | None) -> dict[str, Any] | None:
     return found
 
 
-def _with_scripted_target(
-    scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
-) -> Scenario:
+def _with_scripted_target(scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
     settings = dict(overrides)
     if settings.pop("target", None) is not None:
         raise ScenarioError(_NO_PLACE.format(f"target={shown(overrides['target'])}"))

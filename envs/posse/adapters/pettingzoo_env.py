@@ -71,11 +71,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         ValueError: An unknown split or render mode, a negative seed.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        **WorldEnv.metadata,
-        "name": "posse_track_v0",
-        "is_parallelizable": True,
-    }
+    metadata: ClassVar[dict[str, Any]] = {**WorldEnv.metadata, "name": "posse_track_v0", "is_parallelizable": True}
 
     def __init__(
         self,
@@ -92,16 +88,18 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     ) -> None:
         self._open(
             shortened(scenario, max_cycles, {**overrides, "target": target}),
-            render_mode=render_mode, discrete_actions=discrete_actions, seed=seed, split=split,
+            render_mode=render_mode,
+            discrete_actions=discrete_actions,
+            seed=seed,
+            split=split,
             first_world=first_world,
-        )  # fmt: skip
+        )
         self.possible_agents = agent_names(self.scenario)
         self.agents: list[str] = []
         bounds = self.layout.bounds()
         self.observation_spaces = {agent: box(bounds) for agent in self.possible_agents}
         self.action_spaces = {
-            agent: single_action_space(self.scenario, discrete_actions)
-            for agent in self.possible_agents
+            agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
         }
         self._none_ended = dict.fromkeys(self.possible_agents, False)
         self._state_space: spaces.Box | None = None
@@ -151,11 +149,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         if self.render_mode == "human":
             self.render()
         infos: _Infos = {
-            agent: {
-                "score": 0.0,
-                "reward_terms": self._world.no_terms,
-                "metrics": self._world.no_metrics.copy(),
-            }
+            agent: {"score": 0.0, "reward_terms": self._world.no_terms, "metrics": self._world.no_metrics.copy()}
             for agent in self.agents
         }
         if self._breakable:

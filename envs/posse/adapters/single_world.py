@@ -106,16 +106,7 @@ class SingleWorld:
         self.advance = self.batch.stepper(self.actions.read, *self._written)
 
     def __getstate__(self) -> dict[str, Any]:
-        derived = (
-            "score",
-            "name_terms",
-            "actions",
-            "_written",
-            "observations",
-            "rewards",
-            "terms",
-            "advance",
-        )
+        derived = ("score", "name_terms", "actions", "_written", "observations", "rewards", "terms", "advance")
         kept = {k: v for k, v in self.__dict__.items() if k not in derived}
         return {**kept, "_renderer": None, "_state_layout": None}
 
@@ -225,9 +216,7 @@ def new_renderer(scenario: Scenario, render_mode: str) -> Any:
 def check_render_mode(render_mode: str | None) -> None:
     """Raise ValueError for an unknown render mode."""
     if render_mode is not None and not is_one_of(RENDER_MODES, render_mode):
-        raise ValueError(
-            f"unknown render_mode {shown(render_mode)}; modes are: {', '.join(RENDER_MODES)}, None"
-        )
+        raise ValueError(f"unknown render_mode {shown(render_mode)}; modes are: {', '.join(RENDER_MODES)}, None")
 
 
 def frames_per_second(scenario: Scenario) -> int:
@@ -235,9 +224,7 @@ def frames_per_second(scenario: Scenario) -> int:
     return max(1, round(1 / scenario.control_step))
 
 
-def shortened(
-    scenario: str | Scenario, horizon: int | None, overrides: Mapping[str, Any]
-) -> Scenario:
+def shortened(scenario: str | Scenario, horizon: int | None, overrides: Mapping[str, Any]) -> Scenario:
     """Return a scenario with overrides, and ``horizon`` steps per episode unless that is None.
 
     For ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium). ``settle_time`` is

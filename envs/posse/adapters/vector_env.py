@@ -14,12 +14,7 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import MOTIONS
 from posse.adapters.gymnasium_env import SoloEnv, TeamEnv, solo_options
 from posse.adapters.infos import flattened
-from posse.adapters.single_world import (
-    RENDER_MODES,
-    check_render_mode,
-    frames_per_second,
-    new_renderer,
-)
+from posse.adapters.single_world import RENDER_MODES, check_render_mode, frames_per_second, new_renderer
 from posse.engine.arguments import as_array, options_of
 from posse.engine.paired_batch import TargetPolicy, batch_for, with_agent
 from posse.numeric import BoolArray, FloatArray
@@ -102,9 +97,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     ) -> None:
         check_render_mode(render_mode)
         self.autoreset_mode = _check_mode(autoreset, autoreset_mode)
-        self.scenario = with_agent(
-            self._fitting(scenario, max_episode_steps, overrides), target_policy
-        )
+        self.scenario = with_agent(self._fitting(scenario, max_episode_steps, overrides), target_policy)
         self.single_observation_space, self.single_action_space = self._spaces(discrete_actions)
         self.batch = batch_for(
             self.scenario,
@@ -119,9 +112,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         )
         self._seeded = seed is not None
         self.num_envs = num_envs
-        self.observation_space: spaces.Space[Any] = batch_space(
-            self.single_observation_space, num_envs
-        )
+        self.observation_space: spaces.Space[Any] = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.layout: ObservationLayout = self.batch.layout
         self.render_mode = render_mode
@@ -138,9 +129,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None}
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[FloatArray, _Info]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, _Info]:
         """Start episodes, and return the observations of all worlds.
 
         Args:
@@ -186,9 +175,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             ValueError: Actions of a wrong type or shape, not finite, or out of their space; nothing
                 is changed.
         """
-        observations, rewards, terminated, truncated, batch_infos = self.batch.step(
-            self._motions(actions)
-        )
+        observations, rewards, terminated, truncated, batch_infos = self.batch.step(self._motions(actions))
         infos = self._infos(observations, terminated | truncated, batch_infos)
         self._keep(observations)
         if self.render_mode == "human":
@@ -207,9 +194,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         outside = (array < 0) | (array >= len(MOTIONS))
         if outside.any():
             where = tuple(int(k) for k in np.argwhere(outside)[0])
-            raise ValueError(
-                f"actions{list(where)} = {array[where]} lies outside 0 to {len(MOTIONS) - 1}"
-            )
+            raise ValueError(f"actions{list(where)} = {array[where]} lies outside 0 to {len(MOTIONS) - 1}")
         motions: FloatArray = MOTIONS[array].reshape(self._shape_of_motions())
         return motions
 
@@ -261,9 +246,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
 
     # Overridden for a single tracker.
 
-    def _fitting(
-        self, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]
-    ) -> Scenario:
+    def _fitting(self, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
         return self.single_env.fitting_scenario(scenario, horizon, overrides)
 
     def _spaces(self, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:
@@ -362,9 +345,7 @@ def _check_mode(autoreset: str | None, mode: AutoresetMode | str | None) -> Auto
         ValueError: There is no such mode, or both are given.
     """
     if autoreset is not None and mode is not None:
-        raise ValueError(
-            f"autoreset={shown(autoreset)} and autoreset_mode={shown(mode)} mean the same: give one"
-        )
+        raise ValueError(f"autoreset={shown(autoreset)} and autoreset_mode={shown(mode)} mean the same: give one")
     if mode is None:
         known = ", ".join(map(repr, _MODES.values()))
         for found, name in _MODES.items():

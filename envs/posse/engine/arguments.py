@@ -26,9 +26,7 @@ def check_count(name: str, value: object, least: int) -> int:
         ScenarioError: The value is not a whole number, or out of range.
     """
     if not _is_whole(value) or not least <= value < MOST:  # type: ignore[operator]
-        raise ScenarioError(
-            f"{name}={shown(value)} must be a whole number, at least {least} and below 2**63"
-        )
+        raise ScenarioError(f"{name}={shown(value)} must be a whole number, at least {least} and below 2**63")
     return int(value)  # type: ignore[call-overload, no-any-return]
 
 
@@ -69,9 +67,7 @@ def as_array(name: str, value: object) -> npt.NDArray[Any]:
     try:
         return np.asarray(value)
     except Exception:  # numpy's ValueError, or any error of a foreign object's conversion
-        raise ValueError(
-            f"{name} must be an array, or nested lists of one length, got {shown(value)}"
-        ) from None
+        raise ValueError(f"{name} must be an array, or nested lists of one length, got {shown(value)}") from None
 
 
 def real_numbers(name: str, value: object) -> npt.NDArray[Any]:
@@ -83,9 +79,7 @@ def real_numbers(name: str, value: object) -> npt.NDArray[Any]:
     """
     array = as_array(name, value)
     if array.dtype.kind not in "fiu":
-        raise ValueError(
-            f"{name} must be real numbers, got an array of {array.dtype}: {shown(value)}"
-        )
+        raise ValueError(f"{name} must be real numbers, got an array of {array.dtype}: {shown(value)}")
     return array
 
 
@@ -102,8 +96,7 @@ def check_mask(mask: npt.ArrayLike | None, num_worlds: int) -> BoolArray:
     array = as_array("reset_mask", mask)
     if array.dtype != np.bool_ or array.shape != (num_worlds,):
         raise ValueError(
-            f"reset_mask must be a bool array of shape ({num_worlds},), got "
-            f"{array.dtype} of shape {array.shape}"
+            f"reset_mask must be a bool array of shape ({num_worlds},), got {array.dtype} of shape {array.shape}"
         )
     return array
 
@@ -112,8 +105,7 @@ def action_error(index: tuple[int, int, int], value: np.float32) -> ValueError:
     """Return the error for actions[index]."""
     e, i, k = index
     return ValueError(
-        f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or "
-        "clip the policy's output first"
+        f"actions[{e}, {i}, {k}] = {value} is not a number in [-1, 1]: scale or clip the policy's output first"
     )
 
 
@@ -130,20 +122,14 @@ def check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
 
 
 def check_settings(
-    num_worlds: int,
-    first_world: int,
-    split: str,
-    autoreset: str,
-    num_threads: int | None,
-    own_kernel: bool,
+    num_worlds: int, first_world: int, split: str, autoreset: str, num_threads: int | None, own_kernel: bool
 ) -> None:
     """Raise ScenarioError if these settings of a batch are invalid."""
     num_worlds = check_count("num_worlds", num_worlds, 1)
     first_world = check_count("first_world", first_world, 0)
     if first_world + num_worlds > MOST:
         raise ScenarioError(
-            f"first_world={first_world} and num_worlds={num_worlds} go beyond world 2**63 - 1: "
-            "lower first_world"
+            f"first_world={first_world} and num_worlds={num_worlds} go beyond world 2**63 - 1: lower first_world"
         )
     if num_threads is not None:
         check_count("num_threads", num_threads, 1)
@@ -152,6 +138,4 @@ def check_settings(
     if not is_one_of(SPLITS, split):
         raise ScenarioError(f"unknown split {shown(split)}; splits are: {', '.join(SPLITS)}")
     if not is_one_of(AUTORESET_MODES, autoreset):
-        raise ScenarioError(
-            f"unknown autoreset mode {shown(autoreset)}; modes are: " + ", ".join(AUTORESET_MODES)
-        )
+        raise ScenarioError(f"unknown autoreset mode {shown(autoreset)}; modes are: " + ", ".join(AUTORESET_MODES))

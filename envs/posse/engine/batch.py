@@ -14,33 +14,13 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.engine.arguments import (
-    check_array,
-    check_count,
-    check_mask,
-    check_seed,
-    check_settings,
-    options_of,
-)
+from posse.engine.arguments import check_array, check_count, check_mask, check_seed, check_settings, options_of
 from posse.engine.copies import check_fit, write_copies
-from posse.engine.kernels import (
-    LOOK,
-    START,
-    START_FROM_POSES,
-    Results,
-    first_over,
-)
+from posse.engine.kernels import LOOK, START, START_FROM_POSES, Results, first_over
 from posse.engine.start_poses import check_overlap, check_room_to_turn, poses_of, write_poses
 from posse.engine.stepping import Stepping
-from posse.numeric import (
-    BoolArray,
-    FloatArray,
-    divide,
-)
-from posse.rules.state import (
-    SPLITS,
-    WorldArrays,
-)
+from posse.numeric import BoolArray, FloatArray, divide
+from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
 from posse.shown import shown
 from posse.signals.observation.layout import ObservationLayout
@@ -119,8 +99,7 @@ class Batch(Stepping):
         except (MemoryError, ValueError, OverflowError):
             each = WorldArrays.allocate(scenario, 1).bytes_per_world
             raise ScenarioError(
-                f"num_worlds={num_worlds} of {each} bytes each are more than there is memory for: "
-                "lower it"
+                f"num_worlds={num_worlds} of {each} bytes each are more than there is memory for: lower it"
             ) from None
         self._started = False
         self._prepare()
@@ -162,9 +141,7 @@ class Batch(Stepping):
         self._check_started("observe")
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
 
-    def copies(
-        self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None
-    ) -> Batch:
+    def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None) -> Batch:
         """Return ``count`` copies of the current state of every world, for planning ahead.
 
         Copy j of world e is world ``e * count + j`` of the returned batch. A copy has the present
@@ -189,9 +166,8 @@ class Batch(Stepping):
         self._check_started("copies")
         if into is None:
             into = Batch(
-                self.scenario, self.num_worlds * count, seed=self.seed, split=self.split,
-                num_threads=self.num_threads,
-            )  # fmt: skip
+                self.scenario, self.num_worlds * count, seed=self.seed, split=self.split, num_threads=self.num_threads
+            )
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch on the CPU, got {shown(into)}")
         else:
@@ -200,9 +176,7 @@ class Batch(Stepping):
         into._started = True
         return into
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> FloatArray:
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world and return the observations (E, rows, F).
 
         Args:
@@ -260,9 +234,7 @@ class Batch(Stepping):
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         return chosen
 
-    def step(
-        self, actions: npt.ArrayLike
-    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+    def step(self, actions: npt.ArrayLike) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance every world by one control step.
 
         Args:
@@ -284,27 +256,18 @@ class Batch(Stepping):
         self._check_running()
         return self._step_checked(self.check_actions(actions))
 
-    def _step_checked(
-        self, checked: FloatArray
-    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+    def _step_checked(self, checked: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance every world by the actions of all agents (E, num_agents, 2 + m)."""
         results = self._new_results()
         over = self._run(self._orders, checked, results)
         observations, rewards, terms, (terminated, truncated) = results
-        infos: dict[str, Any] = {
-            "score": self._score.copy(),
-            "reward_terms": TermsByName(self.term_names, terms),
-        }
+        infos: dict[str, Any] = {"score": self._score.copy(), "reward_terms": TermsByName(self.term_names, terms)}
         if over:
             observations = self._end(observations, terminated | truncated, infos)
         return observations, rewards, terminated, truncated, infos
 
     def stepper(
-        self,
-        actions: FloatArray,
-        observations: FloatArray,
-        rewards: FloatArray,
-        terms: FloatArray,
+        self, actions: FloatArray, observations: FloatArray, rewards: FloatArray, terms: FloatArray
     ) -> Callable[[], int]:
         """Return a function that advances every world by one control step, without other overhead.
 
@@ -335,18 +298,19 @@ class Batch(Stepping):
         return self._stepper(actions, observations, rewards, terms)
 
     def _stepper(
-        self,
-        actions: FloatArray,
-        observations: FloatArray,
-        rewards: FloatArray,
-        terms: FloatArray,
+        self, actions: FloatArray, observations: FloatArray, rewards: FloatArray, terms: FloatArray
     ) -> Callable[[], int]:
         """Return the function of :meth:`stepper`; the arrays have a row for every agent."""
         arguments = (
-            self._tables, self._arrays, actions,
-            Results(observations, rewards, terms, self._new_flags()), self._orders,
-            self._scratch[0], 0, divide(self.num_worlds, 1),
-        )  # fmt: skip
+            self._tables,
+            self._arrays,
+            actions,
+            Results(observations, rewards, terms, self._new_flags()),
+            self._orders,
+            self._scratch[0],
+            0,
+            divide(self.num_worlds, 1),
+        )
         kernel = self._kernel
         return lambda: kernel(*arguments)
 

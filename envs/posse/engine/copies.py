@@ -25,9 +25,7 @@ _ONE: Final = np.uint64(1)
 
 
 @kernel
-def draw_anew(
-    config: Records, world: Records, tracker: Records, count: int, seed: int, alike: bool
-) -> None:
+def draw_anew(config: Records, world: Records, tracker: Records, count: int, seed: int, alike: bool) -> None:
     """Give copies, ``count`` consecutive ones per world, new keys, and redraw their faults."""
     c = config[0]
     for i in range(len(world)):
@@ -49,9 +47,7 @@ def write_copies(
     draw_anew(config, copies.world, copies.tracker, count, seed, alike)
 
 
-def check_fit(
-    scenario: Scenario, num_worlds: int, count: int, other: Scenario, other_worlds: int
-) -> None:
+def check_fit(scenario: Scenario, num_worlds: int, count: int, other: Scenario, other_worlds: int) -> None:
     """Raise ValueError if another batch does not fit the copies."""
     if other != scenario or other_worlds != num_worlds * count:
         raise ValueError(

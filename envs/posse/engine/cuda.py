@@ -42,9 +42,7 @@ from posse.signals.parts import parts_for
 class _DeviceResults:
     """Output arrays of one pass, on the device."""
 
-    def __init__(
-        self, observation_shape: tuple[int, int, int], term_names: tuple[str, ...]
-    ) -> None:
+    def __init__(self, observation_shape: tuple[int, int, int], term_names: tuple[str, ...]) -> None:
         worlds, rows, _ = observation_shape
         self.observations = cuda.device_array(observation_shape, np.float32)
         self.rewards = cuda.device_array((worlds, rows), np.float32)
@@ -83,9 +81,7 @@ class CudaBatch(Batch):
         check_device()
         for name, unset in (("num_threads", None), ("own_kernel", False)):
             if settings.get(name, unset) != unset:
-                raise ValueError(
-                    f"{name}={settings[name]!r} is for device='cpu' alone: leave it out"
-                )
+                raise ValueError(f"{name}={settings[name]!r} is for device='cpu' alone: leave it out")
         super().__init__(scenario, num_worlds, **settings)
 
     def _prepare(self) -> None:
@@ -101,17 +97,24 @@ class CudaBatch(Batch):
         self._report = cuda.to_device(NOTHING)
         # In the mode "same_step" a step may take two sets.
         count = 4 if self.autoreset == "same_step" else 2
-        self._results = itertools.cycle(
-            [_DeviceResults(self.observation_shape, self.term_names) for _ in range(count)]
-        )
+        self._results = itertools.cycle([_DeviceResults(self.observation_shape, self.term_names) for _ in range(count)])
         self._last, self._next = next(self._results), next(self._results)
 
     def __getstate__(self) -> dict[str, Any]:
         self._download()
         device = (
-            "_advance", "_device_tables", "_device_arrays", "_device_actions", "_all_step",
-            "_all_look", "_chosen", "_report", "_results", "_last", "_next",
-        )  # fmt: skip
+            "_advance",
+            "_device_tables",
+            "_device_arrays",
+            "_device_actions",
+            "_all_step",
+            "_all_look",
+            "_chosen",
+            "_report",
+            "_results",
+            "_last",
+            "_next",
+        )
         return {k: v for k, v in super().__getstate__().items() if k not in device}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -175,9 +178,7 @@ class CudaBatch(Batch):
             raise ResetNeeded("observe before reset: call reset() first")
         return self._pass(self._all_look).observations
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> DeviceArray:
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> DeviceArray:
         """Start an episode in every world and return its observations, as :class:`posse.Batch`.
 
         ``options["reset_mask"]`` may be on the device. With start poses the whole state is copied
@@ -288,9 +289,15 @@ class CudaBatch(Batch):
     def _begin(self, mask: DeviceArray, anew: bool) -> DeviceArray:
         """Start an episode in the worlds of a mask; return every world's observations."""
         self._launch(
-            choose_worlds, self._device_arrays.world, mask, self._chosen, anew,
-            np.uint64(self.seed), SPLITS.index(self.split), self.first_world,
-        )  # fmt: skip
+            choose_worlds,
+            self._device_arrays.world,
+            mask,
+            self._chosen,
+            anew,
+            np.uint64(self.seed),
+            SPLITS.index(self.split),
+            self.first_world,
+        )
         return self._pass(self._chosen).observations
 
     def _pass(self, orders: DeviceArray) -> _DeviceResults:
@@ -306,9 +313,15 @@ class CudaBatch(Batch):
     def _launch_advance(self, actions: DeviceArray, orders: DeviceArray) -> None:
         done = self._next
         self._launch(
-            self._advance, self._device_tables, self._device_arrays, actions, done.arrays(),
-            done.score, orders, self._report,
-        )  # fmt: skip
+            self._advance,
+            self._device_tables,
+            self._device_arrays,
+            actions,
+            done.arrays(),
+            done.score,
+            orders,
+            self._report,
+        )
 
     def _launch(self, kernel: Any, *arguments: Any) -> None:
         if SIMULATED:
@@ -332,10 +345,7 @@ def check_device() -> None:
     """Raise if the GPU cannot be used, with the reason and the fix."""
     if CONFIG.ENABLE_CUDASIM:
         if not CONFIG.DISABLE_JIT:
-            raise RuntimeError(
-                "NUMBA_ENABLE_CUDASIM=1 simulates the GPU in plain Python: set NUMBA_DISABLE_JIT=1 "
-                "too"
-            )
+            raise RuntimeError("NUMBA_ENABLE_CUDASIM=1 simulates the GPU in plain Python: set NUMBA_DISABLE_JIT=1 too")
         return
     if CONFIG.DISABLE_JIT:
         raise RuntimeError(

@@ -14,15 +14,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from posse.engine.kernels import (
-    LOOK,
-    MOST_ACTION,
-    START,
-    Results,
-    Tables,
-    advance_worlds,
-    prepare,
-)
+from posse.engine.kernels import LOOK, MOST_ACTION, START, Results, Tables, advance_worlds, prepare
 from posse.engine.scratch import SCRATCH_FOR_ONE
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.declared import Rules
@@ -32,10 +24,7 @@ from posse.signals.parts import Parts, Sums, Writers, rules_for, sums_for, write
 CONFIG: Final[Any] = numba.config
 
 if not CONFIG.ENABLE_CUDASIM and importlib.util.find_spec("numba_cuda") is None:
-    raise ImportError(
-        "device='cuda' needs the package numba-cuda, which is not installed: "
-        "pip install 'posse[cuda]'"
-    )
+    raise ImportError("device='cuda' needs the package numba-cuda, which is not installed: pip install 'posse[cuda]'")
 
 import numba.cuda  # noqa: E402 (after the check: older versions of numba include numba.cuda)
 
@@ -112,9 +101,7 @@ def stepping(parts: Parts) -> Any:
             rules = Rules(draw_motion, set_goal, sees, measure)
             sums = Sums(clear_sums, add_to_sums)
             prepare(tables, worlds, writers, s)
-            over = advance_worlds(
-                e, 1, tables, worlds, actions, results, orders, rules, sums, writers, s
-            )
+            over = advance_worlds(e, 1, tables, worlds, actions, results, orders, rules, sums, writers, s)
             results.flags[2, e] = over
             score[e] = worlds.world[e].score
             if over:

@@ -43,21 +43,9 @@ from posse.rules.score import occupy, settle
 from posse.rules.senses.radio import hear, send, share_fixes
 from posse.rules.senses.sensing import look
 from posse.rules.start import draw_start, rest
-from posse.rules.state import (
-    NEVER,
-    WorldArrays,
-    beam_directions,
-    config_record,
-    slot_records,
-)
+from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
-from posse.signals.observation.observing import (
-    TOGETHER,
-    lay_out_fixed,
-    observe_sonar,
-    observe_target,
-    observe_together,
-)
+from posse.signals.observation.observing import TOGETHER, lay_out_fixed, observe_sonar, observe_target, observe_together
 from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
 from posse.signals.reward import target_weights_for, weights_for
 from posse.signals.scratch import MOST_IN_TEAM
@@ -130,13 +118,7 @@ def begin(
 
 @compiled
 def reward(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    tables: Tables,
-    writers: Writers,
-    rewards: FloatArray,
-    terms: FloatArray,
+    c: Record, w: Record, trackers: Records, tables: Tables, writers: Writers, rewards: FloatArray, terms: FloatArray
 ) -> None:
     """Write the reward of every agent (rows,) and its terms (rows, K)."""
     for i in range(c.num_trackers):
@@ -147,9 +129,7 @@ def reward(
 
 
 @compiled
-def act(
-    c: Record, worlds: WorldArrays, e: int, actions: FloatArray, rules: Rules, scratch: Record
-) -> None:
+def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, rules: Rules, scratch: Record) -> None:
     """Move all robots of world e by a control step, and store the messages."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
@@ -234,9 +214,15 @@ def advance_worlds(
             if order == START:
                 draw_start(c, w, trackers, obstacles, rules.draw_motion)
             begin(
-                c, w, trackers, worlds.heard[e], worlds.broadcast[e],
-                worlds.heard_message[e], worlds.message[e], sums.clear,
-            )  # fmt: skip
+                c,
+                w,
+                trackers,
+                worlds.heard[e],
+                worlds.broadcast[e],
+                worlds.heard_message[e],
+                worlds.message[e],
+                sums.clear,
+            )
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
         if order != LOOK:
@@ -318,9 +304,7 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         for first, end in blocks_of(thread, blocks):
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
-                over += advance_worlds(
-                    e, count, used, worlds, actions, results, orders, rules, sums, writers, s
-                )
+                over += advance_worlds(e, count, used, worlds, actions, results, orders, rules, sums, writers, s)
         return over
 
     return advance

@@ -65,13 +65,7 @@ class PairedBatch(Batch):
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int,
-        inside: TargetPolicy,
-        *,
-        moves_target: bool,
-        **settings: Any,
+        self, scenario: Scenario, num_worlds: int, inside: TargetPolicy, *, moves_target: bool, **settings: Any
     ) -> None:
         self._side = "target" if moves_target else "team"
         check_inside(inside, self._side)
@@ -98,18 +92,14 @@ class PairedBatch(Batch):
         """The memory of the policy inside."""
         return self._memory
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> FloatArray:
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world; see :meth:`Batch.reset`."""
         observations = super().reset(seed=seed, options=options)
         mask = (options or {}).get("reset_mask")
         everywhere = np.ones(self.num_worlds, np.bool_)
         return self._look(observations, everywhere if mask is None else np.asarray(mask, np.bool_))
 
-    def step(
-        self, actions: npt.ArrayLike
-    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+    def step(self, actions: npt.ArrayLike) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Advance every world by one control step; see :meth:`Batch.step`.
 
         Raises:
@@ -123,15 +113,16 @@ class PairedBatch(Batch):
         observations, rewards, terminated, truncated, infos = self._step_checked(whole)
         if self.autoreset == "same_step":
             restarted = terminated | truncated
-        infos["reward_terms"] = {
-            name: array[:, self._mine] for name, array in infos["reward_terms"].items()
-        }
+        infos["reward_terms"] = {name: array[:, self._mine] for name, array in infos["reward_terms"].items()}
         if "final_obs" in infos:
             infos["final_obs"] = np.ascontiguousarray(infos["final_obs"][:, self._mine])
         return (
-            self._look(observations, restarted), np.ascontiguousarray(rewards[:, self._mine]),
-            terminated, truncated, infos,
-        )  # fmt: skip
+            self._look(observations, restarted),
+            np.ascontiguousarray(rewards[:, self._mine]),
+            terminated,
+            truncated,
+            infos,
+        )
 
     def observe(self) -> FloatArray:
         """Return the current observations, (E, rows, F)."""
@@ -141,9 +132,7 @@ class PairedBatch(Batch):
         """Restore a snapshot; see :meth:`Batch.restore`."""
         return self._look(super().restore(snapshot))
 
-    def copies(
-        self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None
-    ) -> Batch:
+    def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None) -> Batch:
         """Raise: a plan would need the policy inside.
 
         Raises:
@@ -155,11 +144,7 @@ class PairedBatch(Batch):
         )
 
     def _stepper(
-        self,
-        actions: FloatArray,
-        observations: FloatArray,
-        rewards: FloatArray,
-        terms: FloatArray,
+        self, actions: FloatArray, observations: FloatArray, rewards: FloatArray, terms: FloatArray
     ) -> Callable[[], int]:
         whole = self._of_all(self._length)
         outputs = [self._of_all(*array.shape[2:]) for array in (observations, rewards, terms)]
@@ -187,16 +172,12 @@ class PairedBatch(Batch):
         chosen = np.asarray(chosen)
         wanted = (*self._seen.shape[:2], self._their_length or self._length)
         if chosen.shape[:2] != wanted[:2] or chosen.ndim != 3 or chosen.shape[2] < wanted[2]:
-            raise ValueError(
-                f"the {self._side}'s policy returned actions of shape {chosen.shape}, wanted "
-                f"{wanted}"
-            )
+            raise ValueError(f"the {self._side}'s policy returned actions of shape {chosen.shape}, wanted {wanted}")
         chosen = chosen[:, :, : wanted[2]]
         outside = ~(np.abs(chosen) <= MOST_ACTION)  # also where one is not a number
         if outside.any():
             raise ValueError(
-                f"the {self._side}'s policy returned {chosen[outside][0]} in an action: it must be "
-                "a number in [-1, 1]"
+                f"the {self._side}'s policy returned {chosen[outside][0]} in an action: it must be a number in [-1, 1]"
             )
         whole[:, self._theirs, : wanted[2]] = np.clip(chosen, -1, 1)
         return np.asarray(self._arrays.world["over"] != 0)
@@ -235,9 +216,7 @@ def with_agent(scenario: Scenario, policy: TargetPolicy | None, side: str = "tar
     return scenario.replace(target_motion="agent")
 
 
-def batch_for(
-    scenario: Scenario, num_worlds: int, policy: TargetPolicy | None, **settings: Any
-) -> Batch:
+def batch_for(scenario: Scenario, num_worlds: int, policy: TargetPolicy | None, **settings: Any) -> Batch:
     """Return a batch whose target is moved by a policy, if there is one; see :class:`Batch`."""
     if policy is None:
         return Batch(scenario, num_worlds, **settings)

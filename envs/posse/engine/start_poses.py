@@ -28,18 +28,13 @@ def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) ->
         ValueError: A wrong type or shape, not finite, or outside the start area.
     """
     poses = {}
-    for name, shape in (
-        ("tracker_pose", (scenario.num_trackers, 3)),
-        ("target_pose", (3,)),
-    ):
+    for name, shape in (("tracker_pose", (scenario.num_trackers, 3)), ("target_pose", (3,))):
         if options.get(name) is None:
             continue
         full = (num_worlds, *shape)
         array = real_numbers(name, options[name]).astype(np.float64)
         if array.shape not in (shape, full):
-            raise ValueError(
-                f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each"
-            )
+            raise ValueError(f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each")
         if not np.isfinite(array).all():
             raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
         most = scenario.start_extent
@@ -56,8 +51,7 @@ def check_overlap(s: Scenario, arrays: WorldArrays, chosen: BoolArray) -> None:
     """Raise ValueError if robots overlap each other, an obstacle or a wall."""
     world, tracker = arrays.world, arrays.tracker
     robots = np.stack(
-        [np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen] for k in ("x", "y")],
-        axis=-1,
+        [np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen] for k in ("x", "y")], axis=-1
     ).astype(np.float64)
     names = [*(f"tracker_{i}" for i in range(s.num_trackers)), "the target"]
     apart = np.linalg.norm(robots[:, :, None] - robots[:, None], axis=-1)

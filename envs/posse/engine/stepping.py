@@ -9,29 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.engine.arguments import action_error, as_array, real_numbers, to_float32
-from posse.engine.kernels import (
-    LOOK,
-    STEP,
-    TO_CLIP,
-    Results,
-    bad_action,
-    kernel_of,
-    own_kernel,
-    tables_of,
-)
+from posse.engine.kernels import LOOK, STEP, TO_CLIP, Results, bad_action, kernel_of, own_kernel, tables_of
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
 from posse.engine.user_parts import check_fields, check_functions
 from posse.engine.world_views import WorldViews
-from posse.numeric import (
-    Blocks,
-    BoolArray,
-    FloatArray,
-    checked_before_compiling,
-    direct,
-    run_threads,
-    threads_for,
-)
+from posse.numeric import Blocks, BoolArray, FloatArray, checked_before_compiling, direct, run_threads, threads_for
 from posse.rules.scratch import new_scratch
 from posse.signals.parts import parts_for
 
@@ -56,9 +39,7 @@ class Stepping(WorldViews):
         self._rewards = Recycler((num_worlds, rows))
         self.term_names = parts.term_names
         self._terms = Recycler((num_worlds, rows, len(self.term_names)))
-        self._untyped: Callable[..., int] = (
-            own_kernel(scenario) if self.own_kernel else kernel_of(parts)
-        )
+        self._untyped: Callable[..., int] = own_kernel(scenario) if self.own_kernel else kernel_of(parts)
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
         self._orders = np.full(num_worlds, STEP, np.uint8)
@@ -67,9 +48,16 @@ class Stepping(WorldViews):
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (
-            "_tables", "_observations", "_rewards", "_terms", "_score",
-            "_scratch", "_orders", "_kernel", "_untyped",
-        )  # fmt: skip
+            "_tables",
+            "_observations",
+            "_rewards",
+            "_terms",
+            "_score",
+            "_scratch",
+            "_orders",
+            "_kernel",
+            "_untyped",
+        )
         return {k: v for k, v in self.__dict__.items() if k not in derived}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -92,8 +80,7 @@ class Stepping(WorldViews):
             array = to_float32(real_numbers("actions", array))
         if array.shape != self.action_shape:
             raise ValueError(
-                f"actions have shape {array.shape}, wanted {self.action_shape}: "
-                "(worlds, agents, 2 + message_size)"
+                f"actions have shape {array.shape}, wanted {self.action_shape}: (worlds, agents, 2 + message_size)"
             )
         return np.ascontiguousarray(array)
 
@@ -112,9 +99,7 @@ class Stepping(WorldViews):
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds."""
-        return Results(
-            self._observations.take(), self._rewards.take(), self._terms.take(), self._new_flags()
-        )
+        return Results(self._observations.take(), self._rewards.take(), self._terms.take(), self._new_flags())
 
     def _new_flags(self) -> BoolArray:
         """Return an output array for the ends of episodes: terminated, truncated, (2, E)."""

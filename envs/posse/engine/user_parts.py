@@ -28,9 +28,12 @@ def check_fields(parts: Parts, worlds: WorldArrays) -> None:
         DeclarationError: Names the function, the line and the field.
     """
     fields = {
-        "c": CONFIG.names or (), "w": worlds.world.dtype.names or (), "t": TRACKER.names or (),
-        "v": View._fields, "m": Mate._fields,
-    }  # fmt: skip
+        "c": CONFIG.names or (),
+        "w": worlds.world.dtype.names or (),
+        "t": TRACKER.names or (),
+        "v": View._fields,
+        "m": Mate._fields,
+    }
     for registry, function, _ in _functions(parts):
         _raise(registry, function, unknown_attribute(function, fields))
 
@@ -45,10 +48,17 @@ def check_functions(parts: Parts, tables: Tables, worlds: WorldArrays, scratch: 
         return
     tracker = np.zeros(1, TRACKER)
     examples: dict[str, Any] = {
-        "c": tables.config[0], "w": worlds.world[0], "t": tracker[0], "trackers": tracker,
-        "obstacles": worlds.obstacle[0], "slots": tables.slots, "s": scratch[0],
-        "number": 0, "dx": np.float32(0), "dy": np.float32(0),
-    }  # fmt: skip
+        "c": tables.config[0],
+        "w": worlds.world[0],
+        "t": tracker[0],
+        "trackers": tracker,
+        "obstacles": worlds.obstacle[0],
+        "slots": tables.slots,
+        "s": scratch[0],
+        "number": 0,
+        "dx": np.float32(0),
+        "dy": np.float32(0),
+    }
     types = {name: typeof(example) for name, example in examples.items()}
     types |= {"v": tuple_of_lanes(View), "m": tuple_of_lanes(Mate)}
     for registry, function, returns in _functions(parts):
@@ -66,7 +76,5 @@ def _functions(parts: Parts) -> Iterator[tuple[Registry[Any], Function, str]]:
 
 def _raise(registry: Registry[Any], function: Function, complaint: Complaint | None) -> None:
     if complaint is not None:
-        error: DeclarationError = registry.error(
-            function, f"line {complaint.line}: {complaint.reason}"
-        )
+        error: DeclarationError = registry.error(function, f"line {complaint.line}: {complaint.reason}")
         raise error from None

@@ -6,13 +6,7 @@ distribution of work over threads. It depends on no other room, and every room m
 
 from posse.numeric.arrays import BoolArray, FloatArray, OwnArrays, Record, Records
 from posse.numeric.blocks import Blocks, blocks_of, divide, worlds_of
-from posse.numeric.compiling import (
-    UNCOMPILED,
-    checked_before_compiling,
-    compiled,
-    direct,
-    kernel,
-)
+from posse.numeric.compiling import UNCOMPILED, checked_before_compiling, compiled, direct, kernel
 from posse.numeric.simd.lanes import (
     WIDTH,
     Lanes,

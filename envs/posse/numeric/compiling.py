@@ -66,9 +66,7 @@ def kernel(function: F) -> F: ...
 def kernel(*, sources: Iterable[Callable[..., Any]] = ...) -> Callable[[F], F]: ...
 
 
-def kernel(
-    function: F | None = None, *, sources: Iterable[Callable[..., Any]] = ()
-) -> F | Callable[[F], F]:
+def kernel(function: F | None = None, *, sources: Iterable[Callable[..., Any]] = ()) -> F | Callable[[F], F]:
     """Compile a function that is called from Python, and cache the result on disk.
 
     The arrays passed to a kernel must not overlap: the compiler assumes that writing to one does
@@ -97,9 +95,7 @@ def kernel(
 
 
 @contextlib.contextmanager
-def checked_before_compiling(
-    function: Callable[..., Any], check: Callable[[], None]
-) -> Iterator[None]:
+def checked_before_compiling(function: Callable[..., Any], check: Callable[[], None]) -> Iterator[None]:
     """Call ``check`` if a kernel has to be compiled in this context, before it is; it may raise."""
     cache = getattr(function, "_cache", None)
     if not isinstance(cache, KernelCache):  # uncompiled

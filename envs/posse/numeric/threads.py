@@ -50,9 +50,7 @@ def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
     return 1 if num_worlds * robots_each < _SERIAL_BELOW else min(most, num_worlds)
 
 
-def over_worlds(
-    kernel: Callable[..., None], arguments: tuple[Any, ...], num_worlds: int, num_trackers: int
-) -> None:
+def over_worlds(kernel: Callable[..., None], arguments: tuple[Any, ...], num_worlds: int, num_trackers: int) -> None:
     """Call ``kernel(*arguments, thread, blocks)`` in at most ``MOST_THREADS`` threads."""
     threads = threads_for(num_worlds, num_trackers, MOST_THREADS)
     run_threads(functools.partial(kernel, *arguments), num_worlds, threads)

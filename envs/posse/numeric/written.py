@@ -11,9 +11,7 @@ from typing import Any
 from posse.numeric.compiling import compiled
 
 
-def written(
-    name: str, parameters: Sequence[str], lines: Sequence[str], names: Mapping[str, Any]
-) -> Callable[..., Any]:
+def written(name: str, parameters: Sequence[str], lines: Sequence[str], names: Mapping[str, Any]) -> Callable[..., Any]:
     """Return a compiled function generated from source lines.
 
     Args:

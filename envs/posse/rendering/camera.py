@@ -35,9 +35,7 @@ class Camera:
         scale: Pixels per metre.
     """
 
-    def __init__(
-        self, viewport: tuple[int, int, int, int], arena: float, whole: bool = True
-    ) -> None:
+    def __init__(self, viewport: tuple[int, int, int, int], arena: float, whole: bool = True) -> None:
         self.viewport = viewport
         self._arena = arena
         self._fixed = whole and math.isfinite(arena)

@@ -77,9 +77,7 @@ class Canvas:
             line = max(1, round(width * self._k))
             pygame.draw.circle(self._large, colour, place, round(radius * self._k), line)
 
-    def line(
-        self, start: Point, end: Point, width: float, colour: Colour, opacity: float = 1.0
-    ) -> None:
+    def line(self, start: Point, end: Point, width: float, colour: Colour, opacity: float = 1.0) -> None:
         """Draw a straight line with square ends, of an opacity in [0, 1]."""
         (x0, y0), (x1, y1) = self._place(start), self._place(end)
         length = math.hypot(x1 - x0, y1 - y0)
@@ -107,30 +105,19 @@ class Canvas:
         """Fill a polygon."""
         pygame.draw.polygon(self._large, colour, self._places(corners))
 
-    def outline(
-        self, corners: npt.NDArray[np.float64], width: float, colour: Colour, closed: bool = True
-    ) -> None:
+    def outline(self, corners: npt.NDArray[np.float64], width: float, colour: Colour, closed: bool = True) -> None:
         """Draw the outline of a polygon, or an open line through its corners."""
         line = max(1, round(width * self._k))
         pygame.draw.lines(self._large, colour, closed, self._places(corners), line)
 
-    def dashed_ring(
-        self, centre: Point, radius: float, width: float, dash: float, colour: Colour
-    ) -> None:
+    def dashed_ring(self, centre: Point, radius: float, width: float, dash: float, colour: Colour) -> None:
         """Draw a circle of strokes and gaps of about the length ``dash``."""
         strokes = max(4, round(math.pi * radius / dash))
         for k in range(strokes):
             angles = np.linspace(0, math.pi / strokes, 4) + 2 * math.pi * k / strokes
             self.arc(centre, radius, angles, width, colour)
 
-    def arc(
-        self,
-        centre: Point,
-        radius: float,
-        angles: npt.NDArray[np.float64],
-        width: float,
-        colour: Colour,
-    ) -> None:
+    def arc(self, centre: Point, radius: float, angles: npt.NDArray[np.float64], width: float, colour: Colour) -> None:
         """Draw a part of a circle through given angles, rad, y up."""
         rim = np.stack([np.cos(angles), -np.sin(angles)], axis=-1)
         self.outline(np.asarray(centre, np.float64) + radius * rim, width, colour, closed=False)
@@ -139,9 +126,7 @@ class Canvas:
         """Return the width that a line of text will have, px."""
         return _font(round(size * self._k)).size(text)[0] / self._k
 
-    def text(
-        self, text: str, place: tuple[float, float], size: float, colour: Colour, anchor: float = 0
-    ) -> float:
+    def text(self, text: str, place: tuple[float, float], size: float, colour: Colour, anchor: float = 0) -> float:
         """Write a line of text; return its width, px.
 
         ``place`` is the middle of its height at its left end (``anchor`` 0), its centre (0.5) or

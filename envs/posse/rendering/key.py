@@ -192,10 +192,7 @@ def legend_of(scene: Scene) -> tuple[Entry, ...]:
     if known.slot is not None:
         line = _line(mix(TARGET, GROUND, 0.75), 1.3, 2.2)
         found.append(Entry(selected.goal, line, "selected: the slot that it goes to"))
-    found += [
-        Entry(layers.flashes, _contact, "contact"),
-        Entry(layers.grid, _cross, "grid of 2 m"),
-    ]
+    found += [Entry(layers.flashes, _contact, "contact"), Entry(layers.grid, _cross, "grid of 2 m")]
     return tuple(found)
 
 

@@ -138,9 +138,8 @@ def covered(d: Drawing, tracker: int) -> Floats | None:
     if math.isinf(reach) and math.isinf(s.arena):
         reach = _VIEW_SHOWN
     return area_in_sight(
-        scene.position[tracker], scene.heading[tracker], reach, s.field_of_view, scene.obstacles,
-        s.arena,
-    )  # fmt: skip
+        scene.position[tracker], scene.heading[tracker], reach, s.field_of_view, scene.obstacles, s.arena
+    )
 
 
 def sensing(d: Drawing) -> None:
@@ -269,9 +268,7 @@ def leader_mark(canvas: Canvas, tip: Floats, size: float) -> None:
     x, y = tip
     for grow, colour in ((1.2, PAPER), (0.0, INK)):
         side = size + grow
-        canvas.polygon(
-            [(x, y + grow), (x - side, y - 1.5 * side), (x + side, y - 1.5 * side)], colour
-        )
+        canvas.polygon([(x, y + grow), (x - side, y - 1.5 * side), (x + side, y - 1.5 * side)], colour)
 
 
 def target(d: Drawing) -> None:

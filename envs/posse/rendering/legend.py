@@ -42,11 +42,7 @@ def header(canvas: Canvas, box: Box, scene: Scene, title: str | None, point: flo
     if title and left + canvas.width_of(name, _TEXT * point) < right - _FIGURES * point:
         canvas.text(name, (left, middle), _TEXT * point, FAINT_INK)
     # Columns of fixed width, so that changing digits do not move the text.
-    columns = (
-        (f"{scene.score:.2f}", 38, INK),
-        ("score", 54, FAINT_INK),
-        (f"{scene.time:.1f} s", 0, INK),
-    )
+    columns = ((f"{scene.score:.2f}", 38, INK), ("score", 54, FAINT_INK), (f"{scene.time:.1f} s", 0, INK))
     for text, column, colour in columns:
         canvas.text(text, (right, middle), _TEXT * point, colour, anchor=1)
         right -= column * point

@@ -23,11 +23,25 @@ Box = tuple[int, int, int, int]
 """Left, top, width and height, px."""
 
 LAYERS: Final[tuple[Callable[[Drawing], None], ...]] = (
-    layers.ground, layers.sensing, layers.grid, layers.frame, layers.slots, layers.obstacles,
-    layers.walls, layers.trails, layers.links, selected.sonar, selected.goal, selected.heard,
-    selected.selection, layers.trackers, layers.target, selected.fix, selected.estimate,
+    layers.ground,
+    layers.sensing,
+    layers.grid,
+    layers.frame,
+    layers.slots,
+    layers.obstacles,
+    layers.walls,
+    layers.trails,
+    layers.links,
+    selected.sonar,
+    selected.goal,
+    selected.heard,
+    selected.selection,
+    layers.trackers,
+    layers.target,
+    selected.fix,
+    selected.estimate,
     layers.flashes,
-)  # fmt: skip
+)
 """Every layer, in the order in which they are drawn."""
 
 
@@ -48,12 +62,7 @@ def action_of(scene: Scene) -> Points:
 
 
 def draw_world(
-    canvas: Canvas,
-    camera: Camera,
-    scene: Scene,
-    history: History,
-    point: float,
-    view: View | None = None,
+    canvas: Canvas, camera: Camera, scene: Scene, history: History, point: float, view: View | None = None
 ) -> None:
     """Draw the layers of a world into the camera's viewport.
 
@@ -66,9 +75,7 @@ def draw_world(
         view: Choices; default: nobody is selected.
     """
     canvas.clip(camera.viewport)
-    drawing = Drawing(
-        scene, camera, canvas, point, history.trail(), history.flashes(), view or View()
-    )
+    drawing = Drawing(scene, camera, canvas, point, history.trail(), history.flashes(), view or View())
     for layer in LAYERS:
         layer(drawing)
     canvas.clip(None)

@@ -47,19 +47,13 @@ class Renderer:
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        mode: str = "rgb_array",
-        size: tuple[int, int] = (640, 640),
-        title: str | None = None,
+        self, scenario: Scenario, mode: str = "rgb_array", size: tuple[int, int] = (640, 640), title: str | None = None
     ) -> None:
         if mode not in RENDER_MODES:
             raise ValueError(f"unknown render mode {mode!r}; modes are: {', '.join(RENDER_MODES)}")
         given = np.asarray(size)
         if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
-            raise ValueError(
-                f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px"
-            )
+            raise ValueError(f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px")
         # Imported here, so that importing posse does not import pygame.
         from posse.rendering.canvas import Canvas
 
@@ -92,10 +86,7 @@ class Renderer:
         self._note(self._read(batch, world, None))
 
     def draw(
-        self,
-        batch: Batch,
-        world: int = 0,
-        annotations: Mapping[str, npt.ArrayLike] | None = None,
+        self, batch: Batch, world: int = 0, annotations: Mapping[str, npt.ArrayLike] | None = None
     ) -> npt.NDArray[np.uint8] | None:
         """Draw the current state of a world.
 
@@ -147,9 +138,7 @@ class Renderer:
             self._window.close()
             self._window = None
 
-    def _read(
-        self, batch: Batch, world: int, annotations: Mapping[str, npt.ArrayLike] | None
-    ) -> Scene:
+    def _read(self, batch: Batch, world: int, annotations: Mapping[str, npt.ArrayLike] | None) -> Scene:
         if batch.scenario != self.scenario:
             raise ValueError(
                 f"a batch of {batch.scenario.name!r} does not fit a renderer of "
@@ -164,6 +153,4 @@ class Renderer:
         self._camera.follow(action_of(scene), time or 0.0)
 
     def _compose(self, scene: Scene) -> None:
-        draw_picture(
-            self._canvas, self._box, self._camera, scene, self._history, self._point, self.title
-        )
+        draw_picture(self._canvas, self._box, self._camera, scene, self._history, self._point, self.title)

@@ -23,8 +23,7 @@ class Window:
             self._surface = pygame.display.set_mode(size)
         except pygame.error as error:
             raise RuntimeError(
-                f"no window can be opened ({error}): use render_mode='rgb_array', "
-                "or set SDL_VIDEODRIVER=dummy"
+                f"no window can be opened ({error}): use render_mode='rgb_array', or set SDL_VIDEODRIVER=dummy"
             ) from error
         pygame.display.set_caption(caption)
         self._clock = pygame.time.Clock()

@@ -11,20 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import (
-    FloatArray,
-    Lanes,
-    Record,
-    Records,
-    bits,
-    choose,
-    compiled,
-    greater,
-    least,
-    lesser,
-    load,
-    root,
-)
+from posse.numeric import FloatArray, Lanes, Record, Records, bits, choose, compiled, greater, least, lesser, load, root
 from posse.rules.discs import BLOCK, FAR, TOUCHING_GAP, blocks, natural
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -43,13 +30,7 @@ _FIRST_WALL: Final = 60
 
 @compiled
 def free_share(
-    x: np.float32,
-    y: np.float32,
-    dx: np.float32,
-    dy: np.float32,
-    other_x: Lanes,
-    other_y: Lanes,
-    reach: Lanes,
+    x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, other_x: Lanes, other_y: Lanes, reach: Lanes
 ) -> Lanes:
     """Return the share of a straight move, 0 to 1, until a point is within ``reach`` of another.
 
@@ -77,14 +58,7 @@ def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.floa
 
 @compiled
 def free_of_robots(
-    c: Record,
-    x: np.float32,
-    y: np.float32,
-    dx: np.float32,
-    dy: np.float32,
-    xs: FloatArray,
-    ys: FloatArray,
-    count: int,
+    c: Record, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32, xs: FloatArray, ys: FloatArray, count: int
 ) -> np.float32:
     """Return the share of a robot's move that no other robot blocks.
 

@@ -28,6 +28,4 @@ class Rules(NamedTuple):
 @functools.cache
 def rules_of(motions: Sequence[TargetMotion], sensors: Sequence[Sensor]) -> Rules:
     """Return the functions for worlds of any of these motions and sensors."""
-    return Rules(
-        drawing(motions), setting_goals(motions), seeing(sensors), measuring(sensors, add_noise)
-    )
+    return Rules(drawing(motions), setting_goals(motions), seeing(sensors), measuring(sensors, add_noise))

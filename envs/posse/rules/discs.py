@@ -104,16 +104,7 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 
 @compiled
 def store_rows(
-    a: Lanes,
-    b: Lanes,
-    c: Lanes,
-    d: Lanes,
-    e: Lanes,
-    f: Lanes,
-    g: Lanes,
-    h: Lanes,
-    row: FloatArray,
-    at: int,
+    a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes, row: FloatArray, at: int
 ) -> None:
     """Inverse of :func:`columns`: write eight numbers per record."""
     store_each(transpose(a, b, c, d, e, f, g, h), row, at)
@@ -201,9 +192,7 @@ def find_gaps(c: Record, s: Record) -> None:
 
 
 @compiled
-def find_slots(
-    c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: Record
-) -> None:
+def find_slots(c: Record, w: Record, first: int, slots: Records, taken: np.uint64, s: Record) -> None:
     """Write the nearest slot that is not in ``taken`` of eight trackers from ``first`` on.
 
     ``taken`` is a bit set; the result is -1 if all slots are taken.

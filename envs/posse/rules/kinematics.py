@@ -40,11 +40,7 @@ def half_turn(turn_rate: np.float32, time: np.float32) -> tuple[np.float32, np.f
 
 @compiled
 def arc(
-    cosine: np.float32,
-    sine: np.float32,
-    speed: np.float32,
-    turn_rate: np.float32,
-    time: np.float32,
+    cosine: np.float32, sine: np.float32, speed: np.float32, turn_rate: np.float32, time: np.float32
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Return (dx, dy, cos θ', sin θ') after holding (V, ω) for a time, (2-1) to (2-3).
 
@@ -69,12 +65,7 @@ def approach(value: Lanes, wanted: Lanes, most: np.float32) -> Lanes:
 
 @compiled
 def turn_towards(
-    cosine: np.float32,
-    sine: np.float32,
-    wanted_c: np.float32,
-    wanted_s: np.float32,
-    most: np.float32,
-    time: np.float32,
+    cosine: np.float32, sine: np.float32, wanted_c: np.float32, wanted_s: np.float32, most: np.float32, time: np.float32
 ) -> np.float32:
     """Return the turn rate, at most ``most``, that brings a heading to a wanted one in ``time``.
 

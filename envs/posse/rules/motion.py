@@ -10,18 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import (
-    FloatArray,
-    Lanes,
-    Record,
-    Records,
-    compiled,
-    eight,
-    lesser,
-    load,
-    store,
-    store_fields,
-)
+from posse.numeric import FloatArray, Lanes, Record, Records, compiled, eight, lesser, load, store, store_fields
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
 from posse.rules.kinematics import approach, arc
@@ -45,9 +34,7 @@ def move(robot: Record, time: np.float32) -> None:
 
 
 @compiled
-def move_swept(
-    c: Record, robot: Record, place: int, count: int, obstacles: Records, s: Record
-) -> None:
+def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Records, s: Record) -> None:
     """Move a robot with something near by a physics step, until it is blocked.
 
     The positions of the ``count`` robots that may block it, itself at ``place``, are in scratch
@@ -58,8 +45,7 @@ def move_swept(
     )
     x, y = robot.x, robot.y
     share = lesser(
-        free_of_robots(c, x, y, dx, dy, s.near_x, s.near_y, count),
-        free_of_surroundings(c, obstacles, x, y, dx, dy),
+        free_of_robots(c, x, y, dx, dy, s.near_x, s.near_y, count), free_of_surroundings(c, obstacles, x, y, dx, dy)
     )
     if share < _ONE:
         dx, dy = dx * share, dy * share
@@ -70,14 +56,7 @@ def move_swept(
 
 
 @compiled(seldom=True)
-def move_in_parts(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    actions: FloatArray,
-    s: Record,
-) -> None:
+def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, s: Record) -> None:
     """Move the robots with something near in physics steps, the target first.
 
     The other robots cannot block them.
@@ -98,9 +77,8 @@ def move_in_parts(
             t = trackers[i]
             if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
-                    c, t.speed, t.turn_rate, t.max_speed, t.max_turn_rate,
-                    actions[i, 0], actions[i, 1],
-                )  # fmt: skip
+                    c, t.speed, t.turn_rate, t.max_speed, t.max_turn_rate, actions[i, 0], actions[i, 1]
+                )
                 move_swept(c, t, k, near + 1, obstacles, s)
 
 
@@ -134,19 +112,14 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
         i = BLOCK * block
-        x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate = columns(
-            trackers, i, n, POSE
-        )
+        x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate = columns(trackers, i, n, POSE)
         for _ in range(parts):
             speed, turn_rate = command(
-                c, speed, turn_rate, max_speed, max_turn_rate,
-                load(s.wanted_speed, i), load(s.wanted_turn, i),
-            )  # fmt: skip
+                c, speed, turn_rate, max_speed, max_turn_rate, load(s.wanted_speed, i), load(s.wanted_turn, i)
+            )
             dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
             x, y = x + dx, y + dy
-        store_rows(
-            x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate, s.new_pose, BLOCK * i
-        )
+        store_rows(x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate, s.new_pose, BLOCK * i)
     others = False
     for i in range(n):
         t = trackers[i]
@@ -160,13 +133,7 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
 
 @compiled
 def command_target(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    actions: FloatArray,
-    set_goal: Any,
-    scratch: Record,
+    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, set_goal: Any, scratch: Record
 ) -> None:
     """Set the target's speed and turn rate for the control step."""
     if c.target_agent != 0:
@@ -181,13 +148,7 @@ def command_target(
 
 @compiled
 def motion(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    actions: FloatArray,
-    set_goal: Any,
-    scratch: Record,
+    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, set_goal: Any, scratch: Record
 ) -> None:
     """Move the robots by actions (rows, 2 + m) for one control step; -1 is V = 0, 0 is ω = 0.
 

@@ -67,17 +67,13 @@ def uniform(key: np.uint64, step: int, stream: np.uint64, index: int) -> np.floa
 
 
 @compiled
-def between(
-    low: float, high: float, key: np.uint64, step: int, stream: np.uint64, index: int
-) -> np.float32:
+def between(low: float, high: float, key: np.uint64, step: int, stream: np.uint64, index: int) -> np.float32:
     """Return a float32 drawn uniformly from [low, high)."""
     return np.float32(low + (high - low) * uniform(key, step, stream, index))
 
 
 @compiled
-def normal_pair(
-    key: np.uint64, step: int, stream: np.uint64, index: int
-) -> tuple[np.float32, np.float32]:
+def normal_pair(key: np.uint64, step: int, stream: np.uint64, index: int) -> tuple[np.float32, np.float32]:
     """Return two normal float32, standard deviation 1, drawn inside a circle of radius 3.
 
     Box-Muller with the radius truncated at 3, so that neither number exceeds 3 in absolute value.
@@ -85,7 +81,4 @@ def normal_pair(
     u = uniform(key, step, stream, 2 * index)
     angle = _TWO_PI * uniform(key, step, stream, 2 * index + 1)
     radius = np.float32(math.sqrt(_MINUS_TWO * np.float32(math.log(_CUT + _KEPT * u))))
-    return (
-        radius * np.float32(math.cos(angle)),
-        radius * np.float32(math.sin(angle)),
-    )
+    return (radius * np.float32(math.cos(angle)), radius * np.float32(math.sin(angle)))

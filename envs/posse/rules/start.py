@@ -27,13 +27,7 @@ _TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come fir
 
 @compiled
 def is_clear(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    placed: int,
-    obstacles: Records,
-    x: np.float32,
-    y: np.float32,
+    c: Record, w: Record, trackers: Records, placed: int, obstacles: Records, x: np.float32, y: np.float32
 ) -> bool:
     """Return whether a tracker at (x, y) is clear of walls, obstacles and ``placed`` trackers."""
     if c.walled:
@@ -91,9 +85,9 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
             if (o.x - w.x) * (o.x - w.x) + (o.y - w.y) * (o.y - w.y) < reach * reach:
                 clear = False
         if clear and c.walled and c.target_agent == 0:
-            clear = has_free_circle(
-                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE
-            ) or has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE)
+            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE) or has_free_circle(
+                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
+            )
         if clear:
             break
 
@@ -150,9 +144,7 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
 
 
 @compiled(seldom=True)
-def draw_start(
-    c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any
-) -> None:
+def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)
     draw_obstacles(c, w, obstacles)

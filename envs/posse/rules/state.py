@@ -44,29 +44,74 @@ def _offset(record: np.dtype[Any], name: str) -> int:
 _F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
 
 CONFIG: Final = _record(
-    ("num_trackers", _I), ("num_agents", _I), ("num_obstacles", _I), ("neighbours", _I),
-    ("message_size", _I), ("physics_steps", _I), ("horizon", _I), ("settle_steps", _I),
-    ("outage_steps", _I), ("break_from", _I), ("break_until", _I), ("forget_steps", _I),
-    ("radio_delay", _I), ("breaks", _I), ("break_nearest", _I), ("break_number", _I),
-    ("motion", _I), ("mirrored", _I), ("target_agent", _I),
-    ("sensor", _I), ("fix_bearing", _I),  # 1: a fix is a bearing, else a position
+    ("num_trackers", _I),
+    ("num_agents", _I),
+    ("num_obstacles", _I),
+    ("neighbours", _I),
+    ("message_size", _I),
+    ("physics_steps", _I),
+    ("horizon", _I),
+    ("settle_steps", _I),
+    ("outage_steps", _I),
+    ("break_from", _I),
+    ("break_until", _I),
+    ("forget_steps", _I),
+    ("radio_delay", _I),
+    ("breaks", _I),
+    ("break_nearest", _I),
+    ("break_number", _I),
+    ("motion", _I),
+    ("mirrored", _I),
+    ("target_agent", _I),
+    ("sensor", _I),
+    ("fix_bearing", _I),  # 1: a fix is a bearing, else a position
     ("measured", _I),  # 0: sensors return the target's true position
-    ("terminate_on_contact", _I), ("walled", _I), ("sonar_beams", _I), ("all_round", _I),
-    ("perfect_radio", _I), ("formation", _I), ("whole_arcs", _I),
-    ("dt", _F), ("physics_dt", _F),
+    ("terminate_on_contact", _I),
+    ("walled", _I),
+    ("sonar_beams", _I),
+    ("all_round", _I),
+    ("perfect_radio", _I),
+    ("formation", _I),
+    ("whole_arcs", _I),
+    ("dt", _F),
+    ("physics_dt", _F),
     ("fastest", _F),  # greatest speed of any tracker
-    ("speed_change", _F), ("turn_change", _F),
-    ("target_speed", _F), ("target_turn_rate", _F), ("target_least_speed", _F), ("radius", _F),
-    ("tolerance", _F), ("frame_c", _F), ("frame_s", _F), ("slots_reach", _F),
-    ("half_arena", _F), ("obstacle_least", _F), ("obstacle_most", _F), ("obstacle_gap", _F),
-    ("start_least", _F), ("start_most", _F), ("target_extent", _F), ("safe_distance", _F),
-    ("sensing_range", _F), ("view_cosine", _F), ("range_noise", _F), ("bearing_noise", _F),
-    ("smoothing", _F), ("sonar_range", _F), ("beam_cosine", _F),
-    ("radio_range", _F), ("radio_loss", _F), ("sensor_outages", _F), ("radio_outages", _F),
-    ("formation_distance", _F), ("formation_spacing", _F),
-    ("per_acceleration", _F), ("per_turn_acceleration", _F),  # 1 / limit; 0: no limit
-    ("told_sensing_range", _F), ("told_arena", _F),  # as observed; -1: unlimited
-)  # fmt: skip
+    ("speed_change", _F),
+    ("turn_change", _F),
+    ("target_speed", _F),
+    ("target_turn_rate", _F),
+    ("target_least_speed", _F),
+    ("radius", _F),
+    ("tolerance", _F),
+    ("frame_c", _F),
+    ("frame_s", _F),
+    ("slots_reach", _F),
+    ("half_arena", _F),
+    ("obstacle_least", _F),
+    ("obstacle_most", _F),
+    ("obstacle_gap", _F),
+    ("start_least", _F),
+    ("start_most", _F),
+    ("target_extent", _F),
+    ("safe_distance", _F),
+    ("sensing_range", _F),
+    ("view_cosine", _F),
+    ("range_noise", _F),
+    ("bearing_noise", _F),
+    ("smoothing", _F),
+    ("sonar_range", _F),
+    ("beam_cosine", _F),
+    ("radio_range", _F),
+    ("radio_loss", _F),
+    ("sensor_outages", _F),
+    ("radio_outages", _F),
+    ("formation_distance", _F),
+    ("formation_spacing", _F),
+    ("per_acceleration", _F),
+    ("per_turn_acceleration", _F),  # 1 / limit; 0: no limit
+    ("told_sensing_range", _F),
+    ("told_arena", _F),  # as observed; -1: unlimited
+)
 """The scenario, for kernels."""
 
 _WORLD: Final = (
@@ -79,10 +124,16 @@ _WORLD: Final = (
     ("over", _I),  # 1: the episode has ended, the world must be reset
     ("terminated", _I),
     # the target
-    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
-    ("speed", _F), ("turn_rate", _F),
-    ("frame_cos", _F), ("frame_sin", _F),  # the slot frame, ψ
-    ("goal_cos", _F), ("goal_sin", _F),  # goal heading of a scripted target
+    ("x", _F),
+    ("y", _F),
+    ("heading_cos", _F),
+    ("heading_sin", _F),
+    ("speed", _F),
+    ("turn_rate", _F),
+    ("frame_cos", _F),
+    ("frame_sin", _F),  # the slot frame, ψ
+    ("goal_cos", _F),
+    ("goal_sin", _F),  # goal heading of a scripted target
     ("touching", _U),  # bit mask of the trackers that touch the target
     ("onsets", _I),  # contacts of the target with trackers that began in the current step
     ("near", _I),  # 1: something may touch the target in the next step
@@ -93,10 +144,15 @@ _WORLD: Final = (
     ("score", _F),  # of the current step
     ("tracker_steps", _F),  # control steps of all working trackers
     ("held", _I),  # consecutive steps with each working tracker in its own slot
-    ("settled_at", _I), ("detected_at", _I), ("lost_at", _I), ("recovered_at", _I),
-    ("contacts_tracker", _I), ("contacts_obstacle", _I), ("contacts_target", _I),
+    ("settled_at", _I),
+    ("detected_at", _I),
+    ("lost_at", _I),
+    ("recovered_at", _I),
+    ("contacts_tracker", _I),
+    ("contacts_obstacle", _I),
+    ("contacts_target", _I),
     ("least_gap", _F),
-)  # fmt: skip
+)
 STEP: Final = _offset(_record(*_WORLD), "step")
 WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
 """Fields of every world, without those of declared metrics and motions."""
@@ -123,21 +179,31 @@ def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
 
 FIX_STEP: Final = ("fix_step", _I)  # when it was taken; -1: none yet
 FIX_FIELDS: Final = (
-    ("fix_x", _F), ("fix_y", _F),  # where the target was, m; a bearing: a unit vector
-    ("fix_cos", _F), ("fix_sin", _F),  # its heading; a bearing: 0
-    ("fix_frame_cos", _F), ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
-)  # fmt: skip
+    ("fix_x", _F),
+    ("fix_y", _F),  # where the target was, m; a bearing: a unit vector
+    ("fix_cos", _F),
+    ("fix_sin", _F),  # its heading; a bearing: 0
+    ("fix_frame_cos", _F),
+    ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
+)
 """A fix of the target, in the common frame: a position or a bearing, depending on the sensor
 (:mod:`posse.rules.senses.declaring`). Of a certain control step (``FIX_STEP``)."""
 
 TRACKER: Final = _record(
-    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
-    ("speed", _F), ("turn_rate", _F),
-    ("max_speed", _F), ("max_turn_rate", _F),  # its own limits, from the scenario
-    ("per_speed", _F), ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
+    ("x", _F),
+    ("y", _F),
+    ("heading_cos", _F),
+    ("heading_sin", _F),
+    ("speed", _F),
+    ("turn_rate", _F),
+    ("max_speed", _F),
+    ("max_turn_rate", _F),  # its own limits, from the scenario
+    ("per_speed", _F),
+    ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
     ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
     ("broken_at", _I),  # control step at which it broke, NEVER while it works
-    ("sensor_dead_from", _I), ("radio_dead_from", _I),  # start of outages of outage_time
+    ("sensor_dead_from", _I),
+    ("radio_dead_from", _I),  # start of outages of outage_time
     ("sees", _I),  # 1: its sensor sees the target
     ("near", _I),  # 1: something may touch it in the next step
     ("touching", _I),  # 1: it touches anything
@@ -145,14 +211,18 @@ TRACKER: Final = _record(
     FIX_STEP,  # of its best fix
     ("slot", _S),  # number of the slot that it occupies; -1: none
     ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
-    ("touching_trackers", _U), ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
+    ("touching_trackers", _U),
+    ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
     # its best fix of the target, from its sensor or by radio
-    *FIX_FIELDS, ("fix_vx", _F), ("fix_vy", _F),  # m/s, from successive fixes
+    *FIX_FIELDS,
+    ("fix_vx", _F),
+    ("fix_vy", _F),  # m/s, from successive fixes
     # inputs of score and rewards, with slot and could_arrive
     ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
     ("slot_progress", _F),  # decrease of slot_distance in this step
-    ("start_x", _F), ("start_y", _F),
-)  # fmt: skip
+    ("start_x", _F),
+    ("start_y", _F),
+)
 """One tracker."""
 
 # Kernels read and write these fields of a tracker in blocks of eight; unchanged fields are written
@@ -167,19 +237,28 @@ SLOT: Final = _record(("x", _F), ("y", _F))
 """Position of a slot in the slot frame; one table for all worlds."""
 
 HEARD: Final = _record(
-    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
-    ("speed", _F), ("turn_rate", _F),
+    ("x", _F),
+    ("y", _F),
+    ("heading_cos", _F),
+    ("heading_sin", _F),
+    ("speed", _F),
+    ("turn_rate", _F),
     ("step", _I),  # when it was sent; -1: never heard
     size=32,  # so that it can be read as a block of eight, like TRACKER from x on
-)  # fmt: skip
+)
 """The last message that a tracker received from a team-mate: (E, receiver, sender)."""
 
 BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
-    ("x", _F), ("y", _F), ("heading_cos", _F), ("heading_sin", _F),
-    ("speed", _F), ("turn_rate", _F),
-    FIX_STEP, *FIX_FIELDS,
-)  # fmt: skip
+    ("x", _F),
+    ("y", _F),
+    ("heading_cos", _F),
+    ("heading_sin", _F),
+    ("speed", _F),
+    ("turn_rate", _F),
+    FIX_STEP,
+    *FIX_FIELDS,
+)
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 
 

@@ -6,14 +6,7 @@ import math
 
 from posse.registry import FIELDS, METRICS, REWARD_TERMS
 from posse.scenarios.formation import slot_offsets
-from posse.scenarios.limits import (
-    FARTHEST,
-    LEAST_CHANGE,
-    LONGEST_MOVE,
-    MOST_WEIGHT,
-    SAFE_MARGIN,
-    START_CLEARANCE,
-)
+from posse.scenarios.limits import FARTHEST, LEAST_CHANGE, LONGEST_MOVE, MOST_WEIGHT, SAFE_MARGIN, START_CLEARANCE
 from posse.scenarios.scenario import Scenario, checked_by
 from posse.scenarios.setting import ScenarioError, fail, is_number
 from posse.shown import shown
@@ -41,10 +34,10 @@ def _check_each(s: Scenario) -> None:
         value = getattr(s, name)
         if setting.per_tracker and isinstance(value, tuple) and len(value) != s.num_trackers:
             fail(
-                name, value,
-                f"{len(value)} values for num_trackers={s.num_trackers}: give one number, or one "
-                "for each tracker",
-            )  # fmt: skip
+                name,
+                value,
+                f"{len(value)} values for num_trackers={s.num_trackers}: give one number, or one for each tracker",
+            )
 
 
 def _check_motion(s: Scenario) -> None:
@@ -55,22 +48,15 @@ def _check_motion(s: Scenario) -> None:
             "0.01 % at least: a slower team cannot catch up (paper, assumption ii)"
         )
     if s.target_least_speed > s.target_speed:
-        fail(
-            "target_least_speed", s.target_least_speed,
-            f"it must be at most target_speed={s.target_speed:g}",
-        )  # fmt: skip
+        fail("target_least_speed", s.target_least_speed, f"it must be at most target_speed={s.target_speed:g}")
     if s.target_speed == 0 and s.target_motion != "constant":
         fail("target_speed", s.target_speed, "only a target of constant motion may rest")
     steps = s.control_step / s.physics_step
     if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
         raise ScenarioError(
-            f"control_step={s.control_step:g} must be a whole multiple of "
-            f"physics_step={s.physics_step:g}"
+            f"control_step={s.control_step:g} must be a whole multiple of physics_step={s.physics_step:g}"
         )
-    for name, rate in (
-        ("tracker_turn_rate", max(s.tracker_turn_rates)),
-        ("target_turn_rate", s.target_turn_rate),
-    ):
+    for name, rate in (("tracker_turn_rate", max(s.tracker_turn_rates)), ("target_turn_rate", s.target_turn_rate)):
         turn = rate * s.physics_step
         if turn > 1.0:
             raise ScenarioError(
@@ -85,16 +71,15 @@ def _check_motion(s: Scenario) -> None:
         fail("break_number", s.break_number, f"trackers are 0 to {s.num_trackers - 1}")
     if s.settle_time > s.duration:
         fail(
-            "settle_time", s.settle_time,
+            "settle_time",
+            s.settle_time,
             f"an episode of horizon={s.horizon} steps of {s.control_step:g} s is over before that",
-        )  # fmt: skip
+        )
 
 
 def _check_formation(s: Scenario) -> None:
     offsets = slot_offsets(s)
-    apart = min(
-        (math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf
-    )
+    apart = min((math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf)
     if apart <= 2 * s.tolerance + 1e-9:
         raise ScenarioError(
             f"slots of the {s.formation} lie {apart:.3g} m apart, which must be more than twice "
@@ -124,16 +109,15 @@ def _check_place(s: Scenario) -> None:
         )
     if s.start_distance[0] <= 2 * s.robot_radius:
         fail(
-            "start_distance", s.start_distance,
+            "start_distance",
+            s.start_distance,
             f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m",
-        )  # fmt: skip
+        )
     ring = math.pi * (s.start_distance[1] ** 2 - s.start_distance[0] ** 2)
     excluded = s.num_trackers * math.pi * (2 * s.robot_radius + START_CLEARANCE) ** 2
     if not math.isfinite(s.arena):
         if s.num_obstacles:
-            raise ScenarioError(
-                f"num_obstacles={s.num_obstacles} needs an arena: set arena to its side in m"
-            )
+            raise ScenarioError(f"num_obstacles={s.num_obstacles} needs an arena: set arena to its side in m")
         if excluded > ring:
             raise ScenarioError(
                 f"{s.num_trackers} trackers do not fit at start_distance={s.start_distance}: "
@@ -186,10 +170,7 @@ def _room_to_start(s: Scenario) -> float:
     for at in (0.0, s.target_extent):  # centre and corner
         area = 0.0
         for d in distances:
-            inside = sum(
-                abs(at + d * math.cos(b)) <= inner and abs(at + d * math.sin(b)) <= inner
-                for b in bearings
-            )
+            inside = sum(abs(at + d * math.cos(b)) <= inner and abs(at + d * math.sin(b)) <= inner for b in bearings)
             area += inside / 64 * 2 * math.pi * d * (most - least) / 16
         areas.append(area)
     return min(areas)
@@ -252,8 +233,7 @@ def _check_rewards(s: Scenario) -> None:
         if REWARD_TERMS[name].of_target is None:
             known = [term for term in REWARD_TERMS if REWARD_TERMS[term].of_target is not None]
             raise ScenarioError(
-                f"in target_reward_weights: {name!r} is a term of trackers only; a target has: "
-                f"{', '.join(known)}"
+                f"in target_reward_weights: {name!r} is a term of trackers only; a target has: {', '.join(known)}"
             )
 
 
@@ -265,9 +245,10 @@ def _check_weights(setting: str, weights: dict[str, float]) -> None:
             fail(f"{setting}[{shown(name)}]", weight, "a weight must be a finite number")
         if abs(weight) > MOST_WEIGHT:
             fail(
-                f"{setting}[{shown(name)}]", weight,
+                f"{setting}[{shown(name)}]",
+                weight,
                 f"a weight must lie in [-{MOST_WEIGHT:g}, {MOST_WEIGHT:g}]: scale all of them",
-            )  # fmt: skip
+            )
 
 
 def _check_metrics(s: Scenario) -> None:

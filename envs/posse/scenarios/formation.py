@@ -64,10 +64,7 @@ def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
             for column in range(len(row))
         ]
     wing = spacing * _DIAGONAL
-    return [
-        (-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1))
-        for i in range(n)
-    ]
+    return [(-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1)) for i in range(n)]
 
 
 @compiled

@@ -28,12 +28,7 @@ def _named() -> dict[str, Scenario]:
     scenarios = (
         Scenario(name="constant"),
         Scenario(name="accelerating", target_motion="accelerating"),
-        Scenario(
-            name="smart",
-            target_motion="smart",
-            tracker_turn_rate=1.2,
-            target_turn_rate=2.0,
-        ),
+        Scenario(name="smart", target_motion="smart", tracker_turn_rate=1.2, target_turn_rate=2.0),
         Scenario(
             name="search",
             version=2,
@@ -137,9 +132,7 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
     else:
         near = difflib.get_close_matches(shown(scenario), _named(), n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-        raise ScenarioError(
-            f"unknown scenario {shown(scenario)}{hint}; scenarios are: {', '.join(_named())}"
-        )
+        raise ScenarioError(f"unknown scenario {shown(scenario)}{hint}; scenarios are: {', '.join(_named())}")
     return found.replace(**overrides) if overrides else found
 
 
@@ -153,8 +146,5 @@ def _with_target(target: Any, overrides: dict[str, Any]) -> dict[str, Any]:
             "target_motion= chooses among the scripted ones"
         )
     if overrides.get("target_motion", "agent") != "agent":
-        raise ScenarioError(
-            f"target='agent' and target_motion={shown(overrides['target_motion'])} exclude each "
-            "other"
-        )
+        raise ScenarioError(f"target='agent' and target_motion={shown(overrides['target_motion'])} exclude each other")
     return {**overrides, "target_motion": "agent"}

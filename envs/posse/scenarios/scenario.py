@@ -56,39 +56,34 @@ class Scenario:
     """
 
     name: str = text(dataclasses.MISSING, "name in results and policy cards")
-    version: int = whole(
-        1, 1, math.inf, "incremented when the behaviour of the named scenario changes"
-    )
+    version: int = whole(1, 1, math.inf, "incremented when the behaviour of the named scenario changes")
 
     # The team
-    num_trackers: int = whole(
-        5, 1, MAX_TRACKERS, "robots in the team", source="section 4: five trackers"
-    )
+    num_trackers: int = whole(5, 1, MAX_TRACKERS, "robots in the team", source="section 4: five trackers")
     tracker_speed: float | tuple[float, ...] = number(
-        1.0, "m/s", SMALL, 1000, "greatest speed of a tracker, or of each; above target_speed",
+        1.0,
+        "m/s",
+        SMALL,
+        1000,
+        "greatest speed of a tracker, or of each; above target_speed",
         per_tracker=True,
         source="section 2, assumption ii",
-    )  # fmt: skip
+    )
     tracker_turn_rate: float | tuple[float, ...] = number(
         2.0, "rad/s", SMALL, WIDE, "greatest turn rate of a tracker, or of each", per_tracker=True
     )
     tracker_acceleration: float = number(
-        math.inf, "m/s²", SMALL, FAR, "greatest change of a tracker's speed; inf: no limit",
-        infinite=True,
-    )  # fmt: skip
-    tracker_turn_acceleration: float = number(
-        math.inf, "rad/s²", SMALL, FAR, "greatest change of a tracker's turn rate; inf: no limit",
-        infinite=True,
-    )  # fmt: skip
-    robot_radius: float = number(
-        0.15, "m", SMALL, WIDE, "radius of every robot's disc, trackers and target"
+        math.inf, "m/s²", SMALL, FAR, "greatest change of a tracker's speed; inf: no limit", infinite=True
     )
+    tracker_turn_acceleration: float = number(
+        math.inf, "rad/s²", SMALL, FAR, "greatest change of a tracker's turn rate; inf: no limit", infinite=True
+    )
+    robot_radius: float = number(0.15, "m", SMALL, WIDE, "radius of every robot's disc, trackers and target")
 
     # The target
     target_motion: str = text(
-        "constant", "how the target moves; agent: a policy controls it",
-        lambda: TARGET_MOTIONS, source="section 2",
-    )  # fmt: skip
+        "constant", "how the target moves; agent: a policy controls it", lambda: TARGET_MOTIONS, source="section 2"
+    )
     target_speed: float = number(0.6, "m/s", 0, 1000, "speed of the target; an agent's greatest")
     target_turn_rate: float = number(1.0, "rad/s", SMALL, WIDE, "greatest turn rate of the target")
     target_least_speed: float = number(
@@ -97,133 +92,105 @@ class Scenario:
 
     # The formation
     formation: str = text(
-        "wedge", "wedge: behind the target; ring: around it; rows: compact, behind",
-        lambda: FORMATIONS, source="section 3.3, figure 6",
-    )  # fmt: skip
+        "wedge",
+        "wedge: behind the target; ring: around it; rows: compact, behind",
+        lambda: FORMATIONS,
+        source="section 3.3, figure 6",
+    )
     formation_distance: float = number(
-        1.2, "m", 0, WIDE,
-        "from the target to the nearest slot (ring: the least radius of the ring)", above=True,
-    )  # fmt: skip
+        1.2, "m", 0, WIDE, "from the target to the nearest slot (ring: the least radius of the ring)", above=True
+    )
     formation_spacing: float = number(
         1.2, "m", 0, WIDE, "between neighbouring slots; more than twice the tolerance", above=True
     )
-    tolerance: float = number(
-        0.3, "m", SMALL, WIDE, "a slot is occupied when a tracker is within this distance"
-    )
+    tolerance: float = number(0.3, "m", SMALL, WIDE, "a slot is occupied when a tracker is within this distance")
     settle_time: float = number(
-        3.0, "s", 0, math.inf,
-        "the team has settled when every slot has been held continuously for this long", above=True,
-    )  # fmt: skip
+        3.0,
+        "s",
+        0,
+        math.inf,
+        "the team has settled when every slot has been held continuously for this long",
+        above=True,
+    )
 
     # Time
-    control_step: float = number(
-        0.1, "s", 1e-4, 100, "between two actions; a whole multiple of physics_step"
-    )
+    control_step: float = number(0.1, "s", 1e-4, 100, "between two actions; a whole multiple of physics_step")
     physics_step: float = number(0.05, "s", 1e-4, 100, "between two contact checks")
     horizon: int = whole(600, 1, 1_000_000, "control steps in an episode", unit="steps")
-    terminate_on_contact: bool = flag(
-        False, "whether the episode ends when any tracker touches anything"
-    )
+    terminate_on_contact: bool = flag(False, "whether the episode ends when any tracker touches anything")
 
     # The arena
     arena: float = number(
-        math.inf, "m", 0, 2 * FARTHEST, "side of the walled square; inf: the open plane",
-        above=True, infinite=True,
-    )  # fmt: skip
-    num_obstacles: int = whole(0, 0, MAX_OBSTACLES, "discs in the arena; require an arena")
-    obstacle_radius: tuple[float, float] = pair(
-        (0.4, 0.8), "m", WIDE, "least and greatest radius of an obstacle"
+        math.inf, "m", 0, 2 * FARTHEST, "side of the walled square; inf: the open plane", above=True, infinite=True
     )
+    num_obstacles: int = whole(0, 0, MAX_OBSTACLES, "discs in the arena; require an arena")
+    obstacle_radius: tuple[float, float] = pair((0.4, 0.8), "m", WIDE, "least and greatest radius of an obstacle")
     obstacle_gap: float = number(
-        1.2, "m", 0, WIDE,
-        "least clearance between two obstacles, and between an obstacle and a wall",
-    )  # fmt: skip
+        1.2, "m", 0, WIDE, "least clearance between two obstacles, and between an obstacle and a wall"
+    )
     start_distance: tuple[float, float] = pair(
-        (4.0, 10.0), "m", FARTHEST,
-        "least and greatest distance of a tracker from the target at the start",
-    )  # fmt: skip
+        (4.0, 10.0), "m", FARTHEST, "least and greatest distance of a tracker from the target at the start"
+    )
 
     # Sensing
     sensor: str = text("range-bearing", "kind of the target sensor", lambda: SENSORS)
     sensing_range: float = number(
-        math.inf, "m", 0, FAR, "a tracker sees the target up to this distance; inf: at any",
-        above=True, infinite=True,
-    )  # fmt: skip
-    field_of_view: float = number(
-        2.0 * math.pi, "rad", 0, 2 * math.pi + 1e-9,
-        "full angle of the target sensor about the heading", above=True,
-    )  # fmt: skip
-    range_noise: float = number(
-        0.0, "1", 0, 0.3,
-        "standard deviation of a measured range, as a share of the range; truncated at three",
-    )  # fmt: skip
-    bearing_noise: float = number(
-        0.0, "rad", 0, 0.5, "standard deviation of a measured bearing; truncated at three"
+        math.inf, "m", 0, FAR, "a tracker sees the target up to this distance; inf: at any", above=True, infinite=True
     )
+    field_of_view: float = number(
+        2.0 * math.pi, "rad", 0, 2 * math.pi + 1e-9, "full angle of the target sensor about the heading", above=True
+    )
+    range_noise: float = number(
+        0.0, "1", 0, 0.3, "standard deviation of a measured range, as a share of the range; truncated at three"
+    )
+    bearing_noise: float = number(0.0, "rad", 0, 0.5, "standard deviation of a measured bearing; truncated at three")
     velocity_smoothing: float = number(
-        0.0, "s", 0, WIDE,
-        "time constant of the velocity estimated from successive fixes; 0: none",
-    )  # fmt: skip
+        0.0, "s", 0, WIDE, "time constant of the velocity estimated from successive fixes; 0: none"
+    )
     sonar_beams: int = whole(8, 0, 64, "beams of the sonar ring, evenly spaced from straight ahead")
     sonar_range: float = number(2.0, "m", SMALL, WIDE, "range of the sonar, from the robot's rim")
 
     # Radio
     radio_range: float = number(
-        math.inf, "m", 0, FAR, "trackers hear each other up to this distance; inf: at any",
-        above=True, infinite=True,
-    )  # fmt: skip
-    radio_delay: int = whole(
-        0, 0, 100, "delay of messages; 0: received in the observation after the step",
-        unit="steps",
-    )  # fmt: skip
-    radio_loss: float = number(
-        0.0, "1", 0, 0.999, "probability that a message is lost, for each pair and step"
+        math.inf, "m", 0, FAR, "trackers hear each other up to this distance; inf: at any", above=True, infinite=True
     )
+    radio_delay: int = whole(
+        0, 0, 100, "delay of messages; 0: received in the observation after the step", unit="steps"
+    )
+    radio_loss: float = number(0.0, "1", 0, 0.999, "probability that a message is lost, for each pair and step")
     message_size: int = whole(0, 0, 64, "numbers that a policy can add to each broadcast")
     forget_after: float = number(
-        5.0, "s", 0, WIDE, "time after which a silent team-mate is dropped from the observation",
-        above=True,
-    )  # fmt: skip
+        5.0, "s", 0, WIDE, "time after which a silent team-mate is dropped from the observation", above=True
+    )
     num_neighbours: int | None = whole(
-        None, 0, MAX_TRACKERS - 1,
-        "places for team-mates in an observation; None: min(num_trackers - 1, 8)", none=True,
-    )  # fmt: skip
+        None, 0, MAX_TRACKERS - 1, "places for team-mates in an observation; None: min(num_trackers - 1, 8)", none=True
+    )
 
     # Faults
-    breaks: int = whole(
-        0, 0, MAX_TRACKERS - 1, "trackers that break during an episode, below num_trackers"
-    )
+    breaks: int = whole(0, 0, MAX_TRACKERS - 1, "trackers that break during an episode, below num_trackers")
     break_choice: str = text(
         "nearest",
         "which one breaks: the nearest to the target at that time (usually the leader), a random"
         " one, or the one given by number",
         lambda: BREAK_CHOICES,
     )
-    break_number: int = whole(
-        0, 0, MAX_TRACKERS - 1, "number of the tracker that breaks with break_choice given"
-    )
+    break_number: int = whole(0, 0, MAX_TRACKERS - 1, "number of the tracker that breaks with break_choice given")
     break_window: tuple[float, float] = pair(
         (0.4, 0.6), "1", 1.0, "interval of the time of a break, as shares of the horizon"
     )
     sensor_outages: float = number(
-        0.0, "1", 0, 1,
-        "probability that a tracker's target sensor fails once for outage_time",
-    )  # fmt: skip
-    radio_outages: float = number(
-        0.0, "1", 0, 1, "probability that a tracker's radio fails once for outage_time"
+        0.0, "1", 0, 1, "probability that a tracker's target sensor fails once for outage_time"
     )
+    radio_outages: float = number(0.0, "1", 0, 1, "probability that a tracker's radio fails once for outage_time")
     outage_time: float = number(
-        5.0, "s", 0, WIDE, "length of an outage; its start is drawn over the episode",
-        above=True,
-    )  # fmt: skip
+        5.0, "s", 0, WIDE, "length of an outage; its start is drawn over the episode", above=True
+    )
 
     # Declarations of the user's own
     extra_fields: tuple[str, ...] = declare(
         (), Setting("other", "1", "observation fields of your own, by name: docs/extend.md")
     )
-    metrics: tuple[str, ...] = declare(
-        (), Setting("other", "1", "metrics of your own, by name: docs/extend.md")
-    )
+    metrics: tuple[str, ...] = declare((), Setting("other", "1", "metrics of your own, by name: docs/extend.md"))
 
     # Reward
     reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
@@ -231,8 +198,7 @@ class Scenario:
         Setting("other", "1", "weight of each reward term by name (posse.REWARD_TERMS); others: 0"),
     )
     target_reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
-        (("team", -1.0),),
-        Setting("other", "1", "the same for a target that is an agent: contact, effort, team"),
+        (("team", -1.0),), Setting("other", "1", "the same for a target that is an agent: contact, effort, team")
     )
 
     def __post_init__(self) -> None:
@@ -385,6 +351,4 @@ def _weights(name: str, given: object) -> tuple[tuple[str, float], ...]:
         weights = dict(given)  # type: ignore[call-overload]
         return tuple(sorted(weights.items()))
     except (TypeError, ValueError):
-        raise ScenarioError(
-            f"{name}={shown(given)} is not possible: it must map names of terms to numbers"
-        ) from None
+        raise ScenarioError(f"{name}={shown(given)} is not possible: it must map names of terms to numbers") from None

@@ -83,25 +83,27 @@ def declare(default: Any, setting: Setting) -> Any:
 
 
 def number(
-    default: float, unit: str, low: float, high: float, meaning: str, *,
-    above: bool = False, infinite: bool = False, per_tracker: bool = False, source: str = "",
-) -> Any:  # fmt: skip
+    default: float,
+    unit: str,
+    low: float,
+    high: float,
+    meaning: str,
+    *,
+    above: bool = False,
+    infinite: bool = False,
+    per_tracker: bool = False,
+    source: str = "",
+) -> Any:
     """Declare a real number in [low, high], or in (low, high] with ``above``."""
-    setting = Setting(
-        "number", unit, meaning, low, high, not above, infinite, per_tracker=per_tracker,
-        source=source,
-    )  # fmt: skip
+    setting = Setting("number", unit, meaning, low, high, not above, infinite, per_tracker=per_tracker, source=source)
     return declare(default, setting)
 
 
 def whole(
-    default: int | None, low: int, high: float, meaning: str, *,
-    unit: str = "1", none: bool = False, source: str = "",
-) -> Any:  # fmt: skip
+    default: int | None, low: int, high: float, meaning: str, *, unit: str = "1", none: bool = False, source: str = ""
+) -> Any:
     """Declare a whole number in [low, high]."""
-    return declare(
-        default, Setting("whole", unit, meaning, low, high, may_be_none=none, source=source)
-    )
+    return declare(default, Setting("whole", unit, meaning, low, high, may_be_none=none, source=source))
 
 
 def pair(default: tuple[float, float], unit: str, high: float, meaning: str) -> Any:
@@ -114,10 +116,7 @@ def flag(default: bool, meaning: str) -> Any:
     return declare(default, Setting("flag", "", meaning))
 
 
-def text(
-    default: Any, meaning: str, choices: Callable[[], Iterable[str]] | None = None,
-    source: str = "",
-) -> Any:  # fmt: skip
+def text(default: Any, meaning: str, choices: Callable[[], Iterable[str]] | None = None, source: str = "") -> Any:
     """Declare a string, one of ``choices()`` where given."""
     return declare(default, Setting("text", "", meaning, choices=choices, source=source))
 
@@ -185,9 +184,7 @@ def _check_text(name: str, value: object, setting: Setting) -> None:
         fail(name, value, "it must be a string")
     choices = None if setting.choices is None else tuple(setting.choices())
     if choices is not None and value not in choices:
-        raise ScenarioError(
-            f"unknown {name}={shown(value)}{near(value, choices)}; known: {', '.join(choices)}"
-        )
+        raise ScenarioError(f"unknown {name}={shown(value)}{near(value, choices)}; known: {', '.join(choices)}")
 
 
 def is_one_of(names: Container[str], value: object) -> bool:

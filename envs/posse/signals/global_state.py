@@ -91,12 +91,7 @@ class StateLayout:
 
 
 def _entries(s: Scenario) -> list[StateEntry]:
-    return [
-        *_target_entries(s),
-        *_tracker_entries(s),
-        *_obstacle_entries(s),
-        *_radio_entries(s),
-    ]
+    return [*_target_entries(s), *_tracker_entries(s), *_obstacle_entries(s), *_radio_entries(s)]
 
 
 def _scaled(array: str, field: str, scale: float = 1.0) -> Callable[[WorldArrays], _Values]:
@@ -180,50 +175,46 @@ def _limits(s: Scenario) -> dict[str, tuple[str, float, float]]:
 def _target_entries(s: Scenario) -> list[StateEntry]:
     limits, dt = _limits(s), s.control_step
     named = [
-        StateEntry(
-            f"target_{name}", (), *limits[name], f"the target's {name}", _scaled("world", name)
-        )
+        StateEntry(f"target_{name}", (), *limits[name], f"the target's {name}", _scaled("world", name))
         for name in (*_POSE, "frame_cos", "frame_sin", "goal_cos", "goal_sin")
     ]
     memory = [
-        StateEntry(
-            m.name, (), m.unit, m.bound("low", s), m.bound("high", s), m.meaning,
-            _scaled("world", m.name),
-        )
+        StateEntry(m.name, (), m.unit, m.bound("low", s), m.bound("high", s), m.meaning, _scaled("world", m.name))
         for motion in TARGET_MOTIONS.with_added(s.target_motion)
         for m in motion.memory
-    ]  # fmt: skip
+    ]
     times = (-1.0, (s.duration + s.control_step * s.breaks) * _SLACK)
     return [
-        StateEntry("time", (), "s", 0, s.duration * _SLACK, "since the start",
-                   _scaled("world", "step", dt)),
+        StateEntry("time", (), "s", 0, s.duration * _SLACK, "since the start", _scaled("world", "step", dt)),
         *named,
         *memory,
-        StateEntry("next_break", (), "s", *times, "when the nearest tracker breaks; -1: never",
-                   _when("world", "break_step", dt)),
-        StateEntry("breaks_left", (), "count", 0, s.breaks, "trackers that are still to break",
-                   _scaled("world", "breaks_left")),
-    ]  # fmt: skip
+        StateEntry(
+            "next_break",
+            (),
+            "s",
+            *times,
+            "when the nearest tracker breaks; -1: never",
+            _when("world", "break_step", dt),
+        ),
+        StateEntry(
+            "breaks_left", (), "count", 0, s.breaks, "trackers that are still to break", _scaled("world", "breaks_left")
+        ),
+    ]
 
 
 def _tracker_entries(s: Scenario) -> list[StateEntry]:
     limits, n, dt = _limits(s), s.num_trackers, s.control_step
     speed, duration = max(s.tracker_speeds) * _SLACK, s.duration * _SLACK
     named = [
-        StateEntry(
-            f"tracker_{name}", (n,), *limits[name], f"each tracker's {name}",
-            _scaled("tracker", name),
-        )
+        StateEntry(f"tracker_{name}", (n,), *limits[name], f"each tracker's {name}", _scaled("tracker", name))
         for name in (*_POSE, *_FIX)
-    ]  # fmt: skip
+    ]
     velocity = [
-        StateEntry(f"tracker_{name}", (n,), "m/s", -speed, speed, "velocity from its fixes",
-                   _scaled("tracker", name))
+        StateEntry(f"tracker_{name}", (n,), "m/s", -speed, speed, "velocity from its fixes", _scaled("tracker", name))
         for name in ("fix_vx", "fix_vy")
-    ]  # fmt: skip
+    ]
     times = [
-        StateEntry(f"tracker_{name}", (n,), "s", -1, duration, meaning,
-                   _when("tracker", field, dt))
+        StateEntry(f"tracker_{name}", (n,), "s", -1, duration, meaning, _when("tracker", field, dt))
         for name, field, meaning in (
             ("fix_time", "fix_step", "when its fix was taken; -1: it has none"),
             ("broken_at", "broken_at", "when it broke; -1: it works"),
@@ -231,9 +222,8 @@ def _tracker_entries(s: Scenario) -> list[StateEntry]:
             ("sensor_dead_from", "sensor_dead_from", "start of its sensor's outage; -1: none"),
             ("radio_dead_from", "radio_dead_from", "start of its radio's outage; -1: none"),
         )
-    ]  # fmt: skip
-    sees = StateEntry("tracker_sees", (n,), "1", 0, 1, "1 while it sees the target",
-                      _scaled("tracker", "sees"))  # fmt: skip
+    ]
+    sees = StateEntry("tracker_sees", (n,), "1", 0, 1, "1 while it sees the target", _scaled("tracker", "sees"))
     return [*named, *velocity, *times, sees]
 
 
@@ -245,9 +235,10 @@ def _obstacle_entries(s: Scenario) -> list[StateEntry]:
     return [
         StateEntry("obstacle_x", shape, "m", -half, half, "centre", _scaled("obstacle", "x")),
         StateEntry("obstacle_y", shape, "m", -half, half, "centre", _scaled("obstacle", "y")),
-        StateEntry("obstacle_radius", shape, "m", 0, s.obstacle_radius[1] * _SLACK, "radius",
-                   _scaled("obstacle", "radius")),
-    ]  # fmt: skip
+        StateEntry(
+            "obstacle_radius", shape, "m", 0, s.obstacle_radius[1] * _SLACK, "radius", _scaled("obstacle", "radius")
+        ),
+    ]
 
 
 def _radio_entries(s: Scenario) -> list[StateEntry]:
@@ -255,37 +246,48 @@ def _radio_entries(s: Scenario) -> list[StateEntry]:
     entries: list[StateEntry] = []
     if m:
         entries.append(
-            StateEntry("message", (kept, n, m), "1", -1, 1, "policies' messages, newest first",
-                       lambda arrays: _in_order_of_age(arrays, arrays.message))
-        )  # fmt: skip
+            StateEntry(
+                "message",
+                (kept, n, m),
+                "1",
+                -1,
+                1,
+                "policies' messages, newest first",
+                lambda arrays: _in_order_of_age(arrays, arrays.message),
+            )
+        )
     if perfect_radio(s):
         return entries
     limits, duration = _limits(s), s.duration * _SLACK
     if m:
         entries.append(
-            StateEntry("heard_message", (n, n, m), "1", -1, 1, "last received: receiver, sender",
-                       lambda arrays: arrays.heard_message)
-        )  # fmt: skip
+            StateEntry(
+                "heard_message",
+                (n, n, m),
+                "1",
+                -1,
+                1,
+                "last received: receiver, sender",
+                lambda arrays: arrays.heard_message,
+            )
+        )
     entries.append(
-        StateEntry("heard_time", (n, n), "s", -1, duration, "when that was sent; -1: never",
-                   _when("heard", "step", dt))
-    )  # fmt: skip
+        StateEntry("heard_time", (n, n), "s", -1, duration, "when that was sent; -1: never", _when("heard", "step", dt))
+    )
     entries += [
-        StateEntry(f"heard_{name}", (n, n), *limits[name], "of the sender, as last received",
-                   _of_heard(name))
+        StateEntry(f"heard_{name}", (n, n), *limits[name], "of the sender, as last received", _of_heard(name))
         for name in _POSE
-    ]  # fmt: skip
+    ]
     entries.append(
-        StateEntry("sent", (kept, n), "1", 0, 1, "1: a message was sent; in flight, newest first",
-                   _of_broadcast("sent"))
-    )  # fmt: skip
+        StateEntry(
+            "sent", (kept, n), "1", 0, 1, "1: a message was sent; in flight, newest first", _of_broadcast("sent")
+        )
+    )
     entries.append(
-        StateEntry("sent_fix_time", (kept, n), "s", -1, duration, "time of the fix sent; -1: none",
-                   _sent_fix_time(dt))
-    )  # fmt: skip
+        StateEntry("sent_fix_time", (kept, n), "s", -1, duration, "time of the fix sent; -1: none", _sent_fix_time(dt))
+    )
     entries += [
-        StateEntry(f"sent_{name}", (kept, n), *limits[name], "as sent, newest first",
-                   _of_broadcast(name))
+        StateEntry(f"sent_{name}", (kept, n), *limits[name], "as sent, newest first", _of_broadcast(name))
         for name in (*_POSE, *_FIX)
-    ]  # fmt: skip
+    ]
     return entries

@@ -32,12 +32,8 @@ from posse.scenarios import Scenario
 Column = npt.NDArray[np.float64]
 Figure = Callable[[Scenario, Records], Column]
 
-_PARAMETERS: Final = (
-    ("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots"),
-)  # fmt: skip
-_STEPS: Final[dict[str, str | None]] = {
-    "step": "step", "tracker_step": "tracker_steps", "episode": None,
-}  # fmt: skip
+_PARAMETERS: Final = (("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots"))
+_STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +65,7 @@ class Metric:
         return () if self.each_step is None else ((self.each_step, "number"),)
 
 
-def metric(
-    unit: str, *, per: str = "step", sum_type: type = np.float64
-) -> Callable[[Function], Function]:
+def metric(unit: str, *, per: str = "step", sum_type: type = np.float64) -> Callable[[Function], Function]:
     """Declare a metric with the function's name; the function's docstring is the meaning.
 
     Args:
@@ -145,10 +139,6 @@ def adding(metrics: Sequence[Metric]) -> Any:
             loop.append(f"        total_{k} += {value}")
             value = f"total_{k}"
         after.append(f"w.{m.sum_name} += {value}")
-    head = [
-        "for i in range(c.num_trackers):",
-        "    t = trackers[i]",
-        "    if t.broken_at == NEVER:",
-    ]
+    head = ["for i in range(c.num_trackers):", "    t = trackers[i]", "    if t.broken_at == NEVER:"]
     lines = [*before, *head, *(loop or ["        pass"]), *after]
     return written("add_to_sums", ("c", "w", "trackers", "slots"), lines, functions)

@@ -11,14 +11,7 @@ import posse.signals.metrics
 # Imported for their declarations of the built-in fields and metrics.
 import posse.signals.observation.mate_fields
 import posse.signals.observation.own_fields  # noqa: F401
-from posse.registry import (
-    FIELDS,
-    METRICS,
-    REWARD_TERMS,
-    SENSORS,
-    TARGET_MOTIONS,
-    Registry,
-)
+from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, Registry
 from posse.rules.declared import Rules, rules_of
 from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
@@ -126,9 +119,13 @@ def parts_for(scenario: Scenario) -> Parts:
 def added(parts: Parts) -> Iterator[tuple[Registry[Any], Any]]:
     """Yield the parts that users' modules have declared, each with its registry."""
     groups: tuple[tuple[Registry[Any], tuple[Any, ...]], ...] = (
-        (FIELDS, parts.fields), (FIELDS, parts.mate_fields), (REWARD_TERMS, parts.reward_terms),
-        (TARGET_MOTIONS, parts.motions), (SENSORS, parts.sensors), (METRICS, parts.metrics),
-    )  # fmt: skip
+        (FIELDS, parts.fields),
+        (FIELDS, parts.mate_fields),
+        (REWARD_TERMS, parts.reward_terms),
+        (TARGET_MOTIONS, parts.motions),
+        (SENSORS, parts.sensors),
+        (METRICS, parts.metrics),
+    )
     for registry, things in groups:
         yield from ((registry, thing) for thing in things if not registry.is_built_in(thing.name))
 

@@ -158,9 +158,7 @@ def _in_order(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
 
 def reward_writer(terms: Sequence[RewardTerm]) -> Any:
     """Return (c, w, t, weights (K,), values (K,)) -> reward, compiled; it fills ``values``."""
-    lines = [
-        f"values[{k}] = term_{k}({', '.join(term.parameters)})" for k, term in enumerate(terms)
-    ]
+    lines = [f"values[{k}] = term_{k}({', '.join(term.parameters)})" for k, term in enumerate(terms)]
     functions = {f"term_{k}": term.function for k, term in enumerate(terms)}
     return _summing("reward", ("c", "w", "t", "weights", "values"), lines, functions)
 
@@ -171,22 +169,14 @@ def target_reward_writer(terms: Sequence[RewardTerm]) -> Any:
     The value of a term that is for trackers only is 0.
     """
     functions = {f"term_{k}": term.of_target for k, term in enumerate(terms) if term.of_target}
-    lines = [
-        f"values[{k}] = " + (f"term_{k}(c, w)" if f"term_{k}" in functions else "ZERO")
-        for k in range(len(terms))
-    ]
+    lines = [f"values[{k}] = " + (f"term_{k}(c, w)" if f"term_{k}" in functions else "ZERO") for k in range(len(terms))]
     return _summing("target_reward", ("c", "w", "weights", "values"), lines, functions)
 
 
-def _summing(
-    name: str, parameters: tuple[str, ...], lines: list[str], functions: Mapping[str, Function]
-) -> Any:
+def _summing(name: str, parameters: tuple[str, ...], lines: list[str], functions: Mapping[str, Function]) -> Any:
     """Return a function that runs lines, which fill ``values``, and returns their weighted sum."""
     # From last to first: another order would round differently and change results.
-    sums = [
-        f"reward = float32(weights[{k}] * values[{k}] + reward)"
-        for k in range(len(lines) - 1, -1, -1)
-    ]
+    sums = [f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in range(len(lines) - 1, -1, -1)]
     names = {"ZERO": _ZERO, "float32": np.float32, **functions}
     return written(name, parameters, [*lines, "reward = ZERO", *sums, "return reward"], names)
 

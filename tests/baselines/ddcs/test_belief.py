@@ -54,9 +54,7 @@ def expected(batch: posse.Batch, ddcs: DDCS, memory: Any, o: Any, e: int, i: int
         arm = complex(slot.x, slot.y) * complex(d["frame_cos"], d["frame_sin"])
         to = own(d["now_x"] + arm.real - x, d["now_y"] + arm.imag - y)
         speed = complex(d["speed_x"], d["speed_y"]) + 1j * d["psi_rate"] * arm
-        b[SLOT_AT : SLOT_AT + 7] = [
-            1.0, *soft(*to, 0.3), *soft(*to, 3.0), *own(speed.real, speed.imag)
-        ]  # fmt: skip
+        b[SLOT_AT : SLOT_AT + 7] = [1.0, *soft(*to, 0.3), *soft(*to, 3.0), *own(speed.real, speed.imag)]
     if d["task"] == SEARCHING:
         lost = (d["step"] - max(0, d["lost_step"])) * dt
         b[SEARCH_AT] = lost / (lost + 10.0)

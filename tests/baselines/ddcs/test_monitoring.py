@@ -48,11 +48,7 @@ def fix_error(seen: Seen) -> Any:
 
 
 def test_late_fixes_are_carried_on_to_the_present() -> None:
-    settings: dict[str, Any] = {
-        "radio_delay": 8,
-        "sensing_range": 2.5,
-        "start_distance": (2.0, 3.0),
-    }
+    settings: dict[str, Any] = {"radio_delay": 8, "sensing_range": 2.5, "start_distance": (2.0, 3.0)}
     late, raw = [], []
     for k, seen in enumerate(watch("accelerating", 20, 150, split="train", **settings)):
         mask = (seen.views["target_age"] > 0.5) & (seen.views["target_age"] < 1.5)

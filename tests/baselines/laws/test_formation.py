@@ -25,18 +25,9 @@ def short_way(angle: float) -> float:
 
 
 @PROPERTY
-@given(
-    st.floats(0.3, 4.0), ANGLES, ANGLES, st.floats(0.5, 2.0), ANGLES,
-    st.floats(0.0, 1.0), st.floats(-1.0, 1.0),
-)  # fmt: skip
+@given(st.floats(0.3, 4.0), ANGLES, ANGLES, st.floats(0.5, 2.0), ANGLES, st.floats(0.0, 1.0), st.floats(-1.0, 1.0))
 def test_l_phi_asks_for_the_wanted_rates_at_every_angle(
-    l_now: float,
-    phi: float,
-    gamma: float,
-    l_d: float,
-    phi_d: float,
-    leader_speed: float,
-    leader_omega: float,
+    l_now: float, phi: float, gamma: float, l_d: float, phi_d: float, leader_speed: float, leader_omega: float
 ) -> None:
     demand = l_phi.l_phi_demand(l_now, phi, l_d, phi_d, leader_speed, leader_omega, 2.0, 1.5)
     point = complex(*l_phi.point_velocity(*demand, gamma))  # in the follower's own axes
@@ -96,9 +87,7 @@ def asked(point: complex, theta: float) -> complex:
     seen = []
     for leader in LEADERS:
         arm, wanted = point - leader, PLACE - leader
-        demand = l_phi.l_phi_demand(
-            abs(arm), cmath.phase(arm), abs(wanted), cmath.phase(wanted), 0.6, 0.0, 2.0, 2.0
-        )
+        demand = l_phi.l_phi_demand(abs(arm), cmath.phase(arm), abs(wanted), cmath.phase(wanted), 0.6, 0.0, 2.0, 2.0)
         seen.append((abs(arm), *demand, short_way(cmath.phase(arm) - theta)))
     crossing = cmath.phase(PLACE - LEADERS[1]) - cmath.phase(PLACE - LEADERS[0])
     velocity = l_l.l_l_velocity(*seen[0], *seen[1], crossing, 0.15)
@@ -116,9 +105,7 @@ def test_l_l_closes_both_distances_at_alpha(point: complex, theta: float) -> Non
 
 
 @pytest.mark.parametrize(("point", "nearer"), [(-2.05 + 2.0j, 1), (1.0 - 1.05j, 0), (1.0 + 0j, 0)])
-def test_l_l_in_line_or_on_the_wrong_side_is_l_phi_on_the_nearer(
-    point: complex, nearer: int
-) -> None:
+def test_l_l_in_line_or_on_the_wrong_side_is_l_phi_on_the_nearer(point: complex, nearer: int) -> None:
     arm, wanted = point - LEADERS[nearer], PLACE - LEADERS[nearer]
     turn = cmath.phase(wanted / arm)
     along = complex(-2.0 * (abs(arm) - abs(wanted)), 2.0 * turn * abs(arm))
@@ -146,13 +133,9 @@ def test_a_slot_moves_on_a_circle_of_its_own() -> None:
     st.complex_numbers(max_magnitude=0.99),
     st.floats(0.2, 3.0),
 )
-def test_the_slot_law_adds_an_approach_along_the_offset(
-    offset: complex, slot: complex, gain: float
-) -> None:
+def test_the_slot_law_adds_an_approach_along_the_offset(offset: complex, slot: complex, gain: float) -> None:
     def velocity(max_speed: float) -> complex:
-        return complex(
-            *slots.slot_law(offset.real, offset.imag, slot.real, slot.imag, gain, max_speed)
-        )
+        return complex(*slots.slot_law(offset.real, offset.imag, slot.real, slot.imag, gain, max_speed))
 
     free = slot + gain * offset
     assert velocity(100.0) == pytest.approx(free, abs=1e-9)

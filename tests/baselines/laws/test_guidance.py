@@ -45,8 +45,7 @@ def test_wrap_keeps_the_direction(angle: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("angle", "wrapped"),
-    [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (3 * math.pi, math.pi), (-3.0, -3.0)],
+    ("angle", "wrapped"), [(0.0, 0.0), (math.pi, math.pi), (-math.pi, math.pi), (3 * math.pi, math.pi), (-3.0, -3.0)]
 )
 def test_wrap_at_its_ends(angle: float, wrapped: float) -> None:
     assert geometry.wrap(angle) == wrapped
@@ -74,11 +73,7 @@ def test_bearing_rate_is_the_derivative_of_the_bearing(
         return target[0] - move((0j, theta), speed, -1.0, dt)[0]
 
     rate = geometry.bearing_rate(
-        r,
-        target_speed,
-        geometry.deviation(target_theta, sigma),
-        speed,
-        geometry.deviation(theta, sigma),
+        r, target_speed, geometry.deviation(target_theta, sigma), speed, geometry.deviation(theta, sigma)
     )
     step = 1e-5
     assert rate == pytest.approx(cmath.phase(gap(step) / gap(-step)) / (2 * step), abs=1e-7)
@@ -102,9 +97,7 @@ def test_pngl_without_a_deviation_is_m_sigma_off_the_line_of_sight(sigma: float,
 
 @PROPERTY
 @given(ANGLES, st.floats(0.9, 1.1), ANGLES, ANGLES)
-def test_the_general_law_is_k_sigma_plus_c(
-    sigma: float, k: float, wanted_sigma: float, psi: float
-) -> None:
+def test_the_general_law_is_k_sigma_plus_c(sigma: float, k: float, wanted_sigma: float, psi: float) -> None:
     away = short_way(sigma - wanted_sigma)
     assume(abs(away) < math.pi - 1e-6)
     sigma = wanted_sigma + away  # on the same turn as the wanted one
@@ -123,9 +116,7 @@ def test_the_rate_is_the_derivative_of_the_heading(
     def heading(t: float) -> float:
         # σ_d and ψ turn together: the slot is fixed in the slot frame.
         turned = psi_rate * t
-        return guidance.lawful_heading(
-            sigma + sigma_rate * t, k, wanted_sigma + turned, psi + turned
-        )
+        return guidance.lawful_heading(sigma + sigma_rate * t, k, wanted_sigma + turned, psi + turned)
 
     step = 1e-4
     slope = short_way(heading(step) - heading(-step)) / (2 * step)
@@ -141,9 +132,7 @@ def test_the_range_closes_at_its_gain(
     r: float, sigma: float, target_theta: float, delta: float, target_speed: float, wanted: float
 ) -> None:
     assume(abs(math.cos(delta)) > guidance.MIN_COSINE + 1e-6)
-    speed = guidance.maintenance_speed(
-        target_speed, short_way(target_theta - sigma), delta, r, wanted, 0.2, 0.8, 50.0
-    )
+    speed = guidance.maintenance_speed(target_speed, short_way(target_theta - sigma), delta, r, wanted, 0.2, 0.8, 50.0)
     assume(0.0 < speed < 50.0)
     target = cmath.rect(target_speed, target_theta)
     tracker = cmath.rect(speed, sigma + delta)
@@ -194,9 +183,7 @@ def test_a_velocity_is_taken_up_the_short_way_and_never_in_reverse(
 
 @PROPERTY
 @given(ANGLES, ANGLES, st.floats(-1.5, 1.5))
-def test_a_turning_heading_is_reached_and_then_kept(
-    theta: float, wanted: float, rate: float
-) -> None:
+def test_a_turning_heading_is_reached_and_then_kept(theta: float, wanted: float, rate: float) -> None:
     for _ in range(120):
         v = cmath.rect(0.5, wanted)
         _, omega = regulate(body(theta), v.real, v.imag, rate)

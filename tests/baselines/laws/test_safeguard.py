@@ -53,9 +53,7 @@ def drive(body: Any, x: float, y: float, wanted: tuple[float, float]) -> tuple[f
 @pytest.mark.parametrize("limits", LIMITS)
 @pytest.mark.parametrize("offset", [-0.5, -0.1, 0.0, 0.1, 0.5])
 @pytest.mark.parametrize("radius", [0.15, 0.4, 0.8])
-def test_a_resting_disc_ahead_is_gone_round(
-    limits: tuple[float, float], offset: float, radius: float
-) -> None:
+def test_a_resting_disc_ahead_is_gone_round(limits: tuple[float, float], offset: float, radius: float) -> None:
     body, x, y = body_of(0.0, 1.0, limits), -4.0, 0.0
     discs, reach, least = np.zeros(4, DISC), radius + 0.15, math.inf
     for _ in range(120):
@@ -122,11 +120,7 @@ def test_a_wall_stops_a_robot_that_presses_on(limits: tuple[float, float]) -> No
 def test_a_wanted_velocity_that_is_safe_is_left_alone() -> None:
     discs = np.zeros(4, DISC)
     count = put_disc(discs, 0, -1.0, 0.0, 0.0, 0.0, 0.3, 0.15)
-    assert safe_velocity(body_of(0.0, 1.0, LIMITS[1]), discs, count, 1.0, 0.0, WORK) == (
-        1.0,
-        0.0,
-        False,
-    )
+    assert safe_velocity(body_of(0.0, 1.0, LIMITS[1]), discs, count, 1.0, 0.0, WORK) == (1.0, 0.0, False)
 
 
 def test_a_full_list_of_discs_stays_as_it_is() -> None:

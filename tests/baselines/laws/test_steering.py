@@ -16,9 +16,7 @@ SPEEDS = st.floats(-0.6, 0.6)
 
 @PROPERTY
 @given(PLACES, PLACES, SPEEDS, SPEEDS)
-def test_the_point_is_as_far_away_as_the_robot_gets_in_that_time(
-    x: float, y: float, vx: float, vy: float
-) -> None:
+def test_the_point_is_as_far_away_as_the_robot_gets_in_that_time(x: float, y: float, vx: float, vy: float) -> None:
     t = intercept_time(x, y, vx, vy, 1.0)
     assert t >= 0.0
     assert math.isclose(math.hypot(x + vx * t, y + vy * t), t, rel_tol=1e-6, abs_tol=1e-6)

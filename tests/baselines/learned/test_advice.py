@@ -11,13 +11,7 @@ from tests.support.learned import policy_for
 import posse
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_baselines.learned.advice import (
-    Advice,
-    Advising,
-    BelievingAdviser,
-    advised,
-    check_adviser,
-)
+from posse_baselines.learned.advice import Advice, Advising, BelievingAdviser, advised, check_adviser
 from posse_baselines.playing import play
 
 DDCS = "ddcs-distributed"
@@ -25,10 +19,7 @@ SAID = load(DDCS).message_size
 
 
 def listener(
-    layout: posse.ObservationLayout,
-    answer: tuple[float, float],
-    correction: str = "motion",
-    kind: str = "slots",
+    layout: posse.ObservationLayout, answer: tuple[float, float], correction: str = "motion", kind: str = "slots"
 ) -> LearnedPolicy:
     """Return a policy whose network has a constant output."""
     encoding = Encoding.of(layout, kind)
@@ -110,9 +101,7 @@ def test_a_file_keeps_the_adviser(tmp_path: Path, correction: str, kind: str) ->
 
 
 @pytest.mark.parametrize(("correction", "believes"), [("motion", False), ("velocity", True)])
-def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was(
-    correction: str, believes: bool
-) -> None:
+def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was(correction: str, believes: bool) -> None:
     rng = np.random.default_rng(0)
     batch, alone = worlds(4), worlds(1, first=2)
     advising = Advising(check_adviser(DDCS, load(DDCS)), correction, believes=believes)

@@ -20,9 +20,7 @@ def test_another_sonar_is_refused_by_name() -> None:
 
 def test_a_policy_that_speaks_needs_messages() -> None:
     layout = posse.ObservationLayout(posse.get_scenario("smart", message_size=3))
-    policy = LearnedPolicy(
-        network_for(Encoding.of(layout).size, 5), Encoding.of(layout), {"name": "talker"}
-    )
+    policy = LearnedPolicy(network_for(Encoding.of(layout).size, 5), Encoding.of(layout), {"name": "talker"})
     assert policy.message_size == 3
     with pytest.raises(PolicyError, match="message_size"):
         policy.begin(posse.ObservationLayout(posse.get_scenario("smart")), 1)

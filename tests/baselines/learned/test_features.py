@@ -66,9 +66,7 @@ def test_no_swap_shortens_an_assignment(robots: int, slots: int, seed: int) -> N
 
 @pytest.mark.parametrize("formation", FORMATIONS)
 def test_finite_for_every_formation(formation: str) -> None:
-    batch, observations = observations_of(
-        "constant", formation=formation, formation_distance=1.0, num_trackers=12
-    )
+    batch, observations = observations_of("constant", formation=formation, formation_distance=1.0, num_trackers=12)
     rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
     assert np.isfinite(rows).all()
     assert np.abs(rows[:, :NUM_FEATURES]).max() <= 4

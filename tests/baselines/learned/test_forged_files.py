@@ -99,9 +99,7 @@ def test_descriptions_that_make_no_policy(
     assert len(str(caught.value)) < 1000
 
 
-def test_fields_with_long_names_are_named_in_short(
-    tmp_path: Path, described: dict[str, Any]
-) -> None:
+def test_fields_with_long_names_are_named_in_short(tmp_path: Path, described: dict[str, Any]) -> None:
     described["encoding"]["fields"][0][:3:2] = ["x" * 5000, "x" * 5000]
     policy = LearnedPolicy.from_file(forged(tmp_path, described))
     with pytest.raises(PolicyError, match="do not fit") as caught:
@@ -110,9 +108,7 @@ def test_fields_with_long_names_are_named_in_short(
 
 
 @pytest.mark.parametrize("missing", ["format", "limit", "activation", "output", "encoding", "card"])
-def test_descriptions_that_lack_something(
-    tmp_path: Path, described: dict[str, Any], missing: str
-) -> None:
+def test_descriptions_that_lack_something(tmp_path: Path, described: dict[str, Any], missing: str) -> None:
     del described[missing]
     with pytest.raises(PolicyError, match=f"damaged: KeyError.*{missing}"):
         LearnedPolicy.from_file(forged(tmp_path, described))
@@ -150,27 +146,27 @@ DEEP = "[" * 200_000 + "]" * 200_000
         ("layers.7.weight", TENSORS["layers.2.weight"]),
     ],
 )
-def test_arrays_that_make_no_network(
-    tmp_path: Path, described: dict[str, Any], name: str, array: Any
-) -> None:
+def test_arrays_that_make_no_network(tmp_path: Path, described: dict[str, Any], name: str, array: Any) -> None:
     path = forged(tmp_path, described, {**TENSORS, name: np.asarray(array)})
     with pytest.raises(PolicyError, match=r"forged\.safetensors"):
         LearnedPolicy.from_file(path)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
-@given(
-    exponents=st.lists(st.floats(0, 38), min_size=4, max_size=4),
-    activation=st.sampled_from(["tanh", "relu"]),
-)
+@given(exponents=st.lists(st.floats(0, 38), min_size=4, max_size=4), activation=st.sampled_from(["tanh", "relu"]))
 def test_whatever_is_accepted_acts_in_the_box(exponents: list[float], activation: str) -> None:
     """Finite weights that could overflow are refused; all others give finite actions."""
     import tempfile
 
     description = {
-        "format": 1, "limit": 5.0, "activation": activation, "output": "clip", "adviser": None,
-        "encoding": POLICY.encoding.to_dict(), "card": {},
-    }  # fmt: skip
+        "format": 1,
+        "limit": 5.0,
+        "activation": activation,
+        "output": "clip",
+        "adviser": None,
+        "encoding": POLICY.encoding.to_dict(),
+        "card": {},
+    }
     scaled = dict(TENSORS)
     for (name, array), exponent in zip(list(TENSORS.items())[1:5], exponents, strict=True):
         with np.errstate(over="ignore"):

@@ -56,9 +56,19 @@ def problems_of(path: Path) -> list[str]:
     if json.loads(path.with_suffix(".json").read_text()) != card:
         found.append("the card beside it is not the one inside")
     needed = {
-        "check", "choice", "command", "commit", "curve", "encoding_hash", "name", "seed",
-        "settings", "trained_splits", "training_seeds", "validation_score",
-    }  # fmt: skip
+        "check",
+        "choice",
+        "command",
+        "commit",
+        "curve",
+        "encoding_hash",
+        "name",
+        "seed",
+        "settings",
+        "trained_splits",
+        "training_seeds",
+        "validation_score",
+    }
     if missing := sorted(needed - set(card)):
         return [*found, f"its card lacks {', '.join(missing)}"]
     if policy.name != path.stem:
@@ -67,10 +77,7 @@ def problems_of(path: Path) -> list[str]:
         found.append(f"{len(card['training_seeds'])} training seeds")
     if card["encoding_hash"] != policy.encoding.digest:
         found.append("its inputs are not those that it was trained with")
-    if "train" not in policy.trained_splits or "test" in (
-        *policy.trained_splits,
-        card["chosen_on"],
-    ):
+    if "train" not in policy.trained_splits or "test" in (*policy.trained_splits, card["chosen_on"]):
         found.append(f"trained on {policy.trained_splits}, chosen on {card['chosen_on']!r}")
     if re.search(r"(?<![\w.])/(tmp|home|root|work|Users)/", json.dumps(card)):
         found.append("its card names a folder of the machine it was trained on")
@@ -78,8 +85,7 @@ def problems_of(path: Path) -> list[str]:
     for play, scenario in zip(card["check"]["plays"], scenarios, strict=True):
         if scenario.version != play["version"]:
             found.append(
-                f"it was trained on version {play['version']} of {scenario.name!r}, "
-                f"which is now at {scenario.version}"
+                f"it was trained on version {play['version']} of {scenario.name!r}, which is now at {scenario.version}"
             )
         needs = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
         Encoder(policy.encoding, posse.ObservationLayout(needs))
@@ -94,10 +100,7 @@ def test_a_shipped_file_has_all_that_it_needs(path: Path) -> None:
 
 @pytest.mark.parametrize(
     "path",
-    [
-        pytest.param(path, marks=() if path.stem == "learned-smart" else pytest.mark.long)
-        for path in FILES
-    ],
+    [pytest.param(path, marks=() if path.stem == "learned-smart" else pytest.mark.long) for path in FILES],
     ids=lambda path: path.stem,
 )
 def test_a_shipped_policy_scores_what_its_card_says(path: Path) -> None:
@@ -155,9 +158,14 @@ def seeker(gain: float = 1.0) -> LearnedPolicy:
     weight = np.zeros((2, encoding.size), np.float32)
     weight[0, 16] = weight[1, 17] = gain  # ahead and left of the slot among the features
     network = Network(
-        np.zeros(encoding.size, np.float32), np.full(encoding.size, 3, np.float32), 10.0,
-        (weight,), (np.array([0.2, 0.0], np.float32),), "tanh", "clip",
-    )  # fmt: skip
+        np.zeros(encoding.size, np.float32),
+        np.full(encoding.size, 3, np.float32),
+        10.0,
+        (weight,),
+        (np.array([0.2, 0.0], np.float32),),
+        "tanh",
+        "clip",
+    )
     return LearnedPolicy(network, encoding, {"name": "learned-made-up"})
 
 

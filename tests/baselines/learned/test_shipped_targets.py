@@ -38,8 +38,6 @@ def test_a_shipped_target_is_what_its_card_says(path: Path) -> None:
     assert "test" not in policy.trained_splits
     assert comparison["cost"]["low"] >= 0.10, "than the scripted target, for the reference team"
     check = card["check"]
-    again = make_target_check(
-        check["team"], get_scenario(check["scenario"]), load_target(path.stem)
-    )
+    again = make_target_check(check["team"], get_scenario(check["scenario"]), load_target(path.stem))
     assert again["version"] == check["version"]
     assert again["score"] == pytest.approx(check["score"], abs=TOLERANCE)

@@ -17,9 +17,12 @@ from posse_baselines.ddcs import FLOCKING
 OFFSET = 0.15  # m, of the control point
 ALPHA = 2.0  # 1/s
 LIMITS: dict[str, Any] = {
-    "tracker_speed": 2.0, "tracker_turn_rate": 10.0, "target_speed": 1.2, "num_trackers": 2,
+    "tracker_speed": 2.0,
+    "tracker_turn_rate": 10.0,
+    "target_speed": 1.2,
+    "num_trackers": 2,
     "start_distance": (0.5, 6.0),
-}  # fmt: skip
+}
 """Wide enough to avoid limits. In the first step, 0.6 of the own speed is expected of others."""
 WING = 1.2 * math.sqrt(0.5)
 PLACE = complex(-WING, WING)
@@ -39,11 +42,18 @@ def team(
     start = [(z.real, z.imag, theta * i) for i, z in enumerate((leader, follower))]
     return list(
         drive(
-            policy, "constant", 1, round(seconds / dt), tracker_pose=start,
-            target_pose=(0.0, 0.0, 0.0), target=target, control_step=dt, physics_step=dt / 2,
+            policy,
+            "constant",
+            1,
+            round(seconds / dt),
+            tracker_pose=start,
+            target_pose=(0.0, 0.0, 0.0),
+            target=target,
+            control_step=dt,
+            physics_step=dt / 2,
             **LIMITS,
         )
-    )  # fmt: skip
+    )
 
 
 def control_point(now: Instant) -> tuple[complex, float]:
@@ -119,11 +129,18 @@ def three(policy: str | Policy, error: complex, dt: float) -> list[Instant]:
     places = (-1.2 + 0j, -1.2 + PLACE, -1.2 + PLACE.conjugate() + error)
     return list(
         drive(
-            policy, "constant", 1, round(2.0 / dt), target=lambda _: (1.2, 0.0),
-            tracker_pose=[(z.real, z.imag, 0.0) for z in places], target_pose=(0.0, 0.0, 0.0),
-            control_step=dt, physics_step=dt / 2, **{**LIMITS, "num_trackers": 3},
+            policy,
+            "constant",
+            1,
+            round(2.0 / dt),
+            target=lambda _: (1.2, 0.0),
+            tracker_pose=[(z.real, z.imag, 0.0) for z in places],
+            target_pose=(0.0, 0.0, 0.0),
+            control_step=dt,
+            physics_step=dt / 2,
+            **{**LIMITS, "num_trackers": 3},
         )
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.003), (0.02, 0.001)])

@@ -24,10 +24,7 @@ def exact_time(k: float, aspect: float, general: float = 1.0) -> float:
     def rates(_: float, state: Any) -> list[float]:
         r, sigma = state
         delta = (general - 1.0) * sigma
-        return [
-            math.cos(sigma) / k - math.cos(delta),
-            (-math.sin(sigma) / k - math.sin(delta)) / r,
-        ]
+        return [math.cos(sigma) / k - math.cos(delta), (-math.sin(sigma) / k - math.sin(delta)) / r]
 
     def met(_: float, state: Any) -> float:
         return float(state[0]) - LAST
@@ -45,14 +42,23 @@ def intercept_times(policy: str | Policy, k: float, dt: float, general: float = 
         [
             np.abs(now.line_of_sight[:, 0])
             for now in drive(
-                policy, "constant", len(ASPECTS), math.ceil(1.1 * longest / dt),
-                tracker_pose=tracker, target_pose=np.zeros((len(ASPECTS), 3)),
-                num_trackers=1, control_step=dt, physics_step=dt / 2, target_speed=1.0 / k,
-                tracker_turn_rate=6.0, formation_distance=0.35, tolerance=0.1,
+                policy,
+                "constant",
+                len(ASPECTS),
+                math.ceil(1.1 * longest / dt),
+                tracker_pose=tracker,
+                target_pose=np.zeros((len(ASPECTS), 3)),
+                num_trackers=1,
+                control_step=dt,
+                physics_step=dt / 2,
+                target_speed=1.0 / k,
+                tracker_turn_rate=6.0,
+                formation_distance=0.35,
+                tolerance=0.1,
                 start_distance=(1.0, 10.0),
             )
         ]
-    )  # fmt: skip
+    )
     after = (ranges <= LAST).argmax(axis=0)
     assert (after > 0).all()
     column = np.arange(len(ASPECTS))
@@ -61,9 +67,7 @@ def intercept_times(policy: str | Policy, k: float, dt: float, general: float = 
 
 
 @pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.025), (0.05, 0.010), (0.01, 0.002)])
-def test_velocity_pursuit_meets_its_target_when_the_closed_form_says(
-    dt: float, allowed: float
-) -> None:
+def test_velocity_pursuit_meets_its_target_when_the_closed_form_says(dt: float, allowed: float) -> None:
     for k in RATIOS:
         times = intercept_times("velocity-pursuit", k, dt)
         exact = [exact_time(k, aspect) for aspect in ASPECTS]
@@ -84,11 +88,16 @@ def on_a_circle(policy: str | Policy, seconds: float, rate: float = 0.3) -> list
     """One tracker after a target on a circle of 2 m about (0, 2)."""
     return list(
         drive(
-            policy, "constant", 1, round(10 * seconds), num_trackers=1,
-            tracker_pose=[(-1.2, -1.0, 0.0)], target_pose=(0.0, 0.0, 0.0),
+            policy,
+            "constant",
+            1,
+            round(10 * seconds),
+            num_trackers=1,
+            tracker_pose=[(-1.2, -1.0, 0.0)],
+            target_pose=(0.0, 0.0, 0.0),
             target=lambda _: (0.6, rate),
         )
-    )  # fmt: skip
+    )
 
 
 def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> None:
@@ -105,11 +114,17 @@ def test_the_range_rests_whatever_the_target_s_angle() -> None:
     ranges = [
         abs(now.line_of_sight[0, 0])
         for now in drive(
-            with_settings("velocity-pursuit", range_gain=0.1), "constant", 1, 100,
-            num_trackers=1, tracker_pose=[(-1.2, 0.0, 0.0)], target_pose=(0.0, 0.0, 0.0),
-            target=lambda t: (0.6, 0.5 * math.sin(2.0 * t)), tracker_turn_rate=4.0,
+            with_settings("velocity-pursuit", range_gain=0.1),
+            "constant",
+            1,
+            100,
+            num_trackers=1,
+            tracker_pose=[(-1.2, 0.0, 0.0)],
+            target_pose=(0.0, 0.0, 0.0),
+            target=lambda t: (0.6, 0.5 * math.sin(2.0 * t)),
+            tracker_turn_rate=4.0,
         )
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(ranges, 1.2, atol=0.02)
 
 
@@ -120,9 +135,15 @@ def test_chase_and_maintenance_change_with_hysteresis() -> None:
     for pose in ((-2.4, 0.0, 0.0), (-1.2, 0.0, 2.5)):
         tasks = set()
         for now in drive(
-            "velocity-pursuit", "constant", 1, 60, num_trackers=1, target_speed=0.5,
-            tracker_pose=[pose], target_pose=(0.0, 0.0, 0.0),
-        ):  # fmt: skip
+            "velocity-pursuit",
+            "constant",
+            1,
+            60,
+            num_trackers=1,
+            target_speed=0.5,
+            tracker_pose=[pose],
+            target_pose=(0.0, 0.0, 0.0),
+        ):
             excess, task = abs(now.line_of_sight[0, 0]) - 1.2, int(now.notes["task"][0, 0])
             if excess < 0.15:
                 assert task == FLOCKING
@@ -149,10 +170,15 @@ def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: f
     policy = load(name)
     seen = list(
         drive(
-            policy, "paper-distributed", worlds, 250, tracker_pose=starts,
-            target_pose=np.tile([0.0, 0.0, theta], (worlds, 1)), start_distance=(0.5, 6.0),
+            policy,
+            "paper-distributed",
+            worlds,
+            250,
+            tracker_pose=starts,
+            target_pose=np.tile([0.0, 0.0, theta], (worlds, 1)),
+            start_distance=(0.5, 6.0),
         )
-    )  # fmt: skip
+    )
     relative = np.stack([-now.line_of_sight for now in seen])
     settled = np.abs(relative[200:] - relative[-1]).max(axis=(0, 2)) < 0.1
     assert settled.all()
@@ -169,9 +195,14 @@ def test_without_a_deviation_the_bearing_settles_at_the_heading_over_k() -> None
     bearings = []
     for k in (0.9, 1.0, 1.1):
         *_, last = drive(
-            with_settings("velocity-pursuit", navigation_constant=k), "constant", 1, 400,
-            num_trackers=1, tracker_pose=[(4.0, -1.0, 3.0)], target_pose=(0.0, 0.0, 2.6),
-        )  # fmt: skip
+            with_settings("velocity-pursuit", navigation_constant=k),
+            "constant",
+            1,
+            400,
+            num_trackers=1,
+            tracker_pose=[(4.0, -1.0, 3.0)],
+            target_pose=(0.0, 0.0, 2.6),
+        )
         bearings.append(np.angle(last.line_of_sight[0, 0]))
         assert abs(last.line_of_sight[0, 0]) == pytest.approx(1.2, abs=0.01)
     np.testing.assert_allclose(bearings, [2.6 / 0.9, 2.6, 2.6 / 1.1], atol=0.01)
@@ -184,11 +215,15 @@ def test_the_bearing_converges_at_the_stated_rate() -> None:
             [
                 np.angle(now.line_of_sight[0, 0])
                 for now in drive(
-                    with_settings("pngl", navigation_constant=k), "constant", 1, 60,
-                    num_trackers=1, target_pose=(0.0, 0.0, 0.0),
+                    with_settings("pngl", navigation_constant=k),
+                    "constant",
+                    1,
+                    60,
+                    num_trackers=1,
+                    target_pose=(0.0, 0.0, 0.0),
                     tracker_pose=[(-1.2 * math.cos(0.2), -1.2 * math.sin(0.2), k * 0.2)],
                 )
             ]
-        )  # fmt: skip
+        )
         rate = np.log(errors[10] / errors[50]) / 4.0
         assert rate == pytest.approx(k * 0.6 / 1.2, rel=0.03)

@@ -110,9 +110,7 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 def test_it_plays_past_the_end_of_episodes(autoreset: str) -> None:
-    batch = posse.batch(
-        "obstacles", 3, autoreset=autoreset, horizon=25, settle_time=1.0, start_distance=(1.5, 3.0)
-    )
+    batch = posse.batch("obstacles", 3, autoreset=autoreset, horizon=25, settle_time=1.0, start_distance=(1.5, 3.0))
     played = rollout(batch, Planner(QUICK))
     steps = [step for step, _ in zip(played, range(60), strict=False)]
     assert len(steps) == (25 if autoreset == "disabled" else 60)

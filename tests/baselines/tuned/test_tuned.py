@@ -63,9 +63,7 @@ def test_a_file_says_where_it_is_from(name: str, path: Path) -> None:
 @pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
 def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None:
     check = read_tuned(path).card["check"]
-    results = evaluate(
-        name, path.stem, check["worlds"], check["seed"], split=check["split"], progress=False
-    )
+    results = evaluate(name, path.stem, check["worlds"], check["seed"], split=check["split"], progress=False)
     assert results["safe_score"].mean() == pytest.approx(check["safe_score"], abs=TOLERANCE)
 
 
@@ -86,8 +84,7 @@ def test_without_a_file_the_untuned_policy_is_played(name: str) -> None:
     scenario = "paper-distributed"
     assert scenario not in tuned_files(name)
     np.testing.assert_array_equal(
-        play(batch_of(scenario), load(name))["score"],
-        play(batch_of(scenario), load(TUNED[name]))["score"],
+        play(batch_of(scenario), load(name))["score"], play(batch_of(scenario), load(TUNED[name]))["score"]
     )
 
 

@@ -80,17 +80,14 @@ BOUNDS = np.sign(VALUES + 0.1)
     ("make", "actions"),
     [
         (lambda: posse.batch("smart", num_trackers=3), lambda a: a[None]),
-        (lambda: posse.parallel_env("smart", num_trackers=3),
-         lambda a: {f"tracker_{i}": a[i] for i in range(3)}),
-        (lambda: gymnasium.make("posse/Team-v0", scenario="smart", num_trackers=3).unwrapped,
-         lambda a: a),
+        (lambda: posse.parallel_env("smart", num_trackers=3), lambda a: {f"tracker_{i}": a[i] for i in range(3)}),
+        (lambda: gymnasium.make("posse/Team-v0", scenario="smart", num_trackers=3).unwrapped, lambda a: a),
         (lambda: gymnasium.make("posse/Solo-v0", scenario="smart").unwrapped, lambda a: a[0]),
-        (lambda: gymnasium.make_vec("posse/Team-v0", 1, scenario="smart", num_trackers=3),
-         lambda a: a[None]),
+        (lambda: gymnasium.make_vec("posse/Team-v0", 1, scenario="smart", num_trackers=3), lambda a: a[None]),
         (lambda: gymnasium.make_vec("posse/Solo-v0", 1, scenario="smart"), lambda a: a[:1]),
     ],
     ids=["batch", "parallel", "team", "solo", "team vector", "solo vector"],
-)  # fmt: skip
+)
 def test_a_step_from_just_outside_is_the_bound_s(make: Any, actions: Any) -> None:
     one, other = make(), make()
     one.reset(seed=0)

@@ -164,9 +164,7 @@ def test_contact_terminates_where_it_is_asked_for() -> None:
 
 
 def test_info_says_who_is_broken() -> None:
-    env = gymnasium.make(
-        TEAM, scenario="leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4)
-    )
+    env = gymnasium.make(TEAM, scenario="leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4))
     env.reset(seed=0)
     working = [int(info["working"].sum()) for *_, info in play(env, 10)]
     assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
@@ -224,9 +222,7 @@ def test_episodes_are_counted_and_filmed(tmp_path: Path) -> None:
     pytest.importorskip("moviepy")
     inner = gymnasium.make(TEAM, render_mode="rgb_array", horizon=8, settle_time=0.5)
     env = RecordEpisodeStatistics(
-        RecordVideo(
-            inner, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True
-        )
+        RecordVideo(inner, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True)
     )
     env.reset(seed=0)
     steps = play(env, 8)
@@ -263,7 +259,5 @@ def test_the_ids_can_be_written_down() -> None:
         env = gymnasium.make(name, scenario="smart", num_trackers=1)
         assert type(env.unwrapped) is cls
         assert env.spec is not None
-        assert json.loads(env.spec.to_json())["kwargs"] == {
-            "scenario": "smart", "num_trackers": 1,
-        }  # fmt: skip
+        assert json.loads(env.spec.to_json())["kwargs"] == {"scenario": "smart", "num_trackers": 1}
         assert gymnasium.make(env.spec).reset(seed=0)[0].shape == env.reset(seed=0)[0].shape

@@ -34,9 +34,7 @@ VARIANTS: list[dict[str, Any]] = [
     {"scenario": "field", "message_size": 2},
     {"scenario": "constant", "num_trackers": 1},
 ]
-variants = pytest.mark.parametrize(
-    "settings", VARIANTS, ids=lambda s: "-".join(map(str, s.values()))
-)
+variants = pytest.mark.parametrize("settings", VARIANTS, ids=lambda s: "-".join(map(str, s.values())))
 
 
 def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
@@ -46,10 +44,7 @@ def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
     for _ in range(steps):
         if not env.agents:
             returned.append(env.reset())
-        actions = {
-            agent: rng.uniform(-1, 1, env.action_space(agent).shape).astype(np.float32)
-            for agent in env.agents
-        }
+        actions = {agent: rng.uniform(-1, 1, env.action_space(agent).shape).astype(np.float32) for agent in env.agents}
         returned.append(env.step(actions))
     return returned
 
@@ -150,9 +145,7 @@ def test_the_same_seed_gives_the_same_episodes_in_another_process() -> None:
         "print(env.state().tobytes().hex())\n"
     )
     results = {
-        subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
         for _ in range(2)
     }
     namespace: dict[str, Any] = {}
@@ -202,9 +195,7 @@ def test_without_a_seed_environments_differ() -> None:
 def test_it_starts_from_given_poses() -> None:
     env = posse.parallel_env("constant", num_trackers=2)
     poses = [[1.0, 2.0, 0.5], [-3.0, 0.0, -1.0]]
-    observations, _ = env.reset(
-        seed=0, options={"tracker_pose": poses, "target_pose": [0.0, -1.0, 2.0]}
-    )
+    observations, _ = env.reset(seed=0, options={"tracker_pose": poses, "target_pose": [0.0, -1.0, 2.0]})
     for agent, (x, y, heading) in zip(env.agents, poses, strict=True):
         views = env.layout.views(observations[agent])
         assert views["position"] == pytest.approx([x, y])
@@ -232,9 +223,7 @@ def test_the_end_is_told_once_with_every_metric() -> None:
 
 
 def test_contact_terminates_where_it_is_asked_for() -> None:
-    env = posse.parallel_env(
-        "constant", num_trackers=1, terminate_on_contact=True, target_speed=0.0
-    )
+    env = posse.parallel_env("constant", num_trackers=1, terminate_on_contact=True, target_speed=0.0)
     env.reset(options={"tracker_pose": [[-1.0, 0, 0]], "target_pose": [0.0, 0, 0]})
     for _ in range(20):
         *_, terminations, truncations, infos = env.step({"tracker_0": f32([1, 0])})

@@ -133,10 +133,7 @@ def test_an_agent_whose_episode_is_over_acts_no_more() -> None:
         ({"num_worlds": 2**50}, r"num_worlds=1125899906842624 of \d+ bytes each .*: lower it"),
         ({"num_threads": 10**5000}, r"num_threads=<int .* below 2\*\*63"),
         ({"first_world": 2**63}, r"first_world=9223372036854775808 must .* below 2\*\*63"),
-        (
-            {"first_world": 2**63 - 1},
-            r"first_world=.* num_worlds=2 go beyond .*: lower first_world",
-        ),
+        ({"first_world": 2**63 - 1}, r"first_world=.* num_worlds=2 go beyond .*: lower first_world"),
         ({"seed": 10**5000}, r"seed=<int .*\[0, 2\*\*63\)"),
         ({"split": np.zeros(2)}, r"unknown split array.*splits are: train"),
         ({"autoreset": LONG_NAME}, r"unknown autoreset mode 'xxx.*\(5,002 characters\)"),

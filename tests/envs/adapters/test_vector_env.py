@@ -19,10 +19,16 @@ from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 # Terminations (on contact) and truncations, at different times in different worlds, and breaks.
 BUSY: dict[str, Any] = {
-    "scenario": "constant", "horizon": 25, "settle_time": 0.5, "terminate_on_contact": True,
-    "arena": 10.0, "num_obstacles": 2, "obstacle_gap": 0.6, "start_distance": (1.0, 4.0),
+    "scenario": "constant",
+    "horizon": 25,
+    "settle_time": 0.5,
+    "terminate_on_contact": True,
+    "arena": 10.0,
+    "num_obstacles": 2,
+    "obstacle_gap": 0.6,
+    "start_distance": (1.0, 4.0),
     "obstacle_radius": (0.4, 0.6),
-}  # fmt: skip
+}
 MODES = list(AutoresetMode)
 modes = pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
 names = pytest.mark.parametrize("name", [TEAM, SOLO])
@@ -30,16 +36,12 @@ E = 4
 
 
 def vector(name: str = TEAM, **settings: Any) -> TeamVectorEnv:
-    env = gymnasium.make_vec(
-        name, settings.pop("num_envs", E), vectorization_mode="vector_entry_point", **settings
-    )
+    env = gymnasium.make_vec(name, settings.pop("num_envs", E), vectorization_mode="vector_entry_point", **settings)
     assert isinstance(env, TeamVectorEnv)
     return env
 
 
-def reset_where_it_ended(
-    env: VectorEnv[Any, Any, Any], mode: AutoresetMode, ended: Any
-) -> tuple[Any, Any] | None:
+def reset_where_it_ended(env: VectorEnv[Any, Any, Any], mode: AutoresetMode, ended: Any) -> tuple[Any, Any] | None:
     if mode is not AutoresetMode.DISABLED or not ended.any():
         return None
     return env.reset(options={"reset_mask": ended})
@@ -80,10 +82,7 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
         terminations += mine[2].sum()
         truncations += mine[3].sum()
         ended = mine[2] | mine[3]
-        assert same(
-            reset_where_it_ended(ours, mode, ended),
-            reset_where_it_ended(theirs, mode, ended.copy()),
-        )
+        assert same(reset_where_it_ended(ours, mode, ended), reset_where_it_ended(theirs, mode, ended.copy()))
     assert terminations > 0
     assert truncations > 0
 

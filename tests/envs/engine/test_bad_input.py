@@ -24,19 +24,11 @@ MAKERS: dict[str, Any] = {
     "registry": lambda *a, **k: pettingzoo.make(
         "parallel", "posse/track-v0", **dict(zip(["scenario"], a, strict=False)), **k
     ),
-    "team": lambda *a, **k: gymnasium.make(
-        TEAM, **dict(zip(["scenario"], a, strict=False)), **k
-    ),
-    "solo": lambda *a, **k: gymnasium.make(
-        SOLO, **dict(zip(["scenario"], a, strict=False)), **k
-    ),
-    "team vector": lambda *a, **k: gymnasium.make_vec(
-        TEAM, 2, **dict(zip(["scenario"], a, strict=False)), **k
-    ),
-    "solo vector": lambda *a, **k: gymnasium.make_vec(
-        SOLO, 2, **dict(zip(["scenario"], a, strict=False)), **k
-    ),
-}  # fmt: skip
+    "team": lambda *a, **k: gymnasium.make(TEAM, **dict(zip(["scenario"], a, strict=False)), **k),
+    "solo": lambda *a, **k: gymnasium.make(SOLO, **dict(zip(["scenario"], a, strict=False)), **k),
+    "team vector": lambda *a, **k: gymnasium.make_vec(TEAM, 2, **dict(zip(["scenario"], a, strict=False)), **k),
+    "solo vector": lambda *a, **k: gymnasium.make_vec(SOLO, 2, **dict(zip(["scenario"], a, strict=False)), **k),
+}
 makers = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
 GOOD = {f"tracker_{i}": f32([0.5, 0.1 * i]) for i in range(5)}
 
@@ -59,9 +51,7 @@ GOOD = {f"tracker_{i}": f32([0.5, 0.1 * i]) for i in range(5)}
         ([], {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
     ],
 )
-def test_impossible_settings(
-    make: Any, arguments: list[str], settings: dict[str, Any], message: str
-) -> None:
+def test_impossible_settings(make: Any, arguments: list[str], settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make(*arguments, **settings)
 
@@ -76,9 +66,7 @@ def test_impossible_settings(
         ({"render_mode": "ansi"}, r"unknown render_mode 'ansi'; modes are: human, rgb_array"),
     ],
 )
-def test_impossible_settings_of_pettingzoo(
-    make: Any, settings: dict[str, Any], message: str
-) -> None:
+def test_impossible_settings_of_pettingzoo(make: Any, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make(**settings)
 
@@ -129,9 +117,7 @@ BAD_ACTIONS: list[tuple[Any, str]] = [
     value=st.sampled_from([math.nan, math.inf, -math.inf, 1.00001, -1.00001, 3.0]),
     later=st.integers(0, 37 * 5 * 2 - 1),
 )
-def test_the_first_bad_action_is_named_wherever_it_stands(
-    number: int, value: float, later: int
-) -> None:
+def test_the_first_bad_action_is_named_wherever_it_stands(number: int, value: float, later: int) -> None:
     """Also beyond the last whole block of actions that are checked at once."""
     batch = posse.batch("constant", 37)
     batch.reset(seed=8)

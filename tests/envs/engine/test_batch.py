@@ -87,9 +87,7 @@ def test_two_batches_in_two_python_threads_do_not_disturb_each_other() -> None:
     expected = [play(posse.batch("field", 500, seed=seed), 25) for seed in (1, 2)]
     got: dict[int, list[npt.NDArray[Any]]] = {}
     threads = [
-        threading.Thread(
-            target=lambda s=seed: got.update({s: play(posse.batch("field", 500, seed=s), 25)})
-        )
+        threading.Thread(target=lambda s=seed: got.update({s: play(posse.batch("field", 500, seed=s), 25)}))
         for seed in (1, 2)
     ]
     for thread in threads:
@@ -165,9 +163,7 @@ def test_autoreset_modes_play_the_same_episodes() -> None:
         for _ in range(3):
             seen = [observations]
             for step in range(20):
-                observations, rewards, terminated, truncated, infos = batch.step(
-                    actions_for(batch, step)
-                )
+                observations, rewards, terminated, truncated, infos = batch.step(actions_for(batch, step))
                 last = step == 19
                 assert truncated.tolist() == [last] * 2
                 assert not terminated.any()
@@ -328,9 +324,7 @@ def test_bad_options_are_refused_and_change_nothing(options: dict[str, Any], wor
         batch.reset(seed=1, options=options)
     for key, array in snapshot(batch).items():
         np.testing.assert_array_equal(array, before[key], err_msg=key)
-    np.testing.assert_array_equal(
-        batch.step(actions_for(batch, 1))[0], twin.step(actions_for(batch, 1))[0]
-    )
+    np.testing.assert_array_equal(batch.step(actions_for(batch, 1))[0], twin.step(actions_for(batch, 1))[0])
 
 
 def test_a_refused_reset_leaves_the_seed() -> None:
@@ -379,9 +373,7 @@ np.savez(sys.argv[3], *here(sys.argv[1], int(sys.argv[2])))
 """
 
 
-def in_another_process(
-    tmp_path: Path, name: str, steps: int, **environment: str
-) -> list[npt.NDArray[Any]]:
+def in_another_process(tmp_path: Path, name: str, steps: int, **environment: str) -> list[npt.NDArray[Any]]:
     root = Path(__file__).parents[3]
     paths = [str(root), str(root / "envs"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     out = tmp_path / "out.npz"

@@ -13,15 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.cuda_cases import (
-    CASES,
-    WORLDS,
-    actions_for,
-    make,
-    on_host,
-    play,
-    run_in_simulator,
-)
+from tests.support.cuda_cases import CASES, WORLDS, actions_for, make, on_host, play, run_in_simulator
 
 import posse
 
@@ -50,8 +42,10 @@ def complaint(**environment: str) -> str:
     done = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "CUDA_VISIBLE_DEVICES": "", **environment},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 1
     return done.stderr
 
@@ -68,9 +62,7 @@ def test_an_unknown_device() -> None:
         posse.batch("smart", device="tpu")
 
 
-@pytest.mark.skipif(
-    importlib.util.find_spec("numba_cuda") is None, reason="needs posse[cuda], though no GPU"
-)
+@pytest.mark.skipif(importlib.util.find_spec("numba_cuda") is None, reason="needs posse[cuda], though no GPU")
 def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> None:
     """To the assembly of an H100; a function that a GPU lacks, or a call left over, would show."""
     import numba.cuda.dispatcher  # only now: it looks for a driver
@@ -90,18 +82,21 @@ def test_the_kernels_compile_for_a_device(monkeypatch: pytest.MonkeyPatch) -> No
     actions = np.zeros(batch.action_shape, np.float32)
     kernels = {
         cuda_kernels.stepping(built_in_parts()): (
-            batch._tables, batch.arrays, actions, Results(observations, rewards, terms, flags),
-            infos["score"], orders, report,
+            batch._tables,
+            batch.arrays,
+            actions,
+            Results(observations, rewards, terms, flags),
+            infos["score"],
+            orders,
+            report,
         ),
         cuda_kernels.check_actions: (batch.worlds, actions, actions.copy(), report, True),
         cuda_kernels.choose_worlds: (batch.worlds, flags[0], orders, True, np.uint64(5), 0, 0),
-    }  # fmt: skip
+    }
     for kernel, arguments in kernels.items():
         types = (numba.typeof(argument) for argument in arguments)  # type: ignore[no-untyped-call]
         signature = numba.types.void(*types)
-        assembly, _ = cuda_kernels.cuda.compile(
-            kernel.py_func, signature, device=False, abi="numba", cc=(9, 0)
-        )
+        assembly, _ = cuda_kernels.cuda.compile(kernel.py_func, signature, device=False, abi="numba", cc=(9, 0))
         assert ".entry" in assembly
         assert not re.search(r"^\s*(@\S+\s+)?call", assembly, re.MULTILINE)
         if out := os.environ.get("POSSE_TEST_ASSEMBLY"):

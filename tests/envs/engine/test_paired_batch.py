@@ -58,9 +58,7 @@ def test_it_plays_as_a_batch_whose_target_is_driven_from_outside(autoreset: str)
         theirs, *others, told = outside.step(whole)
         np.testing.assert_array_equal(rewards, others[0][:, :2])
         np.testing.assert_array_equal(truncated, others[2])
-        np.testing.assert_array_equal(
-            infos["reward_terms"]["slot"], told["reward_terms"]["slot"][:, :2]
-        )
+        np.testing.assert_array_equal(infos["reward_terms"]["slot"], told["reward_terms"]["slot"][:, :2])
         if autoreset == "same_step" and truncated.any():
             age[truncated] = 0
             np.testing.assert_array_equal(infos["final_obs"], told["final_obs"][:, :2])
@@ -71,10 +69,7 @@ def test_a_stepper_and_a_pickled_copy_go_on_as_the_batch_does() -> None:
     batch.reset()
     batch.step(actions_of(0))
     copy, other = deepcopy(batch), deepcopy(batch)  # by way of pickling
-    given, seen = (
-        np.zeros((WORLDS, 2, 2), np.float32),
-        np.zeros(batch.observation_shape, np.float32),
-    )
+    given, seen = (np.zeros((WORLDS, 2, 2), np.float32), np.zeros(batch.observation_shape, np.float32))
     rewards = np.zeros((WORLDS, 2), np.float32)
     terms = np.zeros((WORLDS, 2, len(batch.term_names)), np.float32)
     advance = other.stepper(given, seen, rewards, terms)
@@ -96,9 +91,8 @@ def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
     expected = batch.reset()
     if vector:
         env: Any = gym.make_vec(
-            "posse/Team-v0", 1, vectorization_mode="vector_entry_point", scenario=SHORT,
-            target_policy=Weaver(),
-        )  # fmt: skip
+            "posse/Team-v0", 1, vectorization_mode="vector_entry_point", scenario=SHORT, target_policy=Weaver()
+        )
     else:
         env = gym.make("posse/Team-v0", scenario=SHORT, target_policy=Weaver())
     assert env.action_space.shape[-2:] == (2, 2)
@@ -122,11 +116,7 @@ class Wrong(Weaver):
 
 @pytest.mark.parametrize(
     ("actions", "message"),
-    [
-        (np.zeros((WORLDS, 2)), "shape"),
-        (np.full((WORLDS, 1, 2), np.nan), "nan"),
-        (np.full((WORLDS, 1, 2), 1.5), "1.5"),
-    ],
+    [(np.zeros((WORLDS, 2)), "shape"), (np.full((WORLDS, 1, 2), np.nan), "nan"), (np.full((WORLDS, 1, 2), 1.5), "1.5")],
 )
 def test_invalid_actions_of_the_target_are_named(actions: Any, message: str) -> None:
     batch = posse.batch(SHORT, WORLDS, target_policy=Wrong(actions))

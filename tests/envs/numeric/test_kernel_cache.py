@@ -179,13 +179,15 @@ class Herd:
         done = (
             subprocess.run(  # since they matter before posse is imported
                 [sys.executable, "-W", "error", "-c", self.main],
-                cwd=self.root, env=variables, capture_output=True, text=True, check=False,
+                cwd=self.root,
+                env=variables,
+                capture_output=True,
+                text=True,
+                check=False,
             )
             if environment.keys() & {"PYTHONPATH", "NUMBA_DISABLE_JIT"}
-            else forks_of("posse.numeric", options=("-W", "error")).run(
-                self.main, self.root, variables
-            )
-        )  # fmt: skip
+            else forks_of("posse.numeric", options=("-W", "error")).run(self.main, self.root, variables)
+        )
         assert done.returncode == 0, done.stderr
         answer, hits, misses = done.stdout.split()
         return Run(float(answer), int(hits), int(misses), done.stderr)
@@ -206,9 +208,7 @@ def herd(tmp_path: Path) -> Herd:
     return herd
 
 
-def test_a_kernel_is_compiled_once_and_again_when_a_helper_in_another_file_changes(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_a_kernel_is_compiled_once_and_again_when_a_helper_in_another_file_changes(herd: Herd, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
 
     first = herd.run(cache)
@@ -230,9 +230,7 @@ def test_a_kernel_is_compiled_once_and_again_when_a_helper_in_another_file_chang
 
 
 @pytest.mark.long
-def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(herd: Herd, tmp_path: Path) -> None:
     Herd(herd.root, ONE_MAIN).run(tmp_path / "cache")
     loaded = Herd(herd.root, LOADED_MAIN).run(tmp_path / "cache")
     ready_when_loaded, ready_after_compiling = loaded.hits, loaded.misses
@@ -240,9 +238,7 @@ def test_a_kernel_from_disk_does_not_wait_for_the_compiler_which_still_works(
     assert (ready_when_loaded, ready_after_compiling) == (0, 1)
 
 
-def test_kernels_with_other_constants_are_not_taken_for_each_other(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_kernels_with_other_constants_are_not_taken_for_each_other(herd: Herd, tmp_path: Path) -> None:
     """As for own kernels: one source, with the scenario's numbers as constants."""
     (herd.root / "herd" / "kernels.py").write_text(CLOSURE_KERNEL)
     for number, hits in ((2, 0), (5, 0), (2, 1), (5, 1)):
@@ -251,9 +247,7 @@ def test_kernels_with_other_constants_are_not_taken_for_each_other(
 
 
 @pytest.mark.long
-def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_stamp(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_sources_that_change_while_a_process_runs_are_not_filed_under_the_old_stamp(herd: Herd, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     kernels = herd.root / "herd" / "kernels.py"
     # The module rewrites its helper file after the import, as an edit would.
@@ -283,9 +277,7 @@ def test_an_edit_of_a_room_without_kernels_recompiles_nothing(herd: Herd, tmp_pa
     assert runs == [0, 1, 1, 0, 0]
 
 
-def test_an_edit_of_another_package_that_a_kernel_calls_compiles_it_again(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_an_edit_of_another_package_that_a_kernel_calls_compiles_it_again(herd: Herd, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     other = herd.root / "flock"
     other.mkdir()
@@ -313,9 +305,7 @@ def test_an_edit_of_a_function_given_as_a_source_compiles_the_kernel_again(
         assert (run.answer, run.hits) == (2.0 + step, hits)
 
 
-def test_a_script_of_the_user_is_cached_and_compiled_again_when_a_constant_changes(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_a_script_of_the_user_is_cached_and_compiled_again_when_a_constant_changes(herd: Herd, tmp_path: Path) -> None:
     """Even if its file does not, since constants of compiled code can come from elsewhere."""
     cache = tmp_path / "cache"
     script = herd.root / "script.py"
@@ -328,9 +318,7 @@ def test_a_script_of_the_user_is_cached_and_compiled_again_when_a_constant_chang
     assert main.run(cache, NUMBER="1").answer == 3.0
 
 
-def test_a_cache_directory_that_cannot_be_written_costs_time_only(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_a_cache_directory_that_cannot_be_written_costs_time_only(herd: Herd, tmp_path: Path) -> None:
     in_the_way = tmp_path / "file"  # not a matter of permissions, which root ignores
     in_the_way.write_text("")
     run = herd.run(in_the_way / "cache")
@@ -347,9 +335,7 @@ def test_the_cache_directory_is_the_users_alone(herd: Herd, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o702])
-def test_a_directory_that_others_can_write_to_is_not_used(
-    herd: Herd, tmp_path: Path, mode: int
-) -> None:
+def test_a_directory_that_others_can_write_to_is_not_used(herd: Herd, tmp_path: Path, mode: int) -> None:
     cache = tmp_path / "cache"
     herd.run(cache)
     before = snapshot(cache)
@@ -365,9 +351,7 @@ def test_a_directory_that_others_can_write_to_is_not_used(
 
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="needs root to give away")
 @pytest.mark.parametrize("all_of_it", [True, False])
-def test_what_belongs_to_another_user_is_not_used(
-    herd: Herd, tmp_path: Path, all_of_it: bool
-) -> None:
+def test_what_belongs_to_another_user_is_not_used(herd: Herd, tmp_path: Path, all_of_it: bool) -> None:
     cache = tmp_path / "cache"
     herd.run(cache)
     for path in [cache] if all_of_it else list(cache.iterdir()):
@@ -416,9 +400,7 @@ def test_damaged_files_are_compiled_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_files_not_used_for_longest_are_dropped_and_nothing_else(
-    herd: Herd, tmp_path: Path
-) -> None:
+def test_files_not_used_for_longest_are_dropped_and_nothing_else(herd: Herd, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     cache.mkdir(mode=0o700)
     for number in range(300):

@@ -88,9 +88,7 @@ eight_numbers = st.lists(sensible, min_size=WIDTH, max_size=WIDTH)
 
 @settings(derandomize=True, max_examples=200, deadline=None)
 @given(eight_numbers, eight_numbers, st.permutations(range(WIDTH)))
-def test_a_lane_is_what_a_number_alone_would_be(
-    first: list[float], second: list[float], order: list[int]
-) -> None:
+def test_a_lane_is_what_a_number_alone_would_be(first: list[float], second: list[float], order: list[int]) -> None:
     a, b = np.array(first, np.float32), np.array(second, np.float32)
     b[:2] = a[:2]  # equal ones, too
     size = WIDTH * len(NUMBER_BY_NUMBER)
@@ -123,9 +121,15 @@ def test_functions_that_only_calculate_take_plain_numbers_too(first: float, seco
 def turn(rows: Numbers, out: Numbers) -> None:
     """Swap rows and columns."""
     a, b, c, d, e, f, g, h = transpose(
-        load(rows, 0), load(rows, 8), load(rows, 16), load(rows, 24),
-        load(rows, 32), load(rows, 40), load(rows, 48), load(rows, 56),
-    )  # fmt: skip
+        load(rows, 0),
+        load(rows, 8),
+        load(rows, 16),
+        load(rows, 24),
+        load(rows, 32),
+        load(rows, 40),
+        load(rows, 48),
+        load(rows, 56),
+    )
     store(out, 0, a)
     store(out, 8, b)
     store(out, 16, c)
@@ -188,13 +192,8 @@ def put_in_and_take_out(a: Numbers, number: int, out: Numbers) -> None:
 
 
 @settings(derandomize=True, max_examples=200, deadline=None)
-@given(
-    st.lists(st.floats(2.0**-40, 1e9, width=32), min_size=WIDTH, max_size=WIDTH),
-    st.integers(0, 63),
-)
-def test_a_tag_is_kept_and_changes_its_number_by_a_131072nd_at_most(
-    values: list[float], number: int
-) -> None:
+@given(st.lists(st.floats(2.0**-40, 1e9, width=32), min_size=WIDTH, max_size=WIDTH), st.integers(0, 63))
+def test_a_tag_is_kept_and_changes_its_number_by_a_131072nd_at_most(values: list[float], number: int) -> None:
     a = np.array(values, np.float32)
     for function in (put_in_and_take_out, getattr(put_in_and_take_out, "py_func", None)):
         if function is not None:
@@ -217,11 +216,8 @@ def keep_pose(trackers: Any) -> None:
 
 
 @pytest.mark.parametrize("function", [double_fix, getattr(double_fix, "py_func", double_fix)])
-def test_records_are_read_and_written_where_their_fields_are(
-    function: Callable[..., None],
-) -> None:
-    names = ("fix_x", "fix_y", "fix_cos", "fix_sin",
-             "fix_frame_cos", "fix_frame_sin", "fix_vx", "fix_vy")  # fmt: skip
+def test_records_are_read_and_written_where_their_fields_are(function: Callable[..., None]) -> None:
+    names = ("fix_x", "fix_y", "fix_cos", "fix_sin", "fix_frame_cos", "fix_frame_sin", "fix_vx", "fix_vy")
     trackers = np.zeros(3, TRACKER)
     for k, name in enumerate(TRACKER.names or ()):
         trackers[name] = k + np.arange(3)

@@ -97,8 +97,7 @@ def test_numba_still_has_the_passes_that_are_skipped() -> None:
 @pytest.mark.parametrize(("theirs", "name"), CALLED)
 def test_numba_still_has_what_is_called(theirs: type, name: str) -> None:
     assert hasattr(theirs, name), (
-        f"numba {numba.__version__} no longer has {theirs.__name__}.{name}, which "
-        f"{numba_overrides.__name__} uses"
+        f"numba {numba.__version__} no longer has {theirs.__name__}.{name}, which {numba_overrides.__name__} uses"
     )
 
 
@@ -159,9 +158,7 @@ def test_a_function_may_hold_inner_functions_and_branches_of_other_types() -> No
     assert both(2.0) == 7.0
 
 
-@pytest.mark.parametrize(
-    "decorate", [kernel, compiled, numba.njit], ids=["kernel", "compiled", "njit"]
-)
+@pytest.mark.parametrize("decorate", [kernel, compiled, numba.njit], ids=["kernel", "compiled", "njit"])
 def test_a_function_is_linked_with_all_that_it_calls(decorate: Any) -> None:
     """Also where numba itself links, in functions of a user and those called from Python."""
 

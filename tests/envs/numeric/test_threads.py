@@ -207,9 +207,7 @@ def test_workers_that_an_error_left_behind_end_and_new_ones_come() -> None:
 
 def test_many_callers_at_once_are_all_served_by_few_workers() -> None:
     ledgers = [Ledger(500, late=(0,)) for _ in range(8)]
-    callers = [
-        threading.Thread(target=run_threads, args=(ledger.work, 500, 2)) for ledger in ledgers
-    ]
+    callers = [threading.Thread(target=run_threads, args=(ledger.work, 500, 2)) for ledger in ledgers]
     for caller in callers:
         caller.start()
     most = len(workers())
@@ -255,9 +253,8 @@ def run_python(code: str, tmp_path: Path) -> str:
     script = tmp_path / "script.py"
     script.write_text(PROLOGUE + code)
     done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        capture_output=True, text=True, check=False, timeout=120,
-    )  # fmt: skip
+        [sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False, timeout=120
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 

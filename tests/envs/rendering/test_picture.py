@@ -133,9 +133,11 @@ def test_the_selected_tracker_shows_its_last_fix_where_that_was() -> None:
 
 def test_everything_drawn_is_explained() -> None:
     told = {
-        "task": [[0, 1, 2]], "leader": [[1, 1, 1]], "slot": [[0, 1, 2]],
+        "task": [[0, 1, 2]],
+        "leader": [[1, 1, 1]],
+        "slot": [[0, 1, 2]],
         "estimate": np.zeros((1, 3, 3), np.float32),
-    }  # fmt: skip
+    }
     scene = scene_of("field", 2, told, num_trackers=3)
     entries = legend_of(scene)
     assert {entry.layer for entry in entries} == set(LAYERS) - set(UNEXPLAINED)
@@ -165,9 +167,6 @@ def test_a_team_without_a_leader_has_none_in_its_legend() -> None:
 def test_numbers_are_written_on_robots_that_are_large_enough() -> None:
     scene = scene_of("smart", 3)
     for least, differs in ((8.0, True), (4.0, False)):
-        frames = [
-            drawn(scene, View(numbers=numbers, least_robot=least, trails=False))[0]
-            for numbers in (True, False)
-        ]
+        frames = [drawn(scene, View(numbers=numbers, least_robot=least, trails=False))[0] for numbers in (True, False)]
         assert (frames[0] != frames[1]).any() == differs
     assert count(frames[1], TRACKER) > 0

@@ -6,16 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.support.drawing import (
-    SIZE,
-    advance,
-    colour_at,
-    count,
-    like,
-    picture,
-    placed,
-    worlds,
-)
+from tests.support.drawing import SIZE, advance, colour_at, count, like, picture, placed, worlds
 
 import posse
 from posse.rendering.camera import Camera

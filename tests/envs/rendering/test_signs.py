@@ -7,14 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.drawing import (
-    advance,
-    colour_at,
-    like,
-    picture,
-    placed,
-    worlds,
-)
+from tests.support.drawing import advance, colour_at, like, picture, placed, worlds
 
 from posse.rendering.content.scene import read_scene
 from posse.rendering.renderer import Renderer
@@ -23,12 +16,7 @@ from posse.rendering.style import CONTACT, INK, LINK, TASK_COLOURS, TRACKER
 
 def test_links_are_drawn_between_trackers_that_hear_each_other() -> None:
     poses = [(3.0, 0.0, 0.0), (5.0, 0.0, 0.0), (-9.0, 0.0, 0.0)]
-    limited: dict[str, Any] = {
-        "radio_range": 4.0,
-        "radio_delay": 0,
-        "radio_loss": 0.0,
-        "sensing_range": math.inf,
-    }
+    limited: dict[str, Any] = {"radio_range": 4.0, "radio_delay": 0, "radio_loss": 0.0, "sensing_range": math.inf}
     batch = placed(poses, scenario="radio", **limited)
     scene = read_scene(batch)
     np.testing.assert_array_equal(scene.links, [[0, 1, 0], [1, 0, 0], [0, 0, 0]])
@@ -40,9 +28,7 @@ def test_links_are_drawn_between_trackers_that_hear_each_other() -> None:
 
 
 def test_links_fade_when_nothing_is_heard_any_more() -> None:
-    batch = placed(
-        [(3, 0, 0), (5, 0, math.pi / 2)], scenario="radio", radio_range=2.5, radio_loss=0.0
-    )
+    batch = placed([(3, 0, 0), (5, 0, math.pi / 2)], scenario="radio", radio_range=2.5, radio_loss=0.0)
     strength = []
     for _ in range(30):
         strength.append(read_scene(batch).links[0, 1])
@@ -65,9 +51,7 @@ def test_tasks_colour_the_trackers_and_leaders_are_marked() -> None:
         assert like(colour_at(renderer, plain, x, y - 0.07), TRACKER)
     # The mark is drawn over the leader only.
     above = renderer.project([[3, 3], [-3, 3], [3, -3], [-3, -3]]) - (0, 20)
-    inked = [
-        like(tuple(frame[row, column].tolist()), INK) for column, row in above.round().astype(int)
-    ]
+    inked = [like(tuple(frame[row, column].tolist()), INK) for column, row in above.round().astype(int)]
     assert inked == [False, False, True, False]
 
 

@@ -38,16 +38,12 @@ def test_the_simulation_takes_red_and_green_for_alike() -> None:
 
 @pytest.mark.parametrize("vision", VISIONS)
 @pytest.mark.parametrize("group", [ROBOTS, DARK_ROBOTS, PLAYERS, DARK_PLAYERS])
-def test_colours_that_stand_side_by_side_are_told_apart(
-    group: tuple[Colour, ...], vision: str
-) -> None:
+def test_colours_that_stand_side_by_side_are_told_apart(group: tuple[Colour, ...], vision: str) -> None:
     for one, other in itertools.combinations(group, 2):
         assert distance(one, other, vision) >= LEAST, (one, other)
 
 
-@pytest.mark.parametrize(
-    ("curves", "paper"), [(PLAYERS, PAPER), (DARK_PLAYERS, DARK["PAPER"])], ids=["light", "dark"]
-)
+@pytest.mark.parametrize(("curves", "paper"), [(PLAYERS, PAPER), (DARK_PLAYERS, DARK["PAPER"])], ids=["light", "dark"])
 def test_curves_stand_out_from_the_paper(curves: tuple[Colour, ...], paper: Colour) -> None:
     assert min(contrast(colour, paper) for colour in curves) >= 3
 

@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from tests.support.drawing import (
-    SIZE,
-    worlds,
-)
+from tests.support.drawing import SIZE, worlds
 
 import posse
 from posse.rendering.renderer import Renderer
@@ -54,9 +51,7 @@ def test_a_window_shows_the_frame_and_closes(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("event", ["QUIT", "KEYDOWN"])
-def test_a_window_that_the_user_closes_stays_closed(
-    event: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_window_that_the_user_closes_stays_closed(event: str, monkeypatch: pytest.MonkeyPatch) -> None:
     import pygame
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")

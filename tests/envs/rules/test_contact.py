@@ -38,14 +38,20 @@ def least_gap(batch: posse.Batch) -> float:
     seed=st.integers(0, 1000),
     motion=st.sampled_from(["constant", "smart", "agent"]),
 )
-def test_discs_never_overlap_however_fast(
-    speed: float, acceleration: float, seed: int, motion: str
-) -> None:
+def test_discs_never_overlap_however_fast(speed: float, acceleration: float, seed: int, motion: str) -> None:
     batch = posse.batch(
-        num_worlds=4, num_trackers=8, arena=12.0, num_obstacles=2, start_distance=(1.0, 12.0),
-        tracker_speed=speed, tracker_turn_rate=10.0, target_speed=min(0.9 * speed, 0.9),
-        tracker_acceleration=acceleration, target_motion=motion, obstacle_gap=0.5,
-    )  # fmt: skip
+        num_worlds=4,
+        num_trackers=8,
+        arena=12.0,
+        num_obstacles=2,
+        start_distance=(1.0, 12.0),
+        tracker_speed=speed,
+        tracker_turn_rate=10.0,
+        target_speed=min(0.9 * speed, 0.9),
+        tracker_acceleration=acceleration,
+        target_motion=motion,
+        obstacle_gap=0.5,
+    )
     batch.reset(seed=seed)
     rng = np.random.default_rng(seed)
     for _ in range(25):
@@ -65,9 +71,7 @@ def test_a_fast_robot_stops_where_it_meets_what_is_in_its_way(
     speed: float, away: float, bearing: float, miss: float, obstacle: bool
 ) -> None:
     """Against the intersection of a straight line with a circle."""
-    batch = posse.batch(
-        num_trackers=2, tracker_speed=speed, physics_step=0.1, target_speed=0.5, horizon=30
-    )
+    batch = posse.batch(num_trackers=2, tracker_speed=speed, physics_step=0.1, target_speed=0.5, horizon=30)
     direction = np.exp(1j * bearing)
     start = -direction * (away + 0.3) + 1j * direction * miss
     at(batch, [15.0, 15.0, 0.0], [start.real, start.imag, bearing], [0.0, 0.0, 0.0])
@@ -86,9 +90,13 @@ def test_a_fast_robot_stops_where_it_meets_what_is_in_its_way(
 def test_walls_hold(speed: float) -> None:
     batch = posse.batch(num_trackers=4, arena=10.0, tracker_speed=speed, start_distance=(1.0, 5.0))
     at(
-        batch, [0.0, 0.0, 1.0],
-        [4.0, 1.0, 0.0], [-4.0, 1.0, math.pi], [1.0, 4.0, math.pi / 2], [1.0, -4.0, -math.pi / 2],
-    )  # fmt: skip
+        batch,
+        [0.0, 0.0, 1.0],
+        [4.0, 1.0, 0.0],
+        [-4.0, 1.0, math.pi],
+        [1.0, 4.0, math.pi / 2],
+        [1.0, -4.0, -math.pi / 2],
+    )
     for _ in range(30):
         infos = act(batch, *[[1.0, 0.0]] * 4)
     state = one_world(snapshot(batch), 0)
@@ -121,27 +129,34 @@ def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
     stay = [-1.0, 0.0]
     counts = []
     for actions in (
-        [[1.0, 0.0], stay, stay], [[1.0, 0.0], stay, stay], [[1.0, 0.0], stay, stay],
-        [stay, [1.0, 0.0], stay], [stay, [1.0, 0.0], stay], [stay, [1.0, 0.0], stay],
-        [[1.0, 0.0], stay, stay], [[1.0, 0.0], stay, stay], [[1.0, 0.0], stay, stay],
-    ):  # fmt: skip
+        [[1.0, 0.0], stay, stay],
+        [[1.0, 0.0], stay, stay],
+        [[1.0, 0.0], stay, stay],
+        [stay, [1.0, 0.0], stay],
+        [stay, [1.0, 0.0], stay],
+        [stay, [1.0, 0.0], stay],
+        [[1.0, 0.0], stay, stay],
+        [[1.0, 0.0], stay, stay],
+        [[1.0, 0.0], stay, stay],
+    ):
         infos = act(batch, *actions)
         w = batch.worlds[0]
         counts.append((int(w.contacts_tracker), int(w.contacts_target), int(w.contacts_obstacle)))
         assert infos["reward_terms"]["contact"].shape == (1, 3)
-    assert counts == [
-        (0, 0, 0), (1, 0, 0), (1, 0, 0),
-        (1, 0, 0), (1, 1, 0), (1, 1, 0),
-        (1, 1, 0), (2, 1, 0), (2, 1, 0),
-    ]  # fmt: skip
+    assert counts == [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 0), (1, 1, 0), (2, 1, 0), (2, 1, 0)]
 
 
 def test_a_robot_that_is_far_from_all_is_swept_as_soon_as_it_matters() -> None:
     """The engine sweeps only robots that are near something, which must be detected in time."""
     batch = posse.batch(
-        "obstacles", 32, num_trackers=16, tracker_speed=3.0, start_distance=(1.0, 10.0),
-        tracker_acceleration=math.inf, tracker_turn_acceleration=math.inf,
-    )  # fmt: skip
+        "obstacles",
+        32,
+        num_trackers=16,
+        tracker_speed=3.0,
+        start_distance=(1.0, 10.0),
+        tracker_acceleration=math.inf,
+        tracker_turn_acceleration=math.inf,
+    )
     batch.reset(seed=4)
     episodes = [Episode(batch.scenario) for _ in range(2)]
     rng = np.random.default_rng(4)

@@ -20,9 +20,8 @@ def broken(batch: posse.Batch) -> np.ndarray:
 @pytest.mark.parametrize("number", [1, 3, 4])
 def test_drawn_trackers_break_at_drawn_times(number: int) -> None:
     batch = posse.batch(
-        num_worlds=300, breaks=number, break_choice="drawn", break_window=WINDOW, horizon=100,
-        autoreset="disabled",
-    )  # fmt: skip
+        num_worlds=300, breaks=number, break_choice="drawn", break_window=WINDOW, horizon=100, autoreset="disabled"
+    )
     batch.reset(seed=1)
     for step in range(1, 101):
         batch.step(np.zeros(batch.action_shape))
@@ -48,8 +47,7 @@ def test_the_nearest_to_the_target_breaks() -> None:
         before, was_broken = snapshot(batch), broken(batch)
         batch.step(rng.uniform(-1, 1, batch.action_shape))
         away = np.hypot(
-            before["tracker_x"] - before["world_x"][:, None],
-            before["tracker_y"] - before["world_y"][:, None],
+            before["tracker_x"] - before["world_x"][:, None], before["tracker_y"] - before["world_y"][:, None]
         )
         for e in np.flatnonzero((broken(batch) & ~was_broken).any(axis=1)):
             new = np.flatnonzero(broken(batch)[e] & ~was_broken[e])
@@ -59,9 +57,7 @@ def test_the_nearest_to_the_target_breaks() -> None:
 
 
 def test_several_leaders_break_one_after_the_other_within_the_window() -> None:
-    batch = posse.batch(
-        "leader-loss", 100, breaks=3, break_window=(0.2, 0.6), autoreset="disabled", horizon=100
-    )
+    batch = posse.batch("leader-loss", 100, breaks=3, break_window=(0.2, 0.6), autoreset="disabled", horizon=100)
     batch.reset(seed=3)
     for _ in range(100):
         batch.step(np.zeros(batch.action_shape))
@@ -75,9 +71,14 @@ def test_several_leaders_break_one_after_the_other_within_the_window() -> None:
 
 def test_a_given_tracker_breaks_at_a_given_time() -> None:
     batch = posse.batch(
-        "leader-loss", 20, break_choice="given", break_number=3, break_window=(0.3, 0.3),
-        autoreset="disabled", horizon=100,
-    )  # fmt: skip
+        "leader-loss",
+        20,
+        break_choice="given",
+        break_number=3,
+        break_window=(0.3, 0.3),
+        autoreset="disabled",
+        horizon=100,
+    )
     batch.reset(seed=3)
     for _ in range(100):
         batch.step(np.zeros(batch.action_shape))
@@ -87,13 +88,9 @@ def test_a_given_tracker_breaks_at_a_given_time() -> None:
 
 
 def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
-    batch = posse.batch(
-        "leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled"
-    )
+    batch = posse.batch("leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled")
     batch.reset(seed=4)
-    twin = posse.batch(
-        "leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled"
-    )
+    twin = posse.batch("leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled")
     twin.reset(seed=4)
     rng = np.random.default_rng(4)
     for step in range(1, 60):
@@ -109,8 +106,7 @@ def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
             continue
         for key in ("x", "y", "heading_cos", "heading_sin"):
             np.testing.assert_array_equal(
-                batch.state[f"tracker_{key}"][broken(batch)],
-                before[f"tracker_{key}"][broken(batch)],
+                batch.state[f"tracker_{key}"][broken(batch)], before[f"tracker_{key}"][broken(batch)]
             )
         assert (views["speed"][broken(batch)] == 0).all()
         assert (views["turn_rate"][broken(batch)] == 0).all()
@@ -128,9 +124,7 @@ def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
 
 def test_it_stays_in_the_team_and_in_the_way() -> None:
     batch = posse.batch(num_trackers=2, breaks=1, break_window=(0.0, 0.0), autoreset="disabled")
-    batch.reset(
-        options={"target_pose": [3.0, 0.0, math.pi / 2], "tracker_pose": [[1, 0, 0], [0, 0, 0]]}
-    )
+    batch.reset(options={"target_pose": [3.0, 0.0, math.pi / 2], "tracker_pose": [[1, 0, 0], [0, 0, 0]]})
     for _ in range(20):
         observations, *_ = batch.step([[[1.0, 0.0], [1.0, 0.0]]])
     assert observations.shape[1] == 2

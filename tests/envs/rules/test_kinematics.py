@@ -36,9 +36,7 @@ def test_a_step_lies_on_the_circle(theta: float, speed: float, turn: float, time
 
 def test_a_robot_that_holds_its_speeds_goes_round_the_circle_it_should() -> None:
     batch = posse.batch(target_turn_rate=2.0, target_motion="agent", num_trackers=1)
-    batch.reset(
-        options={"tracker_pose": [[5.0, 0.0, math.pi / 2]], "target_pose": [0.0, -8.0, 0.0]}
-    )
+    batch.reset(options={"tracker_pose": [[5.0, 0.0, math.pi / 2]], "target_pose": [0.0, -8.0, 0.0]})
     # V = 0.75 and ω = 0.5: a circle of 1.5 m, whose centre lies 1.5 m to the left of (5, 0).
     actions = np.array([[[0.5, 0.25], [-1.0, 0.0]]], np.float32)
     for step in range(1, 127):
@@ -51,10 +49,7 @@ def test_a_robot_that_holds_its_speeds_goes_round_the_circle_it_should() -> None
 
 @pytest.mark.parametrize("name", ["constant", "accelerating", "smart"])
 def test_the_physics_step_changes_nothing_but_rounding(name: str) -> None:
-    at_once: dict[str, Any] = {
-        "tracker_acceleration": math.inf,
-        "tracker_turn_acceleration": math.inf,
-    }
+    at_once: dict[str, Any] = {"tracker_acceleration": math.inf, "tracker_turn_acceleration": math.inf}
     coarse = posse.batch(name, 8, physics_step=0.1, **at_once)
     fine = posse.batch(name, 8, physics_step=0.005, **at_once)
     coarse.reset(seed=3)
@@ -86,9 +81,7 @@ def test_a_heading_stays_a_unit_vector_for_a_hundred_thousand_steps() -> None:
 
 
 def test_acceleration_limits_are_kept_and_used() -> None:
-    batch = posse.batch(
-        num_worlds=4, tracker_acceleration=0.8, tracker_turn_acceleration=3.0, autoreset="disabled"
-    )
+    batch = posse.batch(num_worlds=4, tracker_acceleration=0.8, tracker_turn_acceleration=3.0, autoreset="disabled")
     batch.reset(seed=2)
     rng = np.random.default_rng(2)
     before = snapshot(batch)
@@ -136,9 +129,7 @@ def test_approach_and_turn_towards() -> None:
     st.sampled_from([0.0, 1e-8, 3e-7, 1e-6, 1e-3, 0.5, 0.9999, 1.0, 1.00005, 1.001, 2.0, 30.0]),
     st.sampled_from([-1.0, 1.0]),
 )
-def test_a_turn_is_the_angle_within_its_limit(
-    heading: float, limit: float, share: float, side: float
-) -> None:
+def test_a_turn_is_the_angle_within_its_limit(heading: float, limit: float, share: float, side: float) -> None:
     """Also close to the limit, to zero and to an about-turn."""
     error = side * min(share * limit, math.pi)
     most, time = F(limit / 0.1), F(0.1)
@@ -159,9 +150,7 @@ def test_a_turn_is_the_angle_within_its_limit(
 
 def test_each_tracker_moves_within_its_own_limits() -> None:
     speeds, rates = (1.0, 0.7, 1.4), (2.0, 0.5, 1.1)
-    batch = posse.batch(
-        "constant", 4, num_trackers=3, tracker_speed=speeds, tracker_turn_rate=rates
-    )
+    batch = posse.batch("constant", 4, num_trackers=3, tracker_speed=speeds, tracker_turn_rate=rates)
     batch.reset(seed=0)
     batch.step(np.ones(batch.action_shape, np.float32))
     np.testing.assert_allclose(batch.state["tracker_speed"], [speeds] * 4, rtol=1e-6)

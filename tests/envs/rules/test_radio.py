@@ -25,8 +25,10 @@ def test_fixes_and_what_was_heard_equal_an_independent_working(case: Any) -> Non
         for i, fix in enumerate(senses.fixes):
             assert state["tracker_fix_step"][i] == fix.step
             if fix.step >= 0:
-                t = {k: complex(state[f"tracker_fix_{k[0]}"][i], state[f"tracker_fix_{k[1]}"][i])
-                     for k in (("x", "y"), ("cos", "sin"), ("vx", "vy"))}  # fmt: skip
+                t = {
+                    k: complex(state[f"tracker_fix_{k[0]}"][i], state[f"tracker_fix_{k[1]}"][i])
+                    for k in (("x", "y"), ("cos", "sin"), ("vx", "vy"))
+                }
                 assert t["x", "y"] == pytest.approx(fix.place, abs=1e-4)
                 assert t["cos", "sin"] == pytest.approx(fix.heading, abs=1e-5)
                 assert t["vx", "vy"] == pytest.approx(fix.velocity, abs=2e-3)
@@ -39,9 +41,7 @@ def test_fixes_and_what_was_heard_equal_an_independent_working(case: Any) -> Non
                         heard += 1
                         place = complex(state["heard_x"][i, j], state["heard_y"][i, j])
                         assert place == pytest.approx(words.place, abs=1e-6)
-                        np.testing.assert_array_equal(
-                            state["heard_message"][i, j], words.message.astype(np.float32)
-                        )
+                        np.testing.assert_array_equal(state["heard_message"][i, j], words.message.astype(np.float32))
     assert heard > 0 or state["heard_step"].size == 0
 
 
@@ -66,10 +66,7 @@ def test_what_is_said_arrives_after_exactly_the_delay(delay: int) -> None:
 def test_the_range_ends_where_it_should() -> None:
     batch = posse.batch(num_trackers=3, radio_range=5.0)
     batch.reset(
-        options={
-            "target_pose": [10.0, 10.0, 0.0],
-            "tracker_pose": [[0, 0, 0], [4.999, 0, 0], [0.0, -5.001, 0]],
-        }
+        options={"target_pose": [10.0, 10.0, 0.0], "tracker_pose": [[0, 0, 0], [4.999, 0, 0], [0.0, -5.001, 0]]}
     )
     assert (batch.state["heard_step"][0] >= 0).tolist() == [
         [False, True, False],
@@ -79,9 +76,7 @@ def test_the_range_ends_where_it_should() -> None:
 
 
 def test_losses_have_their_rate_and_are_independent() -> None:
-    batch = posse.batch(
-        num_worlds=200, num_trackers=4, radio_loss=0.3, radio_range=1e4, horizon=100
-    )
+    batch = posse.batch(num_worlds=200, num_trackers=4, radio_loss=0.3, radio_range=1e4, horizon=100)
     batch.reset(seed=1)
     arrived = []
     for step in range(1, 60):
@@ -101,9 +96,7 @@ def test_losses_have_their_rate_and_are_independent() -> None:
 
 
 def test_an_outage_is_silent_both_ways() -> None:
-    batch = posse.batch(
-        num_worlds=50, num_trackers=3, radio_outages=0.5, outage_time=2.0, horizon=80
-    )
+    batch = posse.batch(num_worlds=50, num_trackers=3, radio_outages=0.5, outage_time=2.0, horizon=80)
     batch.reset(seed=2)
     silent = 0
     for step in range(1, 80):
@@ -119,28 +112,18 @@ def test_an_outage_is_silent_both_ways() -> None:
 def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
     """A chain of four of which only the first sees the target; each hop takes delay plus a step."""
     batch = posse.batch(
-        num_trackers=4, sensing_range=3.0, radio_range=4.5, radio_delay=2, target_speed=0.0,
-        start_distance=(1.0, 16.0),
-    )  # fmt: skip
-    batch.reset(
-        options={
-            "target_pose": [0, 0, 0],
-            "tracker_pose": [[2, 0, 0], [6, 0, 0], [10, 0, 0], [14, 0, 0]],
-        }
+        num_trackers=4, sensing_range=3.0, radio_range=4.5, radio_delay=2, target_speed=0.0, start_distance=(1.0, 16.0)
     )
+    batch.reset(options={"target_pose": [0, 0, 0], "tracker_pose": [[2, 0, 0], [6, 0, 0], [10, 0, 0], [14, 0, 0]]})
     stay = np.tile([-1.0, 0.0], (1, 4, 1))
     for step in range(1, 14):
         observations = batch.step(stay)[0]
         fixes = batch.state["tracker_fix_step"][0]
         # Said at step k, a fix is heard at k + 2, and passed on with the next broadcast, k + 3.
-        assert fixes.tolist() == [
-            max(-1, step - lag) if step >= lag else -1 for lag in (0, 2, 5, 8)
-        ]
+        assert fixes.tolist() == [max(-1, step - lag) if step >= lag else -1 for lag in (0, 2, 5, 8)]
         views = batch.layout.views(observations)
         known = fixes >= 0
-        np.testing.assert_allclose(
-            views["target_age"][0][known], 0.1 * (step - fixes[known]), atol=1e-6
-        )
+        np.testing.assert_allclose(views["target_age"][0][known], 0.1 * (step - fixes[known]), atol=1e-6)
         np.testing.assert_allclose(views["target_range"][0][known], 2 + 4 * np.flatnonzero(known))
         assert views["target_seen"][0].tolist() == [1, 0, 0, 0]
 
@@ -189,8 +172,6 @@ def test_the_graph_is_connected_over_hops() -> None:
 
 def test_radio_alive_is_told_apart_in_the_reference_itself() -> None:
     recording = record("field", ())
-    alive = [
-        [radio_alive(recording.scenario, state, i) for i in range(5)] for state in recording.states
-    ]
+    alive = [[radio_alive(recording.scenario, state, i) for i in range(5)] for state in recording.states]
     assert not np.all(alive)
     assert np.any(alive)

@@ -31,12 +31,7 @@ def in_place(batch: posse.Batch, shift: complex = 0.0, **poses: complex) -> None
     places = slots(batch.scenario) + shift
     for name, place in poses.items():
         places[int(name.removeprefix("tracker_"))] = place
-    batch.reset(
-        options={
-            "target_pose": [0.0, 0.0, 0.0],
-            "tracker_pose": [[p.real, p.imag, 0.0] for p in places],
-        }
-    )
+    batch.reset(options={"target_pose": [0.0, 0.0, 0.0], "tracker_pose": [[p.real, p.imag, 0.0] for p in places]})
 
 
 FOLLOW = 2 * 0.6 - 1  # the action that keeps the target's speed

@@ -23,12 +23,7 @@ def offsets(batch: posse.Batch) -> tuple[np.ndarray, np.ndarray]:
 
 def test_sight_ends_at_its_range() -> None:
     batch = posse.batch("radio", num_trackers=2, sensing_range=4.0, radio_range=0.1)
-    batch.reset(
-        options={
-            "target_pose": [0.0, 0.0, 0.0],
-            "tracker_pose": [[3.999, 0.0, 1.0], [0.0, -4.001, 1.0]],
-        }
-    )
+    batch.reset(options={"target_pose": [0.0, 0.0, 0.0], "tracker_pose": [[3.999, 0.0, 1.0], [0.0, -4.001, 1.0]]})
     assert batch.state["tracker_sees"].tolist() == [[1, 0]]
     assert batch.state["tracker_fix_step"].tolist() == [[0, -1]]
 
@@ -49,12 +44,7 @@ def test_sight_ends_at_the_field_of_view(view: float) -> None:
 
 @pytest.mark.parametrize(
     ("name", "more"),
-    [
-        ("obstacles", {}),
-        ("field", {}),
-        ("search", {}),
-        ("obstacles", {"num_obstacles": 19, "arena": 36.0}),
-    ],
+    [("obstacles", {}), ("field", {}), ("search", {}), ("obstacles", {"num_obstacles": 19, "arena": 36.0})],
 )
 def test_sight_is_what_geometry_says(name: str, more: dict[str, Any]) -> None:
     batch = posse.batch(name, 40, field_of_view=4.0, **more)
@@ -143,9 +133,8 @@ def test_a_smoothed_velocity_settles_with_its_time_constant() -> None:
 @pytest.mark.parametrize("beams", [1, 2, 4, 8, 13, 32])
 def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
     batch = posse.batch(
-        "obstacles", 12, num_trackers=8, sonar_beams=beams, start_distance=(1.0, 10.0),
-        target_motion="agent",
-    )  # fmt: skip
+        "obstacles", 12, num_trackers=8, sonar_beams=beams, start_distance=(1.0, 10.0), target_motion="agent"
+    )
     observations = batch.reset(seed=5)
     near = 0
     for _ in range(2):
@@ -166,9 +155,7 @@ def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
 
 def test_the_sonar_reads_the_free_width_straight_ahead() -> None:
     batch = posse.batch(num_trackers=2, sonar_beams=4, arena=20.0)
-    observations = batch.reset(
-        options={"target_pose": [5, 5, 0], "tracker_pose": [[0, 0, 0], [1.0, 0.0, 0]]}
-    )
+    observations = batch.reset(options={"target_pose": [5, 5, 0], "tracker_pose": [[0, 0, 0], [1.0, 0.0, 0]]})
     readings = batch.layout.views(observations)["sonar"][0]
     np.testing.assert_allclose(readings[0], [0.7, 2.0, 2.0, 2.0], atol=1e-6)
     np.testing.assert_allclose(readings[1], [2.0, 2.0, 0.7, 2.0], atol=1e-6)

@@ -127,9 +127,7 @@ def in_slots(worlds: int) -> tuple[Floats, Floats]:
     theta = np.linspace(-3, 3, worlds)
     slots = np.array([x + 1j * y for x, y in slot_offsets(posse.get_scenario("smart"))])
     places = slots * np.exp(1j * theta)[:, None]
-    trackers = np.stack(
-        [places.real, places.imag, np.broadcast_to(theta[:, None], places.shape)], -1
-    )
+    trackers = np.stack([places.real, places.imag, np.broadcast_to(theta[:, None], places.shape)], -1)
     return trackers, np.stack([0 * theta, 0 * theta, theta], -1)
 
 
@@ -151,9 +149,7 @@ def test_it_leaves_a_ring_by_the_widest_gap(team: Controller) -> None:
     bearings = gaps[:, None] + np.radians([60, 120, 180, 240, 300])
     trackers = np.stack([4 * np.cos(bearings), 4 * np.sin(bearings), bearings + np.pi], -1)
     headings = np.random.default_rng(0).uniform(-np.pi, np.pi, 40)
-    batch = start(
-        40, tracker_pose=trackers, target_pose=np.stack([0 * headings, 0 * headings, headings], -1)
-    )
+    batch = start(40, tracker_pose=trackers, target_pose=np.stack([0 * headings, 0 * headings, headings], -1))
     play = Play(batch, team, 35)
     left = np.angle(play.target[-1] * np.exp(-1j * gaps))
     assert np.abs(left).max() < np.radians(45)
@@ -166,10 +162,7 @@ def test_it_heeds_where_trackers_are_going() -> None:
     for direction in (1.0, -1.0):
         theta = 0.0 if direction > 0 else math.pi
         batch = start(
-            1,
-            num_trackers=2,
-            tracker_pose=[[-2.0, 0.0, theta], [2.0, 0.0, theta]],
-            target_pose=[0.0, 0.0, math.pi / 2],
+            1, num_trackers=2, tracker_pose=[[-2.0, 0.0, theta], [2.0, 0.0, theta]], target_pose=[0.0, 0.0, math.pi / 2]
         )
         batch.arrays.tracker["speed"] = batch.scenario.tracker_speeds[0]
         batch.step(flying_blind(batch))
@@ -224,9 +217,7 @@ def test_it_breaks_a_formation_that_a_constant_target_leaves_whole() -> None:
     trackers, target = in_slots(40)
     scores = {
         motion: Play(
-            start(40, tracker_pose=trackers, target_pose=target, target_motion=motion),
-            keeping_slots,
-            600,
+            start(40, tracker_pose=trackers, target_pose=target, target_motion=motion), keeping_slots, 600
         ).score.mean()
         for motion in ("constant", "smart")
     }
@@ -296,10 +287,7 @@ def test_it_keeps_off_obstacles_and_walls(scenario: str) -> None:
 def test_it_follows_from_the_state_alone() -> None:
     trackers, target = in_slots(6)
     trackers[:, :, :2] *= 1.5
-    plays = [
-        Play(start(6, tracker_pose=trackers, target_pose=target, seed=seed), pursuing, 200)
-        for seed in (1, 2)
-    ]
+    plays = [Play(start(6, tracker_pose=trackers, target_pose=target, seed=seed), pursuing, 200) for seed in (1, 2)]
     np.testing.assert_array_equal(plays[0].target, plays[1].target)
 
 

@@ -20,9 +20,13 @@ from posse.scenarios import ScenarioError
 from posse.scenarios.formation import FORMATIONS
 
 CROWDED: dict[str, Any] = {
-    "num_obstacles": 8, "obstacle_gap": 0.5, "obstacle_radius": (0.3, 0.6), "num_trackers": 8,
-    "start_distance": (1.0, 8.0), "horizon": 1000,
-}  # fmt: skip
+    "num_obstacles": 8,
+    "obstacle_gap": 0.5,
+    "obstacle_radius": (0.3, 0.6),
+    "num_trackers": 8,
+    "start_distance": (1.0, 8.0),
+    "horizon": 1000,
+}
 
 
 @st.composite
@@ -71,12 +75,18 @@ def scenarios(draw: st.DrawFn) -> posse.Scenario:
 )
 @example(
     scenario=posse.get_scenario("obstacles", target_turn_rate=0.6, arena=16.0, **CROWDED),
-    crowds=True, stays=4.0, leaves=4.0, seed=7,
-)  # fmt: skip
+    crowds=True,
+    stays=4.0,
+    leaves=4.0,
+    seed=7,
+)
 @example(
     scenario=posse.get_scenario("field", arena=20.0, target_turn_rate=0.8, obstacle_gap=0.6),
-    crowds=True, stays=10.0, leaves=4.0, seed=7,
-)  # fmt: skip
+    crowds=True,
+    stays=10.0,
+    leaves=4.0,
+    seed=7,
+)
 def test_no_disc_is_ever_inside_another_or_a_wall(
     scenario: posse.Scenario, crowds: bool, stays: float, leaves: float, seed: int
 ) -> None:
@@ -106,17 +116,13 @@ def tight_spots(batch: posse.Batch, rng: np.random.Generator) -> Complexes:
 
 
 @pytest.mark.parametrize(
-    ("motion", "turn", "arena"),
-    [("constant", 0.6, 16.0), ("accelerating", 1.2, 12.0), ("smart", 1.8, 12.0)],
+    ("motion", "turn", "arena"), [("constant", 0.6, 16.0), ("accelerating", 1.2, 12.0), ("smart", 1.8, 12.0)]
 )
-def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(
-    motion: str, turn: float, arena: float
-) -> None:
+def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(motion: str, turn: float, arena: float) -> None:
     """Place the target as trackers can push it, in poses that it would not reach on its own."""
     batch = posse.batch(
-        "obstacles", 1000, target_motion=motion, target_turn_rate=turn, arena=arena,
-        **{**CROWDED, "num_trackers": 1},
-    )  # fmt: skip
+        "obstacles", 1000, target_motion=motion, target_turn_rate=turn, arena=arena, **{**CROWDED, "num_trackers": 1}
+    )
     batch.reset(seed=3)
     rng = np.random.default_rng(3)
     spots, course = tight_spots(batch, rng), np.exp(2j * np.pi * rng.uniform(size=1000))
@@ -124,9 +130,7 @@ def test_a_target_that_has_no_room_to_turn_does_not_get_stuck(
     assert chosen.sum() > 50
     world = batch.arrays.world
     world["x"][chosen], world["y"][chosen] = spots[chosen].real, spots[chosen].imag
-    world["heading_cos"][chosen], world["heading_sin"][chosen] = (
-        course[chosen].real, course[chosen].imag,
-    )  # fmt: skip
+    world["heading_cos"][chosen], world["heading_sin"][chosen] = (course[chosen].real, course[chosen].imag)
     world["near"][chosen] = 1
     rest = np.tile([-1.0, 0.0], (1000, 1, 1))
     standing, longest = np.zeros(1000, np.int64), 0

@@ -19,13 +19,10 @@ import posse
 @pytest.mark.parametrize("name", posse.scenario_names())
 @pytest.mark.parametrize(
     "overrides",
-    [{}, {"num_trackers": 30, "breaks": 0}, {"num_trackers": 1, "breaks": 0},
-     {"target_motion": "agent"}],
+    [{}, {"num_trackers": 30, "breaks": 0}, {"num_trackers": 1, "breaks": 0}, {"target_motion": "agent"}],
     ids=["", "thirty", "one", "agent"],
-)  # fmt: skip
-def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(
-    name: str, overrides: dict[str, Any]
-) -> None:
+)
+def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(name: str, overrides: dict[str, Any]) -> None:
     if overrides.get("num_trackers") == 30 and math.isinf(posse.get_scenario(name).arena):
         overrides = {**overrides, "start_distance": (1.5, 5.0)}
     batch = posse.batch(name, 60, **overrides)
@@ -38,9 +35,7 @@ def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(
         gaps = free_gaps(s, world)
         gaps[:, s.num_trackers] = np.inf  # the target, for which start_distance counts
         assert gaps.min() > 0.19, "START_CLEARANCE"
-        away = np.hypot(
-            world["tracker_x"] - world["world_x"], world["tracker_y"] - world["world_y"]
-        )
+        away = np.hypot(world["tracker_x"] - world["world_x"], world["tracker_y"] - world["world_y"])
         assert away.min() >= least - 1e-4
         assert away.max() <= most + 1e-4
         assert max(abs(world["world_x"]), abs(world["world_y"])) <= s.target_extent
@@ -50,10 +45,7 @@ def test_distance_bearing_and_heading_are_uniform() -> None:
     batch = posse.batch(num_worlds=1000)
     batch.reset(seed=2)
     state = snapshot(batch)
-    offset = (
-        state["tracker_x"] - state["world_x"][:, None]
-        + 1j * (state["tracker_y"] - state["world_y"][:, None])
-    )  # fmt: skip
+    offset = state["tracker_x"] - state["world_x"][:, None] + 1j * (state["tracker_y"] - state["world_y"][:, None])
     heading = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
     course = state["world_heading_cos"] + 1j * state["world_heading_sin"]
     for shares in (
@@ -137,10 +129,7 @@ def test_poses_change_the_poses_and_no_other_draw() -> None:
     drawn.reset(seed=5)
     state = snapshot(drawn)
     heading = np.arctan2(state["world_heading_sin"], state["world_heading_cos"])
-    given.reset(
-        seed=5,
-        options={"target_pose": np.stack([state["world_x"], state["world_y"], heading], axis=-1)},
-    )
+    given.reset(seed=5, options={"target_pose": np.stack([state["world_x"], state["world_y"], heading], axis=-1)})
     for key, value in snapshot(given).items():
         np.testing.assert_allclose(value, state[key], atol=1e-5, err_msg=key)
     actions = np.random.default_rng(0).uniform(-1, 1, drawn.action_shape)
@@ -150,9 +139,11 @@ def test_poses_change_the_poses_and_no_other_draw() -> None:
 
 @settings(derandomize=True, max_examples=200, deadline=None)
 @given(
-    x=st.floats(-9.7, 9.7), y=st.floats(-9.7, 9.7), heading=st.floats(-4.0, 4.0),
+    x=st.floats(-9.7, 9.7),
+    y=st.floats(-9.7, 9.7),
+    heading=st.floats(-4.0, 4.0),
     motion=st.sampled_from(["accelerating", "agent"]),
-)  # fmt: skip
+)
 def test_a_target_starts_where_it_has_room_to_turn_and_nowhere_else(
     x: float, y: float, heading: float, motion: str
 ) -> None:

@@ -65,9 +65,7 @@ def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     # The turn rate is a sine of a drawn amplitude, rate and phase.
     state = snapshot(batch)
     time = 0.1 * np.arange(400)[:, None]
-    wave = state["world_weave_amplitude"] * np.sin(
-        state["world_weave_rate"] * time + state["world_weave_phase"]
-    )
+    wave = state["world_weave_amplitude"] * np.sin(state["world_weave_rate"] * time + state["world_weave_phase"])
     np.testing.assert_allclose(turns, wave, atol=2e-4 * max(1.0, limit))
     assert state["world_weave_amplitude"].min() >= 0.4 * limit
     assert state["world_weave_amplitude"].max() <= 0.9 * limit
@@ -89,9 +87,7 @@ def test_a_long_control_step_keeps_the_goal_a_unit_vector(overrides: dict[str, A
     batch.reset(seed=3)
     _, courses, turns = follow(batch, 60)
     state = snapshot(batch)
-    np.testing.assert_allclose(
-        np.hypot(state["world_goal_cos"], state["world_goal_sin"]), 1, atol=1e-5
-    )
+    np.testing.assert_allclose(np.hypot(state["world_goal_cos"], state["world_goal_sin"]), 1, atol=1e-5)
     np.testing.assert_allclose(np.abs(courses), 1.0, atol=1e-6)
     assert np.abs(turns).max() <= overrides["target_turn_rate"]
 
@@ -128,9 +124,14 @@ def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, mot
 @pytest.mark.parametrize("turn", [0.3, 4.0])
 def test_the_safeguard_holds_for_wide_and_narrow_turners(turn: float) -> None:
     batch = posse.batch(
-        "obstacles", 200, target_turn_rate=turn, arena=24.0, num_obstacles=8, num_trackers=2,
+        "obstacles",
+        200,
+        target_turn_rate=turn,
+        arena=24.0,
+        num_obstacles=8,
+        num_trackers=2,
         target_motion="accelerating",
-    )  # fmt: skip
+    )
     batch.reset(seed=5)
     places, _, _ = follow(batch, 500)
     assert room(batch, places) > 0.09

@@ -22,15 +22,11 @@ def test_slots_are_where_their_definition_says_and_apart(formation: str, number:
     between = np.abs(places[:, None] - places[None, :]) + np.diag(np.full(number, np.inf))
     assert between.min() > 2 * scenario.tolerance
     if number > 1:
-        assert between.min() == pytest.approx(scenario.formation_spacing, rel=1e-6) or (
-            formation == "ring"
-        )
+        assert between.min() == pytest.approx(scenario.formation_spacing, rel=1e-6) or (formation == "ring")
     assert np.abs(places).min() >= scenario.formation_distance - 1e-12
     if formation != "ring":
         assert places.real.max() <= -scenario.formation_distance + 1e-12, "behind the target"
-        np.testing.assert_allclose(sorted(places.imag), sorted(-places.imag), atol=1e-9) if (
-            number % 2
-        ) else None
+        np.testing.assert_allclose(sorted(places.imag), sorted(-places.imag), atol=1e-9) if (number % 2) else None
 
 
 def test_the_paper_s_wedge_has_one_leader_ahead_and_two_wings() -> None:
@@ -44,9 +40,7 @@ def test_the_paper_s_wedge_has_one_leader_ahead_and_two_wings() -> None:
 @pytest.mark.parametrize("formation", FORMATIONS)
 @pytest.mark.parametrize("motion", ["accelerating", "smart", "agent"])
 def test_every_slot_can_be_followed_without_reversing(formation: str, motion: str) -> None:
-    batch = posse.batch(
-        num_worlds=4, formation=formation, target_motion=motion, num_trackers=8, horizon=300
-    )
+    batch = posse.batch(num_worlds=4, formation=formation, target_motion=motion, num_trackers=8, horizon=300)
     s = batch.scenario
     batch.reset(seed=1)
     places, rate = slots(s), s.slot_turn_rate

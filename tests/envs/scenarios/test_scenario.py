@@ -156,20 +156,26 @@ def test_every_field_has_an_impossible_value_among_the_tests() -> None:
 
 
 VALUES = st.one_of(
-    st.none(), st.booleans(), st.integers(-3, 100), st.integers(), st.floats(), st.text(max_size=5),
-    st.tuples(st.floats(0, 10), st.floats(0, 10)), st.lists(st.integers(), max_size=3),
-    st.dictionaries(st.text(max_size=3), st.floats(), max_size=2), st.just(10**400),
-)  # fmt: skip
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 100),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=5),
+    st.tuples(st.floats(0, 10), st.floats(0, 10)),
+    st.lists(st.integers(), max_size=3),
+    st.dictionaries(st.text(max_size=3), st.floats(), max_size=2),
+    st.just(10**400),
+)
 
 
 @hypothesis.settings(derandomize=True, max_examples=200, deadline=None)
 @given(
     name=st.sampled_from(posse.scenario_names()),
     overrides=st.dictionaries(
-        st.sampled_from([field.name for field in dataclasses.fields(Scenario)]), VALUES,
-        min_size=1, max_size=3,
+        st.sampled_from([field.name for field in dataclasses.fields(Scenario)]), VALUES, min_size=1, max_size=3
     ),
-)  # fmt: skip
+)
 def test_nothing_but_a_scenario_error_is_ever_raised(name: str, overrides: dict[str, Any]) -> None:
     try:
         scenario = posse.get_scenario(name, **overrides)
@@ -224,10 +230,7 @@ def wide_settings(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @hypothesis.settings(
-    derandomize=True,
-    max_examples=100,
-    deadline=None,
-    suppress_health_check=[hypothesis.HealthCheck.filter_too_much],
+    derandomize=True, max_examples=100, deadline=None, suppress_health_check=[hypothesis.HealthCheck.filter_too_much]
 )
 @given(
     name=st.sampled_from(posse.scenario_names()),
@@ -235,9 +238,7 @@ def wide_settings(draw: st.DrawFn) -> dict[str, Any]:
     num_trackers=st.sampled_from([2, 5, 9]),
     chosen=wide_settings(),
 )
-def test_what_is_allowed_is_finite_and_within_its_bounds(
-    name: str, chosen: dict[str, Any], **settings: Any
-) -> None:
+def test_what_is_allowed_is_finite_and_within_its_bounds(name: str, chosen: dict[str, Any], **settings: Any) -> None:
     try:
         batch = posse.batch(name, 3, **settings, horizon=30, settle_time=1e-6, **chosen)
     except ScenarioError:
@@ -275,9 +276,15 @@ def test_what_is_allowed_runs_and_stays_finite(
 ) -> None:
     try:
         batch = posse.batch(
-            name, 2, tracker_speed=tracker_speed, target_speed=tracker_speed * target_share,
-            tracker_turn_rate=turn_rate, target_turn_rate=turn_rate, horizon=40, **overrides,
-        )  # fmt: skip
+            name,
+            2,
+            tracker_speed=tracker_speed,
+            target_speed=tracker_speed * target_share,
+            tracker_turn_rate=turn_rate,
+            target_turn_rate=turn_rate,
+            horizon=40,
+            **overrides,
+        )
     except ScenarioError:
         return
     observations = batch.reset(seed=1)
@@ -320,9 +327,18 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
 
 def test_all_the_scenarios_that_the_benchmark_names_are_there() -> None:
     assert set(posse.scenario_names()) == {
-        "constant", "accelerating", "smart", "search", "obstacles", "radio", "leader-loss",
-        "field", "duel", "paper-centralized", "paper-distributed",
-    }  # fmt: skip
+        "constant",
+        "accelerating",
+        "smart",
+        "search",
+        "obstacles",
+        "radio",
+        "leader-loss",
+        "field",
+        "duel",
+        "paper-centralized",
+        "paper-distributed",
+    }
 
 
 def test_reward_weights_compare_whatever_their_order_and_kind() -> None:

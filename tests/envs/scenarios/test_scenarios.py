@@ -48,9 +48,7 @@ def test_a_scenario_is_taken_as_it_is() -> None:
     assert get_scenario(mine, horizon=70) == Scenario(name="mine", num_trackers=2, horizon=70)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "near"), [("smrt", "smart"), ("leader_loss", "leader-loss"), ("feild", "field")]
-)
+@pytest.mark.parametrize(("wrong", "near"), [("smrt", "smart"), ("leader_loss", "leader-loss"), ("feild", "field")])
 def test_an_unknown_name_is_answered_with_near_ones_and_all(wrong: str, near: str) -> None:
     with pytest.raises(ScenarioError, match=f"unknown scenario {wrong!r}.*mean.*{near!r}") as info:
         get_scenario(wrong)
@@ -103,10 +101,7 @@ def started(name: str) -> posse.Batch:
 def test_it_starts_as_it_says(name: str) -> None:
     batch, s = started(name), get_scenario(name)
     state = batch.state
-    distance = np.hypot(
-        state["tracker_x"] - state["world_x"][:, None],
-        state["tracker_y"] - state["world_y"][:, None],
-    )
+    distance = np.hypot(state["tracker_x"] - state["world_x"][:, None], state["tracker_y"] - state["world_y"][:, None])
     assert distance.min() >= s.start_distance[0] - 1e-4
     assert distance.max() <= s.start_distance[1] + 1e-4
     assert not state["tracker_touching"].any()
@@ -151,9 +146,7 @@ def test_the_bound_leaves_room_for_the_approach_and_for_a_score(name: str) -> No
 
 
 def test_only_the_first_three_differ_in_nothing_but_the_motion_of_a_free_target() -> None:
-    assert get_scenario("accelerating") == get_scenario(
-        "constant", name="accelerating", target_motion="accelerating"
-    )
+    assert get_scenario("accelerating") == get_scenario("constant", name="accelerating", target_motion="accelerating")
     for name in ("constant", "accelerating", "smart"):
         s = get_scenario(name)
         assert all(math.isinf(x) for x in (s.arena, s.sensing_range, s.radio_range))
@@ -210,8 +203,7 @@ def test_in_leader_loss_the_nearest_tracker_breaks_in_mid_episode() -> None:
     idle = np.zeros(batch.action_shape, np.float32)
     for step in range(s.horizon):
         distance = np.hypot(
-            state["tracker_x"] - state["world_x"][:, None],
-            state["tracker_y"] - state["world_y"][:, None],
+            state["tracker_x"] - state["world_x"][:, None], state["tracker_y"] - state["world_y"][:, None]
         )
         before = (state["tracker_broken_at"] <= step).any(axis=1, keepdims=True)
         batch.step(idle)
@@ -227,9 +219,15 @@ def test_field_has_something_of_every_other_scenario() -> None:
     assert s.target_motion == "smart"
     assert all(math.isfinite(x) for x in (s.arena, s.sensing_range, s.radio_range))
     present = (
-        s.num_obstacles, s.range_noise, s.bearing_noise, s.radio_delay, s.radio_loss, s.breaks,
-        s.sensor_outages, s.radio_outages,
-    )  # fmt: skip
+        s.num_obstacles,
+        s.range_noise,
+        s.bearing_noise,
+        s.radio_delay,
+        s.radio_loss,
+        s.breaks,
+        s.sensor_outages,
+        s.radio_outages,
+    )
     assert min(present) > 0
 
 

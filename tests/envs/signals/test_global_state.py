@@ -18,16 +18,26 @@ from posse.signals.global_state import StateLayout
 DRAWS: Final = ("world_seed", "world_split", "world_index", "world_episode", "world_key")
 FOLLOWS: Final = (
     # from poses: contacts, and who is near to what (test_contact)
-    "world_touching", "world_near", "tracker_touching", "tracker_touching_trackers",
-    "tracker_touching_obstacles", "tracker_near",
+    "world_touching",
+    "world_near",
+    "tracker_touching",
+    "tracker_touching_trackers",
+    "tracker_touching_obstacles",
+    "tracker_near",
     "tracker_onsets",  # counted again if anything is near, else 0
     # from poses, the slot frame and contacts: who occupies which slot (test_score)
-    "tracker_slot", "tracker_slot_distance",
+    "tracker_slot",
+    "tracker_slot_distance",
     # from the scenario, always the same
-    "tracker_max_speed", "tracker_max_turn_rate", "tracker_per_speed", "tracker_per_turn_rate",
+    "tracker_max_speed",
+    "tracker_max_turn_rate",
+    "tracker_per_speed",
+    "tracker_per_turn_rate",
     # from the times of faults, from time and contacts
-    "world_working", "world_over", "world_terminated",
-)  # fmt: skip
+    "world_working",
+    "world_over",
+    "world_terminated",
+)
 """What the vector leaves out because it follows from the rest, and the engine keeps."""
 
 
@@ -92,20 +102,20 @@ def drive(batch: posse.Batch, rng: np.random.Generator) -> npt.NDArray[np.float3
     seed=st.integers(0, 2**20),
 )
 def test_equal_states_with_equal_draws_go_on_alike(
-    name: str,
-    near: bool,
-    outages: float,
-    acceleration: float,
-    steps: int,
-    seed: int,
-    **settings: Any,
+    name: str, near: bool, outages: float, acceleration: float, steps: int, seed: int, **settings: Any
 ) -> None:
     place: dict[str, Any] = {"start_distance": (0.7, 3.0)} if near else {}
     try:
         scenario = posse.get_scenario(
-            name, horizon=70, outage_time=1.0, sensor_outages=outages, radio_outages=outages,
-            tracker_acceleration=acceleration, **place, **settings,
-        )  # fmt: skip
+            name,
+            horizon=70,
+            outage_time=1.0,
+            sensor_outages=outages,
+            radio_outages=outages,
+            tracker_acceleration=acceleration,
+            **place,
+            **settings,
+        )
     except posse.ScenarioError:
         return
     one, other = (posse.batch(scenario, 8, seed=seed) for _ in range(2))

@@ -19,9 +19,7 @@ def test_every_term_and_the_sum_equal_an_independent_working(case: Any) -> None:
     s, n = recording.scenario, recording.scenario.num_trackers
     episode = Episode(s)
     episode.follow(recording.states[0])
-    for state, rewards, infos in zip(
-        recording.states[1:], recording.rewards, recording.infos, strict=True
-    ):
+    for state, rewards, infos in zip(recording.states[1:], recording.rewards, recording.infos, strict=True):
         episode.follow(state)
         v = state["tracker_speed"] / s.tracker_speed
         turn = state["tracker_turn_rate"] / s.tracker_turn_rate
@@ -59,9 +57,7 @@ def test_terms_are_those_declared_and_weights_are_used() -> None:
 
 
 def test_shaping_never_touches_the_score() -> None:
-    plain, shaped = (
-        posse.batch("smart", 4, reward_weights=weights) for weights in ({}, {"effort": -5.0})
-    )
+    plain, shaped = (posse.batch("smart", 4, reward_weights=weights) for weights in ({}, {"effort": -5.0}))
     plain.reset(seed=2)
     shaped.reset(seed=2)
     actions = np.random.default_rng(2).uniform(-1, 1, plain.action_shape)

@@ -6,22 +6,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from tests.support.reference.state import (
-    Array,
-    Complexes,
-    State,
-    headings,
-    obstacles,
-    positions,
-    working,
-)
+from tests.support.reference.state import Array, Complexes, State, headings, obstacles, positions, working
 
 import posse
 
 
-def on_arc(
-    place: complex, heading: complex, speed: float, turn_rate: float, time: float
-) -> tuple[complex, complex]:
+def on_arc(place: complex, heading: complex, speed: float, turn_rate: float, time: float) -> tuple[complex, complex]:
     """Return position and heading after a time on the circle of (V, ω)."""
     turned = heading * np.exp(1j * turn_rate * time)
     if turn_rate == 0.0:

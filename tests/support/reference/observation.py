@@ -15,9 +15,7 @@ import posse
 from posse.scenarios.formation import FORMATIONS
 
 
-def _in_order(
-    recent: list[tuple[float, int, Said]], told: npt.NDArray[Any]
-) -> list[tuple[float, int, Said]]:
+def _in_order(recent: list[tuple[float, int, Said]], told: npt.NDArray[Any]) -> list[tuple[float, int, Said]]:
     """Return team-mates, nearest first; those equally near within rounding in the given order."""
     places = [int(number) for number in told]
     ordered = list(recent)
@@ -30,9 +28,7 @@ def _in_order(
     return ordered
 
 
-def observation(
-    s: posse.Scenario, state: State, i: int, senses: Senses, told: npt.NDArray[Any]
-) -> dict[str, Array]:
+def observation(s: posse.Scenario, state: State, i: int, senses: Senses, told: npt.NDArray[Any]) -> dict[str, Array]:
     """Return the observation of tracker i by field name, as ``ObservationLayout.views``.
 
     ``told`` holds the numbers of the team-mates in the engine's order, for those equally far.
@@ -87,10 +83,15 @@ def observation(
             values["sonar"] = values["sonar"][0]
     k, m = s.neighbours, s.message_size
     mates: dict[str, Array] = {
-        "number": np.full(k, -1.0), "age": np.full(k, -1.0), "range": np.full(k, -1.0),
-        "bearing": np.zeros((k, 2)), "heading": np.zeros((k, 2)),
-        "speed": np.zeros(k), "turn_rate": np.zeros(k), "message": np.zeros((k, m)),
-    }  # fmt: skip
+        "number": np.full(k, -1.0),
+        "age": np.full(k, -1.0),
+        "range": np.full(k, -1.0),
+        "bearing": np.zeros((k, 2)),
+        "heading": np.zeros((k, 2)),
+        "speed": np.zeros(k),
+        "turn_rate": np.zeros(k),
+        "message": np.zeros((k, m)),
+    }
     recent = [
         (abs(words.place - p), j, words)
         for (listener, j), words in senses.heard.items()

@@ -52,15 +52,7 @@ CASES: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = (
         ),
     ),  # no two trackers alike
     ("constant", (("num_trackers", 1),)),
-    (
-        "constant",
-        (
-            ("num_trackers", 26),
-            ("num_neighbours", 5),
-            ("formation", "ring"),
-            ("message_size", 1),
-        ),
-    ),
+    ("constant", (("num_trackers", 26), ("num_neighbours", 5), ("formation", "ring"), ("message_size", 1))),
     ("constant", (("breaks", 2), ("formation", "ring"), ("break_window", (0.2, 0.4)))),
     ("field", (("num_trackers", 9), ("num_neighbours", 3), ("message_size", 2))),
     ("field", (("breaks", 3), ("field_of_view", 2.0), ("forget_after", 0.35))),
@@ -81,9 +73,12 @@ def record(name: str, overrides: tuple[tuple[str, Any], ...] = (), steps: int = 
     Short, and from starts nearby, so that much happens: contacts, settling, breaks, recovery.
     """
     settings: dict[str, Any] = {
-        "horizon": steps, "start_distance": (1.5, 5.0), "settle_time": 0.5, "outage_time": 3.0,
+        "horizon": steps,
+        "start_distance": (1.5, 5.0),
+        "settle_time": 0.5,
+        "outage_time": 3.0,
         **dict(overrides),
-    }  # fmt: skip
+    }
     batch = posse.batch(name, 1, seed=8, **settings)
     s, n = batch.scenario, batch.scenario.num_trackers
     rng = np.random.default_rng(0)

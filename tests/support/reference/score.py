@@ -47,9 +47,7 @@ class Episode:
     distance: Array = field(default_factory=lambda: np.zeros(0))
     progress: Array = field(default_factory=lambda: np.zeros(0))
     onsets: Array = field(default_factory=lambda: np.zeros(0))
-    contacts: dict[str, int] = field(
-        default_factory=lambda: {"tracker": 0, "obstacle": 0, "target": 0}
-    )
+    contacts: dict[str, int] = field(default_factory=lambda: {"tracker": 0, "obstacle": 0, "target": 0})
     _start: Complexes | None = None
     _arrived: npt.NDArray[np.bool_] | None = None
     _touch: npt.NDArray[np.bool_] | None = None
@@ -90,11 +88,10 @@ class Episode:
         free = [c for c in range(n) if c not in taken]
         distance = np.array(
             [
-                away[i, self.occupied[i]] if i in self.occupied
-                else away[i, free].min() if free else away[i].min()
+                away[i, self.occupied[i]] if i in self.occupied else away[i, free].min() if free else away[i].min()
                 for i in range(n)
             ]
-        )  # fmt: skip
+        )
         self.progress = np.zeros(n) if first else self.distance - distance
         self.distance = distance
         sees = [can_see(s, state, i) for i in range(n)]

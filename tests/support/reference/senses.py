@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from tests.support.reference.draws import normal_pair, uniform
-from tests.support.reference.state import (
-    Array,
-    Complexes,
-    State,
-    headings,
-    obstacles,
-    positions,
-    working,
-)
+from tests.support.reference.state import Array, Complexes, State, headings, obstacles, positions, working
 
 import posse
 

@@ -22,9 +22,7 @@ from posse_training.errors import ClusterError, MissingExtraError, SettingsError
 from posse_training.runs.seeds.on_worker import train_on_worker
 from posse_training.runs.settings import TrainSettings
 
-without_ray = pytest.mark.skipif(
-    importlib.util.find_spec("ray") is not None, reason="Ray is installed"
-)
+without_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
 COMMANDS = (
     "compare idle --scenarios smart --episodes 2 --no-figures --planner-episodes 0 --ray",
     "record idle --episodes 2 --ray 10.0.0.1:6379",
@@ -37,10 +35,7 @@ COMMANDS = (
 @without_ray
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_names_the_extra(
-    command: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(command.split()) == 2
@@ -49,9 +44,7 @@ def test_a_command_names_the_extra(
 
 @without_ray
 @pytest.mark.parametrize("ray", [True, "auto", Cluster()])
-def test_evaluate_names_the_extra(
-    ray: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_evaluate_names_the_extra(ray: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(MissingExtraError, match=r"posse\[cluster\]"):
         evaluate("idle", "smart", 2, ray=ray)
@@ -64,9 +57,7 @@ def test_which_cluster() -> None:
     assert as_cluster("auto") == Cluster(address="auto")
     assert of_option(None, Path()) is None
     assert of_option((), Path("w")) == Cluster(work=Path("w"))
-    assert of_option(("10.0.0.1:6379",), Path("w")) == Cluster(
-        address="10.0.0.1:6379", work=Path("w")
-    )
+    assert of_option(("10.0.0.1:6379",), Path("w")) == Cluster(address="10.0.0.1:6379", work=Path("w"))
     with pytest.raises(SettingsError, match="one address at most, not 'auto smart'"):
         of_option(("auto", "smart"), Path())
     with pytest.raises(SettingsError, match="worlds=0 is out of range: 1 to"):
@@ -86,10 +77,7 @@ def test_nothing_answers_at_an_address() -> None:
 
 
 def test_policies_are_told_apart_by_what_they_do(tmp_path: Path) -> None:
-    slow, fast = (
-        from_function(lambda o: 1.0 * o[..., :2]),
-        from_function(lambda o: 2.0 * o[..., :2]),
-    )
+    slow, fast = (from_function(lambda o: 1.0 * o[..., :2]), from_function(lambda o: 2.0 * o[..., :2]))
     assert policy_identity(slow) != policy_identity(fast)
     assert policy_identity(load("learned-smart")) == policy_identity(load("learned-smart"))
     assert policy_identity(load("ddcs-tuned")) != policy_identity(load("ddcs-distributed"))
@@ -102,9 +90,7 @@ def test_files_are_sent_as_policies_and_names_as_names() -> None:
     assert sent("runs/best.safetensors", idle) is idle
 
 
-def test_a_policys_module_is_part_of_its_identity(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_policys_module_is_part_of_its_identity(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     source = tmp_path / "team_of_mine.py"
     text = "class Still:\n    def begin(s, *a): ...\n    act = restart = begin\n"
@@ -120,9 +106,11 @@ def test_a_policys_module_is_part_of_its_identity(
 
 @pytest.mark.parametrize(
     ("seeds", "folder", "expected"),
-    [("3 4", [], ["runs/train/smart-ppo-3", "runs/train/smart-ppo-4"]),
-     ("3 4", ["--folder", "f"], ["f/seed-3", "f/seed-4"])],
-)  # fmt: skip
+    [
+        ("3 4", [], ["runs/train/smart-ppo-3", "runs/train/smart-ppo-4"]),
+        ("3 4", ["--folder", "f"], ["f/seed-3", "f/seed-4"]),
+    ],
+)
 def test_each_seed_has_a_folder_of_its_own(
     seeds: str, folder: list[str], expected: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,9 +126,7 @@ def test_each_seed_has_a_folder_of_its_own(
     assert found == [(path, seed) for path, seed in zip(expected, (3, 4), strict=True)]
 
 
-def test_a_seed_twice_and_another_run_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "--seeds", "1", "1"]) == 2
     assert "names one twice" in capsys.readouterr().err
     folder = tmp_path / "seed-1"

@@ -43,9 +43,7 @@ def test_results_stand_in_the_order_of_the_worlds(kind: str, tmp_path: Path) -> 
     one, other = job(), job(5)
     assert collect([one, other], Here(), store, Watcher()) == {}
     for each, offset in ((one, 0), (other, 5)):
-        np.testing.assert_array_equal(
-            joined(store.read(each))["square"], (np.arange(23) + offset) ** 2
-        )
+        np.testing.assert_array_equal(joined(store.read(each))["square"], (np.arange(23) + offset) ** 2)
 
 
 def test_a_worker_that_dies_costs_its_shard_only() -> None:
@@ -57,11 +55,7 @@ def test_a_worker_that_dies_costs_its_shard_only() -> None:
             lost.append(shard)
 
     unlucky = Shard(8, 4)
-    backend = Here(
-        lambda _, shard, attempt: (
-            Outcome(lost="node gone") if shard == unlucky and attempt < 3 else None
-        )
-    )
+    backend = Here(lambda _, shard, attempt: Outcome(lost="node gone") if shard == unlucky and attempt < 3 else None)
     store, one = Memory(), job()
     assert collect([one], backend, store, Counting()) == {}
     np.testing.assert_array_equal(joined(store.read(one))["square"], np.arange(23) ** 2)
@@ -135,11 +129,7 @@ def test_a_damaged_file_is_done_again(tmp_path: Path) -> None:
 
 
 def test_two_processes_cannot_collect_the_same(tmp_path: Path) -> None:
-    with (
-        Folder(tmp_path).held(job()),
-        pytest.raises(ClusterError, match="wait for it"),
-        Folder(tmp_path).held(job()),
-    ):
+    with Folder(tmp_path).held(job()), pytest.raises(ClusterError, match="wait for it"), Folder(tmp_path).held(job()):
         pass
     with Folder(tmp_path).held(job(1)), Folder(tmp_path).held(job()):
         pass

@@ -18,9 +18,28 @@ def test_on_a_cluster_of_three_nodes(tmp_path: Path) -> None:
         pytest.skip("needs .venv-recipes: make recipes")
     paths = [str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
     done = subprocess.run(
-        [ELSEWHERE, "-W", "ignore", "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "0",
-         "-W", "ignore", "--basetemp", tmp_path / "cases", "tests/support/ray_cases.py"],
-        cwd=ROOT, capture_output=True, text=True, timeout=500, check=False,
+        [
+            ELSEWHERE,
+            "-W",
+            "ignore",
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-n",
+            "0",
+            "-W",
+            "ignore",
+            "--basetemp",
+            tmp_path / "cases",
+            "tests/support/ray_cases.py",
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=500,
+        check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "RAY_AUTH_MODE": "disabled"},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]

@@ -76,7 +76,7 @@ def row(name: str, value: Any) -> Callable[[Content], None]:
         (setting("seed", 2**63), "whole number"),
         (setting("commit", "<script>"), "a commit's hash"),
         (setting("replay", "javascript:alert(1)"), "begins with https://"),
-        (setting("replay", "https://x/\"><script>"), "begins with https://"),
+        (setting("replay", 'https://x/"><script>'), "begins with https://"),
         (setting("rows", []), "not an object"),
         (row("more", [1]), "has the unknown 'more'"),
         (row("score", 0.5), "list of 1 to 10,000"),
@@ -91,10 +91,8 @@ def row(name: str, value: Any) -> Callable[[Content], None]:
         (row("safe_score", [0.75, 0.5]), "above score in world 0"),
         (row("safe_score", [0.25, 0.25]), "without any contact in world 1"),
     ],
-)  # fmt: skip
-def test_an_invalid_value_is_named(
-    tmp_path: Path, change: Callable[[Content], None], message: str
-) -> None:
+)
+def test_an_invalid_value_is_named(tmp_path: Path, change: Callable[[Content], None], message: str) -> None:
     with pytest.raises(ResultFileError) as error:
         read_result(forged(tmp_path, change))
     assert message in str(error.value)
@@ -103,11 +101,8 @@ def test_an_invalid_value_is_named(
 
 @pytest.mark.parametrize(
     "content",
-    [
-        b"", b"\xff\xfe", b"{", b"[" * 100_000, b'{"a": NaN}', b'{"a": 1, "a": 2}', b"7" * 5000,
-        b" " * 1_000_001,
-    ],
-)  # fmt: skip
+    [b"", b"\xff\xfe", b"{", b"[" * 100_000, b'{"a": NaN}', b'{"a": 1, "a": 2}', b"7" * 5000, b" " * 1_000_001],
+)
 def test_what_is_no_result_file_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "r.json"
     path.write_bytes(content)
@@ -129,9 +124,7 @@ def test_a_missing_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[s
         (setting("reads_state", True), "is not true of pursuit"),
     ],
 )
-def test_what_cannot_be_played_is_refused(
-    tmp_path: Path, change: Callable[[Content], None], message: str
-) -> None:
+def test_what_cannot_be_played_is_refused(tmp_path: Path, change: Callable[[Content], None], message: str) -> None:
     with pytest.raises(ResultFileError) as error:
         verify(forged(tmp_path, change), progress=False)
     assert message in str(error.value)
@@ -163,9 +156,7 @@ def test_a_policy_file_must_be_the_one_that_was_played(tmp_path: Path) -> None:
         verify(path, progress=False)
 
 
-@pytest.mark.parametrize(
-    "name", ["../p.safetensors", "/tmp/p.safetensors", "p.pkl", "a/b.safetensors"]
-)
+@pytest.mark.parametrize("name", ["../p.safetensors", "/tmp/p.safetensors", "p.pkl", "a/b.safetensors"])
 def test_a_policy_file_lies_in_the_same_folder(tmp_path: Path, name: str) -> None:
     def change(content: Content) -> None:
         content.update(policy_kind="file", policy=name, policy_sha256="0" * 64)

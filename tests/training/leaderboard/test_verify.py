@@ -10,13 +10,7 @@ import pytest
 
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate
-from posse_training.leaderboard import (
-    ResultFile,
-    play_for_result,
-    read_result,
-    verify,
-    write_result,
-)
+from posse_training.leaderboard import ResultFile, play_for_result, read_result, verify, write_result
 
 SCENARIO = "paper-distributed"
 WORLDS = 100
@@ -48,17 +42,13 @@ def test_rows_are_those_of_an_evaluation(result: ResultFile) -> None:
     assert (result.seed, result.split, result.worlds) == (2026, "test", WORLDS)
 
 
-def test_a_true_result_holds(
-    result: ResultFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_true_result_holds(result: ResultFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_result(result, tmp_path / "r.json")
     assert cli.main(["verify", str(path)]) == 0
     assert f"holds: all {WORLDS} worlds are equal" in capsys.readouterr().out
 
 
-def test_one_forged_row_is_found(
-    result: ResultFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_forged_row_is_found(result: ResultFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     better = round(result.rows["score"][17] + 1e-6, 6)
     forged = with_row(result, "score", 17, better)
     if result.rows["contact_free"][17] == 1:
@@ -72,9 +62,7 @@ def test_one_forged_row_is_found(
 
 def test_on_another_machine_means_decide(result: ResultFile, tmp_path: Path) -> None:
     elsewhere = dataclasses.replace(result, machine="another machine")
-    slightly = verify(
-        write_result(all_better(elsewhere, 0.004), tmp_path / "a.json"), progress=False
-    )
+    slightly = verify(write_result(all_better(elsewhere, 0.004), tmp_path / "a.json"), progress=False)
     assert slightly.holds
     assert not slightly.same_machine
     assert slightly.differing > 0
@@ -86,9 +74,7 @@ def test_on_another_machine_means_decide(result: ResultFile, tmp_path: Path) -> 
     assert "too few" in verify(write_result(short, tmp_path / "c.json"), progress=False).explanation
 
 
-def test_a_policy_file_travels_with_its_result(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_policy_file_travels_with_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = tmp_path / "mine.safetensors"
     given.write_bytes(shipped()["learned-smart"].read_bytes())
     out = tmp_path / "sent" / "r.json"

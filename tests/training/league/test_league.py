@@ -34,11 +34,15 @@ def tiny(folder: Path, **changes: Any) -> LeagueSettings:
         episodes=3,
         overrides={"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 2},
         training={
-            "num_worlds": 4, "rollout": 20, "minibatch": 32, "epochs": 1, "evaluate_worlds": 2,
+            "num_worlds": 4,
+            "rollout": 20,
+            "minibatch": 32,
+            "epochs": 1,
+            "evaluate_worlds": 2,
             "imitate_rounds": 1,
         },
         folder=folder,
-    )  # fmt: skip
+    )
     return replace(settings, **changes)
 
 
@@ -72,9 +76,7 @@ def die_at(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, call: int) ->
 
 
 @pytest.mark.long
-def test_a_killed_league_ends_as_one_that_was_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = play_league(tiny(tmp_path / "whole"), console=quiet())
     assert [m.label for m in found.teams] == ["idle", "trackers-1", "trackers-2"]
     assert [m.label for m in found.targets] == ["smart", "target-1", "target-2"]

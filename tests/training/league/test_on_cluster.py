@@ -50,11 +50,7 @@ def test_no_shard_is_lost_or_played_twice(tmp_path: Path, monkeypatch: pytest.Mo
             raise Killed
         original(*arguments)
 
-    unlucky = Here(
-        lambda job, shard, attempt: (
-            Outcome(lost="gone") if (shard.first, attempt) == (2, 1) else None
-        )
-    )
+    unlucky = Here(lambda job, shard, attempt: Outcome(lost="gone") if (shard.first, attempt) == (2, 1) else None)
     with monkeypatch.context() as patched:
         patched.setattr(Folder, "write", dying)
         with pytest.raises(Killed):

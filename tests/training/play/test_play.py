@@ -90,8 +90,10 @@ def test_what_the_team_gets_the_target_loses() -> None:
         assert points_of(score, True) + points_of(score, False) == pytest.approx(100)
 
 
-@pytest.mark.parametrize("keys", [(pygame.K_LEFT, pygame.K_RIGHT, pygame.K_UP, pygame.K_DOWN),
-                                  (pygame.K_a, pygame.K_d, pygame.K_w, pygame.K_s)])  # fmt: skip
+@pytest.mark.parametrize(
+    "keys",
+    [(pygame.K_LEFT, pygame.K_RIGHT, pygame.K_UP, pygame.K_DOWN), (pygame.K_a, pygame.K_d, pygame.K_w, pygame.K_s)],
+)
 def test_arrows_and_letters_steer(keys: tuple[int, ...]) -> None:
     left, right, up, down = keys
     assert steer(Wheel(0.0), {left}, 0.1) == Wheel(0.0, 1.0)
@@ -141,9 +143,7 @@ def test_the_player_drives_one_tracker_and_the_policy_the_others() -> None:
     assert moved[2] == pytest.approx(0.8, abs=1e-3)  # at 1 m/s
     assert (np.delete(moved, 2) == 0).all()
     assert (straight.heading[2] != turning.heading[2]).any()
-    np.testing.assert_array_equal(
-        np.delete(straight.heading, 2, 0), np.delete(turning.heading, 2, 0)
-    )
+    np.testing.assert_array_equal(np.delete(straight.heading, 2, 0), np.delete(turning.heading, 2, 0))
 
 
 def test_a_session_keeps_its_best_and_shows_best_and_last_side_by_side(tmp_path: Path) -> None:
@@ -163,9 +163,7 @@ def test_a_session_keeps_its_best_and_shows_best_and_last_side_by_side(tmp_path:
     assert replay is not None
     assert all(player.frames == SHORT + 1 for player in replay.players)
     assert all("you as tracker 0" in player.name for player in replay.players)
-    assert len(read_replay(write_replay(replay, tmp_path / "r.html")).players) == len(
-        replay.players
-    )
+    assert len(read_replay(write_replay(replay, tmp_path / "r.html")).players) == len(replay.players)
 
 
 def test_a_round_that_is_cut_short_is_recorded_too() -> None:
@@ -242,9 +240,7 @@ def test_every_phase_has_a_picture_with_the_points(size: tuple[int, int]) -> Non
         (["--world", "-1"], "world=-1"),
     ],
 )
-def test_mistakes_are_named(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mistakes_are_named(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["play", *arguments]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
 
@@ -269,12 +265,7 @@ def test_the_command_plays_and_writes_a_replay(
 
 
 def test_robots_have_names() -> None:
-    assert [robot_of(n, 3) for n in ("target", "target_0", "tracker_0", "tracker_2")] == [
-        3,
-        3,
-        0,
-        2,
-    ]
+    assert [robot_of(n, 3) for n in ("target", "target_0", "tracker_0", "tracker_2")] == [3, 3, 0, 2]
     with pytest.raises(SettingsError, match="tracker_1 is no robot"):
         robot_of("tracker_1", 1)
     with pytest.raises(PolicyError, match="against a person"):

@@ -62,9 +62,7 @@ def test_every_number_arrives(browser: Browser, written: Path) -> None:
                     }""",
                     [k, name, 123],
                 )
-                np.testing.assert_allclose(
-                    found, column.values[123].ravel(), rtol=0, atol=1e-9, err_msg=name
-                )
+                np.testing.assert_allclose(found, column.values[123].ravel(), rtol=0, atol=1e-9, err_msg=name)
                 sums = page.evaluate(
                     """([k, name]) => window.replay.app.players[k].columns.get(name).series
                         .reduce((sum, value, i) => sum + value * ((i % 97) + 1), 0)""",
@@ -91,15 +89,17 @@ def test_it_plays_to_the_end_and_pauses(browser: Browser, written: Path) -> None
         until(page, "window.replay.app.position < 100 && window.replay.app.playing")
 
 
-def test_keys_seek_and_the_picture_follows_the_data(
-    browser: Browser, written: Path, tmp_path: Path
-) -> None:
+def test_keys_seek_and_the_picture_follows_the_data(browser: Browser, written: Path, tmp_path: Path) -> None:
     player = read_replay(written).players[0]
     with opened(browser, written) as page:
         for keys, frame in (
-            (["ArrowRight"], 1), (["Shift+ArrowRight"], 11), (["ArrowLeft"], 10), (["End"], 200),
-            (["Home"], 0), (["Shift+ArrowRight"] * 9, 90),
-        ):  # fmt: skip
+            (["ArrowRight"], 1),
+            (["Shift+ArrowRight"], 11),
+            (["ArrowLeft"], 10),
+            (["End"], 200),
+            (["Home"], 0),
+            (["Shift+ArrowRight"] * 9, 90),
+        ):
             for key in keys:
                 page.keyboard.press(key)
             assert state(page, "position") == frame
@@ -163,17 +163,13 @@ def test_the_safe_score_stops_at_the_first_contact(browser: Browser, tmp_path: P
     replay = record(["pursuit", "idle"], "obstacles", world=3, seconds=30, observations=False)
     scores = [player.columns["score"].values for player in replay.players]
     touches = [
-        next((event.step for event in player.events if event.kind == "contact"), 10**6)
-        for player in replay.players
+        next((event.step for event in player.events if event.kind == "contact"), 10**6) for player in replay.players
     ]
     assert touches[0] < 300 < touches[1]
     with opened(browser, write_replay(replay, tmp_path / "a.html"), "#t=28") as page:
         for name, kept in (("score so far", [10**6] * 2), ("safe score so far", touches)):
             row = page.locator("tr", has=page.get_by_text(name, exact=True))
-            wanted = [
-                f"{score[: min(281, end)].sum() / 280:.3f}"
-                for score, end in zip(scores, kept, strict=True)
-            ]
+            wanted = [f"{score[: min(281, end)].sum() / 280:.3f}" for score, end in zip(scores, kept, strict=True)]
             assert row.locator("td").all_inner_texts()[1:] == wanted
 
 
@@ -358,9 +354,15 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
     browser: Browser, tmp_path: Path, view: float, reach: float
 ) -> None:
     replay = record(
-        ["ddcs-distributed"], "obstacles", seed=2, num_obstacles=12, obstacle_gap=0.8,
-        field_of_view=view, sensing_range=reach, observations=False,
-    )  # fmt: skip
+        ["ddcs-distributed"],
+        "obstacles",
+        seed=2,
+        num_obstacles=12,
+        obstacle_gap=0.8,
+        field_of_view=view,
+        sensing_range=reach,
+        observations=False,
+    )
     sees = replay.players[0].columns["tracker_sees"].values.astype(bool)
     with opened(browser, write_replay(replay, tmp_path / "a.html")) as page:
         inside = page.evaluate("""() => {

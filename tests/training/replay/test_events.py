@@ -82,9 +82,7 @@ def test_a_leader_is_whom_more_than_half_follow() -> None:
         **{f"world_{k}_at": np.full(frames, -1) for k in ("detected", "settled", "recovered")},
         **{f"world_contacts_{k}": np.zeros(frames) for k in ("tracker", "obstacle", "target")},
     }
-    leader = np.array(
-        [[-1, -1, -1, -1], [2, 2, 2, 0], [2, 2, 0, 0], [0, 0, 0, 2], [0, 0, 0, 0], [2, 2, 2, 2]]
-    )
+    leader = np.array([[-1, -1, -1, -1], [2, 2, 2, 0], [2, 2, 0, 0], [0, 0, 0, 2], [0, 0, 0, 0], [2, 2, 2, 2]])
     events = find_events(states, 0.1, leader)
     assert [(event.step, event.robots) for event in events] == [(3, (2, 0)), (5, (0, 2))]
     assert find_events(states, 0.1, None) == ()

@@ -37,8 +37,11 @@ def test_any_column_comes_back_to_half_its_resolution(values: Any, resolution: f
 
 
 @settings(deadline=None)
-@given(values=arrays.arrays(np.int64, st.tuples(st.integers(1, 12), st.integers(0, 3)),
-                            elements=st.integers(-(2**30), 2**30)))  # fmt: skip
+@given(
+    values=arrays.arrays(
+        np.int64, st.tuples(st.integers(1, 12), st.integers(0, 3)), elements=st.integers(-(2**30), 2**30)
+    )
+)
 def test_whole_numbers_come_back_exactly(values: Any) -> None:
     replay = Replay({}, (Player("p", {"c": Column(values)}),))
     np.testing.assert_array_equal(decode(*encode(replay)).players[0].columns["c"].values, values)
@@ -91,15 +94,22 @@ def test_what_is_no_replay_is_refused() -> None:
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("players",), None), (("players",), [3]), (("world",), 3),
-        (("players", 0, "frames"), -1), (("players", 0, "frames"), 2**40),
+        (("players",), None),
+        (("players",), [3]),
+        (("world",), 3),
+        (("players", 0, "frames"), -1),
+        (("players", 0, "frames"), 2**40),
         (("players", 0, "columns", 0, "shape"), [-1]),
-        (("players", 0, "columns", 0, "width"), 0), (("players", 0, "columns", 0, "order"), 10**9),
-        (("players", 0, "columns", 0, "scale"), 0), (("players", 0, "columns", 0, "scale"), "x"),
-        (("players", 0, "columns", 0, "name"), []), (("players", 0, "metrics"), []),
-        (("players", 0, "events"), [[1]]), (("players", 0, "about"), 3),
+        (("players", 0, "columns", 0, "width"), 0),
+        (("players", 0, "columns", 0, "order"), 10**9),
+        (("players", 0, "columns", 0, "scale"), 0),
+        (("players", 0, "columns", 0, "scale"), "x"),
+        (("players", 0, "columns", 0, "name"), []),
+        (("players", 0, "metrics"), []),
+        (("players", 0, "events"), [[1]]),
+        (("players", 0, "about"), 3),
     ],
-)  # fmt: skip
+)
 def test_forged_headers_are_refused(place: tuple[Any, ...], value: Any) -> None:
     header, data = encode(Replay({}, (Player("p", {"c": Column(np.arange(50.0))}),)))
     forged = json.loads(header)

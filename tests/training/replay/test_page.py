@@ -28,13 +28,8 @@ WEB = resources.files("posse_training.replay") / "web"
 
 @pytest.mark.parametrize("scenario", ["smart", "field"])
 @pytest.mark.parametrize(("observations", "most"), [(True, 1_000_000), (False, 150_000)])
-def test_a_minute_of_two_teams_of_six_can_be_mailed(
-    scenario: str, observations: bool, most: int
-) -> None:
-    replay = record(
-        ["ddcs-distributed", "learned-field"], scenario, world=3, num_trackers=6,
-        observations=observations,
-    )  # fmt: skip
+def test_a_minute_of_two_teams_of_six_can_be_mailed(scenario: str, observations: bool, most: int) -> None:
+    replay = record(["ddcs-distributed", "learned-field"], scenario, world=3, num_trackers=6, observations=observations)
     assert replay.players[0].frames == 601
     assert len(page(replay).encode()) <= most
 
@@ -164,8 +159,7 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
     world = ["--scenario", "smart", "--world", "3", "--seconds", "1", "--no-observations"]
     assert main(["replay", "idle", "pursuit", *world, "--num-trackers", "3"]) == 0
     assert "replay.html" in capsys.readouterr().out
-    assert main(["replay", "replay.html", "random", *world, "--num-trackers", "3",
-                 "--out", "all.html"]) == 0  # fmt: skip
+    assert main(["replay", "replay.html", "random", *world, "--num-trackers", "3", "--out", "all.html"]) == 0
     replay = read_replay(tmp_path / "all.html")
     assert [player.name for player in replay.players] == ["idle", "pursuit", "random"]
     assert replay.world["world"] == 3
@@ -185,20 +179,14 @@ def test_a_page_of_one_and_of_four_players() -> None:
 def test_a_page_with_damaged_data_is_named(tmp_path: Path) -> None:
     path = write_replay(short("constant"), tmp_path / "a.html")
     whole = path.read_text()
-    for old, new in (
-        ('id="data">', 'id="data">=x='),
-        ('"settings":{', '"setting":{'),
-        ('"fields":[', '"fields":[3,'),
-    ):
+    for old, new in (('id="data">', 'id="data">=x='), ('"settings":{', '"setting":{'), ('"fields":[', '"fields":[3,')):
         assert old in whole
         path.write_text(whole.replace(old, new, 1))
         with pytest.raises(SettingsError, match=r"cannot read a replay from .*a\.html"):
             read_replay(path)
 
 
-def test_a_full_disk_keeps_the_old_page_and_names_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_keeps_the_old_page_and_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_replay(short("constant"), tmp_path / "a.html")
     before = path.read_bytes()
 

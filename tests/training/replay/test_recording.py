@@ -25,8 +25,7 @@ def close(column: Any, frame: int, value: Any, angle: bool = False) -> None:
 
 
 @pytest.mark.parametrize(
-    ("policy", "scenario"),
-    [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("planner", "leader-loss")],
+    ("policy", "scenario"), [("ddcs-distributed", "field"), ("learned-radio", "radio"), ("planner", "leader-loss")]
 )
 def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -> None:
     player_of = load(policy)
@@ -34,9 +33,7 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
     recorded = record([policy], settings, seed=5, world=2)
     player = decode(*encode(recorded)).players[0]
     settings = settings.replace(message_size=max(settings.message_size, player_of.message_size))
-    batch = posse.Batch(
-        settings, 1, seed=5, split="test", first_world=2, autoreset="disabled"
-    )  # fmt: skip
+    batch = posse.Batch(settings, 1, seed=5, split="test", first_world=2, autoreset="disabled")
     memory, observations = begin(player_of, batch), batch.reset()
     column, outage = player.columns, round(settings.outage_time / settings.control_step)
     assert player.frames == 151
@@ -85,9 +82,7 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
 
 def test_the_world_is_described() -> None:
     world = short().world
-    assert (world["scenario"], world["seed"], world["split"], world["world"]) == (
-        "field", 3, "test", 1,
-    )  # fmt: skip
+    assert (world["scenario"], world["seed"], world["split"], world["world"]) == ("field", 3, "test", 1)
     assert world["version"] == posse.get_scenario("field").version
     assert world["changed"] == {"num_trackers": [5, 4]}
     batch = posse.batch("field", 1, seed=3, split="test", first_world=1, num_trackers=4)

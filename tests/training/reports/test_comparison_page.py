@@ -22,22 +22,21 @@ def make(path: Path, seed: int) -> LearnedPolicy:
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "plain")
     weight = np.random.default_rng(seed).normal(size=(2, encoding.size)).astype(np.float32)
     network = Network(
-        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
-        (weight / np.float32(8),), (np.array([0.5, 0], np.float32),), "tanh", "clip",
-    )  # fmt: skip
+        np.zeros(encoding.size, np.float32),
+        np.ones(encoding.size, np.float32),
+        5.0,
+        (weight / np.float32(8),),
+        (np.array([0.5, 0], np.float32),),
+        "tanh",
+        "clip",
+    )
     score = Estimate(0.25, 0.2, 0.3, 50).to_dict()
     card = {
         "name": path.stem,
         "scenarios": [{"name": "constant"}],
         "seed": 2,
         "training_seeds": [
-            {
-                "seed": k,
-                "score": score,
-                "steps": 1000,
-                "commit": f"abc{k}",
-                "command": f"posse train --seed {k}",
-            }
+            {"seed": k, "score": score, "steps": 1000, "commit": f"abc{k}", "command": f"posse train --seed {k}"}
             for k in (1, 2, 3)
         ],
     }

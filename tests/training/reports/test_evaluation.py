@@ -66,9 +66,7 @@ def test_the_score_is_the_mean_of_the_steps_scores() -> None:
 
 
 def test_an_episode_that_terminates_is_summed_up_when_it_ends() -> None:
-    results = evaluate(
-        "pursuit", "constant", 50, terminate_on_contact=True, horizon=300, progress=False
-    )
+    results = evaluate("pursuit", "constant", 50, terminate_on_contact=True, horizon=300, progress=False)
     ended_early = results["duration"] < 300 * 0.1 - 1e-6
     assert ended_early.any()
     np.testing.assert_array_equal(ended_early, results.contacts > 0)

@@ -94,9 +94,7 @@ def test_a_hostile_label_is_text(found: tuple[Path, Comparison], tmp_path: Path)
     assert HOSTILE in hostile.text["th"]
 
 
-def test_replays_are_of_the_worlds_with_the_largest_differences(
-    found: tuple[Path, Comparison],
-) -> None:
+def test_replays_are_of_the_worlds_with_the_largest_differences(found: tuple[Path, Comparison]) -> None:
     path, comparison = found
     page = Page(path)
     wins, losses = extremes(comparison, 2)
@@ -114,10 +112,7 @@ def test_replays_are_of_the_worlds_with_the_largest_differences(
 
 def plays_of(label: str, scenario: str, *seeds: list[float]) -> Plays:
     settings = posse.get_scenario(scenario)
-    return Plays(
-        label,
-        tuple(Results(label, settings, 7, "test", {"safe_score": np.array(s)}) for s in seeds),
-    )
+    return Plays(label, tuple(Results(label, settings, 7, "test", {"safe_score": np.array(s)}) for s in seeds))
 
 
 def test_extremes_are_paired_by_world_and_not_all_of_one_policy() -> None:
@@ -132,8 +127,9 @@ def test_extremes_are_paired_by_world_and_not_all_of_one_policy() -> None:
         found.plays[plays.scenario.name, plays.label] = plays
     wins, losses = extremes(found, 3)
     assert [(w.policy, w.seed, w.world, w.mine, w.baseline) for w in wins] == [
-        ("mine", 0, 1, 0.9, 0.5), ("other", 0, 1, 0.6, 0.5),
-    ]  # fmt: skip
+        ("mine", 0, 1, 0.9, 0.5),
+        ("other", 0, 1, 0.6, 0.5),
+    ]
     assert [(w.policy, w.seed, w.world) for w in losses] == [("mine", 1, 1)]
     assert extremes(found, 0) == ([], [])
     del found.plays["smart", "mine"], found.plays["smart", "other"], found.plays["radio", "mine"]

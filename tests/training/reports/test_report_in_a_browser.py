@@ -36,10 +36,7 @@ def test_a_replay_opens_and_plays_and_nothing_hostile_runs(written: Path) -> Non
         assert frame.locator("body").evaluate("window.replay.app.position") >= 1
         for where in (page.locator("body"), frame.locator("body")):
             assert where.evaluate("window.ran") is None
-        assert (
-            page.locator("body").evaluate("document.querySelector('iframe').contentDocument")
-            is None
-        )
+        assert page.locator("body").evaluate("document.querySelector('iframe').contentDocument") is None
         assert buttons.first.inner_text() == "Close"
         buttons.first.press("Enter")
         page.locator("iframe").wait_for(state="detached")
@@ -48,10 +45,7 @@ def test_a_replay_opens_and_plays_and_nothing_hostile_runs(written: Path) -> Non
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_on_a_phone_in_light_and_dark(written: Path, dark: bool) -> None:
-    with (
-        chromium() as browser,
-        opened(browser, written, size=(390, 844), dark=dark, touch=True) as page,
-    ):
+    with chromium() as browser, opened(browser, written, size=(390, 844), dark=dark, touch=True) as page:
         wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
         assert wide[0] <= wide[1] == 390
         paper, ink = (DARK[PAPER], DARK[INK]) if dark else (PAPER, INK)

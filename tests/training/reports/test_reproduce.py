@@ -7,13 +7,7 @@ import pytest
 
 import posse
 from posse_training.reports.reproduce import MEMBERS, MODELS, Settings, reproduce
-from posse_training.reports.reproduce.recording import (
-    Floats,
-    Recording,
-    draw_starts,
-    median_world,
-    settling_times,
-)
+from posse_training.reports.reproduce.recording import Floats, Recording, draw_starts, median_world, settling_times
 
 
 def recording(relative: Floats, speeds: Floats) -> Recording:
@@ -25,9 +19,7 @@ def recording(relative: Floats, speeds: Floats) -> Recording:
     trackers[..., :2] = relative[:, None] + target[:, :, None, :2]
     none = np.full(trackers.shape[:3], -1)
     slots = np.zeros((*trackers.shape[:3], 2))
-    return Recording(
-        np.arange(steps) * 0.1, trackers, target, speeds[:, None], slots, none, none, none < 0, 0.15
-    )  # fmt: skip
+    return Recording(np.arange(steps) * 0.1, trackers, target, speeds[:, None], slots, none, none, none < 0, 0.15)
 
 
 def test_settling_time_of_a_known_approach() -> None:

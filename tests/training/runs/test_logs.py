@@ -26,9 +26,7 @@ def largest_file(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
-def test_a_full_disk_ends_the_logs_and_not_the_training(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_full_disk_ends_the_logs_and_not_the_training(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     notes: list[str] = []
     settings = small(tmp_path / "run", "ppo", tensorboard=True)
     (tmp_path / "run").mkdir()

@@ -25,10 +25,7 @@ from posse_training.runs.train import resume, train
     ("algorithm", "changes"),
     [
         ("ppo", {}),
-        *(
-            pytest.param(name, {}, marks=pytest.mark.long)
-            for name in ("mappo", "recurrent-ppo", "sac", "td3")
-        ),
+        *(pytest.param(name, {}, marks=pytest.mark.long) for name in ("mappo", "recurrent-ppo", "sac", "td3")),
         ("mappo", ADVISED),
         ("ppo", BELIEVING),
         pytest.param("recurrent-ppo", BELIEVING, marks=pytest.mark.long),
@@ -104,9 +101,7 @@ def test_kill_9_loses_at_most_one_interval(tmp_path: Path) -> None:
     assert_equal(numbers(whole), numbers(killed))
 
 
-def test_killed_before_the_first_checkpoint_it_starts_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_killed_before_the_first_checkpoint_it_starts_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def killed(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -119,9 +114,7 @@ def test_killed_before_the_first_checkpoint_it_starts_anew(
     assert_equal(numbers(tmp_path / "whole"), numbers(tmp_path / "cut"))
 
 
-def test_checkpoints_are_no_further_apart_than_asked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_checkpoints_are_no_further_apart_than_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
     write = checkpoint.write_checkpoint
 

@@ -122,9 +122,7 @@ def test_nothing_is_made_before_settings_are_checked(
         ("sac", {"replay": 10**9, "scenario": "smart", "overrides": {}}, "num_worlds, replay"),
     ],
 )
-def test_more_memory_than_there_is(
-    tmp_path: Path, algorithm: str, changes: dict[str, Any], names: str
-) -> None:
+def test_more_memory_than_there_is(tmp_path: Path, algorithm: str, changes: dict[str, Any], names: str) -> None:
     with pytest.raises(SettingsError, match=f"GB of memory.*reduce {names}"):
         train(small(tmp_path / "run", algorithm, **changes), console=quiet())
     assert not (tmp_path / "run").exists()
@@ -172,9 +170,7 @@ class TestSomebodyElsesFolder:
         assert [file.name for file in (planted / "run").iterdir()] == ["settings.json"]
 
     @pytest.mark.parametrize("command", [["train", "--resume"], ["ship", "--name", "learned-x"]])
-    def test_no_command_imports_it(
-        self, planted: Path, command: list[str], capsys: pytest.CaptureFixture[str]
-    ) -> None:
+    def test_no_command_imports_it(self, planted: Path, command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
         write(planted / "run", beside="planted:Thing")
         assert main([*command, str(planted / "run")]) == 2
         assert "'planted:Thing' as 'beside'" in capsys.readouterr().err

@@ -31,12 +31,19 @@ def target_run(folder: Path, **changes: Any) -> TrainSettings:
     return small(
         folder,
         **{
-            "side": "target", "encoding": "plain", "against": "ddcs-distributed,idle",
-            "scenario": "smart", "team_sizes": (), "steps": 640, "evaluate_every": 320,
+            "side": "target",
+            "encoding": "plain",
+            "against": "ddcs-distributed,idle",
+            "scenario": "smart",
+            "team_sizes": (),
+            "steps": 640,
+            "evaluate_every": 320,
             "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
-            "reward_weights": {"team": -1.0, "contact": -0.5}, "checkpoint_every": 160, **changes,
+            "reward_weights": {"team": -1.0, "contact": -0.5},
+            "checkpoint_every": 160,
+            **changes,
         },
-    )  # fmt: skip
+    )
 
 
 def test_a_target_is_trained_and_played(tmp_path: Path) -> None:
@@ -66,9 +73,14 @@ def test_a_killed_run_resumes_bit_for_bit(
         file = tmp_path / "evader.safetensors"
         target_for(posse.get_scenario("smart"), cells=8 * recurrent).save(file)
         changes = {
-            "side": "trackers", "encoding": "slots", "against": f"smart,{file}",
-            "reward_weights": {}, "steps": 1920, "checkpoint_every": 480, "evaluate_every": 960,
-        }  # fmt: skip
+            "side": "trackers",
+            "encoding": "slots",
+            "against": f"smart,{file}",
+            "reward_weights": {},
+            "steps": 1920,
+            "checkpoint_every": 480,
+            "evaluate_every": 960,
+        }
     train(target_run(tmp_path / "whole", **changes), console=quiet())
     settings = target_run(tmp_path / "cut", **changes)
     original, calls = TrainingCallback._on_rollout_start, [0]
@@ -113,9 +125,13 @@ def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
 def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
     train(target_run(tmp_path / "first", steps=160), console=quiet())
     second = target_run(
-        tmp_path / "second", steps=80, start=str(tmp_path / "first"), learning_rate=0.0,
-        final_learning_rate=0.0, evaluate_every=10**6,
-    )  # fmt: skip
+        tmp_path / "second",
+        steps=80,
+        start=str(tmp_path / "first"),
+        learning_rate=0.0,
+        final_learning_rate=0.0,
+        evaluate_every=10**6,
+    )
     train(second, console=quiet())
     before, after = (numbers(tmp_path / name)["last"] for name in ("first", "second"))
     np.testing.assert_array_equal(before["layers.0.weight"], after["layers.0.weight"])
@@ -135,9 +151,7 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
         ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "trackers only"),
     ],
 )
-def test_settings_that_fit_no_target_are_refused(
-    changes: dict[str, Any], message: str, tmp_path: Path
-) -> None:
+def test_settings_that_fit_no_target_are_refused(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
     with pytest.raises((SettingsError, posse.ScenarioError), match=message):
         target_run(tmp_path, **changes)
 
@@ -172,9 +186,7 @@ def test_a_target_has_defaults_of_its_own() -> None:
     assert set(settings.reward_weights) == {"team", "contact"}
 
 
-def test_the_command_says_how_to_watch_a_target(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_says_how_to_watch_a_target(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = (
         "train --side target --scenario smart --against ddcs-distributed,idle --steps 160 "
         "--num-worlds 4 --rollout 20 --minibatch 20 --hidden 8 --evaluate-worlds 2 --beside None "

@@ -12,15 +12,7 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
-from tests.support.runs import (
-    ADVISED,
-    ALGORITHM_CASES,
-    BELIEVING,
-    assert_equal,
-    numbers,
-    quiet,
-    small,
-)
+from tests.support.runs import ADVISED, ALGORITHM_CASES, BELIEVING, assert_equal, numbers, quiet, small
 
 from posse_baselines import PolicyError, load
 from posse_baselines.learned import LearnedPolicy
@@ -43,9 +35,7 @@ def test_two_trainings_from_one_seed_agree_exactly(tmp_path: Path, algorithm: st
 
 
 @pytest.mark.parametrize("changes", [ADVISED, BELIEVING])
-def test_an_advised_training_exports_what_it_played(
-    tmp_path: Path, changes: dict[str, Any]
-) -> None:
+def test_an_advised_training_exports_what_it_played(tmp_path: Path, changes: dict[str, Any]) -> None:
     file = train(small(tmp_path / "run", **changes), console=quiet())
     policy = load(file)
     assert isinstance(policy, LearnedPolicy)
@@ -79,9 +69,7 @@ def test_the_card_says_what_it_is(tmp_path: Path) -> None:
     assert len(table) == 3
 
 
-def test_the_best_policy_is_kept_not_the_last(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_best_policy_is_kept_not_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scores = iter([0.2, 0.9, 0.4])
     monkeypatch.setattr(
         module,
@@ -100,9 +88,7 @@ def test_the_best_policy_is_kept_not_the_last(
     assert LearnedPolicy.from_file(best).card["validation_safe_score"] == 0.9
 
 
-def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(
-    tmp_path: Path,
-) -> None:
+def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_path: Path) -> None:
     """Rollouts are complete, so the number of remaining steps may be negative."""
     settings = small(tmp_path, steps=100, learning_rate=1e-3, final_learning_rate=1e-4)
     env = make_env(settings)
@@ -115,9 +101,7 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(
     assert steps_made(replace(settings, steps=3 * at_once), env.num_envs) == 3 * at_once
 
 
-@pytest.mark.parametrize(
-    ("rows", "wanted", "size"), [(81920, 8192, 8192), (100, 40, 50), (7, 3, 7), (6, 100, 6)]
-)
+@pytest.mark.parametrize(("rows", "wanted", "size"), [(81920, 8192, 8192), (100, 40, 50), (7, 3, 7), (6, 100, 6)])
 def test_minibatches_are_even(rows: int, wanted: int, size: int) -> None:
     assert even_minibatch(rows, wanted) == size
 
@@ -133,9 +117,7 @@ def test_a_training_that_diverges_says_so(tmp_path: Path, monkeypatch: pytest.Mo
         train(small(tmp_path / "run"), console=quiet())
 
 
-def test_what_was_good_before_a_divergence_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     usual = PPO.train
 
     def diverge(self: PPO) -> None:
@@ -191,7 +173,5 @@ def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
         wanted = [(int(float(row["steps"])), float(row[name])) for row in curve]
         assert [step for step, _ in logged] == [step for step, _ in wanted] == [640, 1280]
         assert [v for _, v in logged] == pytest.approx([v for _, v in wanted], abs=1e-6)
-    assert {"reward/slot", "reward/contact", "training/score", "rollout/success_rate"} <= set(
-        log.Tags()["scalars"]
-    )
+    assert {"reward/slot", "reward/contact", "training/score", "rollout/success_rate"} <= set(log.Tags()["scalars"])
     assert {"contact/share", "contact/multiplier"} <= set(log.Tags()["scalars"])

@@ -17,9 +17,8 @@ def test_contacts_are_counted_once_an_episode_and_cost_whom_makes_them() -> None
     def make() -> posse.Batch:
         # Close to one another and without a safeguard: trackers that wander touch.
         return posse.batch(
-            "constant", 12, seed=5, horizon=HORIZON, settle_time=1.0, start_distance=(1.0, 1.5),
-            autoreset="disabled",
-        )  # fmt: skip
+            "constant", 12, seed=5, horizon=HORIZON, settle_time=1.0, start_distance=(1.0, 1.5), autoreset="disabled"
+        )
 
     batch, twin = make(), make()
     env = TeamVecEnv([batch], Encoding.of(batch.layout), staggered=False)

@@ -111,9 +111,7 @@ def test_a_model_of_sb3_contrib_remembers_as_its_export_does(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("changes", [{}, {"encoding": "plain"}, BELIEVING])
-def test_what_is_exported_plays_as_the_model_does_through_episodes(
-    tmp_path: Path, changes: dict[str, Any]
-) -> None:
+def test_what_is_exported_plays_as_the_model_does_through_episodes(tmp_path: Path, changes: dict[str, Any]) -> None:
     settings = small(tmp_path, "recurrent-ppo", steps=160, **changes)
     env = make_env(settings)
     model: Any = make_model(settings, env)

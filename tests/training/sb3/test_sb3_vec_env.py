@@ -19,9 +19,7 @@ from posse_training.sb3.vec_env import TeamVecEnv
 HORIZON = 12
 
 
-def make(
-    worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any
-) -> TeamVecEnv:
+def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any) -> TeamVecEnv:
     values = {"horizon": HORIZON, "settle_time": 0.5, **settings}
     batch = posse.batch("constant", worlds, seed=5, autoreset="disabled", **values)
     return TeamVecEnv([batch], Encoding.of(batch.layout), staggered=staggered, see_state=see_state)
@@ -39,9 +37,7 @@ def draw(env: TeamVecEnv, generator: np.random.Generator) -> Any:
 
 def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
     env = make()
-    batch = posse.batch(
-        "constant", 3, seed=5, horizon=HORIZON, settle_time=0.5, autoreset="same_step"
-    )
+    batch = posse.batch("constant", 3, seed=5, horizon=HORIZON, settle_time=0.5, autoreset="same_step")
     np.testing.assert_array_equal(env.reset().reshape(3, 5, -1), batch.reset())
     generator = np.random.default_rng(1)
     total = np.zeros((3, 5))
@@ -214,10 +210,7 @@ class TestMethods:
             ([], "no batches given"),
             ([{"autoreset": "same_step"}], 'autoreset="disabled"'),
             ([{"autoreset": "disabled", "target_motion": "agent"}], "the target"),
-            (
-                [{"autoreset": "disabled"}, {"autoreset": "disabled", "message_size": 1}],
-                "different lengths",
-            ),
+            ([{"autoreset": "disabled"}, {"autoreset": "disabled", "message_size": 1}], "different lengths"),
         ],
     )
     def test_bad_batches(self, batches: list[dict[str, Any]], message: str) -> None:
@@ -258,13 +251,7 @@ class _Recorder(BaseCallback):
         infos = self.locals["infos"]
         self.rewards.append(self.locals["rewards"].copy())
         self.dones.append(self.locals["dones"].copy())
-        self.finals.append(
-            {
-                s: i["terminal_observation"]
-                for s, i in enumerate(infos)
-                if i.get("TimeLimit.truncated")
-            }
-        )
+        self.finals.append({s: i["terminal_observation"] for s, i in enumerate(infos) if i.get("TimeLimit.truncated")})
         return True
 
 
@@ -273,10 +260,16 @@ def test_returns_are_bootstrapped_at_truncation_and_nowhere_else() -> None:
     discount, decay, steps = 0.9, 0.8, 3 * HORIZON
     env = make(staggered=True)
     model = PPO(
-        "MlpPolicy", env, n_steps=steps, batch_size=steps * env.num_envs, gamma=discount,
-        gae_lambda=decay, seed=0, device="cpu",
+        "MlpPolicy",
+        env,
+        n_steps=steps,
+        batch_size=steps * env.num_envs,
+        gamma=discount,
+        gae_lambda=decay,
+        seed=0,
+        device="cpu",
         policy_kwargs={"features_extractor_class": Normaliser},
-    )  # fmt: skip
+    )
     recorder = _Recorder()
     _, callback = model._setup_learn(steps, recorder)
     model.collect_rollouts(env, callback, model.rollout_buffer, steps)

@@ -50,9 +50,13 @@ def filled(kind: type[RolloutBuffer]) -> Any:
     for _ in range(6):
         draw = generator.normal(size=(4, 9)).astype(np.float32)
         buffer.add(
-            draw[:, :3], draw[:, 3:5], draw[:, 5], draw[:, 6] > 1,
-            torch.from_numpy(draw[:, 7:8]), torch.from_numpy(draw[:, 8]),
-        )  # fmt: skip
+            draw[:, :3],
+            draw[:, 3:5],
+            draw[:, 5],
+            draw[:, 6] > 1,
+            torch.from_numpy(draw[:, 7:8]),
+            torch.from_numpy(draw[:, 8]),
+        )
     buffer.compute_returns_and_advantage(torch.ones(4), np.array([True, False, False, True]))
     return buffer
 

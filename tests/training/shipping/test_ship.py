@@ -48,9 +48,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
     return tuple(folder / str(seed) for seed in (1, 2, 3))
 
 
-def test_the_best_seed_is_shipped_and_all_are_on_record(
-    runs: tuple[Path, ...], tmp_path: Path
-) -> None:
+def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], tmp_path: Path) -> None:
     path = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
     shipped = LearnedPolicy.from_file(path)
     assert shipped.name == "learned-trial"
@@ -58,13 +56,21 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(
     scores = [
         sum(
             evaluate(
-                str(run / "best.safetensors"), "constant", 10, CHOICE_SEED, split="validation",
-                progress=False, num_trackers=size, horizon=40, settle_time=1.0,
+                str(run / "best.safetensors"),
+                "constant",
+                10,
+                CHOICE_SEED,
+                split="validation",
+                progress=False,
+                num_trackers=size,
+                horizon=40,
+                settle_time=1.0,
             )["safe_score"].mean()
             for size in (2, 3)
-        ) / 2
+        )
+        / 2
         for run in runs
-    ]  # fmt: skip
+    ]
     recorded = [run["safe_score"]["value"] for run in shipped.card["training_seeds"]]
     assert recorded == pytest.approx(scores)
     assert shipped.card["validation_safe_score"] == pytest.approx(max(scores))
@@ -94,9 +100,7 @@ def test_a_run_that_learned_nothing_is_not_shipped(
     policy = LearnedPolicy.from_file(path)
     policy.with_card({**policy.card, "steps": 0}).save(path)
     kept = tmp_path / "kept"
-    card = LearnedPolicy.from_file(
-        ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path, keep=kept))
-    ).card
+    card = LearnedPolicy.from_file(ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path, keep=kept))).card
     assert card["seed"] != best
     assert [run["steps"] for run in card["training_seeds"]][best - 1] == 0
     names = {f"learned-trial-{seed}" for seed in (1, 2, 3)}
@@ -133,14 +137,19 @@ def test_a_file_too_large_is_not_left_behind(
 def test_the_command_on_record_gives_the_settings_again() -> None:
     for settings in (
         replace(
-            default_settings("constant"), overrides={"horizon": 40, "settle_time": 1.0}, seed=7,
-            reward_weights={"contact": -0.5, "progress": 0.5, "slot": 0.25}, team_sizes=(2, 3),
-            imitate="ddcs-distributed", beside=None, tensorboard=False,
+            default_settings("constant"),
+            overrides={"horizon": 40, "settle_time": 1.0},
+            seed=7,
+            reward_weights={"contact": -0.5, "progress": 0.5, "slot": 0.25},
+            team_sizes=(2, 3),
+            imitate="ddcs-distributed",
+            beside=None,
+            tensorboard=False,
         ),
         replace(default_settings("smart,radio", "sac"), wandb="my project"),
         default_settings("field"),
         replace(default_settings("smart"), imitate=None, log_deviation=-0.5),
-    ):  # fmt: skip
+    ):
         words = shlex.split(command_of(settings))[2:]
         for own in (True, False):  # with the scenario's own defaults, and before there were any
             default = default_settings(settings.scenario, settings.algorithm, own=own)

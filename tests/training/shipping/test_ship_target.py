@@ -16,10 +16,17 @@ from posse_training.shipping.ship_target import Settings, ship_target
 def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path) -> None:
     run = tmp_path / "run"
     settings = small(
-        run, side="target", encoding="plain", against="idle", scenario="smart", team_sizes=(),
-        steps=80, evaluate_every=80, overrides={"horizon": HORIZON, "settle_time": 1.0},
+        run,
+        side="target",
+        encoding="plain",
+        against="idle",
+        scenario="smart",
+        team_sizes=(),
+        steps=80,
+        evaluate_every=80,
+        overrides={"horizon": HORIZON, "settle_time": 1.0},
         reward_weights={"team": -1.0},
-    )  # fmt: skip
+    )
     train(settings, console=quiet())
     asked = Settings(run, "mine", "idle", worlds=4, out=tmp_path / "out")
     with pytest.raises(SettingsError, match=r"costs idle .* more than 'smart': at least 0.1"):

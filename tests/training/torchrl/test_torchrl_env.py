@@ -39,10 +39,7 @@ def test_specs_hold(scenario: str) -> None:
 def test_specs_hold_where_the_target_is_an_agent() -> None:
     env = PosseEnv("constant", WORLDS, target_motion="agent", num_trackers=3, **SHORT)
     check_env_specs(env, seed=1)
-    assert env.group_map == {
-        "agents": ["tracker_0", "tracker_1", "tracker_2"],
-        "target": ["target_0"],
-    }
+    assert env.group_map == {"agents": ["tracker_0", "tracker_1", "tracker_2"], "target": ["target_0"]}
 
 
 def test_the_state_and_discrete_actions() -> None:
@@ -192,9 +189,7 @@ def test_start_poses_can_be_given() -> None:
 def test_settings_reach_the_batch() -> None:
     env = PosseEnv("constant", 1, seed=4, first_world=17, split="test", num_trackers=3)
     batch = posse.batch("constant", 20, seed=4, split="test", num_trackers=3)
-    np.testing.assert_array_equal(
-        env.reset()["agents", "observation"].numpy(), batch.reset()[17:18]
-    )
+    np.testing.assert_array_equal(env.reset()["agents", "observation"].numpy(), batch.reset()[17:18])
 
 
 def test_a_choice_of_autoreset_is_refused() -> None:
@@ -245,9 +240,7 @@ def test_a_collector_gathers_whole_batches() -> None:
     batch.reset()
     for step in range(12):
         observations, *_ = batch.step(np.ones(batch.action_shape, np.float32))
-        np.testing.assert_array_equal(
-            data["next", "agents", "observation"][:, step].numpy(), observations
-        )
+        np.testing.assert_array_equal(data["next", "agents", "observation"][:, step].numpy(), observations)
     assert data["next", "truncated"].squeeze(-1)[:, 11].all()
 
 

@@ -9,15 +9,7 @@ import pytest
 import torch
 
 import posse
-from posse_training.torchrl.agent import (
-    ACTION,
-    DRAWN,
-    OBSERVATION,
-    REWARD_NEXT,
-    VALUE,
-    Agent,
-    RunningScale,
-)
+from posse_training.torchrl.agent import ACTION, DRAWN, OBSERVATION, REWARD_NEXT, VALUE, Agent, RunningScale
 from posse_training.torchrl.env import TRACKERS, PosseEnv
 from posse_training.torchrl.ppo import Settings, objectives, roll_out, spread_flags, train
 
@@ -70,11 +62,7 @@ def test_advantages_bootstrap_what_was_truncated_and_not_what_was_terminated() -
     later = torch.zeros_like(value[:, 0])
     for t in reversed(range(20)):
         goes_on = 1 - torch.maximum(terminated, truncated)[:, t]
-        surprise = (
-            rollout[REWARD_NEXT][:, t]
-            + 0.9 * value_next[:, t] * (1 - terminated[:, t])
-            - value[:, t]
-        )
+        surprise = rollout[REWARD_NEXT][:, t] + 0.9 * value_next[:, t] * (1 - terminated[:, t]) - value[:, t]
         later = surprise + 0.9 * 0.8 * goes_on * later
         expected[:, t] = later
     torch.testing.assert_close(rollout["advantage"], expected)
@@ -119,27 +107,32 @@ def test_the_same_seed_gives_the_same_agent() -> None:
 
 @pytest.mark.long
 def test_it_learns_to_close_in() -> None:
-    settings = Settings(
-        num_worlds=32, rollout_steps=50, updates=12,
-        minibatches=2, learning_rate=1e-3, discount=0.95,
-    )  # fmt: skip
+    settings = Settings(num_worlds=32, rollout_steps=50, updates=12, minibatches=2, learning_rate=1e-3, discount=0.95)
     rewards: list[float] = []
     train(
         "constant",
         settings,
         report=lambda figures: rewards.append(figures["reward"]),
-        horizon=50, target_speed=0.2, start_distance=(1.5, 3.0),
-    )  # fmt: skip
+        horizon=50,
+        target_speed=0.2,
+        start_distance=(1.5, 3.0),
+    )
     assert np.mean(rewards[-3:]) > 1.5 * np.mean(rewards[:3])
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("num_worlds", 0), ("updates", -1), ("learning_rate", 0.0), ("discount", 1.5),
-        ("trace", -0.1), ("entropy", -1.0), ("hidden", (64, 0)), ("seed", -1),
+        ("num_worlds", 0),
+        ("updates", -1),
+        ("learning_rate", 0.0),
+        ("discount", 1.5),
+        ("trace", -0.1),
+        ("entropy", -1.0),
+        ("hidden", (64, 0)),
+        ("seed", -1),
     ],
-)  # fmt: skip
+)
 def test_impossible_settings_are_refused(name: str, value: Any) -> None:
     with pytest.raises(ValueError, match=f"{name}="):
         Settings(**{name: value})

@@ -62,11 +62,7 @@ def test_every_point_is_a_setting_that_can_be_played() -> None:
     tunables = tunable("ddcs-distributed")
     space = Space(tunables)
     rng = np.random.default_rng(1)
-    for point in [
-        *rng.random((200, len(tunables))),
-        np.zeros(len(tunables)),
-        np.ones(len(tunables)),
-    ]:
+    for point in [*rng.random((200, len(tunables))), np.zeros(len(tunables)), np.ones(len(tunables))]:
         settings_of("ddcs-distributed").replace(**space.values(point))
 
 
@@ -80,9 +76,7 @@ def test_a_setting_that_must_exceed_one_that_is_not_searched() -> None:
 def test_the_start_is_the_default_and_wide_ranges_are_logarithmic() -> None:
     for t in tunable("pngl-l-phi"):
         space = Space((t,), ())
-        values = Space((t,), tuple(o for o in tunable("pngl-l-phi") if o is not t)).values(
-            space.start
-        )
+        values = Space((t,), tuple(o for o in tunable("pngl-l-phi") if o is not t)).values(space.start)
         assert values[t.name] == pytest.approx(t.default, rel=1e-5, abs=1e-9)
     wide = Space((Tunable("x", 1.0, 0.1, 10.0, "s"),))
     assert wide.values(np.array([0.25]))["x"] == pytest.approx(10**-0.5, rel=1e-5)

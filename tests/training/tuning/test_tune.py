@@ -44,9 +44,7 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize("after", [1, 3])
-def test_a_killed_run_resumes_to_the_same_result(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int
-) -> None:
+def test_a_killed_run_resumes_to_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> None:
     whole = card_of(small(tmp_path / "whole"))
     generation = tune_module._generation
     made: list[int] = []
@@ -82,12 +80,11 @@ def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
     assert card_of(small(tmp_path / "again", generations=generations)) == card
 
 
-def test_progress_is_lines_where_there_is_no_terminal(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_progress_is_lines_where_there_is_no_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = "--generations 2 --population 4 --worlds 2 --validation-worlds 3 --every 1"
-    assert main(["tune", POLICY, "--scenario", "paper-distributed", *words.split(), "--out",
-                 str(tmp_path / "run")]) == 0  # fmt: skip
+    assert (
+        main(["tune", POLICY, "--scenario", "paper-distributed", *words.split(), "--out", str(tmp_path / "run")]) == 0
+    )
     out = capsys.readouterr().out
     assert "searching 1 settings: bias" in out
     assert "generation    2  safe score" in out
@@ -159,9 +156,7 @@ def test_a_damaged_state_is_named(tmp_path: Path, damage: Any) -> None:
 
 
 def test_only_names_the_searched_settings(tmp_path: Path) -> None:
-    card = card_of(
-        small(tmp_path / "run", policy="ddcs-distributed", only=("gain",), generations=1)
-    )
+    card = card_of(small(tmp_path / "run", policy="ddcs-distributed", only=("gain",), generations=1))
     assert card["searched"] == ["gain"]
     assert set(card["settings"]) <= {"gain"}
     assert card["command"].endswith("--only gain")
@@ -173,9 +168,7 @@ def test_nothing_has_an_effect(tmp_path: Path) -> None:
         tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
 
 
-def test_shipped_runs_are_repeated_by_their_own_commands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_shipped_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for module in ("posse_baselines.tuned.files", "posse_training.tuning.tune"):
         monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")

@@ -9,16 +9,7 @@ import pygame
 import pytest
 
 from posse_training.viewer.keys import BINDINGS, command_of
-from posse_training.viewer.state import (
-    COMMANDS,
-    SPEEDS,
-    ZOOMS,
-    Command,
-    Limits,
-    State,
-    advance,
-    react,
-)
+from posse_training.viewer.state import COMMANDS, SPEEDS, ZOOMS, Command, Limits, State, advance, react
 
 LIMITS = Limits(robots=6, policies=3, last=600, second=10)
 

@@ -112,9 +112,7 @@ def test_time_runs_while_it_plays_and_stands_while_it_does_not() -> None:
     assert shown.moment.scene.step == 30
 
 
-def test_old_moments_are_forgotten_when_there_are_too_many(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_old_moments_are_forgotten_when_there_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tape_module, "_MOST_BYTES", 1)
     monkeypatch.setattr(tape_module, "_LEAST_KEPT", 40)
     tape = Tape(load("idle"), posse.get_scenario("smart"), 7, 0, "test")
@@ -154,9 +152,11 @@ def test_another_policy_plays_the_same_world_up_to_the_same_moment() -> None:
 def test_what_is_being_loaded_is_said_before() -> None:
     told: list[str] = []
     shown = Viewer(
-        ("pursuit", "ddcs-distributed"), posse.get_scenario("field"), size=(960, 640),
+        ("pursuit", "ddcs-distributed"),
+        posse.get_scenario("field"),
+        size=(960, 640),
         show=lambda _: told.append(shown.message),
-    )  # fmt: skip
+    )
     assert told == []
     for command in (Command("policy", 1), Command("policy", -1), Command("world", 1)):
         shown.do(command)
@@ -312,9 +312,7 @@ def test_the_panel_says_what_the_robot_observed() -> None:
         assert lines["task"].value in ("searching", "converging", "flocking")
         assert "leader" not in lines
         blocks = [line.name for line in lines_of(moment, layout, robot) if line.is_heading]
-        assert blocks[:4] == [
-            "action and reward", "observed: own motion", "observed: target", "observed: sonar",
-        ]  # fmt: skip
+        assert blocks[:4] == ["action and reward", "observed: own motion", "observed: target", "observed: sonar"]
         assert blocks[-1] == "observed: task"
     target = {line.name: line.value for line in lines_of(moment, layout, 5)}
     assert target["slots occupied"] == f"{int(moment.scene.occupied.sum())} of 5"

@@ -29,9 +29,8 @@ class PosseTaskClass(TaskClass):
         """Return a function that makes ``num_envs`` worlds."""
         settings = {**self.config, "seed": 0 if seed is None else seed}
         return lambda: PosseEnv(
-            num_worlds=num_envs, device=device, state=True,
-            discrete_actions=not continuous_actions, **settings,
-        )  # fmt: skip
+            num_worlds=num_envs, device=device, state=True, discrete_actions=not continuous_actions, **settings
+        )
 
     def supports_continuous_actions(self) -> bool:
         """Return ``True``."""
@@ -117,6 +116,4 @@ class PosseTask(Task):
 
 def register() -> None:
     """Make the tasks known to BenchMARL by name, ``posse/smart``."""
-    task_config_registry.update(
-        {f"posse/{t.name.lower()}": t for t in PosseTask.__members__.values()}
-    )
+    task_config_registry.update({f"posse/{t.name.lower()}": t for t in PosseTask.__members__.values()})

@@ -70,11 +70,7 @@ class Watcher:
 
 
 def collect(
-    jobs: Sequence[Job],
-    backend: Backend,
-    store: Store,
-    watcher: Watcher,
-    attempts: int = 4,
+    jobs: Sequence[Job], backend: Backend, store: Store, watcher: Watcher, attempts: int = 4
 ) -> dict[Job, Exception]:
     """Compute all shards that the store lacks; return the jobs that failed, with their errors.
 

@@ -97,18 +97,14 @@ class ClusterPlayers(Players):
         opponent = None if self._opponent is None else self._opponent.name
         return Results(name, settings, seed, split, joined(self._store.read(job)), opponent)
 
-    def _job(
-        self, policy: str | Policy, scenario: Scenario, episodes: int, seed: int, split: str
-    ) -> Job:
+    def _job(self, policy: str | Policy, scenario: Scenario, episodes: int, seed: int, split: str) -> Job:
         name, size = self._of(policy)
         if self._opponent is not None:
             scenario = self._opponent.fit(scenario)
             if not isinstance(policy, str):
                 against(policy, self._opponent)  # raises here if it cannot play against it
         fitted = scenario.replace(message_size=max(scenario.message_size, size))
-        return evaluation_job(
-            policy, name, fitted, episodes, seed, split, self._cluster, self._limit, self._opponent
-        )
+        return evaluation_job(policy, name, fitted, episodes, seed, split, self._cluster, self._limit, self._opponent)
 
     def _of(self, policy: str | Policy) -> _Known:
         if isinstance(policy, str):

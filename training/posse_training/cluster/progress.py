@@ -22,9 +22,7 @@ class ClusterProgress(Watcher):
         console: Where to show it.
     """
 
-    def __init__(
-        self, title: str, *, disable: bool = False, console: Console | None = None
-    ) -> None:
+    def __init__(self, title: str, *, disable: bool = False, console: Console | None = None) -> None:
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),

@@ -146,6 +146,5 @@ class Folder:
 
     def _cannot_write(self, error: OSError) -> ClusterError:
         return ClusterError(
-            f"cannot write to {self._folder}: {error.strerror or error}. Make room, then run the "
-            "same again: it resumes"
+            f"cannot write to {self._folder}: {error.strerror or error}. Make room, then run the same again: it resumes"
         )

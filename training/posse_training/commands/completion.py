@@ -36,7 +36,5 @@ def main(arguments: Sequence[str]) -> None:
         print('usage: posse completion {bash,zsh}\n\nIn ~/.bashrc: eval "$(posse completion bash)"')
         return
     if len(arguments) != 1 or arguments[0] not in _SHELLS:
-        raise SettingsError(
-            f"{' '.join(arguments)!r:.80} is no shell: name one of {', '.join(_SHELLS)}"
-        )
+        raise SettingsError(f"{' '.join(arguments)!r:.80} is no shell: name one of {', '.join(_SHELLS)}")
     print(_SHELLS[arguments[0]].replace("@COMMANDS@", " ".join(COMMANDS)), end="")

@@ -45,9 +45,7 @@ def main(arguments: Sequence[str]) -> None:
     if which.out.suffix.lower() not in _PAGES:
         raise SettingsError(f"--out {which.out} must end in {' or '.join(_PAGES)}")
     if not all(_LEAST <= side <= _MOST for side in which.size):
-        raise SettingsError(
-            f"--size {which.size[0]} {which.size[1]} must be {_LEAST} to {_MOST} px each"
-        )
+        raise SettingsError(f"--size {which.size[0]} {which.size[1]} must be {_LEAST} to {_MOST} px each")
     from posse import get_scenario
     from posse_baselines import load
     from posse_training.play.game import Game, robot_of
@@ -59,9 +57,8 @@ def main(arguments: Sequence[str]) -> None:
         scenario = scenario.replace(num_trackers=which.num_trackers)
     robot = robot_of(which.robot, scenario.num_trackers)
     game = Game(
-        load(which.against), scenario, robot, seed=which.seed, world=which.world,
-        split=which.split, size=which.size,
-    )  # fmt: skip
+        load(which.against), scenario, robot, seed=which.seed, world=which.world, split=which.split, size=which.size
+    )
     instead = f"see the team alone: posse watch {which.against} --film film.gif"
     open_window(which.size, f"posse: {scenario.name}", instead)
     run(game)

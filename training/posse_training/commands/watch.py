@@ -68,19 +68,23 @@ def main(arguments: Sequence[str]) -> None:
         policies = [load(name) for name in which.policies]
         print(
             film(
-                [(p.name, against(p, target)) for p in policies], scenario, path=which.film,
-                seed=which.seed, world=which.world, split=which.split, start=which.start,
+                [(p.name, against(p, target)) for p in policies],
+                scenario,
+                path=which.film,
+                seed=which.seed,
+                world=which.world,
+                split=which.split,
+                start=which.start,
                 seconds=scenario.duration if which.seconds is None else which.seconds,
-                speed=1.5 if which.speed is None else which.speed, size=which.size,
+                speed=1.5 if which.speed is None else which.speed,
+                size=which.size,
             )
-        )  # fmt: skip
+        )
         return
     given = {"--from": which.start or None, "--seconds": which.seconds, "--speed": which.speed}
     for option, value in given.items():
         if value is not None:
-            raise SettingsError(
-                f"{option} {value:g} is for films: add --film film.gif, or leave it out"
-            )
+            raise SettingsError(f"{option} {value:g} is for films: add --film film.gif, or leave it out")
     size = which.size or _SIZE
     if not all(_LEAST <= side <= _MOST for side in size):
         raise SettingsError(f"--size {size[0]} {size[1]} must be {_LEAST} to {_MOST} px each")
@@ -91,9 +95,8 @@ def main(arguments: Sequence[str]) -> None:
     others = [name for name in policy_names() if name not in which.policies]
     names = [*which.policies, *(others if len(which.policies) == 1 else [])]
     viewer = Viewer(
-        names, scenario, target, seed=which.seed, world=which.world, split=which.split, size=size,
-        show=show,
-    )  # fmt: skip
+        names, scenario, target, seed=which.seed, world=which.world, split=which.split, size=size, show=show
+    )
     command = f"posse watch {' '.join(which.policies)} --scenario {which.scenario}"
     if which.target is not None:
         command += f" --target {which.target}"

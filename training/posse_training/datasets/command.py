@@ -48,10 +48,16 @@ def main(arguments: Sequence[str]) -> None:
     with how_to_resume(which.ray), progress_bar(disable=cluster is not None) as bar:
         task = bar.add_task("episodes", total=which.episodes)
         dataset = record_dataset(
-            which.policies, which.scenario, which.episodes, out=which.out, name=which.name,
-            seed=which.seed, split=which.split, progress=lambda count: bar.advance(task, count),
+            which.policies,
+            which.scenario,
+            which.episodes,
+            out=which.out,
+            name=which.name,
+            seed=which.seed,
+            split=which.split,
+            progress=lambda count: bar.advance(task, count),
             ray=cluster or False,
-        )  # fmt: skip
+        )
     print(
         f"{dataset.total_episodes} episodes, {dataset.total_steps:,} steps: "
         f"MINARI_DATASETS_PATH={which.out} and minari.load_dataset({dataset.spec.dataset_id!r})"

@@ -18,26 +18,19 @@ Part = tuple[list[EpisodeBuffer], list[dict[str, Any]]]
 """Buffers of some episodes, and their metadata."""
 
 
-def play_part(
-    players: Sequence[Policy], scenario: Scenario, seed: int, split: str, shard: Shard
-) -> Part:
+def play_part(players: Sequence[Policy], scenario: Scenario, seed: int, split: str, shard: Shard) -> Part:
     """Play an episode in every world of a shard, world i by player i mod their number."""
     buffers, about = [], []
     for i in range(shard.first, shard.first + shard.count):
         policy = players[i % len(players)]
-        batch = Batch(
-            scenario, 1, seed=seed, split=split, first_world=i, autoreset="same_step",
-            num_threads=1,
-        )  # fmt: skip
+        batch = Batch(scenario, 1, seed=seed, split=split, first_world=i, autoreset="same_step", num_threads=1)
         for buffer, metrics in play_episodes(batch, policy, i):
             buffers.append(buffer)
             about.append({"policy": policy.name, "world": i, **metrics})
     return buffers, about
 
 
-def play_episodes(
-    batch: Batch, policy: Policy, first: int
-) -> Iterator[tuple[EpisodeBuffer, Metrics]]:
+def play_episodes(batch: Batch, policy: Policy, first: int) -> Iterator[tuple[EpisodeBuffer, Metrics]]:
     """Play one episode in every world; yield its buffer and its metrics.
 
     Observations are (T + 1, N, F), actions (T, N, 2 + m), rewards (T,), the mean of the team's.
@@ -85,8 +78,7 @@ def play_episodes(
             infos={
                 "score": np.stack([step[e] for step in scores[: length + 1]]),
                 "reward_terms": {
-                    name: np.stack([step[name][e] for step in terms[: length + 1]])
-                    for name in batch.term_names
+                    name: np.stack([step[name][e] for step in terms[: length + 1]]) for name in batch.term_names
                 },
             },
         )

@@ -27,12 +27,7 @@ _STEPS: Final = ("observations", "actions", "rewards", "terminations", "truncati
 
 @contextlib.contextmanager
 def recorded_on_cluster(
-    players: Sequence[Policy],
-    scenario: Scenario,
-    episodes: int,
-    seed: int,
-    split: str,
-    cluster: Cluster,
+    players: Sequence[Policy], scenario: Scenario, episodes: int, seed: int, split: str, cluster: Cluster
 ) -> Iterator[Iterator[Part]]:
     """Have episodes played on a cluster; yield an iterator over them in their order.
 
@@ -64,16 +59,11 @@ def recorded_on_cluster(
             failed = collect([job], backend, store, watcher, cluster.attempts)
         if failed:
             raise failed[job]
-        yield (
-            _part(arrays, shard, names, seed)
-            for arrays, shard in zip(store.iterate(job), job.shards, strict=True)
-        )
+        yield (_part(arrays, shard, names, seed) for arrays, shard in zip(store.iterate(job), job.shards, strict=True))
     store.remove(job)
 
 
-def record_on_worker(
-    players: Sequence[Policy], scenario: Scenario, seed: int, split: str, shard: Shard
-) -> Arrays:
+def record_on_worker(players: Sequence[Policy], scenario: Scenario, seed: int, split: str, shard: Shard) -> Arrays:
     """Play the episodes of a shard; return their arrays, named ``EPISODE/WHAT``."""
     arrays: Arrays = {}
     buffers, about = play_part(players, scenario, seed, split, shard)
@@ -82,11 +72,7 @@ def record_on_worker(
         found = {name: getattr(buffer, name) for name in _STEPS}
         found["score"] = infos["score"]
         found |= {f"terms/{name}": column for name, column in infos["reward_terms"].items()}
-        found |= {
-            f"metrics/{name}": value
-            for name, value in metadata.items()
-            if name not in ("policy", "world")
-        }
+        found |= {f"metrics/{name}": value for name, value in metadata.items() if name not in ("policy", "world")}
         arrays |= {f"{k}/{name}": np.asarray(value) for name, value in found.items()}
     return arrays
 
@@ -95,22 +81,12 @@ def _part(arrays: Arrays, shard: Shard, names: Sequence[str], seed: int) -> Part
     """Return the buffers and metadata that arrays hold."""
     buffers, about = [], []
     for k in range(shard.count):
-        found = {
-            name.removeprefix(f"{k}/"): array
-            for name, array in arrays.items()
-            if name.startswith(f"{k}/")
-        }
+        found = {name.removeprefix(f"{k}/"): array for name, array in arrays.items() if name.startswith(f"{k}/")}
         world = shard.first + k
         metrics = {
-            name.removeprefix("metrics/"): float(array)
-            for name, array in found.items()
-            if name.startswith("metrics/")
+            name.removeprefix("metrics/"): float(array) for name, array in found.items() if name.startswith("metrics/")
         }
-        terms = {
-            name.removeprefix("terms/"): array
-            for name, array in found.items()
-            if name.startswith("terms/")
-        }
+        terms = {name.removeprefix("terms/"): array for name, array in found.items() if name.startswith("terms/")}
         buffers.append(
             EpisodeBuffer(
                 id=world,

@@ -68,9 +68,7 @@ def record_dataset(
         ClusterError: There is no such cluster, or the workers of some episodes died again and
             again.
     """
-    given = (
-        [policies] if isinstance(policies, str) or not isinstance(policies, Sequence) else policies
-    )
+    given = [policies] if isinstance(policies, str) or not isinstance(policies, Sequence) else policies
     players = [load(each) if isinstance(each, str) else each for each in given]
     if not players:
         raise PolicyError("no policies given: pass at least one")
@@ -93,17 +91,19 @@ def record_dataset(
         else:
             from posse_training.datasets.on_cluster import recorded_on_cluster
 
-            parts = stack.enter_context(
-                recorded_on_cluster(players, settings, episodes, seed, split, cluster)
-            )
+            parts = stack.enter_context(recorded_on_cluster(players, settings, episodes, seed, split, cluster))
         stack.enter_context(_datasets_in(folder))
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", UserWarning)  # that an e-mail address is missing
         dataset = _write(
-            called, env, parts, progress,
+            called,
+            env,
+            parts,
+            progress,
             description=f"{episodes} episodes of posse's scenario {scenario!r}, played by {name}",
-            algorithm_name=name, code_permalink=f"posse {posse.__version__} {commit() or ''}",
-        )  # fmt: skip
+            algorithm_name=name,
+            code_permalink=f"posse {posse.__version__} {commit() or ''}",
+        )
     about = {
         "version": posse.__version__,
         "commit": commit(),
@@ -126,29 +126,28 @@ def load_dataset(out: str | Path, name: str) -> minari.MinariDataset:
         return minari.load_dataset(name)
 
 
-def _buffers(
-    players: Sequence[Policy], settings: Scenario, episodes: int, seed: int, split: str
-) -> Iterator[Part]:
+def _buffers(players: Sequence[Policy], settings: Scenario, episodes: int, seed: int, split: str) -> Iterator[Part]:
     """Yield buffers of episodes and their metadata, some at a time."""
     for shard in cut(episodes, AT_ONCE):
         yield play_part(players, settings, seed, split, shard)
 
 
 def _write(
-    called: str,
-    env: gymnasium.Env[Any, Any],
-    parts: Iterator[Part],
-    progress: Callable[[int], object],
-    **about: Any,
+    called: str, env: gymnasium.Env[Any, Any], parts: Iterator[Part], progress: Callable[[int], object], **about: Any
 ) -> minari.MinariDataset:
     dataset: minari.MinariDataset | None = None
     done = 0
     for buffers, metadata in parts:
         if dataset is None:
             dataset = minari.create_dataset_from_buffers(
-                called, buffers, env=env, data_format="hdf5", author="posse",
-                requirements=[f"posse=={posse.__version__}"], **about,
-            )  # fmt: skip
+                called,
+                buffers,
+                env=env,
+                data_format="hdf5",
+                author="posse",
+                requirements=[f"posse=={posse.__version__}"],
+                **about,
+            )
         else:
             dataset.storage.update_episodes(buffers)
         dataset.storage.update_episode_metadata(metadata, range(done, done + len(buffers)))

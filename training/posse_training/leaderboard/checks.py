@@ -25,9 +25,7 @@ def text(longest: int) -> Check:
 
     def check(name: str, value: Any) -> None:
         if not (isinstance(value, str) and 0 < len(value) <= longest and value.isprintable()):
-            raise ValueError(
-                f"{name}={value!r:.60} must be a printable text of 1 to {longest} characters"
-            )
+            raise ValueError(f"{name}={value!r:.60} must be a printable text of 1 to {longest} characters")
 
     return check
 
@@ -86,6 +84,5 @@ def shares(name: str, values: Any, most: int, digits: int) -> None:
     for world, value in enumerate(values):
         if type(value) not in (int, float) or not 0 <= value <= 1 or round(value, digits) != value:
             raise ValueError(
-                f"{name}={value!r:.60} in world {world} must be a number in [0, 1] of at most "
-                f"{digits} decimals"
+                f"{name}={value!r:.60} in world {world} must be a number in [0, 1] of at most {digits} decimals"
             )

@@ -88,9 +88,7 @@ _FIELDS: Final[dict[str, checks.Check]] = {
     "posse_version": checks.text(50),
     "commit": checks.optional(checks.matching(r"[0-9a-f]{7,40}\+?", "a commit's hash")),
     "machine": checks.text(300),
-    "replay": checks.optional(
-        checks.matching(r"https://[!#-;=?-~]{1,300}", "an address that begins with https://")
-    ),
+    "replay": checks.optional(checks.matching(r"https://[!#-;=?-~]{1,300}", "an address that begins with https://")),
 }
 _PATTERNS: Final = {
     "shipped": (r"[a-z][a-z0-9-]*", "the name of a policy of the package"),
@@ -131,13 +129,9 @@ def read_result(path: str | Path) -> ResultFile:
     if len(content) > MOST_BYTES:
         raise ResultFileError(f"{path}: more than {MOST_BYTES:,} bytes; no result file is so large")
     try:
-        given = json.loads(
-            content.decode("utf-8"), object_pairs_hook=_unique, parse_constant=_refuse
-        )
+        given = json.loads(content.decode("utf-8"), object_pairs_hook=_unique, parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
-        raise ResultFileError(
-            f"{path}: not a JSON file as posse submit writes it: {error}"
-        ) from error
+        raise ResultFileError(f"{path}: not a JSON file as posse submit writes it: {error}") from error
     return _checked(given, path)
 
 

@@ -61,12 +61,7 @@ def play_for_result(
 
 
 def result_of(
-    text: str,
-    policy: Policy,
-    results: Results,
-    *,
-    label: str | None = None,
-    replay: str | None = None,
+    text: str, policy: Policy, results: Results, *, label: str | None = None, replay: str | None = None
 ) -> ResultFile:
     """Return the result file of an evaluation; ``text`` is what the policy was loaded from."""
     kind, name, digest = "shipped", text, None
@@ -147,9 +142,14 @@ def main(arguments: Sequence[str]) -> None:
     if which.out.suffix != ".json":
         raise ResultFileError(f"--out {which.out} must end in .json")
     result = play_for_result(
-        which.policy, which.scenario, worlds=which.worlds, seed=which.seed, split=which.split,
-        label=which.label, replay=which.replay,
-    )  # fmt: skip
+        which.policy,
+        which.scenario,
+        worlds=which.worlds,
+        seed=which.seed,
+        split=which.split,
+        label=which.label,
+        replay=which.replay,
+    )
     write_result(result, which.out)
     copy = which.out.parent / result.policy
     if result.policy_kind == "file" and not (copy.exists() and copy.samefile(which.policy)):

@@ -72,20 +72,14 @@ def verify(path: str | Path, *, run_code: bool = False, progress: bool = True) -
     _check_scenario(result, path)
     policy = _policy(result, path, run_code=run_code)
     if bool(policy.reads_state) != result.reads_state:
-        raise ResultFileError(
-            f"{path}: reads_state={result.reads_state} is not true of {result.policy}"
-        )
-    again = evaluate(
-        policy, result.scenario, result.worlds, result.seed, split=result.split, progress=progress
-    )
+        raise ResultFileError(f"{path}: reads_state={result.reads_state} is not true of {result.policy}")
+    again = evaluate(policy, result.scenario, result.worlds, result.seed, split=result.split, progress=progress)
     return _compare(result, {name: np.array(rounded(again, name)) for name in COLUMNS})
 
 
 def _check_scenario(result: ResultFile, path: Path) -> None:
     if result.scenario not in scenario_names():
-        raise ResultFileError(
-            f"{path}: scenario={result.scenario!r} is not one of: {', '.join(scenario_names())}"
-        )
+        raise ResultFileError(f"{path}: scenario={result.scenario!r} is not one of: {', '.join(scenario_names())}")
     version = get_scenario(result.scenario).version
     if version != result.scenario_version:
         raise ResultFileError(
@@ -99,8 +93,7 @@ def _policy(result: ResultFile, path: Path, *, run_code: bool) -> Policy:
     if result.policy_kind == "shipped":
         if result.policy not in policy_names():
             raise ResultFileError(
-                f"{path}: policy={result.policy!r} is not shipped; shipped policies are: "
-                f"{', '.join(policy_names())}"
+                f"{path}: policy={result.policy!r} is not shipped; shipped policies are: {', '.join(policy_names())}"
             )
         return load(result.policy)
     if result.policy_kind == "code":
@@ -114,14 +107,10 @@ def _policy(result: ResultFile, path: Path, *, run_code: bool) -> Policy:
     try:
         size = beside.stat().st_size
         if size > MOST_POLICY_BYTES:
-            raise ResultFileError(
-                f"{beside}: {size:,} bytes; at most {MOST_POLICY_BYTES:,} are read"
-            )
+            raise ResultFileError(f"{beside}: {size:,} bytes; at most {MOST_POLICY_BYTES:,} are read")
         digest = hashlib.sha256(beside.read_bytes()).hexdigest()
     except OSError as error:
-        raise ResultFileError(
-            f"{path}: its policy file {result.policy} must lie beside it ({error})"
-        ) from error
+        raise ResultFileError(f"{path}: its policy file {result.policy} must lie beside it ({error})") from error
     if digest != result.policy_sha256:
         raise ResultFileError(
             f"{beside}: not the policy file that was played: its SHA-256 is {digest[:12]}..., "

@@ -38,9 +38,14 @@ def draw_matrix(found: League) -> list[Path]:
                 s = found.at(team, target).score
                 colour = "white" if s.value < _LIGHT else "black"
                 axis.text(
-                    j, i, f"{s.value:.2f}\n±{(s.high - s.low) / 2:.2f}", ha="center", va="center",
-                    color=colour, fontsize=7,
-                )  # fmt: skip
+                    j,
+                    i,
+                    f"{s.value:.2f}\n±{(s.high - s.low) / 2:.2f}",
+                    ha="center",
+                    va="center",
+                    color=colour,
+                    fontsize=7,
+                )
         figure.colorbar(image, label="score of the team", shrink=0.8)
         note(figure, _played(found))
         files = [found.settings.path / f"{NAME}.{suffix}" for suffix in ("png", "svg")]

@@ -31,10 +31,7 @@ from posse_training.league.work import Pair, Work
 
 
 def play_league(
-    settings: LeagueSettings,
-    *,
-    console: Console | None = None,
-    ray: bool | str | Cluster = False,
+    settings: LeagueSettings, *, console: Console | None = None, ray: bool | str | Cluster = False
 ) -> League:
     """Train the generations that are missing, play all against all, train best responses.
 
@@ -62,9 +59,7 @@ def play_league(
                 keep(settings)
                 return _League(settings, work).play()
         except InUseError as error:
-            raise RunFolderError(
-                f"league {error}: wait for it, or choose another --folder"
-            ) from error
+            raise RunFolderError(f"league {error}: wait for it, or choose another --folder") from error
 
 
 @contextlib.contextmanager
@@ -113,9 +108,7 @@ class _League:
         run = training(s, side, trained, against(parts), steps, latest(own))
         self.work.train({trained.label: run})
 
-    def _exploit(
-        self, played: CrossPlay, teams: list[Member], targets: list[Member]
-    ) -> list[Exploited]:
+    def _exploit(self, played: CrossPlay, teams: list[Member], targets: list[Member]) -> list[Exploited]:
         """Train best responses to the last members, or to all, and say what they gain."""
         s = self.settings
         first = {"none": s.generations, "last": s.generations - 1, "all": 0}[s.responses]

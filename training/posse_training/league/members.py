@@ -80,12 +80,7 @@ def against(parts: Mapping[str, int]) -> str:
 
 
 def training(
-    settings: LeagueSettings,
-    side: str,
-    trained: Member,
-    opponents: str,
-    steps: int,
-    start: Member | None,
+    settings: LeagueSettings, side: str, trained: Member, opponents: str, steps: int, start: Member | None
 ) -> TrainSettings:
     """Return the settings of a member's training; ``start``: whose networks it begins with.
 

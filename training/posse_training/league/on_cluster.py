@@ -32,16 +32,12 @@ class ClusterWork(Work):
         backend: Its workers.
     """
 
-    def __init__(
-        self, settings: LeagueSettings, console: Console, cluster: Cluster, backend: Backend
-    ) -> None:
+    def __init__(self, settings: LeagueSettings, console: Console, cluster: Cluster, backend: Backend) -> None:
         super().__init__(settings, console)
         self._cluster, self._backend = cluster, backend
         self._store = Folder(cluster.work)
 
-    def play(
-        self, pairs: Sequence[Pair], episodes: int, seed: int, split: str
-    ) -> Iterator[Results]:
+    def play(self, pairs: Sequence[Pair], episodes: int, seed: int, split: str) -> Iterator[Results]:
         """See :class:`~posse_training.league.work.Work`.
 
         Raises:

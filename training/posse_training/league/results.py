@@ -71,9 +71,7 @@ def write_results(found: League) -> None:
     folder = found.settings.path
     text = io.StringIO(newline="")
     writer = csv.writer(text)
-    writer.writerow(
-        ["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"]
-    )
+    writer.writerow(["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"])
     for c in found.cells:
         s = c.score
         values = [s.value, s.low, s.high, c.safe_score.value, c.contact_free.value]
@@ -83,13 +81,10 @@ def write_results(found: League) -> None:
         "settings": found.settings.to_dict(),
         "cells": [cell.to_dict() for cell in found.cells],
         "exploited": [
-            {
-                "side": e.side, "label": e.label, "gain": e.gain,
-                "before": e.before.to_dict(), "after": e.after.to_dict(),
-            }
+            {"side": e.side, "label": e.label, "gain": e.gain, "before": e.before.to_dict(), "after": e.after.to_dict()}
             for e in found.exploited
         ],
-    }  # fmt: skip
+    }
     write_atomically(folder / SUMMARY, (json.dumps(summary, indent=2) + "\n").encode())
 
 
@@ -105,14 +100,11 @@ def tables(found: League) -> list[Table]:
     exploited = Table(title="best responses")
     for column in ("member", "strongest opponent so far", "score", "with the response", "gain"):
         exploited.add_column(column)
-    opponent: dict[str, Callable[[Cell], str]] = {
-        TEAM: lambda cell: cell.target, TARGET: lambda cell: cell.team,
-    }  # fmt: skip
+    opponent: dict[str, Callable[[Cell], str]] = {TEAM: lambda cell: cell.target, TARGET: lambda cell: cell.team}
     for e in found.exploited:
         exploited.add_row(
-            e.label, opponent[e.side](e.before), str(e.before.score), str(e.after.score),
-            f"{e.gain:+.3f}",
-        )  # fmt: skip
+            e.label, opponent[e.side](e.before), str(e.before.score), str(e.after.score), f"{e.gain:+.3f}"
+        )
     return [matrix, exploited] if found.exploited else [matrix]
 
 

@@ -58,14 +58,16 @@ class LeagueSettings:
 
     def __post_init__(self) -> None:
         for name, least in (
-            ("generations", 1), ("target_steps", 1), ("team_steps", 1), ("response_steps", 1),
-            ("episodes", 2), ("seed", 0),
-        ):  # fmt: skip
+            ("generations", 1),
+            ("target_steps", 1),
+            ("team_steps", 1),
+            ("response_steps", 1),
+            ("episodes", 2),
+            ("seed", 0),
+        ):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise SettingsError(
-                    f"{name}={value!r:.80} must be a whole number of {least} or more"
-                )
+                raise SettingsError(f"{name}={value!r:.80} must be a whole number of {least} or more")
         for name in ("teams", "targets"):
             named = getattr(self, name)
             if not named or any("," in each or not each for each in named):
@@ -123,7 +125,6 @@ def keep(settings: LeagueSettings) -> None:
         if differing:
             shown = ", ".join(f"{n}={theirs[n]!r:.60}" for n in differing)
             raise RunFolderError(
-                f"{settings.path} has a league with {shown}: go on with these, or choose another "
-                "--folder"
+                f"{settings.path} has a league with {shown}: go on with these, or choose another --folder"
             )
     write_atomically(path, (json.dumps(mine, indent=2) + "\n").encode())

@@ -31,16 +31,13 @@ class Work:
         self.scenario = get_scenario(settings.scenario, **settings.overrides)
         self.console = console
 
-    def play(
-        self, pairs: Sequence[Pair], episodes: int, seed: int, split: str
-    ) -> Iterator[Results]:
+    def play(self, pairs: Sequence[Pair], episodes: int, seed: int, split: str) -> Iterator[Results]:
         """Yield the results of each pair, in their order."""
         for team, target in pairs:
             self.console.print(f"playing {team.label} against {target.label}", markup=False)
             yield evaluate(
-                team.policy, self.scenario, episodes, seed, target=target.policy, split=split,
-                progress=False,
-            )  # fmt: skip
+                team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False
+            )
 
     def train(self, runs: Mapping[str, TrainSettings]) -> None:
         """Make trainings that do not depend on each other, by label, or go on with them."""

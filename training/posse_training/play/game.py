@@ -16,17 +16,7 @@ from posse.rendering.style import FAINT_INK, GRID, INK, PAPER, TARGET
 from posse_baselines import Policy, PolicyError
 from posse_training.errors import SettingsError
 from posse_training.play.round import Round
-from posse_training.play.session import (
-    COUNTDOWN,
-    OVER,
-    PAUSED,
-    READY,
-    RUNNING,
-    Session,
-    advance,
-    finish,
-    react,
-)
+from posse_training.play.session import COUNTDOWN, OVER, PAUSED, READY, RUNNING, Session, advance, finish, react
 from posse_training.play.steering import KEYS, Wheel, steer
 from posse_training.replay import Replay, join
 from posse_training.viewer.layout import lay_out
@@ -96,8 +86,7 @@ class Game:
             self._scenario = scenario.replace(**changed)
             if scenario.num_agents != scenario.num_trackers:
                 raise ScenarioError(
-                    f"the target of {scenario.name!r} is an agent that nobody drives: "
-                    "play as the target"
+                    f"the target of {scenario.name!r} is an agent that nobody drives: play as the target"
                 )
         self._policy, self._robot = policy, robot
         self._seed, self._split = seed, split
@@ -193,15 +182,20 @@ class Game:
         canvas.clip(None)
         view = View(self._robot, links=False, sensing=not self._as_target, least_robot=7.0)
         draw_picture(
-            canvas, layout.picture, self._camera, scene, self._round.history, p,
-            self._policy.name, f"world {self.session.world}", view,
-        )  # fmt: skip
+            canvas,
+            layout.picture,
+            self._camera,
+            scene,
+            self._round.history,
+            p,
+            self._policy.name,
+            f"world {self.session.world}",
+            view,
+        )
         self._draw_bar()
         left, top, width, height = self._camera.viewport
         middle = (left + width / 2, top + height * 0.22)
-        big = {
-            COUNTDOWN: f"{max(1, int(np.ceil(self.session.left)))}", PAUSED: "paused",
-        }.get(phase)  # fmt: skip
+        big = {COUNTDOWN: f"{max(1, int(np.ceil(self.session.left)))}", PAUSED: "paused"}.get(phase)
         if big is not None:
             canvas.text(big, middle, (80 if phase == COUNTDOWN else 40) * p, INK, anchor=0.5)
         if phase in (READY, OVER):
@@ -220,9 +214,7 @@ class Game:
         self.session = session
 
     def _begin(self, world: int) -> Round:
-        return Round(
-            self._policy, self._scenario, self._robot, self._seed, world, self._split
-        )  # fmt: skip
+        return Round(self._policy, self._scenario, self._robot, self._seed, world, self._split)
 
     def _keep(self) -> None:
         """Remember the round that has ended."""
@@ -241,9 +233,7 @@ class Game:
                 f"best of the session: {best:.0f}",
                 "Enter: again    N: next world    Esc: end",
             ]
-        goal = (
-            "keep the team out of its slots" if self._as_target else "help the team hold its slots"
-        )
+        goal = "keep the team out of its slots" if self._as_target else "help the team hold its slots"
         return [
             f"You drive {who}",
             f"{goal}, for {self._scenario.duration:g} s",
@@ -275,9 +265,10 @@ class Game:
         canvas.box(left, top, width, 1, GRID)
         best = self.session.best
         texts = (
-            f"{max(self._round.left, 0):.0f} s left", f"{self._round.points:.0f} points",
+            f"{max(self._round.left, 0):.0f} s left",
+            f"{self._round.points:.0f} points",
             "best -" if best is None else f"best {best:.0f}",
-        )  # fmt: skip
+        )
         for k, text in enumerate(texts):
             x = left + edge + k * (width - 2 * edge) / 4
             canvas.text(text, (x, y), 19 * p, FAINT_INK if k == 2 else INK)

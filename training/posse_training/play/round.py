@@ -31,13 +31,9 @@ class Round:
         history: Trails and contacts.
     """
 
-    def __init__(
-        self, policy: Policy, scenario: Scenario, robot: int, seed: int, world: int, split: str
-    ) -> None:
+    def __init__(self, policy: Policy, scenario: Scenario, robot: int, seed: int, world: int, split: str) -> None:
         self._policy, self._robot, self._n = policy, robot, scenario.num_trackers
-        batch = Batch(
-            scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled"
-        )  # fmt: skip
+        batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
         who = "you as the target" if robot == self._n else f"you as tracker {robot}"
         self._recorder = Recorder(batch, f"{policy.name}, {who}")
         self._memory = begin(policy, batch)
@@ -77,7 +73,5 @@ class Round:
         return self._recorder.replay()
 
     def _look(self) -> None:
-        self.scene: Scene = read_scene(
-            self._recorder.batch, 0, self._annotations, self._observations
-        )
+        self.scene: Scene = read_scene(self._recorder.batch, 0, self._annotations, self._observations)
         self.history.note(self.scene)

@@ -7,14 +7,4 @@ from posse_training.replay.page import read_replay, write_replay
 from posse_training.replay.playing import record
 from posse_training.replay.recording import Recorder
 
-__all__ = [
-    "Column",
-    "Event",
-    "Player",
-    "Recorder",
-    "Replay",
-    "join",
-    "read_replay",
-    "record",
-    "write_replay",
-]
+__all__ = ["Column", "Event", "Player", "Recorder", "Replay", "join", "read_replay", "record", "write_replay"]

@@ -54,15 +54,38 @@ _BELIEF: Final = 0.01
 _RESOLUTIONS: Final = {"m": 0.001, "m/s": 0.001, "rad": 0.001, "rad/s": 0.001, "s": 0.01}
 _FINE: Final = 0.001
 STATES: Final = (
-    "tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin", "tracker_sees",
-    "tracker_slot", "tracker_onsets", "tracker_broken_at", "tracker_sensor_dead_from",
-    "tracker_radio_dead_from", "tracker_fix_step", "tracker_fix_x", "tracker_fix_y",
-    "tracker_fix_cos", "tracker_fix_sin", "heard_step",
-    "world_step", "world_x", "world_y", "world_heading_cos", "world_heading_sin",
-    "world_frame_cos", "world_frame_sin", "world_pressed", "world_score", "world_detected_at",
-    "world_settled_at", "world_recovered_at",
-    "world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target",
-)  # fmt: skip
+    "tracker_x",
+    "tracker_y",
+    "tracker_heading_cos",
+    "tracker_heading_sin",
+    "tracker_sees",
+    "tracker_slot",
+    "tracker_onsets",
+    "tracker_broken_at",
+    "tracker_sensor_dead_from",
+    "tracker_radio_dead_from",
+    "tracker_fix_step",
+    "tracker_fix_x",
+    "tracker_fix_y",
+    "tracker_fix_cos",
+    "tracker_fix_sin",
+    "heard_step",
+    "world_step",
+    "world_x",
+    "world_y",
+    "world_heading_cos",
+    "world_heading_sin",
+    "world_frame_cos",
+    "world_frame_sin",
+    "world_pressed",
+    "world_score",
+    "world_detected_at",
+    "world_settled_at",
+    "world_recovered_at",
+    "world_contacts_tracker",
+    "world_contacts_obstacle",
+    "world_contacts_target",
+)
 
 """Names of the state arrays that are recorded in each frame."""
 
@@ -146,9 +169,7 @@ def action_columns(actions: Sequence[FloatArray], whole: bool) -> dict[str, Colu
     return columns
 
 
-def observation_columns(
-    layout: ObservationLayout, observations: FloatArray, whole: bool
-) -> dict[str, Column]:
+def observation_columns(layout: ObservationLayout, observations: FloatArray, whole: bool) -> dict[str, Column]:
     """Return a column of each field of observations (T + 1, rows, F), or only of the sonar."""
     columns = {}
     views = layout.views(observations)

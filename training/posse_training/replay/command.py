@@ -54,10 +54,16 @@ def main(arguments: list[str]) -> None:
         overrides = {} if which.num_trackers is None else {"num_trackers": which.num_trackers}
         replays.append(
             record(
-                [player], which.scenario, target=which.target,
-                seed=which.seed, world=which.world, split=which.split,
-                seconds=which.seconds, observations=which.observations, **overrides,
+                [player],
+                which.scenario,
+                target=which.target,
+                seed=which.seed,
+                world=which.world,
+                split=which.split,
+                seconds=which.seconds,
+                observations=which.observations,
+                **overrides,
             )
-        )  # fmt: skip
+        )
     path = write_replay(join(replays), which.out)
     print(f"{path} ({path.stat().st_size / 1000:.0f} kB): open it in a browser")

@@ -114,11 +114,7 @@ def join(replays: Sequence[Replay]) -> Replay:
         other = _identity(replay.world)
         differing = sorted(
             {k for k in first if first[k] != other[k]} - {"settings"}
-            | {
-                k
-                for k in first["settings"] | other["settings"]
-                if first["settings"].get(k) != other["settings"].get(k)
-            }
+            | {k for k in first["settings"] | other["settings"] if first["settings"].get(k) != other["settings"].get(k)}
         )
         if differing:
             raise SettingsError(

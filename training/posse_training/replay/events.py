@@ -18,9 +18,7 @@ _TOUCHED: Final = {
 }
 
 
-def find_events(
-    states: _States, control_step: float, leader: npt.NDArray[Any] | None
-) -> tuple[Event, ...]:
+def find_events(states: _States, control_step: float, leader: npt.NDArray[Any] | None) -> tuple[Event, ...]:
     """Return the events of an episode in order of time.
 
     Args:
@@ -71,9 +69,7 @@ def _contacts(states: _States) -> list[Event]:
     for step in np.flatnonzero((states["tracker_onsets"] > 0).any(axis=1)).tolist():
         robots = np.flatnonzero(states["tracker_onsets"][step] > 0)
         before = max(step - 1, 0)
-        touched = [
-            what for name, what in _TOUCHED.items() if states[name][step] > states[name][before]
-        ]
+        touched = [what for name, what in _TOUCHED.items() if states[name][step] > states[name][before]]
         text = f"contact: {_names(robots)}, with {' and '.join(touched) or 'something'}"
         events.append(Event(step, "contact", text, tuple(robots.tolist())))
     return events

@@ -67,14 +67,11 @@ def decode(header: str, data: bytes) -> Replay:
         described = _from_json(json.loads(header))
         version = described["format"]
         if version != FORMAT:
-            raise SettingsError(
-                f"a replay of format {version!r:.80} cannot be read: known is {FORMAT}"
-            )
+            raise SettingsError(f"a replay of format {version!r:.80} cannot be read: known is {FORMAT}")
         return _decoded(described, _inflated(data))
     except SettingsError:
         raise
-    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError,
-            zlib.error) as error:  # fmt: skip
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError, zlib.error) as error:
         raise SettingsError(f"this is not the data of a replay: {error!r:.200}") from error
 
 

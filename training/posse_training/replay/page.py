@@ -25,16 +25,47 @@ from posse_training.replay.format import decode, encode
 from posse_training.runs.settings import SettingsError
 
 MODULES: Final = (
-    "data.js", "colours.js", "state.js", "geometry.js", "camera.js", "world.js", "sensing.js",
-    "robots.js", "view.js", "events.js", "timeline.js", "values.js", "panel.js", "header.js",
-    "export.js", "legend.js", "controls.js", "main.js",
-)  # fmt: skip
+    "data.js",
+    "colours.js",
+    "state.js",
+    "geometry.js",
+    "camera.js",
+    "world.js",
+    "sensing.js",
+    "robots.js",
+    "view.js",
+    "events.js",
+    "timeline.js",
+    "values.js",
+    "panel.js",
+    "header.js",
+    "export.js",
+    "legend.js",
+    "controls.js",
+    "main.js",
+)
 """Modules of the page's code, each after those that it imports from."""
 _COLOURS: Final = (
-    "PAPER", "GROUND", "GRID", "WALL", "OBSTACLE", "OBSTACLE_RIM", "INK", "FAINT_INK", "TARGET",
-    "SLOT", "SLOT_FILLED", "TRACKER", "TRACKER_RIM", "TRAIL", "BROKEN", "LINK", "SENSING",
-    "SENSING_RIM", "CONTACT",
-)  # fmt: skip
+    "PAPER",
+    "GROUND",
+    "GRID",
+    "WALL",
+    "OBSTACLE",
+    "OBSTACLE_RIM",
+    "INK",
+    "FAINT_INK",
+    "TARGET",
+    "SLOT",
+    "SLOT_FILLED",
+    "TRACKER",
+    "TRACKER_RIM",
+    "TRAIL",
+    "BROKEN",
+    "LINK",
+    "SENSING",
+    "SENSING_RIM",
+    "CONTACT",
+)
 _IMPORT: Final = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT: Final = re.compile(r"^export ", re.MULTILINE)
 _DATA: Final = re.compile(
@@ -124,12 +155,7 @@ def contents(replay: Replay) -> tuple[str, str, str]:
 def shell() -> list[str]:
     """Return the HTML that is the same for all replays: before, between and after the contents."""
     code, loader, sheet = code_of_page(), _file("loader.js"), _file("style.css")
-    policy = {
-        "default-src": "'none'",
-        **content_policy(),
-        "base-uri": "'none'",
-        "form-action": "'none'",
-    }
+    policy = {"default-src": "'none'", **content_policy(), "base-uri": "'none'", "form-action": "'none'"}
     values = {
         "policy": "; ".join(f"{name} {value}" for name, value in policy.items()),
         "style": sheet,
@@ -160,9 +186,7 @@ def _title(replay: Replay) -> str:
 def code_of_page() -> str:
     """Return the modules concatenated, without imports and the keyword "export"."""
     modules = (_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in MODULES)
-    return "".join(
-        f"// --- {name} ---\n{text}\n" for name, text in zip(MODULES, modules, strict=True)
-    )
+    return "".join(f"// --- {name} ---\n{text}\n" for name, text in zip(MODULES, modules, strict=True))
 
 
 def in_letters(data: bytes) -> str:

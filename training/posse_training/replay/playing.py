@@ -52,9 +52,7 @@ def record(
     if opponent is not None:
         settings = opponent.fit(settings)
     if not 1 <= len(policies) <= MOST_PLAYERS:
-        raise SettingsError(
-            f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies"
-        )
+        raise SettingsError(f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies")
     if seconds is not None and not seconds > 0:
         raise SettingsError(f"seconds={seconds!r} must be above 0")
     steps = settings.horizon if seconds is None else round(seconds / settings.control_step)
@@ -67,12 +65,9 @@ def record(
         check_moves_all(player, settings)
         longest = max(settings.message_size, policy.message_size)
         batch = Batch(
-            settings.replace(message_size=longest), 1,
-            seed=seed, split=split, first_world=world, autoreset="disabled",
-        )  # fmt: skip
-        recorder = Recorder(
-            batch, label or policy.name, observations=observations, about=_about(policy)
+            settings.replace(message_size=longest), 1, seed=seed, split=split, first_world=world, autoreset="disabled"
         )
+        recorder = Recorder(batch, label or policy.name, observations=observations, about=_about(policy))
         memory, seen = begin(player, batch), recorder.reset()
         for _ in range(max(1, steps)):
             actions, memory = player.act(seen, memory)

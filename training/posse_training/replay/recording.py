@@ -59,9 +59,7 @@ class Recorder:
         about: Mapping[str, Any] | None = None,
     ) -> None:
         if not 0 <= world < batch.num_worlds:
-            raise SettingsError(
-                f"world={world} is not in the batch: it holds worlds 0 to {batch.num_worlds - 1}"
-            )
+            raise SettingsError(f"world={world} is not in the batch: it holds worlds 0 to {batch.num_worlds - 1}")
         if batch.autoreset == "same_step":
             raise SettingsError(
                 "a batch with autoreset='same_step' loses its last states and cannot be recorded: "
@@ -128,9 +126,7 @@ class Recorder:
         for name, column in self._states.items():
             column.append(state[name][self._world].copy())
         self._observations.append(observations[self._world].copy())
-        self._metrics = {
-            name: float(value[self._world]) for name, value in self.batch.metrics().items()
-        }
+        self._metrics = {name: float(value[self._world]) for name, value in self.batch.metrics().items()}
 
     def player(self) -> Player:
         """Return the episode recorded so far.

@@ -46,24 +46,14 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
             for term in REWARD_TERMS
             if term.name in weights
         ],
-        "fields": [
-            _describe(field)
-            for field in batch.layout.fields
-            if observations or field.name == "sonar"
-        ],
-        "metrics": [
-            {"name": metric.name, "unit": metric.unit, "meaning": metric.meaning}
-            for metric in posse.METRICS
-        ],
+        "fields": [_describe(field) for field in batch.layout.fields if observations or field.name == "sonar"],
+        "metrics": [{"name": metric.name, "unit": metric.unit, "meaning": metric.meaning} for metric in posse.METRICS],
     }
 
 
 def _settings(scenario: Scenario) -> dict[str, Any]:
     """Return every setting by name, with pairs as lists."""
-    return {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in scenario.to_dict().items()
-    }
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in scenario.to_dict().items()}
 
 
 def _describe(field: Field) -> dict[str, Any]:

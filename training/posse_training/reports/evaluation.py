@@ -85,22 +85,32 @@ def evaluate(
 
         posse.Batch(settings, 1, seed=seed, split=split)  # raises here what is invalid
         columns = evaluate_on_cluster(
-            sent(given, policy) if opponent is None else policy, policy.name, settings, episodes,
-            seed, split, cluster, progress=progress, time_limit=time_limit,
-        )  # fmt: skip
+            sent(given, policy) if opponent is None else policy,
+            policy.name,
+            settings,
+            episodes,
+            seed,
+            split,
+            cluster,
+            progress=progress,
+            time_limit=time_limit,
+        )
     elif callable(progress):
         advance = limited(progress, time_limit)
         columns = _play_all(policy, settings, episodes, seed, split, num_threads, advance)
     else:
         with progress_bar(disable=not progress) as bar:
             parts = len(cut(episodes, WORLDS))
-            task = bar.add_task(
-                escape(f"{policy.name} on {settings.name}"), total=parts * settings.horizon
-            )
+            task = bar.add_task(escape(f"{policy.name} on {settings.name}"), total=parts * settings.horizon)
             columns = _play_all(
-                policy, settings, episodes, seed, split, num_threads,
+                policy,
+                settings,
+                episodes,
+                seed,
+                split,
+                num_threads,
                 limited(lambda steps: bar.advance(task, steps), time_limit),
-            )  # fmt: skip
+            )
     named = None if opponent is None else opponent.name
     return Results(policy.name, settings, seed, split, columns, named)
 
@@ -152,10 +162,7 @@ def _play_all(
     advance: Callable[[int], object],
 ) -> dict[str, Column]:
     return joined(
-        [
-            play_shard(policy, scenario, shard, seed, split, num_threads, advance)
-            for shard in cut(episodes, WORLDS)
-        ]
+        [play_shard(policy, scenario, shard, seed, split, num_threads, advance) for shard in cut(episodes, WORLDS)]
     )
 
 
@@ -169,10 +176,7 @@ def play_shard(
     advance: Callable[[int], object],
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (count,)."""
-    batch = posse.Batch(
-        scenario, shard.count, seed=seed, split=split, first_world=shard.first,
-        num_threads=num_threads,
-    )  # fmt: skip
+    batch = posse.Batch(scenario, shard.count, seed=seed, split=split, first_world=shard.first, num_threads=num_threads)
     return play_episode(batch, policy, advance)
 
 

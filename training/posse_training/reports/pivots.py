@@ -36,16 +36,10 @@ def pivots(found: Comparison) -> list[Pivot]:
     """Return the tables of a comparison: the policies in the order in which they were named."""
     tables = [
         _pivot(found, "safe_score", "Safe score", _MEANINGS["safe_score"], _decimals),
-        _pivot(
-            found, "contact_free", "Worlds without a contact", _MEANINGS["contact_free"], _percent
-        ),
+        _pivot(found, "contact_free", "Worlds without a contact", _MEANINGS["contact_free"], _percent),
     ]
     if any(row["of_planner"] is not None for row in found.rows):
-        tables.append(
-            _pivot(
-                found, "of_planner", "Share of the planner's", _MEANINGS["of_planner"], _decimals
-            )
-        )
+        tables.append(_pivot(found, "of_planner", "Share of the planner's", _MEANINGS["of_planner"], _decimals))
     if any(row["difference"] is not None for row in found.rows):
         meaning = _MEANINGS["difference"].format(found.reference)
         tables.append(_pivot(found, "difference", "Difference", meaning, _signed))
@@ -55,18 +49,13 @@ def pivots(found: Comparison) -> list[Pivot]:
 _MEANINGS: Final = {
     "safe_score": "Mean share of slots held; every step counts 0 from a team's first contact on.",
     "contact_free": "Share of worlds in which no tracker touches anything.",
-    "of_planner": "Safe score as a share of the planner's, which reads the full state, in the "
-    "worlds of both.",
+    "of_planner": "Safe score as a share of the planner's, which reads the full state, in the worlds of both.",
     "difference": "Mean difference of the safe score to {}, paired by world.",
 }
 
 
 def _pivot(
-    found: Comparison,
-    column: str,
-    title: str,
-    meaning: str,
-    cell: Callable[[Estimate | float], tuple[str, str]],
+    found: Comparison, column: str, title: str, meaning: str, cell: Callable[[Estimate | float], tuple[str, str]]
 ) -> Pivot:
     rows = {(row["scenario"], row["policy"]): row for row in found.rows}
     scenarios = tuple(dict.fromkeys(scenario for scenario, _ in rows))

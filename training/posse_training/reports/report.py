@@ -28,10 +28,16 @@ from posse_training.reports.pivots import Pivot, pivots
 from posse_training.reports.statistics import Estimate
 
 _COLUMNS: Final = {
-    "safe_score": "safe score", "score": "score", "contact_free": "contact-free",
-    "of_planner": "of the planner's", "bound": "bound", "settled": "settled",
-    "difference": "difference", "improvement": "better in", "interquartile_mean": "IQM",
-}  # fmt: skip
+    "safe_score": "safe score",
+    "score": "score",
+    "contact_free": "contact-free",
+    "of_planner": "of the planner's",
+    "bound": "bound",
+    "settled": "settled",
+    "difference": "difference",
+    "improvement": "better in",
+    "interquartile_mean": "IQM",
+}
 
 
 @dataclass(frozen=True)
@@ -44,11 +50,7 @@ class Shown:
 
 
 def report(
-    found: Comparison,
-    facts: dict[str, str],
-    figures: Sequence[Path],
-    wins: Sequence[Shown],
-    losses: Sequence[Shown],
+    found: Comparison, facts: dict[str, str], figures: Sequence[Path], wins: Sequence[Shown], losses: Sequence[Shown]
 ) -> str:
     """Return the page.
 
@@ -82,8 +84,7 @@ def report(
         "style": style,
         "heading": html.escape(heading),
         "facts": "".join(
-            f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd></div>"
-            for name, text in known.items()
+            f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd></div>" for name, text in known.items()
         ),
         "sections": "\n".join(sections),
         "shell": in_letters(zlib.compress(json.dumps(shell()).encode(), 9)) if packed else "",
@@ -149,10 +150,7 @@ def _scrolled(before: str, head: str, rows: Sequence[str]) -> str:
 
 
 def _replays(
-    found: Comparison,
-    wins: Sequence[Shown],
-    losses: Sequence[Shown],
-    packed: list[tuple[str, str, str]],
+    found: Comparison, wins: Sequence[Shown], losses: Sequence[Shown], packed: list[tuple[str, str, str]]
 ) -> str:
     """Return the replays' section, and add their contents to ``packed``."""
     if not wins and not losses:
@@ -214,8 +212,7 @@ def _problems(found: Comparison) -> str:
     parts = []
     for title, some in (("Left out", found.left_out), ("Failed", found.failed)):
         lines = [
-            f"<li>{html.escape(out['policy'])} on {html.escape(out['what'])}: "
-            f"{html.escape(out['why'])}</li>"
+            f"<li>{html.escape(out['policy'])} on {html.escape(out['what'])}: {html.escape(out['why'])}</li>"
             for out in some
         ]
         parts.append(_section(title, f"<ul>{''.join(lines)}</ul>") if lines else "")

@@ -163,8 +163,6 @@ def _resample(parts: Sequence[Values], statistic: Callable[..., float]) -> Estim
     drawn = np.empty(RESAMPLES)
     for k in range(RESAMPLES):
         chosen = rng.integers(worlds, size=worlds)
-        drawn[k] = statistic(
-            *(part[np.ix_(rng.integers(len(part), size=len(part)), chosen)] for part in spread)
-        )
+        drawn[k] = statistic(*(part[np.ix_(rng.integers(len(part), size=len(part)), chosen)] for part in spread))
     low, high = np.percentile(drawn, (50 * (1 - LEVEL), 50 * (1 + LEVEL)))
     return Estimate(statistic(*parts), float(low), float(high), parts[0].size)

@@ -21,12 +21,7 @@ from posse_training.runs.saved.checkpoint import Arrays, write_checkpoint
 from posse_training.runs.saved.curve import Point, as_csv, best_of, read_points
 from posse_training.runs.saved.export import export, make_card
 from posse_training.runs.saved.folder import BEST, CURVE, LAST
-from posse_training.runs.saved.model_state import (
-    model_state,
-    random_state,
-    restore_model,
-    restore_random_state,
-)
+from posse_training.runs.saved.model_state import model_state, random_state, restore_model, restore_random_state
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.validation import validate
 from posse_training.sb3.contact_bound import ContactBound
@@ -170,9 +165,7 @@ class TrainingCallback(BaseCallback):
         return float(np.mean([e["score"] for e in episodes])) if episodes else None
 
     def _policy(self) -> LearnedPolicy:
-        card = make_card(
-            self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.curve
-        )
+        card = make_card(self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.curve)
         adviser = make_adviser(self.settings)
         return export(self.model, self.env.encoding, card, adviser, self.settings.correction)
 

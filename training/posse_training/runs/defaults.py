@@ -30,9 +30,7 @@ def default_settings(
         SettingsError: An unknown algorithm, or an invalid default.
     """
     if algorithm not in ALGORITHMS:
-        raise SettingsError(
-            f"unknown algorithm {algorithm!r:.80}; algorithms are: {', '.join(ALGORITHMS)}"
-        )
+        raise SettingsError(f"unknown algorithm {algorithm!r:.80}; algorithms are: {', '.join(ALGORITHMS)}")
     values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
     if side == "target":  # its opponents are for the user to name
         values |= {"side": side, "against": "ddcs-distributed"}

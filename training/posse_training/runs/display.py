@@ -69,9 +69,7 @@ class Display(LiveDisplay):
         """Show the safe score of ``settings.beside`` on the same worlds."""
         self._beside = score
 
-    def progress(
-        self, steps: int, training_score: float | None, bound: ContactBound | None = None
-    ) -> None:
+    def progress(self, steps: int, training_score: float | None, bound: ContactBound | None = None) -> None:
         """Show the steps made, the mean score of the latest training episodes, and contacts."""
         self._steps = steps
         self._training_score = training_score
@@ -146,6 +144,5 @@ class Display(LiveDisplay):
 
 def _bound_text(bound: ContactBound) -> str:
     return (
-        f"contact in {bound.share or 0.0:.1%} of episodes (bound {bound.bound:.1%}, "
-        f"multiplier {bound.multiplier:.2f})"
+        f"contact in {bound.share or 0.0:.1%} of episodes (bound {bound.bound:.1%}, multiplier {bound.multiplier:.2f})"
     )

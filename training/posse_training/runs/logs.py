@@ -23,9 +23,7 @@ def check_wandb(settings: TrainSettings) -> None:
         SettingsError: The message says what to install.
     """
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
-        raise SettingsError(
-            f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out"
-        )
+        raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
 
 
 def make_logger(folder: Path, settings: TrainSettings, note: Callable[[str], None]) -> Logger:
@@ -37,9 +35,13 @@ def make_logger(folder: Path, settings: TrainSettings, note: Callable[[str], Non
     if settings.wandb is not None:
         wandb: Any = importlib.import_module("wandb")
         wandb.init(
-            project=settings.wandb, name=folder.name, dir=folder, config=settings.to_dict(),
-            sync_tensorboard=True, resume="allow",
-        )  # fmt: skip
+            project=settings.wandb,
+            name=folder.name,
+            dir=folder,
+            config=settings.to_dict(),
+            sync_tensorboard=True,
+            resume="allow",
+        )
     installed = importlib.util.find_spec("tensorboard") is not None
     wanted = settings.tensorboard and installed
     return Logger(str(folder), [_TensorBoard(folder, note)] if wanted else [])

@@ -35,9 +35,7 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
     return TeamVecEnv(
         batches,
         encoding,
-        advising=(
-            Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None
-        ),
+        advising=(Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None),
         see_state=settings.algorithm == "mappo",
     )
 
@@ -51,10 +49,7 @@ def make_adviser(settings: TrainSettings) -> Adviser | None:
     if settings.advise is None:
         return None
     return check_adviser(
-        settings.advise,
-        load(settings.advise),
-        settings.correction,
-        believes=settings.encoding == "belief",
+        settings.advise, load(settings.advise), settings.correction, believes=settings.encoding == "belief"
     )
 
 

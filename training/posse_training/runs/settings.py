@@ -200,9 +200,7 @@ class TrainSettings:
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
-                raise SettingsError(
-                    f"unknown setting {name!r:.80}; settings are: {', '.join(sorted(known))}"
-                )
+                raise SettingsError(f"unknown setting {name!r:.80}; settings are: {', '.join(sorted(known))}")
         fitted = dict(values)
         for name in ("hidden", "team_sizes"):
             if isinstance(fitted.get(name), list):
@@ -225,18 +223,14 @@ def _check_together(s: TrainSettings) -> None:
             f"not {s.algorithm}: set a weight of the reward term contact instead"
         )
     if s.imitate is not None and (s.recurrent or not s.on_policy):
-        raise SettingsError(
-            f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out"
-        )
+        raise SettingsError(f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out")
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
         raise SettingsError(
             f"final_log_deviation={s.final_log_deviation} must not exceed "
             f"log_deviation={s.log_deviation}, where it begins"
         )
     if s.encoding == "belief" and s.advise is None:
-        raise SettingsError(
-            "encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned"
-        )
+        raise SettingsError("encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned")
     if s.advise is not None and (s.imitate is not None or s.message_size):
         raise SettingsError(
             f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
@@ -250,24 +244,17 @@ def _check_together(s: TrainSettings) -> None:
     parts = s.scenarios
     if s.num_worlds < len(parts):
         raise SettingsError(
-            f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and "
-            "team sizes"
+            f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and team sizes"
         )
     if len({p.sonar_beams for p in parts}) > 1:
-        raise SettingsError(
-            "scenarios that are trained on together need equal sonar_beams: set it in overrides"
-        )
+        raise SettingsError("scenarios that are trained on together need equal sonar_beams: set it in overrides")
 
 
 def _check_target(s: TrainSettings) -> None:
     """Raise if settings do not fit a target that learns."""
     if s.against is None:
-        raise SettingsError(
-            "side='target' needs the teams that chase it: set against, for example to ddcs-tuned"
-        )
-    for name, wanted in (
-        ("imitate", None), ("advise", None), ("message_size", 0), ("encoding", "plain"),
-    ):  # fmt: skip
+        raise SettingsError("side='target' needs the teams that chase it: set against, for example to ddcs-tuned")
+    for name, wanted in (("imitate", None), ("advise", None), ("message_size", 0), ("encoding", "plain")):
         value = getattr(s, name)
         if value != wanted:
             raise SettingsError(
@@ -275,9 +262,7 @@ def _check_target(s: TrainSettings) -> None:
                 "target has no team, no slots and no messages"
             )
     if s.algorithm == "mappo":
-        raise SettingsError(
-            "algorithm='mappo' does not go with side='target', which observes everything: use ppo"
-        )
+        raise SettingsError("algorithm='mappo' does not go with side='target', which observes everything: use ppo")
 
 
 _ELSEWHERE = {

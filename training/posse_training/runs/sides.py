@@ -91,8 +91,7 @@ def make_batches(settings: TrainSettings, num_threads: int | None = None) -> lis
     edges = [settings.num_worlds * end // ends[-1] for end in ends]
     if settings.num_worlds < len(pairs):
         raise SettingsError(
-            f"num_worlds={settings.num_worlds} is less than one for each of {len(pairs)} scenarios "
-            "and opponents"
+            f"num_worlds={settings.num_worlds} is less than one for each of {len(pairs)} scenarios and opponents"
         )
     batches = []
     for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
@@ -103,10 +102,15 @@ def make_batches(settings: TrainSettings, num_threads: int | None = None) -> lis
             inside = {"target_policy": pair.opponent.policy}
         batches.append(
             posse.batch(
-                pair.scenario, last - first, seed=settings.seed, first_world=first,
-                autoreset="disabled", num_threads=num_threads, **inside,
+                pair.scenario,
+                last - first,
+                seed=settings.seed,
+                first_world=first,
+                autoreset="disabled",
+                num_threads=num_threads,
+                **inside,
             )
-        )  # fmt: skip
+        )
     return batches
 
 
@@ -129,17 +133,15 @@ def play_all(settings: TrainSettings, policy: Any, seed: int, split: str) -> lis
             opponent = pair.opponent if isinstance(pair.opponent, Target) else None
             found.append(
                 evaluate(
-                    policy, pair.scenario, settings.evaluate_worlds, seed, target=opponent,
-                    split=split, progress=False,
+                    policy, pair.scenario, settings.evaluate_worlds, seed, target=opponent, split=split, progress=False
                 )
-            )  # fmt: skip
+            )
             continue
         assert isinstance(pair.opponent, Policy)
         target = policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
         played = evaluate(
-            pair.opponent, pair.scenario, settings.evaluate_worlds, seed, target=target,
-            split=split, progress=False,
-        )  # fmt: skip
+            pair.opponent, pair.scenario, settings.evaluate_worlds, seed, target=target, split=split, progress=False
+        )
         denied = {"score": 1 - played["score"], "safe_score": 1 - played["score"]}
         found.append(replace(played, columns={**played.columns, **denied}))
     return found

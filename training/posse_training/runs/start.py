@@ -13,9 +13,7 @@ from posse_training.runs.saved.model_state import unflatten_tensors
 from posse_training.sb3.normalisation import RunningStatistics
 
 
-def start_from(
-    folder: Path, model: BaseAlgorithm, statistics: RunningStatistics, log_deviation: float
-) -> None:
+def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics, log_deviation: float) -> None:
     """Take networks and input statistics from a run's checkpoint; optimisers start anew.
 
     Args:
@@ -28,17 +26,11 @@ def start_from(
         CheckpointError: There is no checkpoint, it is damaged, or of other networks or inputs.
     """
     arrays, state = read_checkpoint(folder)
-    model_arrays = {
-        name.removeprefix("model/"): array
-        for name, array in arrays.items()
-        if name.startswith("model/")
-    }
+    model_arrays = {name.removeprefix("model/"): array for name, array in arrays.items() if name.startswith("model/")}
     try:
         parts = unflatten_tensors(state["model"]["parts"], model_arrays)
         model.policy.load_state_dict(parts["policy"])
-        statistics.restore(
-            {name: arrays[f"statistics/{name}"] for name in ("count", "mean", "variance")}
-        )
+        statistics.restore({name: arrays[f"statistics/{name}"] for name in ("count", "mean", "variance")})
     except (KeyError, RuntimeError, TypeError, ValueError) as error:
         raise CheckpointError(
             f"the networks in {folder} do not fit this run: {error!s:.300}. Train with its hidden, "

@@ -27,17 +27,16 @@ from posse_training.sb3.imitation import imitate
 from posse_training.sb3.normalisation import RunningStatistics
 
 _NOT_FINITE = (
-    "found invalid values", "= nan is not a number", "must be finite", "can overflow",
+    "found invalid values",
+    "= nan is not a number",
+    "must be finite",
+    "can overflow",
     "means must lie within",
-)  # fmt: skip
+)
 
 
 def train(
-    settings: TrainSettings,
-    *,
-    console: Console | None = None,
-    resume: bool = False,
-    num_threads: int | None = None,
+    settings: TrainSettings, *, console: Console | None = None, resume: bool = False, num_threads: int | None = None
 ) -> Path:
     """Train a policy; return the file of the one that scored best on the validation worlds.
 
@@ -56,11 +55,7 @@ def train(
     """
     check_before(settings)
     folder = settings.run_folder
-    with (
-        locked_run(folder),
-        torch_threads(settings.threads),
-        Display(settings, console or Console()) as display,
-    ):
+    with locked_run(folder), torch_threads(settings.threads), Display(settings, console or Console()) as display:
         saved = open_run(folder, settings, resume)
         env = make_env(settings, num_threads)
         model = make_model(settings, env)
@@ -85,22 +80,12 @@ def train(
                 imitate(model, settings, env.encoding, expert, statistics, copy_report(display))
         display.begin(model.num_timesteps, steps, callback.curve)
         with _divergence(callback):
-            model.learn(
-                settings.steps - model.num_timesteps,
-                callback=callback,
-                reset_num_timesteps=saved is None,
-            )
+            model.learn(settings.steps - model.num_timesteps, callback=callback, reset_num_timesteps=saved is None)
             callback.finish()
     return folder / (BEST if (folder / BEST).is_file() else LAST)
 
 
-def resume(
-    folder: Path,
-    *,
-    console: Console | None = None,
-    steps: int | None = None,
-    trust_code: bool = False,
-) -> Path:
+def resume(folder: Path, *, console: Console | None = None, steps: int | None = None, trust_code: bool = False) -> Path:
     """Resume the training of a run folder; see :func:`train`.
 
     Args:

@@ -22,9 +22,7 @@ _WARM_REACH: Final = 0.1  # of random outputs that are added to an adviser's pro
 _HELD: Final = 20  # steps for which a random action is held, so that trackers move somewhere
 
 
-def first_statistics(
-    settings: TrainSettings, env: TeamVecEnv, statistics: RunningStatistics
-) -> None:
+def first_statistics(settings: TrainSettings, env: TeamVecEnv, statistics: RunningStatistics) -> None:
     """Gather input statistics from one episode of random actions in a few worlds."""
     few = replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings))))
     warm = make_env(few)
@@ -62,8 +60,5 @@ def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
         "safe_score": safe.value,
         "low": safe.low,
         "high": safe.high,
-        **{
-            name: float(np.mean(np.concatenate([r[name] for r in results])))
-            for name in ("score", "contact_free")
-        },
+        **{name: float(np.mean(np.concatenate([r[name] for r in results]))) for name in ("score", "contact_free")},
     }

@@ -17,9 +17,7 @@ from torch import nn
 class SplitNetworks(nn.Module):
     """A policy network on the first numbers of the input, a value network on all of them."""
 
-    def __init__(
-        self, size: int, private_size: int, hidden: list[int], activation: type[nn.Module]
-    ) -> None:
+    def __init__(self, size: int, private_size: int, hidden: list[int], activation: type[nn.Module]) -> None:
         super().__init__()
         self.private_size = private_size
         self.latent_dim_pi = self.latent_dim_vf = hidden[-1]
@@ -51,9 +49,7 @@ class CentralizedCriticPolicy(ActorCriticPolicy):
         **kwargs: Arguments of stable-baselines3's actor-critic policy.
     """
 
-    def __init__(
-        self, *args: Any, private_size: int, hidden: tuple[int, ...] = (64, 64), **kwargs: Any
-    ) -> None:
+    def __init__(self, *args: Any, private_size: int, hidden: tuple[int, ...] = (64, 64), **kwargs: Any) -> None:
         self.private_size = private_size
         self.hidden = list(hidden)
         super().__init__(*args, **kwargs)

@@ -45,12 +45,7 @@ def play_round(
     """Play one episode in each world; the expert acts in a share of them, the copy in the rest."""
     parts = 2 + settings.message_size
     longest = max(settings.message_size, expert.message_size)
-    batch = posse.Batch(
-        scenario.replace(message_size=longest),
-        worlds,
-        seed=settings.seed,
-        first_world=first_world,
-    )
+    batch = posse.Batch(scenario.replace(message_size=longest), worlds, seed=settings.seed, first_world=first_world)
     state = _state_writer(batch, settings)
     encoder = Encoder(encoding, batch.layout)
     size = encoding.size + (state.size if state else 0)
@@ -97,9 +92,7 @@ def _state_writer(batch: posse.Batch, settings: TrainSettings) -> StateWriter | 
     if settings.algorithm != "mappo":
         return None
     return StateWriter(
-        batch,
-        max(s.num_trackers for s in settings.scenarios),
-        max(s.num_obstacles for s in settings.scenarios),
+        batch, max(s.num_trackers for s in settings.scenarios), max(s.num_obstacles for s in settings.scenarios)
     )
 
 

@@ -61,11 +61,18 @@ def imitate(
         worlds = max(1, WORLDS // len(scenarios))
         played = [
             play_round(
-                policy, settings, encoding, expert, scenario, generator, share, worlds,
+                policy,
+                settings,
+                encoding,
+                expert,
+                scenario,
+                generator,
+                share,
+                worlds,
                 FIRST_WORLD + (k * len(scenarios) + s) * worlds,
             )
             for s, scenario in enumerate(scenarios)
-        ]  # fmt: skip
+        ]
         rounds += played
         if k == 0:
             for part in played:

@@ -56,9 +56,7 @@ class RunningStatistics:
         variance = flat.var(axis=0, dtype=np.float64)
         total = self.count + count
         delta = mean - self.mean
-        self.variance = (
-            self.variance * self.count + variance * count + delta**2 * self.count * count / total
-        ) / total
+        self.variance = (self.variance * self.count + variance * count + delta**2 * self.count * count / total) / total
         self.mean = self.mean + delta * count / total
         self.count = min(total, _REMEMBERED)
 
@@ -88,8 +86,6 @@ class RunningStatistics:
         """
         for name in ("mean", "variance"):
             if saved[name].shape != self.mean.shape:
-                raise ValueError(
-                    f"{name} has the shape {saved[name].shape}, wanted {self.mean.shape}"
-                )
+                raise ValueError(f"{name} has the shape {saved[name].shape}, wanted {self.mean.shape}")
         self.count = float(saved["count"][0])
         self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()

@@ -67,9 +67,7 @@ def from_sb3(
     if isinstance(model, (str, Path)):
         name = Path(model).stem if name is None else name
         model = _load(Path(model), algorithm)
-    return ModelPolicy(
-        model, name or type(model).__name__, message_size, encoding, normalize, deterministic
-    )
+    return ModelPolicy(model, name or type(model).__name__, message_size, encoding, normalize, deterministic)
 
 
 class ModelPolicy(BasePolicy):
@@ -135,9 +133,7 @@ class ModelPolicy(BasePolicy):
         rows = seen if self._whole_team else seen.reshape(worlds * trackers, -1)
         if self._normalize is not None:
             rows = np.asarray(self._normalize.normalize_obs(rows))
-        chosen, states = self.model.predict(
-            rows, state=states, episode_start=begins, deterministic=self._deterministic
-        )
+        chosen, states = self.model.predict(rows, state=states, episode_start=begins, deterministic=self._deterministic)
         motions = MOTIONS[chosen] if self._discrete else np.clip(chosen, -1, 1)
         motions = motions.reshape(worlds, trackers, -1)
         actions = np.zeros((worlds, trackers, 2 + layout.scenario.message_size), np.float32)
@@ -160,8 +156,7 @@ def _load(path: Path, algorithm: type[BaseAlgorithm] | None) -> BaseAlgorithm:
         return kind.load(path, device="cpu")
     except Exception as error:  # whatever a damaged file makes the library raise
         raise PolicyError(
-            f"{str(path)!r} cannot be loaded as a model of {kind.__name__} "
-            f"({type(error).__name__}: {error!s:.200})"
+            f"{str(path)!r} cannot be loaded as a model of {kind.__name__} ({type(error).__name__}: {error!s:.200})"
         ) from error
 
 
@@ -177,6 +172,5 @@ def _algorithm_of(path: Path) -> type[BaseAlgorithm]:
             found: type[BaseAlgorithm] = getattr(stable_baselines3, name)
             return found
     raise PolicyError(
-        f"{str(path)!r} is a model of another library's algorithm: name its class, "
-        "from_sb3(path, algorithm=TQC)"
+        f"{str(path)!r} is a model of another library's algorithm: name its class, from_sb3(path, algorithm=TQC)"
     )

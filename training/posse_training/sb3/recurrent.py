@@ -62,9 +62,7 @@ class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):
         for first in range(0, self.n_envs, slots):
             yield self._sequences(order[first : first + slots], self.first_states)
 
-    def _sequences(
-        self, slots: npt.NDArray[np.int64], states: RNNStates
-    ) -> RecurrentRolloutBufferSamples:
+    def _sequences(self, slots: npt.NDArray[np.int64], states: RNNStates) -> RecurrentRolloutBufferSamples:
         """Return the sequences of some slots, padded to equal length: (sequences x steps, ...)."""
         begins = self.episode_starts[:, slots] > 0
         goes_on = ~begins[0]
@@ -98,8 +96,7 @@ class SequenceBuffer(FlatRolloutBuffer, RecurrentRolloutBuffer):
             advantages=parts["advantages"],
             returns=parts["returns"],
             lstm_states=RNNStates(
-                (at_start(states.pi[0]), at_start(states.pi[1])),
-                (at_start(states.vf[0]), at_start(states.vf[1])),
+                (at_start(states.pi[0]), at_start(states.pi[1])), (at_start(states.vf[0]), at_start(states.vf[1]))
             ),
             episode_starts=torch.zeros(len(chosen)),
             mask=there.float(),

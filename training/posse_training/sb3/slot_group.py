@@ -36,12 +36,7 @@ class SlotGroup:
     """
 
     def __init__(
-        self,
-        batch: Batch,
-        encoding: Encoding,
-        advising: Advising | None,
-        state: StateWriter | None,
-        first: int,
+        self, batch: Batch, encoding: Encoding, advising: Advising | None, state: StateWriter | None, first: int
     ) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
@@ -145,12 +140,7 @@ class SlotGroup:
             self._state.write(out[:, self.private_size :], worlds)
 
     def _report(
-        self,
-        raw: FloatArray,
-        ended: BoolArray,
-        terminated: BoolArray,
-        over: BoolArray,
-        infos: list[dict[str, Any]],
+        self, raw: FloatArray, ended: BoolArray, terminated: BoolArray, over: BoolArray, infos: list[dict[str, Any]]
     ) -> None:
         """Fill the infos of worlds whose episodes ended; ``over``: not by shortening."""
         trackers, horizon = self.batch.action_shape[1], self.batch.scenario.horizon

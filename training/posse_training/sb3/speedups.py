@@ -50,13 +50,7 @@ class FlatRolloutBuffer(RolloutBuffer):
     """
 
     def add(
-        self,
-        obs: Any,
-        action: Any,
-        reward: Any,
-        episode_start: Any,
-        value: torch.Tensor,
-        log_prob: torch.Tensor,
+        self, obs: Any, action: Any, reward: Any, episode_start: Any, value: torch.Tensor, log_prob: torch.Tensor
     ) -> None:
         """Store one step of every slot."""
         self.observations[self.pos] = obs

@@ -119,9 +119,7 @@ class TeamVecEnv(VecEnv):
         """Take the actions (slots, 2 + m) of the next step."""
         self._actions = actions
 
-    def step_wait(
-        self,
-    ) -> tuple[FloatArray, FloatArray, BoolArray, list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[FloatArray, FloatArray, BoolArray, list[dict[str, Any]]]:
         """Step every world; return observations, rewards, dones and infos, one row a slot.
 
         Where an episode ended, the observation is the first of the next episode, and the info holds
@@ -179,8 +177,7 @@ class TeamVecEnv(VecEnv):
         for name, array in mine.items():
             if name not in saved or saved[name].shape != array.shape:
                 raise ValueError(
-                    f"the saved worlds do not fit these: {name!r} is missing or not of shape "
-                    f"{array.shape}"
+                    f"the saved worlds do not fit these: {name!r} is missing or not of shape {array.shape}"
                 )
             if name.endswith(".world_over") and saved[name].any():
                 raise ValueError("the saved worlds have episodes that are over; none goes on there")
@@ -190,11 +187,7 @@ class TeamVecEnv(VecEnv):
             group.resume()
 
     def _arrays(self) -> dict[str, npt.NDArray[Any]]:
-        return {
-            f"{k}.{name}": array
-            for k, group in enumerate(self._groups)
-            for name, array in group.arrays().items()
-        }
+        return {f"{k}.{name}": array for k, group in enumerate(self._groups) for name, array in group.arrays().items()}
 
     def close(self) -> None:
         """Do nothing: worlds hold only memory."""
@@ -221,11 +214,7 @@ class TeamVecEnv(VecEnv):
             setattr(batch, attr_name, value)
 
     def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: VecEnvIndices = None,
-        **method_kwargs: Any,
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
         """Call a method once for each batch; return its result for each slot."""
         results: dict[int, Any] = {}
@@ -241,11 +230,7 @@ class TeamVecEnv(VecEnv):
         return [False] * len(self._batches_of(indices))
 
     def _batches_of(self, indices: VecEnvIndices) -> list[Batch]:
-        owners = [
-            group.batch
-            for group in self._groups
-            for _ in range(group.slots.start, group.slots.stop)
-        ]
+        owners = [group.batch for group in self._groups for _ in range(group.slots.start, group.slots.stop)]
         return [owners[slot] for slot in self._get_indices(indices)]
 
 
@@ -261,9 +246,7 @@ def _check(batches: Sequence[Batch], advising: Advising | None) -> set[int]:
             )
         both = batch.observation_shape[1] == batch.scenario.num_agents
         if both and batch.scenario.target_motion == "agent":
-            raise ValueError(
-                f"the target of {batch.scenario.name!r} is an agent; one policy drives one side"
-            )
+            raise ValueError(f"the target of {batch.scenario.name!r} is an agent; one policy drives one side")
     lengths = {MOTION} if advising else {batch.action_shape[2] for batch in batches}
     if len(lengths) > 1:
         raise ValueError(f"batches have actions of different lengths: {sorted(lengths)}")

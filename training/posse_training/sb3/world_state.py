@@ -23,14 +23,7 @@ OBSTACLE_SIZE: Final = 3
 
 
 @kernel
-def _write(
-    config: Records,
-    world: Records,
-    tracker: Records,
-    obstacle: Records,
-    places: int,
-    out: FloatArray,
-) -> None:
+def _write(config: Records, world: Records, tracker: Records, obstacle: Records, places: int, out: FloatArray) -> None:
     c = config[0]
     n = c.num_trackers
     for e in range(len(world)):
@@ -86,7 +79,5 @@ class StateWriter:
         ``out`` is (trackers of these worlds, size).
         """
         arrays = self._batch.arrays
-        world, tracker, obstacle = (
-            a[worlds] for a in (arrays.world, arrays.tracker, arrays.obstacle)
-        )
+        world, tracker, obstacle = (a[worlds] for a in (arrays.world, arrays.tracker, arrays.obstacle))
         _write(self._config, world, tracker, obstacle, self._places, out)

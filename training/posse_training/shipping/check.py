@@ -27,9 +27,7 @@ CHECK_SEED: Final = 2
 CHECK_WORLDS: Final = 32
 AGAIN_SEED: Final = 3
 AGAIN_WORLDS: Final = 100
-_NOT_PLAYED: Final = {
-    "name", "version", "reward_weights", "target_reward_weights", "message_size"
-}  # fmt: skip
+_NOT_PLAYED: Final = {"name", "version", "reward_weights", "target_reward_weights", "message_size"}
 """Fields of a scenario that change no score, or that a check states separately."""
 
 
@@ -39,10 +37,7 @@ def make_check(policy: LearnedPolicy, scenarios: Sequence[Scenario]) -> dict[str
         "split": SPLIT,
         "seed": CHECK_SEED,
         "worlds": max(4, CHECK_WORLDS // len(scenarios)),
-        "plays": [
-            {"scenario": s.name, "version": s.version, "settings": _settings_of(s)}
-            for s in scenarios
-        ],
+        "plays": [{"scenario": s.name, "version": s.version, "settings": _settings_of(s)} for s in scenarios],
     }
     for play, score in zip(check["plays"], replay(policy, check), strict=True):
         play["score"] = score
@@ -53,13 +48,12 @@ def replay(policy: LearnedPolicy, check: Mapping[str, Any]) -> list[float]:
     """Return the current scores of a policy on the worlds of a check."""
     return [
         float(
-            evaluate(
-                policy, scenario, check["worlds"], check["seed"], split=check["split"],
-                progress=False,
-            )["score"].mean()
+            evaluate(policy, scenario, check["worlds"], check["seed"], split=check["split"], progress=False)[
+                "score"
+            ].mean()
         )
         for scenario in check_scenarios(check)
-    ]  # fmt: skip
+    ]
 
 
 def check_scenarios(check: Mapping[str, Any]) -> list[Scenario]:
@@ -67,9 +61,7 @@ def check_scenarios(check: Mapping[str, Any]) -> list[Scenario]:
     return [
         get_scenario(
             play["scenario"],
-            **dict[str, Any](
-                (k, tuple(v) if isinstance(v, list) else v) for k, v in play["settings"].items()
-            ),
+            **dict[str, Any]((k, tuple(v) if isinstance(v, list) else v) for k, v in play["settings"].items()),
         )
         for play in check["plays"]
     ]
@@ -81,8 +73,7 @@ def _settings_of(scenario: Scenario) -> dict[str, Any]:
     return {
         field.name: getattr(scenario, field.name)
         for field in dataclasses.fields(scenario)
-        if field.name not in _NOT_PLAYED
-        and getattr(scenario, field.name) != getattr(named, field.name)
+        if field.name not in _NOT_PLAYED and getattr(scenario, field.name) != getattr(named, field.name)
     }
 
 
@@ -96,9 +87,7 @@ def check_again(path: Path) -> LearnedPolicy:
     old = policy.card["check"]
     scenarios = check_scenarios(old)
     worlds = max(8, AGAIN_WORLDS // len(scenarios))
-    results = [
-        evaluate(policy, s, worlds, AGAIN_SEED, split=SPLIT, progress=False) for s in scenarios
-    ]
+    results = [evaluate(policy, s, worlds, AGAIN_SEED, split=SPLIT, progress=False) for s in scenarios]
     again = {
         "commit": commit(),
         "split": SPLIT,
@@ -108,10 +97,7 @@ def check_again(path: Path) -> LearnedPolicy:
         "trained_on_versions": policy.card.get("evaluated_again", {}).get(
             "trained_on_versions", {play["scenario"]: play["version"] for play in old["plays"]}
         ),
-        **{
-            name: float(np.mean([r[name].mean() for r in results]))
-            for name in ("score", "safe_score", "contact_free")
-        },
+        **{name: float(np.mean([r[name].mean() for r in results])) for name in ("score", "safe_score", "contact_free")},
     }
     card = {**policy.card, "check": make_check(policy, scenarios), "evaluated_again": again}
     policy.with_card(card).save(path)

@@ -35,9 +35,17 @@ LARGEST: Final = 1_000_000
 _JUDGED: Final = ("safe_score", "score", "contact_free")
 """The first one decides; the others are stated beside it."""
 _MAY_DIFFER: Final = {
-    "seed", "folder", "steps", "evaluate_every", "evaluate_worlds", "beside", "checkpoint_every",
-    "threads", "tensorboard", "wandb",
-}  # fmt: skip
+    "seed",
+    "folder",
+    "steps",
+    "evaluate_every",
+    "evaluate_worlds",
+    "beside",
+    "checkpoint_every",
+    "threads",
+    "tensorboard",
+    "wandb",
+}
 """Settings in which the compared runs may differ."""
 
 
@@ -118,8 +126,7 @@ def _save(policy: LearnedPolicy, path: Path) -> None:
         size = trial.stat().st_size
     if size > LARGEST:
         raise SettingsError(
-            f"{path} would have {size:,} bytes, {LARGEST:,} are allowed: train with smaller hidden "
-            "layers"
+            f"{path} would have {size:,} bytes, {LARGEST:,} are allowed: train with smaller hidden layers"
         )
     policy.save(path)
 
@@ -145,8 +152,7 @@ def _one_training(runs: Sequence[Path]) -> list[TrainSettings]:
         ]
         if differing:
             raise SettingsError(
-                f"{runs[0]} and {folder} must differ in their seeds only: they differ in "
-                f"{', '.join(differing)}"
+                f"{runs[0]} and {folder} must differ in their seeds only: they differ in {', '.join(differing)}"
             )
     return trained
 
@@ -158,8 +164,7 @@ def _curve(run: Path) -> list[dict[str, float]]:
             return [{name: float(v) for name, v in row.items()} for row in csv.DictReader(file)]
     except (OSError, AttributeError, TypeError, ValueError, csv.Error) as error:
         raise SettingsError(
-            f"{path} is missing or damaged: {error}. Resume the run to write it again: "
-            f"posse train --resume {run}"
+            f"{path} is missing or damaged: {error}. Resume the run to write it again: posse train --resume {run}"
         ) from error
 
 
@@ -184,5 +189,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
     console.print(
         f"{path} ({path.stat().st_size:,} bytes) holds training seed {policy.card['seed']}",
-        markup=False, soft_wrap=True,
-    )  # fmt: skip
+        markup=False,
+        soft_wrap=True,
+    )

@@ -67,11 +67,9 @@ def ship_target(settings: Settings) -> Path:
     scenario = trained.scenarios[0]
     new = Target(settings.name, "agent", policy)
     plays = {
-        target.name: evaluate(
-            settings.team, scenario, settings.worlds, TEST_SEED, target=target, progress=False
-        )
+        target.name: evaluate(settings.team, scenario, settings.worlds, TEST_SEED, target=target, progress=False)
         for target in (load_target(settings.scripted), new)
-    }  # fmt: skip
+    }
     scripted, learned = plays[settings.scripted], plays[settings.name]
     cost = difference(scripted["score"][None], learned["score"][None])
     if not cost.low >= settings.least:
@@ -86,16 +84,16 @@ def ship_target(settings: Settings) -> Path:
         "command": command_of(trained),
         "shipped_at": commit(),
         "comparison": {
-            "team": settings.team, "split": "test", "seed": TEST_SEED, "worlds": settings.worlds,
+            "team": settings.team,
+            "split": "test",
+            "seed": TEST_SEED,
+            "worlds": settings.worlds,
             "scores": {name: played.estimate("score").to_dict() for name, played in plays.items()},
-            "target_contacts": {
-                name: float((played["target_contacts"] > 0).mean())
-                for name, played in plays.items()
-            },
+            "target_contacts": {name: float((played["target_contacts"] > 0).mean()) for name, played in plays.items()},
             "cost": cost.to_dict(),
         },
         "check": make_target_check(settings.team, scenario, new),
-    }  # fmt: skip
+    }
     path = settings.out / f"{settings.name}.safetensors"
     policy.with_card(card).save(path)
     return path
@@ -103,14 +101,16 @@ def ship_target(settings: Settings) -> Path:
 
 def make_target_check(team: str, scenario: Scenario, target: Target) -> dict[str, Any]:
     """Return the score of a team against a target on a few validation worlds."""
-    played = evaluate(
-        team, scenario, CHECK_WORLDS, TEST_SEED, target=target, split="validation", progress=False
-    )
+    played = evaluate(team, scenario, CHECK_WORLDS, TEST_SEED, target=target, split="validation", progress=False)
     return {
-        "team": team, "scenario": scenario.name, "version": scenario.version,
-        "split": "validation", "seed": TEST_SEED, "worlds": CHECK_WORLDS,
+        "team": team,
+        "scenario": scenario.name,
+        "version": scenario.version,
+        "split": "validation",
+        "seed": TEST_SEED,
+        "worlds": CHECK_WORLDS,
         "score": float(played["score"].mean()),
-    }  # fmt: skip
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

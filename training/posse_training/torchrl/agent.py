@@ -68,9 +68,7 @@ class Agent(nn.Module):
         size = env.observation_spec[OBSERVATION].shape[-1]
         width = env.full_action_spec[ACTION].shape[-1]
         self.scale = RunningScale(size)
-        policy = nn.Sequential(
-            self.scale, *_layers(size, hidden, width, 0.01), AddStateIndependentNormalScale(width)
-        )
+        policy = nn.Sequential(self.scale, *_layers(size, hidden, width, 0.01), AddStateIndependentNormalScale(width))
         value = nn.Sequential(self.scale, *_layers(size, hidden, 1, 1.0))
         parameters = [(TRACKERS, "loc"), (TRACKERS, "scale")]
         self.actor = ProbabilisticActor(

@@ -81,9 +81,7 @@ class PosseEnv(EnvBase):
                 "that are done; leave it out"
             )
         engine = "cuda" if torch.device(device).type == "cuda" else "cpu"
-        self.batch = posse.batch(
-            scenario, num_worlds, autoreset="disabled", device=engine, **settings
-        )
+        self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", device=engine, **settings)
         if state and engine == "cuda":
             raise ValueError("state=True needs device='cpu': leave one of them out")
         single_action_space(self.batch.scenario, discrete_actions)  # raises if impossible
@@ -101,17 +99,14 @@ class PosseEnv(EnvBase):
 
     def _make_specs(self) -> None:
         worlds, rows, width = self.batch.action_shape
-        low, high = (
-            torch.from_numpy(bound).expand(worlds, rows, -1) for bound in self.batch.layout.bounds()
-        )
+        low, high = (torch.from_numpy(bound).expand(worlds, rows, -1) for bound in self.batch.layout.bounds())
         observation = Composite(shape=(worlds,))
         action = Composite(shape=(worlds,))
         reward = Composite(shape=(worlds,))
         for group, part in self._rows.items():
             count = len(self.group_map[group])
             observation[group] = Composite(
-                observation=Bounded(low[:, part], high[:, part], dtype=torch.float32),
-                shape=(worlds, count),
+                observation=Bounded(low[:, part], high[:, part], dtype=torch.float32), shape=(worlds, count)
             )
             each: Bounded | Categorical = (
                 Bounded(-1.0, 1.0, (worlds, count, width), dtype=torch.float32)
@@ -119,22 +114,18 @@ class PosseEnv(EnvBase):
                 else Categorical(len(self._motions), (worlds, count), dtype=torch.int64)
             )
             action[group] = Composite(action=each, shape=(worlds, count))
-            reward[group] = Composite(
-                reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count)
-            )
+            reward[group] = Composite(reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count))
         observation["score"] = Bounded(0.0, 1.0, (worlds, 1), dtype=torch.float32)
         if self._state_layout is not None:
-            least, greatest = (
-                torch.from_numpy(bound).expand(worlds, -1) for bound in self._state_layout.bounds()
-            )
+            least, greatest = (torch.from_numpy(bound).expand(worlds, -1) for bound in self._state_layout.bounds())
             observation["state"] = Bounded(least, greatest, dtype=torch.float32)
         flag = Binary(1, (worlds, 1), dtype=torch.bool)
         self.observation_spec = observation.to(self.device)
         self.action_spec = action.to(self.device)
         self.reward_spec = reward.to(self.device)
-        self.done_spec = Composite(
-            done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(worlds,)
-        ).to(self.device)
+        self.done_spec = Composite(done=flag, terminated=flag.clone(), truncated=flag.clone(), shape=(worlds,)).to(
+            self.device
+        )
 
     def _set_seed(self, seed: int | None) -> None:
         """Make the next reset of all worlds restart from episode 0 of a seed."""

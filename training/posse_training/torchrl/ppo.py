@@ -150,12 +150,7 @@ def train(
 
 def objectives(agent: Agent, settings: Settings) -> tuple[ClipPPOLoss, GAE]:
     """Return the loss and the advantage estimator, with the keys of the trackers' tensors."""
-    loss = ClipPPOLoss(
-        agent.actor,
-        agent.critic,
-        clip_epsilon=settings.clip,
-        entropy_coeff=settings.entropy,
-    )
+    loss = ClipPPOLoss(agent.actor, agent.critic, clip_epsilon=settings.clip, entropy_coeff=settings.entropy)
     loss.set_keys(
         action=DRAWN,
         sample_log_prob=LOG_PROBABILITY,
@@ -165,12 +160,7 @@ def objectives(agent: Agent, settings: Settings) -> tuple[ClipPPOLoss, GAE]:
         terminated=(TRACKERS, "terminated"),
     )
     advantage = GAE(gamma=settings.discount, lmbda=settings.trace, value_network=agent.critic)
-    advantage.set_keys(
-        value=VALUE,
-        reward=REWARD,
-        done=(TRACKERS, "done"),
-        terminated=(TRACKERS, "terminated"),
-    )
+    advantage.set_keys(value=VALUE, reward=REWARD, done=(TRACKERS, "done"), terminated=(TRACKERS, "terminated"))
     return loss, advantage
 
 

@@ -21,9 +21,7 @@ CHECK_SEED: Final = 2
 CHECK_WORLDS: Final = 32
 
 
-def make_card(
-    settings: TuneSettings, scorer: Scorer, state: State, best: dict[str, Any]
-) -> dict[str, Any]:
+def make_card(settings: TuneSettings, scorer: Scorer, state: State, best: dict[str, Any]) -> dict[str, Any]:
     """Return the card of a finished run, whose best point of the curve is given."""
     values: dict[str, float] = best["settings"]
     fresh = settings.seed + FRESH_SEED
@@ -49,12 +47,7 @@ def make_card(
             "tuned": _scores(scorer, values, count, fresh),
             "untuned": _scores(scorer, {}, count, fresh),
         },
-        "check": {
-            "split": "validation",
-            "seed": CHECK_SEED,
-            "worlds": CHECK_WORLDS,
-            "safe_score": float(check.mean()),
-        },
+        "check": {"split": "validation", "seed": CHECK_SEED, "worlds": CHECK_WORLDS, "safe_score": float(check.mean())},
         "software": {
             "cmaes": cmaes.__version__,
             "numpy": np.__version__,

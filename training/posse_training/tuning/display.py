@@ -111,14 +111,11 @@ class Display(LiveDisplay):
             table.add_row("", ProgressBar(total=1.0, completed=done, width=_WIDTH))
             if state.generations:
                 scores = state.generations[-1]["scores"]
-                table.add_row(
-                    "training score", f"{max(scores):.3f} best, {min(scores):.3f} worst candidate"
-                )
+                table.add_row("training score", f"{max(scores):.3f} best, {min(scores):.3f} worst candidate")
         if state is not None and state.curve:
             last, best = state.curve[-1], max(p["score"] for p in state.curve)
             table.add_row(
-                "validation score",
-                f"{last['score']:.3f} [{last['low']:.3f}, {last['high']:.3f}]   best {best:.3f}",
+                "validation score", f"{last['score']:.3f} [{last['low']:.3f}, {last['high']:.3f}]   best {best:.3f}"
             )
             untuned = state.curve[0]["score"]
             for row in sparkline([p["score"] for p in state.curve], untuned, width=_WIDTH):

@@ -32,9 +32,7 @@ class Elsewhere(Watcher):
         self._report: Callable[[int], object] = lambda count: None
         self._done = 0
 
-    def arrays(
-        self, jobs: Sequence[Job], report: Callable[[int], object] = lambda count: None
-    ) -> list[Arrays]:
+    def arrays(self, jobs: Sequence[Job], report: Callable[[int], object] = lambda count: None) -> list[Arrays]:
         """Return the arrays of each job; report how many shards are done."""
         self._report, self._done = report, 0
         store = Memory()
@@ -78,10 +76,7 @@ class ClusterScorer(Scorer):
     ) -> list[Scores]:
         """See :class:`Scorer`."""
         shards = (Shard(first, count),)
-        jobs = [
-            self._job(f"candidate {k + 1}", values, split, shards, None)
-            for k, values in enumerate(candidates)
-        ]
+        jobs = [self._job(f"candidate {k + 1}", values, split, shards, None) for k, values in enumerate(candidates)]
         found = self._workers.arrays(jobs, report)
         self.played(count * len(jobs))
         return [metrics["safe_score"] for metrics in found]
@@ -91,25 +86,13 @@ class ClusterScorer(Scorer):
         assert self.elsewhere is not None
         return self.elsewhere
 
-    def _job(
-        self,
-        name: str,
-        values: dict[str, float],
-        split: str,
-        shards: tuple[Shard, ...],
-        seed: int | None,
-    ) -> Job:
+    def _job(self, name: str, values: dict[str, float], split: str, shards: tuple[Shard, ...], seed: int | None) -> Job:
         here = self.seed if seed is None else seed
         return Job(name, score_on_worker, (self.policy, self.scenario, values, split, here), shards)
 
 
 def score_on_worker(
-    policy: TunablePolicy,
-    scenario: Scenario,
-    values: dict[str, float],
-    split: str,
-    seed: int,
-    shard: Shard,
+    policy: TunablePolicy, scenario: Scenario, values: dict[str, float], split: str, seed: int, shard: Shard
 ) -> Arrays:
     """Play a candidate in the worlds of a shard; return its metrics, (count,) each."""
     scorer = Scorer(policy, scenario, seed, threads=1)

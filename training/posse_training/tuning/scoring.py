@@ -43,9 +43,7 @@ def tunable_policy(name: str) -> tuple[TunablePolicy, tuple[Tunable, ...]]:
         found = tunables(policy.settings)
         if found:
             return policy, found
-    raise PolicyError(
-        f"policy {name!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}"
-    )
+    raise PolicyError(f"policy {name!r:.100} has no tunable settings; those that have: {', '.join(FAMILY)}")
 
 
 @dataclass(frozen=True)
@@ -82,16 +80,18 @@ class Scorer:
     ) -> dict[str, Scores]:
         """Return the metrics of a candidate, (count,) each, on worlds ``first`` and following."""
         batch = posse.Batch(
-            self.scenario, count, seed=self.seed if seed is None else seed, split=split,
-            first_world=first, num_threads=self.threads,
-        )  # fmt: skip
+            self.scenario,
+            count,
+            seed=self.seed if seed is None else seed,
+            split=split,
+            first_world=first,
+            num_threads=self.threads,
+        )
         found = play(batch, self.policy.with_settings(**values))
         self.played(count)
         return found
 
-    def scores(
-        self, values: dict[str, float], split: str, first: int, count: int, seed: int | None = None
-    ) -> Scores:
+    def scores(self, values: dict[str, float], split: str, first: int, count: int, seed: int | None = None) -> Scores:
         """Return the safe scores of a candidate, (count,)."""
         return self.metrics(values, split, first, count, seed)["safe_score"]
 

@@ -37,9 +37,7 @@ class Search:
         ValueError: A past generation has another shape, or numbers that are not finite.
     """
 
-    def __init__(
-        self, start: Point, population: int, seed: int, past: Iterable[Generation] = ()
-    ) -> None:
+    def __init__(self, start: Point, population: int, seed: int, past: Iterable[Generation] = ()) -> None:
         self._cma = CMA(
             mean=np.array(start, np.float64),
             sigma=SIGMA,

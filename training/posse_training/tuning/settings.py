@@ -70,9 +70,7 @@ class TuneSettings:
             if value is None:
                 continue
             if not math.isfinite(value) or not low <= value <= high:
-                raise SettingsError(
-                    f"{name}={value!r} is out of range: choose it from {low:g} to {high:,g}"
-                )
+                raise SettingsError(f"{name}={value!r} is out of range: choose it from {low:g} to {high:,g}")
 
     @property
     def folder(self) -> Path:

@@ -70,9 +70,7 @@ def _from_unit(t: Tunable, unit: float) -> float:
     return min(t.high, max(t.low, float(f"{value:.6g}")))
 
 
-def select(
-    tunables: Sequence[Tunable], names: Sequence[str]
-) -> tuple[tuple[Tunable, ...], tuple[Tunable, ...]]:
+def select(tunables: Sequence[Tunable], names: Sequence[str]) -> tuple[tuple[Tunable, ...], tuple[Tunable, ...]]:
     """Return the tunable settings with these names, and the others."""
     chosen = tuple(t for t in tunables if t.name in names)
     return chosen, tuple(t for t in tunables if t.name not in names)

@@ -73,9 +73,7 @@ def read_state(folder: Path, identity: dict[str, Any]) -> State | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != _FORMAT:
-            raise CheckpointError(
-                f"the format of {path} is {content['format']!r:.80}, this version reads {_FORMAT!r}"
-            )
+            raise CheckpointError(f"the format of {path} is {content['format']!r:.80}, this version reads {_FORMAT!r}")
         text = content["state"]
         whole = content["digest"] == hashlib.sha256(text.encode()).hexdigest()
         state = State(**json.loads(text)) if whole else None
@@ -94,6 +92,5 @@ def read_state(folder: Path, identity: dict[str, Any]) -> State | None:
 
 def _damaged(path: Path, why: str) -> CheckpointError:
     return CheckpointError(
-        f"{path} is damaged: {why}. The run cannot be resumed: remove {path.parent}, or choose "
-        "another --out"
+        f"{path} is damaged: {why}. The run cannot be resumed: remove {path.parent}, or choose another --out"
     )

@@ -64,9 +64,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
                 display.note("finding the settings that have an effect")
                 names = settings.only or scorer.effective(tunables)
                 if not names:
-                    raise SettingsError(
-                        f"no setting of {settings.policy!r} has an effect on {settings.scenario!r}"
-                    )
+                    raise SettingsError(f"no setting of {settings.policy!r} has an effect on {settings.scenario!r}")
                 state = State(identity, list(names))
             card = _run(settings, scorer, Space(*select(tunables, state.names)), state, display)
     except InUseError as error:
@@ -95,9 +93,7 @@ def _place(settings: TuneSettings, scorer: Scorer, display: Display) -> Iterator
         yield ClusterScorer(**vars(scorer), elsewhere=elsewhere)
 
 
-def _run(
-    settings: TuneSettings, scorer: Scorer, space: Space, state: State, display: Display
-) -> dict[str, Any]:
+def _run(settings: TuneSettings, scorer: Scorer, space: Space, state: State, display: Display) -> dict[str, Any]:
     """Search until the time is over; return the card."""
     search = Search(space.start, settings.population, settings.seed, state.generations)
     since = time.monotonic() - state.seconds
@@ -130,12 +126,7 @@ def _run(
 
 
 def _generation(
-    settings: TuneSettings,
-    scorer: Scorer,
-    space: Space,
-    search: Search,
-    state: State,
-    report: Callable[[int], object],
+    settings: TuneSettings, scorer: Scorer, space: Space, search: Search, state: State, report: Callable[[int], object]
 ) -> None:
     """Score a generation on worlds of its own, the same for all its candidates."""
     points = search.ask()
@@ -148,12 +139,7 @@ def _generation(
 
 
 def _validate(
-    settings: TuneSettings,
-    scorer: Scorer,
-    space: Space,
-    state: State,
-    point: Point,
-    display: Display,
+    settings: TuneSettings, scorer: Scorer, space: Space, state: State, point: Point, display: Display
 ) -> None:
     """Append the validation score of a point to the curve; the first one is the untuned policy."""
     values = space.values(point) if state.generations else {}
@@ -186,8 +172,7 @@ def _check_only(settings: TuneSettings, tunables: tuple[Tunable, ...]) -> None:
     for name in settings.only:
         if name not in known:
             raise SettingsError(
-                f"only={name!r:.80} is not a tunable setting of {settings.policy!r}; these are: "
-                f"{', '.join(known)}"
+                f"only={name!r:.80} is not a tunable setting of {settings.policy!r}; these are: {', '.join(known)}"
             )
 
 
@@ -199,6 +184,5 @@ def _shipped_path(settings: TuneSettings) -> Path | None:
         if policy == settings.policy:
             return SHIPPED_TUNED / name / f"{settings.scenario}.json"
     raise SettingsError(
-        f"--ship needs a policy whose tuned version ships: {', '.join(TUNED.values())}; "
-        f"not {settings.policy!r}"
+        f"--ship needs a policy whose tuned version ships: {', '.join(TUNED.values())}; not {settings.policy!r}"
     )

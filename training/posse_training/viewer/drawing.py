@@ -76,9 +76,7 @@ def rows_of(layout: Layout) -> int:
     return int((layout.panel[3] / layout.point - 2 * _EDGE - 24) // _ROW)
 
 
-def draw_panel(
-    canvas: Canvas, layout: Layout, title: str, lines: Sequence[Line], scroll: int
-) -> None:
+def draw_panel(canvas: Canvas, layout: Layout, title: str, lines: Sequence[Line], scroll: int) -> None:
     """Draw the panel: a title, and the lines from a number on."""
     if layout.panel is None:
         return

@@ -45,11 +45,7 @@ def lines_of(moment: Moment, layout: ObservationLayout, robot: int) -> list[Line
     n = len(moment.scene.position)
     if robot >= n:
         return _target(moment, layout.scenario)
-    return [
-        *_condition(moment, robot),
-        *_action(moment, layout.scenario, robot),
-        *_observation(moment, layout, robot),
-    ]
+    return [*_condition(moment, robot), *_action(moment, layout.scenario, robot), *_observation(moment, layout, robot)]
 
 
 def title_of(robot: int, trackers: int) -> str:

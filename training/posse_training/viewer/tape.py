@@ -59,17 +59,13 @@ class Tape:
         PolicyError: The policy does not fit the scenario, or the target is an agent.
     """
 
-    def __init__(
-        self, policy: Policy, scenario: Scenario, seed: int, world: int, split: str
-    ) -> None:
+    def __init__(self, policy: Policy, scenario: Scenario, seed: int, world: int, split: str) -> None:
         check_moves_all(policy, scenario)
         longest = max(scenario.message_size, policy.message_size)
         self.scenario = scenario.replace(message_size=longest)
         self.name = policy.name
         self._policy = policy
-        self._batch = Batch(
-            self.scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled"
-        )
+        self._batch = Batch(self.scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
         self.layout = self._batch.layout
         self._memory = begin(policy, self._batch)
         self._observations = self._batch.reset()
@@ -137,9 +133,12 @@ class Tape:
         metrics = {name: float(value[0]) for name, value in self._batch.metrics().items()}
         self._moments.append(
             Moment(
-                scene, self._observations[0].copy(), None if actions is None else actions[0].copy(),
+                scene,
+                self._observations[0].copy(),
+                None if actions is None else actions[0].copy(),
                 {name: np.array(value)[0] for name, value in self._annotations.items()},
-                np.array(reward), metrics,
+                np.array(reward),
+                metrics,
             )
-        )  # fmt: skip
+        )
         return actions

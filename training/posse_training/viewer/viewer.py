@@ -17,13 +17,7 @@ from posse.rendering.content.view import View
 from posse.rendering.key import legend_of
 from posse.rendering.picture import action_of, draw_picture, viewport_of
 from posse_baselines import Policy, PolicyError, Target, against, load
-from posse_training.viewer.drawing import (
-    draw_help,
-    draw_message,
-    draw_panel,
-    draw_timeline,
-    rows_of,
-)
+from posse_training.viewer.drawing import draw_help, draw_message, draw_panel, draw_timeline, rows_of
 from posse_training.viewer.keys import command_of
 from posse_training.viewer.layout import Layout, lay_out
 from posse_training.viewer.panel import Line, lines_of, title_of
@@ -96,10 +90,7 @@ class Viewer:
     def limits(self) -> Limits:
         """What the state can refer to."""
         dt = self._scenario.control_step
-        return Limits(
-            self._scenario.num_trackers + 1, len(self._policies), self._tape.end,
-            max(1, round(1 / dt)),
-        )  # fmt: skip
+        return Limits(self._scenario.num_trackers + 1, len(self._policies), self._tape.end, max(1, round(1 / dt)))
 
     def resize(self, size: tuple[int, int]) -> None:
         """Fit the viewer to a window of a size (width, height), px."""
@@ -177,9 +168,8 @@ class Viewer:
         """The choices that the picture is drawn with."""
         state, small = self.state, self._scenario.num_trackers <= _SMALL_TEAM
         return View(
-            state.selected, state.links, state.sensing, state.trails,
-            numbers=True, least_robot=7.0 if small else 5.5,
-        )  # fmt: skip
+            state.selected, state.links, state.sensing, state.trails, numbers=True, least_robot=7.0 if small else 5.5
+        )
 
     def draw(self) -> pygame.Surface:
         """Return a picture of the window; valid until the next call."""
@@ -197,18 +187,31 @@ class Viewer:
             draw_help(canvas, layout, legend_of(scene))
             return canvas.finish()
         draw_picture(
-            canvas, layout.picture, self._camera, scene, self._history, layout.point,
-            self._tape.name, self._remark(), self.view,
-        )  # fmt: skip
+            canvas,
+            layout.picture,
+            self._camera,
+            scene,
+            self._history,
+            layout.point,
+            self._tape.name,
+            self._remark(),
+            self.view,
+        )
         if state.selected is not None:
             title = title_of(state.selected, self._scenario.num_trackers)
             draw_panel(canvas, layout, title, self._lines(), state.scroll)
         tape = self._tape
         draw_timeline(
-            canvas, layout, playing=not (state.paused or self._ended), step=scene.step,
-            first=tape.first, played=tape.last, end=tape.end,
-            control_step=self._scenario.control_step, contacts=tape.contacts,
-        )  # fmt: skip
+            canvas,
+            layout,
+            playing=not (state.paused or self._ended),
+            step=scene.step,
+            first=tape.first,
+            played=tape.last,
+            end=tape.end,
+            control_step=self._scenario.control_step,
+            contacts=tape.contacts,
+        )
         if self.message:
             draw_message(canvas, layout, self.message)
         return canvas.finish()
@@ -307,7 +310,9 @@ class Viewer:
 
 
 _TYPED: Final = {
-    "?": (pygame.K_h, False), "+": (pygame.K_PLUS, False),
-    "[": (pygame.K_LEFTBRACKET, False), "]": (pygame.K_RIGHTBRACKET, False),
-}  # fmt: skip
+    "?": (pygame.K_h, False),
+    "+": (pygame.K_PLUS, False),
+    "[": (pygame.K_LEFTBRACKET, False),
+    "]": (pygame.K_RIGHTBRACKET, False),
+}
 """Characters that lie on other keys on some keyboards."""

@@ -30,9 +30,7 @@ def blocks(disc: Record, clearance: float, ux: float, uy: float) -> bool:
 
 
 @compiled
-def turn_past(
-    discs: Records, count: int, clearance: float, ux: float, uy: float, side: float
-) -> float:
+def turn_past(discs: Records, count: int, clearance: float, ux: float, uy: float, side: float) -> float:
     """Return the turn (rad, left positive) to a clear direction on a side (1: left, -1: right).
 
     ``2 * _MOST_TURN`` if there is none within ``_MOST_TURN``.
@@ -60,9 +58,7 @@ def turn_past(
 
 
 @compiled
-def way_past(
-    f: Record, s: Record, d: Record, discs: Records, count: int, vx: float, vy: float
-) -> tuple[float, float]:
+def way_past(f: Record, s: Record, d: Record, discs: Records, count: int, vx: float, vy: float) -> tuple[float, float]:
     """Return the wanted velocity (m/s), turned past what stands in its way."""
     speed = length(vx, vy)
     if speed < 1e-6:

@@ -10,13 +10,7 @@ from posse_baselines.ddcs.memory import FLOCKING
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
 from posse_baselines.laws.geometry import length, line_of_sight, wrap
 from posse_baselines.laws.l_l import l_l_velocity
-from posse_baselines.laws.l_phi import (
-    held_command,
-    l_phi_demand,
-    limit_command,
-    point_velocity,
-    sampled_rate,
-)
+from posse_baselines.laws.l_phi import held_command, l_phi_demand, limit_command, point_velocity, sampled_rate
 from posse_baselines.laws.slots import rotate, slot_heading, slot_velocity
 
 BY_SLOT_FRAME: Final = 1
@@ -64,50 +58,39 @@ def place_on_leader(
     f: Record, s: Record, d: Record, mate: Record, own: Record, theirs: Record
 ) -> tuple[float, float, float, float]:
     """Return the wanted place (x, y), m, by a team-mate, and its velocity (x, y), m/s."""
-    mate_x, mate_y, place_x, place_y, speed, theta, _, rate = place_and_frame(
-        f, s, d, mate, own, theirs
-    )
-    vx, vy = slot_velocity(
-        speed * math.cos(theta), speed * math.sin(theta), rate, place_x - mate_x, place_y - mate_y
-    )
+    mate_x, mate_y, place_x, place_y, speed, theta, _, rate = place_and_frame(f, s, d, mate, own, theirs)
+    vx, vy = slot_velocity(speed * math.cos(theta), speed * math.sin(theta), rate, place_x - mate_x, place_y - mate_y)
     return place_x, place_y, vx, vy
 
 
 @compiled
 def demand_on(
-    f: Record,
-    s: Record,
-    d: Record,
-    mate: Record,
-    own: Record,
-    theirs: Record,
-    x: float,
-    y: float,
-    body: Record,
+    f: Record, s: Record, d: Record, mate: Record, own: Record, theirs: Record, x: float, y: float, body: Record
 ) -> tuple[float, float, float, float, float]:
     """Return the demand of l-φ on a team-mate for the control point c_j, and its position.
 
     (l, A, B, direction now, wanted direction): the directions of l in the common frame. c_j is
     wanted where it lies when the robot is in its place, and heads as one does there.
     """
-    mate_x, mate_y, place_x, place_y, speed, theta, frame, rate = place_and_frame(
-        f, s, d, mate, own, theirs
-    )
+    mate_x, mate_y, place_x, place_y, speed, theta, frame, rate = place_and_frame(f, s, d, mate, own, theirs)
     heading = slot_heading(
-        speed * math.cos(theta), speed * math.sin(theta), rate,
-        place_x - mate_x, place_y - mate_y, frame,
-    )  # fmt: skip
-    offset = s.point_offset
-    l_now, angle = line_of_sight(
-        mate_x, mate_y, x + offset * body.heading_cos, y + offset * body.heading_sin
+        speed * math.cos(theta), speed * math.sin(theta), rate, place_x - mate_x, place_y - mate_y, frame
     )
+    offset = s.point_offset
+    l_now, angle = line_of_sight(mate_x, mate_y, x + offset * body.heading_cos, y + offset * body.heading_sin)
     l_d, wanted = line_of_sight(
         mate_x, mate_y, place_x + offset * math.cos(heading), place_y + offset * math.sin(heading)
     )
     a, b = l_phi_demand(
-        l_now, wrap(angle - theta), l_d, wrap(wanted - theta), speed, rate,
-        sampled_rate(s.alpha_1, body.dt), sampled_rate(s.alpha_2, body.dt),
-    )  # fmt: skip
+        l_now,
+        wrap(angle - theta),
+        l_d,
+        wrap(wanted - theta),
+        speed,
+        rate,
+        sampled_rate(s.alpha_1, body.dt),
+        sampled_rate(s.alpha_2, body.dt),
+    )
     return l_now, a, b, angle, wanted
 
 
@@ -137,15 +120,7 @@ def second_of(f: Record, s: Record, d: Record, mates: Records, slots: Records, o
 
 @compiled
 def on_leader(
-    f: Record,
-    s: Record,
-    d: Record,
-    mates: Records,
-    slots: Records,
-    own: int,
-    x: float,
-    y: float,
-    body: Record,
+    f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, x: float, y: float, body: Record
 ) -> tuple[float, float, float, float]:
     """Return (vx, vy, V, ω) of a follower in the flock: velocity of c_j, and command.
 
@@ -160,13 +135,10 @@ def on_leader(
         ahead, across = point_velocity(a, b, gamma)
     else:
         mate = mates[second]
-        l_k, a_k, b_k, angle_k, wanted_k = demand_on(
-            f, s, d, mate, place, slots[mate.slot], x, y, body
-        )
+        l_k, a_k, b_k, angle_k, wanted_k = demand_on(f, s, d, mate, place, slots[mate.slot], x, y, body)
         ahead, across = l_l_velocity(
-            l_i, a, b, gamma, l_k, a_k, b_k, wrap(angle_k - theta), wanted_k - wanted,
-            s.least_crossing,
-        )  # fmt: skip
+            l_i, a, b, gamma, l_k, a_k, b_k, wrap(angle_k - theta), wanted_k - wanted, s.least_crossing
+        )
     vx, vy = rotate(ahead, across, body.heading_cos, body.heading_sin)
     speed, omega = held_command(ahead, across, s.point_offset, body.dt)
     speed, omega = limit_command(speed, omega, s.point_offset, body.max_speed, body.max_omega)

@@ -73,9 +73,7 @@ def place_of(
 
 
 @compiled(seldom=True)
-def central_tracker(
-    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float
-) -> tuple[int, int]:
+def central_tracker(f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float) -> tuple[int, int]:
     """Return the tracker with the least sum of distances to all heard, and their number."""
     n, others = len(mates), 0
     best, least = own, 1e30
@@ -97,9 +95,7 @@ def central_tracker(
 
 
 @compiled
-def select_leader(
-    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int
-) -> None:
+def select_leader(f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int) -> None:
     """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
     if d.known:
         best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, barred)
@@ -113,9 +109,7 @@ def select_leader(
 
 
 @compiled
-def settle_lead(
-    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float
-) -> None:
+def settle_lead(f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float) -> None:
     """Process received claims; hand over or appoint if due; (x, y) is the own position."""
     for j in range(len(mates)):
         mate = mates[j]

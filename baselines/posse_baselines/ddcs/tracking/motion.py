@@ -15,12 +15,7 @@ from posse_baselines.ddcs.monitoring import is_there
 from posse_baselines.ddcs.tracking.following import on_leader, place_on_leader
 from posse_baselines.ddcs.tracking.slots import slot_place
 from posse_baselines.laws.geometry import bearing_rate, clip, deviation, length, line_of_sight
-from posse_baselines.laws.guidance import (
-    MIN_COSINE,
-    lawful_heading,
-    lawful_rate,
-    maintenance_speed,
-)
+from posse_baselines.laws.guidance import MIN_COSINE, lawful_heading, lawful_rate, maintenance_speed
 from posse_baselines.laws.heading import regulate
 from posse_baselines.laws.slots import slot_heading
 from posse_baselines.laws.steering import approach_velocity, meeting_velocity
@@ -74,16 +69,26 @@ def to_slot(s: Record, d: Record, slots: Records, x: float, y: float, body: Reco
     if d.task == CONVERGING:
         gain, clearance, rate = _FULL_SPEED, s.clearance, 0.0
     vx, vy = meeting_velocity(
-        x - d.now_x, y - d.now_y, arm_x, arm_y, d.speed_x, d.speed_y, d.mean_x, d.mean_y,
-        d.psi_rate, s.weave_time, clearance, gain, body.max_speed, body.acceleration,
-    )  # fmt: skip
+        x - d.now_x,
+        y - d.now_y,
+        arm_x,
+        arm_y,
+        d.speed_x,
+        d.speed_y,
+        d.mean_x,
+        d.mean_y,
+        d.psi_rate,
+        s.weave_time,
+        clearance,
+        gain,
+        body.max_speed,
+        body.acceleration,
+    )
     return take_up(body, vx, vy, rate)
 
 
 @compiled
-def pursue(
-    s: Record, d: Record, constant: float, slot: Record, x: float, y: float, body: Record
-) -> Motion:
+def pursue(s: Record, d: Record, constant: float, slot: Record, x: float, y: float, body: Record) -> Motion:
     """Return the motion of PNGL with constant K: θ = K σ + c, ω = K dσ/dt + dc/dt.
 
     Converging is the chase at full speed, flocking the speed of (13) with a correction of the
@@ -97,9 +102,7 @@ def pursue(
         wanted_theta = math.atan2(d.frame_sin, d.frame_cos)
         frame_rate = d.psi_rate
     if s.deviation == OF_OCCUPANT:
-        wanted_theta = slot_heading(
-            d.speed_x, d.speed_y, d.psi_rate, arm_x, arm_y, wanted_theta
-        )  # fmt: skip
+        wanted_theta = slot_heading(d.speed_x, d.speed_y, d.psi_rate, arm_x, arm_y, wanted_theta)
     if s.deviation != NO_DEVIATION and d.task == FLOCKING:
         # Feedback on the bearing, c = ... + G wrap(σ - σ_d), acts as a greater K does.
         constant += s.bearing_gain
@@ -111,9 +114,8 @@ def pursue(
     target_delta = deviation(d.now_theta, sigma)
     if d.task == FLOCKING:
         speed = maintenance_speed(
-            d.speed, target_delta, delta, r, length(arm_x, arm_y), frame_rate,
-            s.range_gain, body.max_speed,
-        )  # fmt: skip
+            d.speed, target_delta, delta, r, length(arm_x, arm_y), frame_rate, s.range_gain, body.max_speed
+        )
     else:
         # A chase has to close in, whichever side of the target its slot is on.
         speed = float(body.max_speed)
@@ -122,9 +124,8 @@ def pursue(
     sigma_rate = bearing_rate(r, d.speed, target_delta, speed, delta)
     d.closing = 1 if d.task == CONVERGING else 0
     return take_up(
-        body, speed * math.cos(theta), speed * math.sin(theta),
-        lawful_rate(constant, sigma_rate, frame_rate),
-    )  # fmt: skip
+        body, speed * math.cos(theta), speed * math.sin(theta), lawful_rate(constant, sigma_rate, frame_rate)
+    )
 
 
 @compiled
@@ -147,9 +148,7 @@ def follows(f: Record, s: Record, d: Record, mates: Records, own: int) -> bool:
 
 
 @compiled
-def note_error(
-    f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, x: float, y: float
-) -> None:
+def note_error(f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, x: float, y: float) -> None:
     """Store the distance of a tracker from its place, m."""
     d.pursues = 0
     if follows(f, s, d, mates, own):
@@ -166,15 +165,7 @@ def note_error(
 
 @compiled
 def wanted_motion(
-    f: Record,
-    s: Record,
-    d: Record,
-    mates: Records,
-    slots: Records,
-    own: int,
-    x: float,
-    y: float,
-    body: Record,
+    f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, x: float, y: float, body: Record
 ) -> Motion:
     """Return the motion of a tracker that is not searching."""
     n = len(slots)
@@ -185,12 +176,8 @@ def wanted_motion(
     if follows(f, s, d, mates, own):
         if d.task == FLOCKING:
             return on_leader(f, s, d, mates, slots, own, x, y, body)
-        place_x, place_y, vx, vy = place_on_leader(
-            f, s, d, mates[d.leader], slots[d.slot], slots[0]
-        )
-        vx, vy = approach_velocity(
-            place_x - x, place_y - y, vx, vy, _FULL_SPEED, body.max_speed, body.acceleration
-        )
+        place_x, place_y, vx, vy = place_on_leader(f, s, d, mates[d.leader], slots[d.slot], slots[0])
+        vx, vy = approach_velocity(place_x - x, place_y - y, vx, vy, _FULL_SPEED, body.max_speed, body.acceleration)
         return take_up(body, vx, vy, 0.0)
     if s.guidance == PNGL:
         return pursue(s, d, own_constant(s, own, n), slots[d.slot], x, y, body)

@@ -14,9 +14,7 @@ from posse_baselines.laws.geometry import length
 
 
 @compiled
-def mark_seen(
-    f: Record, d: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int
-) -> None:
+def mark_seen(f: Record, d: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int) -> None:
     """Mark the cells of a map (GRID²,) covered by a tracker at (x, y)."""
     # In cells from the map's corner; the centre of cell i is at i + 0.5.
     scale = GRID / (2.0 * f.area)
@@ -45,13 +43,7 @@ def begin_search(f: Record, d: Record, seen: npt.NDArray[np.uint16]) -> None:
 
 @compiled
 def look_around(
-    f: Record,
-    s: Record,
-    d: Record,
-    mates: Records,
-    seen: npt.NDArray[np.uint16],
-    x: float,
-    y: float,
+    f: Record, s: Record, d: Record, mates: Records, seen: npt.NDArray[np.uint16], x: float, y: float
 ) -> None:
     """Update the map of areas covered by this tracker and those it hears."""
     if len(seen) == 0 or d.step % max(1, round(s.look_time / f.dt)) != 0:
@@ -91,9 +83,7 @@ def wander(
 
 
 @compiled
-def age_of(
-    f: Record, s: Record, d: Record, seen: npt.NDArray[np.uint16], i: int, j: int, lost: bool
-) -> float:
+def age_of(f: Record, s: Record, d: Record, seen: npt.NDArray[np.uint16], i: int, j: int, lost: bool) -> float:
     """Return the time (s) since a cell (i, j) was last covered, at most ``stale_after``.
 
     With ``lost``, a cell not covered since the target was lost counts as never covered.
@@ -106,9 +96,7 @@ def age_of(
 
 
 @compiled
-def age_around(
-    f: Record, s: Record, d: Record, seen: npt.NDArray[np.uint16], i: int, j: int, reach: int
-) -> float:
+def age_around(f: Record, s: Record, d: Record, seen: npt.NDArray[np.uint16], i: int, j: int, reach: int) -> float:
     """Return the mean age (s) of the cells in a square around a cell; outside, age is 0."""
     total = 0.0
     for k in range(max(0, i - reach), min(GRID, i + reach + 1)):
@@ -166,9 +154,7 @@ def choose_goal(
                 if m != own and is_there(f, s, d, mates[m], len(mates)):
                     mx, my = mate_now(f, s, d, mates[m])
                     # A team-mate's goal counts more than its position.
-                    other = length(
-                        cx - mx - 2.0 * mates[m].speed_x, cy - my - 2.0 * mates[m].speed_y
-                    )
+                    other = length(cx - mx - 2.0 * mates[m].speed_x, cy - my - 2.0 * mates[m].speed_y)
                     if other < way:
                         value -= way - other
             if value > best:

@@ -106,15 +106,7 @@ def choose_slot(
 
 @compiled
 def loses_slot(
-    f: Record,
-    s: Record,
-    d: Record,
-    mates: Records,
-    slots: Records,
-    own: int,
-    slot: int,
-    x: float,
-    y: float,
+    f: Record, s: Record, d: Record, mates: Records, slots: Records, own: int, slot: int, x: float, y: float
 ) -> bool:
     """Return whether a team-mate that claims a slot has precedence.
 

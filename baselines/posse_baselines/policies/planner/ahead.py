@@ -37,19 +37,17 @@ class Law(OwnArrays):
     def __init__(self, scenario: Scenario) -> None:
         n, parts = scenario.num_trackers, MOST_THREADS
         self._tables = (
-            config_record(scenario), slot_records(scenario),
-            np.zeros((parts, n, n), np.float32), np.zeros((parts, WORK_ROWS, n + 1), np.float32),
-            np.zeros((parts, _MOST_DISCS), DISC), np.zeros(parts, BODY), np.zeros(parts, PLAYS),
-        )  # fmt: skip
+            config_record(scenario),
+            slot_records(scenario),
+            np.zeros((parts, n, n), np.float32),
+            np.zeros((parts, WORK_ROWS, n + 1), np.float32),
+            np.zeros((parts, _MOST_DISCS), DISC),
+            np.zeros(parts, BODY),
+            np.zeros(parts, PLAYS),
+        )
 
     def drive(
-        self,
-        batch: Batch,
-        going: BoolArray,
-        ways: Records,
-        plans: Records,
-        seen: Foresight,
-        actions: FloatArray,
+        self, batch: Batch, going: BoolArray, ways: Records, plans: Records, seen: Foresight, actions: FloatArray
     ) -> None:
         """Write actions (E, rows, 2 + m) for the trackers of those worlds that are ``going`` (E,).
 
@@ -67,22 +65,25 @@ class Law(OwnArrays):
         over_worlds(
             drive_all,
             (
-                *self._tables, arrays.world, arrays.tracker, arrays.obstacle,
-                going, ways, plans, seen.paths, seen.begun, per_path, actions,
+                *self._tables,
+                arrays.world,
+                arrays.tracker,
+                arrays.obstacle,
+                going,
+                ways,
+                plans,
+                seen.paths,
+                seen.begun,
+                per_path,
+                actions,
             ),
             batch.num_worlds,
             batch.scenario.num_trackers,
-        )  # fmt: skip
+        )
 
 
 def play_ahead(
-    law: Law,
-    copies: Batch,
-    ways: Records,
-    plans: Records,
-    seen: Foresight,
-    steps: int,
-    distance_cost: float,
+    law: Law, copies: Batch, ways: Records, plans: Records, seen: Foresight, steps: int, distance_cost: float
 ) -> tuple[npt.NDArray[np.float64], FloatArray]:
     """Play copies ahead; return what each is worth, (C,), and the target's path, (C, steps + 1, 4).
 

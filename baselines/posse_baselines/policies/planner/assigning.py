@@ -63,9 +63,7 @@ def assign_slots(
             if since >= 0 and ways[i].foresees > 0.0:
                 time = arrival_time(path, float(since), slots[k], t.x, t.y, speed, c.dt)
             else:
-                time = time_to_slot(
-                    x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, WEAVE_TIME, speed
-                )
+                time = time_to_slot(x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, WEAVE_TIME, speed)
             # Time for turning towards it.
             away = wrap(math.atan2(y, x) - math.atan2(t.heading_sin, t.heading_cos))
             time += _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)

@@ -33,9 +33,7 @@ def foreseen(path: FloatArray, at: float, slot: Record) -> tuple[float, float]:
 
 
 @compiled
-def arrival_time(
-    path: FloatArray, at: float, slot: Record, x: float, y: float, max_speed: float, dt: float
-) -> float:
+def arrival_time(path: FloatArray, at: float, slot: Record, x: float, y: float, max_speed: float, dt: float) -> float:
     """Return when a tracker at (x, y) can be in a slot, straight on at full speed, s from now.
 
     A slot never closes in faster than about ``max_speed`` itself, so the gap that is left bounds

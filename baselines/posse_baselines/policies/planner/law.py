@@ -12,27 +12,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import (
-    Blocks,
-    BoolArray,
-    FloatArray,
-    Record,
-    Records,
-    compiled,
-    kernel,
-    worlds_of,
-)
+from posse.numeric import Blocks, BoolArray, FloatArray, Record, Records, compiled, kernel, worlds_of
 from posse.rules import NEVER
 from posse_baselines.laws.geometry import wrap
 from posse_baselines.laws.heading import regulate
 from posse_baselines.laws.safeguard import safe_velocity
 from posse_baselines.laws.slots import rotate
-from posse_baselines.laws.steering import (
-    approach_velocity,
-    meeting_velocity,
-    way_round,
-    write_motion,
-)
+from posse_baselines.laws.steering import approach_velocity, meeting_velocity, way_round, write_motion
 from posse_baselines.policies.planner.assigning import WEAVE_TIME, assign_slots
 from posse_baselines.policies.planner.foresight import arrival_time, foreseen
 from posse_baselines.policies.planner.surroundings import surround
@@ -70,15 +56,24 @@ def wanted_velocity(
             slot_vx, slot_vy = (to_x - w.x - arm_x) / time, (to_y - w.y - arm_y) / time
             round_x, round_y = way_round(from_x, from_y, arm_x, arm_y, _CLEARANCE)
             return approach_velocity(
-                round_x + shift_x - from_x, round_y + shift_y - from_y, slot_vx, slot_vy,
-                way.gain, speed, acceleration,
-            )  # fmt: skip
+                round_x + shift_x - from_x, round_y + shift_y - from_y, slot_vx, slot_vy, way.gain, speed, acceleration
+            )
     return meeting_velocity(
-        from_x, from_y, arm_x + shift_x, arm_y + shift_y,
-        float(w.speed * w.heading_cos), float(w.speed * w.heading_sin),
-        float(p.mean_x), float(p.mean_y), frame_rate,
-        WEAVE_TIME, _CLEARANCE, way.gain, speed, acceleration,
-    )  # fmt: skip
+        from_x,
+        from_y,
+        arm_x + shift_x,
+        arm_y + shift_y,
+        float(w.speed * w.heading_cos),
+        float(w.speed * w.heading_sin),
+        float(p.mean_x),
+        float(p.mean_y),
+        frame_rate,
+        WEAVE_TIME,
+        _CLEARANCE,
+        way.gain,
+        speed,
+        acceleration,
+    )
 
 
 @compiled
@@ -126,9 +121,7 @@ def drive(
         if t.broken_at != NEVER:
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
-        vx, vy = wanted_velocity(
-            c, slots[plans[i].slot], ways[i], w, t, p, path, since, frame_rate, body.acceleration
-        )
+        vx, vy = wanted_velocity(c, slots[plans[i].slot], ways[i], w, t, p, path, since, frame_rate, body.acceleration)
         count = surround(c, w, trackers, obstacles, i, _MARGIN, discs)
         body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
         body.speed, body.omega = t.speed, t.turn_rate
@@ -165,7 +158,19 @@ def drive_all(
         if going[e]:
             shared = e // worlds_per_path
             drive(
-                config[0], slots, ways[e], world[e], tracker[e], obstacle[e], plans[e],
-                paths[shared], begun[shared], costs[thread], work[thread], discs[thread],
-                bodies[thread], plays[thread], actions[e],
-            )  # fmt: skip
+                config[0],
+                slots,
+                ways[e],
+                world[e],
+                tracker[e],
+                obstacle[e],
+                plans[e],
+                paths[shared],
+                begun[shared],
+                costs[thread],
+                work[thread],
+                discs[thread],
+                bodies[thread],
+                plays[thread],
+                actions[e],
+            )

@@ -14,14 +14,7 @@ from posse_baselines.policies.planner.ahead import Foresight, Law, play_ahead
 from posse_baselines.policies.planner.assigning import PLAN
 from posse_baselines.policies.planner.settings import PlannerSettings
 from posse_baselines.policies.planner.ways import TRIES, Variations, standard_ways
-from posse_baselines.policy import (
-    BasePolicy,
-    Memory,
-    PolicyError,
-    check_fits,
-    check_observations,
-    message_size_of,
-)
+from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations, message_size_of
 
 
 @dataclass
@@ -84,12 +77,14 @@ class Planner(BasePolicy):
         standard = standard_ways(n)
         steps = self._steps(batch, self.settings.look_ahead)
         memory = _Memory(
-            batch, Law(layout.scenario), Variations(self.settings, n), standard,
-            np.repeat(standard[:1], num_worlds, axis=0), np.zeros((num_worlds, n), PLAN),
-            Foresight(
-                np.zeros((num_worlds, steps + 1, 4), np.float32), np.zeros(num_worlds, np.int64)
-            ),
-        )  # fmt: skip
+            batch,
+            Law(layout.scenario),
+            Variations(self.settings, n),
+            standard,
+            np.repeat(standard[:1], num_worlds, axis=0),
+            np.zeros((num_worlds, n), PLAN),
+            Foresight(np.zeros((num_worlds, steps + 1, 4), np.float32), np.zeros(num_worlds, np.int64)),
+        )
         return self.restart(memory, np.ones(num_worlds, np.bool_))
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
@@ -128,9 +123,14 @@ class Planner(BasePolicy):
         for turn in range(s.rounds + 1):
             m.copies = m.batch.copies(TRIES, seed=s.seed, alike=True, into=m.copies)
             worth, paths = play_ahead(
-                m.law, m.copies, np.ascontiguousarray(tries.reshape(-1, tries.shape[2])),
-                np.repeat(m.plans, TRIES, axis=0), m.seen, steps, s.distance_cost,
-            )  # fmt: skip
+                m.law,
+                m.copies,
+                np.ascontiguousarray(tries.reshape(-1, tries.shape[2])),
+                np.repeat(m.plans, TRIES, axis=0),
+                m.seen,
+                steps,
+                s.distance_cost,
+            )
             best = worth.reshape(num_worlds, TRIES).argmax(axis=1)
             ways = tries[everyone, best]
             if turn < s.rounds:

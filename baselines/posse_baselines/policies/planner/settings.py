@@ -33,18 +33,14 @@ class PlannerSettings:
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            value, low, high = (
-                getattr(self, field.name), field.metadata["low"], field.metadata["high"],
-            )  # fmt: skip
+            value, low, high = (getattr(self, field.name), field.metadata["low"], field.metadata["high"])
             whole = isinstance(field.default, int)
             if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
                 kind = "a whole number" if whole else "a number"
                 raise ValueError(f"{field.name}={value!r} must be {kind}")
             if not low <= value <= high:
                 unit = field.metadata["unit"]
-                raise ValueError(
-                    f"{field.name}={value!r} must lie in [{low}, {high}] {unit}".strip()
-                )
+                raise ValueError(f"{field.name}={value!r} must lie in [{low}, {high}] {unit}".strip())
         if self.keep > self.look_ahead:
             raise ValueError(
                 f"keep={self.keep!r} must be at most look_ahead={self.look_ahead!r}: what comes "

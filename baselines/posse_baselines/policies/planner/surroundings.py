@@ -11,15 +11,7 @@ _NEAR: Final = 3.0  # m; farther things are no danger yet
 
 
 @compiled
-def surround(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    i: int,
-    margin: float,
-    discs: Records,
-) -> int:
+def surround(c: Record, w: Record, trackers: Records, obstacles: Records, i: int, margin: float, discs: Records) -> int:
     """List what is near tracker i; return how many things that are.
 
     ``margin`` (m) is the free width to keep; twice as much to the target.

@@ -59,8 +59,7 @@ class Variations:
         shape = (_REPEAT, settings.rounds, TRIES - 1, num_trackers)
         self._changed = rng.random(shape) < settings.varied
         self._shifts = {
-            name: settings.spread * (high - low) * rng.normal(size=shape)
-            for name, (low, high) in _RANGES.items()
+            name: settings.spread * (high - low) * rng.normal(size=shape) for name, (low, high) in _RANGES.items()
         }
         self._foresees = rng.random(shape) < 0.5
 

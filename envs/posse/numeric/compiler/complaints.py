@@ -18,12 +18,7 @@ _COLOURS: Final = re.compile(r"\x1b\[[0-9;]*m")
 _RECORD: Final = re.compile(r"Record\(.*?;\d+;(?:True|False)\)", re.DOTALL)
 _HEADING: Final = "Failed in nopython mode"
 _LONGEST: Final = 200
-_ARTICLES: Final = {
-    "nothing": "nothing",
-    "number": "a number",
-    "pair": "a pair",
-    "truth": "a truth",
-}
+_ARTICLES: Final = {"nothing": "nothing", "number": "a number", "pair": "a pair", "truth": "a truth"}
 
 
 class Complaint(NamedTuple):
@@ -33,9 +28,7 @@ class Complaint(NamedTuple):
     reason: str
 
 
-def unknown_attribute(
-    function: Callable[..., Any], attributes: Mapping[str, Iterable[str]]
-) -> Complaint | None:
+def unknown_attribute(function: Callable[..., Any], attributes: Mapping[str, Iterable[str]]) -> Complaint | None:
     """Return the first use of an attribute that a parameter lacks, or None.
 
     Args:
@@ -62,9 +55,7 @@ def unknown_attribute(
     return None
 
 
-def why_not_compiled(
-    function: Callable[..., Any], arguments: Sequence[Any], returns: str
-) -> Complaint | None:
+def why_not_compiled(function: Callable[..., Any], arguments: Sequence[Any], returns: str) -> Complaint | None:
     """Compile a function alone for the given numba types; return its error, or None.
 
     Args:

@@ -133,10 +133,6 @@ def _open_regular(path: Path) -> int:
 def _prune(directory: Path) -> None:
     """Delete the least recently used kernels, and unfinished files of killed processes."""
     files = sorted(directory.glob(f"*{_SUFFIX}"), key=lambda path: path.stat().st_mtime)
-    left = [
-        path
-        for path in directory.glob(f"*{_UNFINISHED}")
-        if path.stat().st_mtime < time.time() - _HOUR
-    ]
+    left = [path for path in directory.glob(f"*{_UNFINISHED}") if path.stat().st_mtime < time.time() - _HOUR]
     for path in files[:-_KEPT] + left:
         path.unlink(missing_ok=True)

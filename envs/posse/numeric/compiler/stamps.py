@@ -23,10 +23,19 @@ _POSSE: Final = Path(__file__).resolve().parents[2]
 _NO_KERNELS: Final = {
     "posse": ("adapters", "rendering"),
     "posse_training": (
-        "commands", "datasets", "leaderboard", "league", "play", "replay", "reports", "runs",
-        "shipping", "tuning", "viewer",
+        "commands",
+        "datasets",
+        "leaderboard",
+        "league",
+        "play",
+        "replay",
+        "reports",
+        "runs",
+        "shipping",
+        "tuning",
+        "viewer",
     ),
-}  # fmt: skip
+}
 """Rooms without compiled code, by package; kernels do not depend on them."""
 
 _STAMPED_BY_VERSION: Final = ("numba", "llvmlite", "numpy")
@@ -156,9 +165,7 @@ class Stamp:
             if isinstance(constant, CodeType):
                 self._add_code(constant, scope)
             else:
-                self._write(
-                    sorted(map(repr, constant)) if type(constant) is frozenset else constant
-                )
+                self._write(sorted(map(repr, constant)) if type(constant) is frozenset else constant)
         self._add_named(code.co_names, scope)
 
     def _add_named(self, names: tuple[str, ...], scope: dict[str, Any]) -> None:

@@ -14,9 +14,7 @@ def _first(context: Any, builder: Any, sig: Any, values: Any) -> Any:
 
 def _add(typing: Any, array: Any, value: Any) -> Any:
     """Atomically add to the first element of an array; return its previous value."""
-    return types.int64(
-        array, types.int64
-    ), lambda context, builder, sig, values: builder.atomic_rmw(
+    return types.int64(array, types.int64), lambda context, builder, sig, values: builder.atomic_rmw(
         "add", _first(context, builder, sig, values), values[1], "seq_cst"
     )
 

@@ -11,12 +11,7 @@ from numba.core import cgutils, types
 from numba.core.extending import models, register_model
 from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv.castgraph import Conversion
-from numba.core.typing.templates import (
-    AbstractTemplate,
-    ConcreteTemplate,
-    infer_global,
-    signature,
-)
+from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
 
 from posse.numeric.simd.lanes import (
     WIDTH,
@@ -98,9 +93,7 @@ def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any
     return _spread(builder, context.cast(builder, value, fromty, types.float32))
 
 
-def _declare(
-    function: Any, result: Any, arguments: tuple[Any, ...], emit: Callable[..., Any]
-) -> None:
+def _declare(function: Any, result: Any, arguments: tuple[Any, ...], emit: Callable[..., Any]) -> None:
     """Declare the types and the instructions of a function or operator to numba."""
 
     @infer_global(function)

@@ -61,9 +61,7 @@ class History:
         for i in np.flatnonzero(scene.struck).tolist():
             self._contacts[scene.step, i] = scene.position[i]
         self._marks = [m for m in marks if self._age(m[0]) <= _TRAIL_TIME]
-        self._contacts = {
-            key: place for key, place in self._contacts.items() if self._age(key[0]) < _FLASH_TIME
-        }
+        self._contacts = {key: place for key, place in self._contacts.items() if self._age(key[0]) < _FLASH_TIME}
         return None if begun else (scene.step - last) * self._step_time
 
     def trail(self) -> list[Mark]:
@@ -72,10 +70,7 @@ class History:
 
     def flashes(self) -> list[Flash]:
         """Return the contacts that have just begun."""
-        return [
-            Flash(place, self._age(step) / _FLASH_TIME)
-            for (step, _), place in self._contacts.items()
-        ]
+        return [Flash(place, self._age(step) / _FLASH_TIME) for (step, _), place in self._contacts.items()]
 
     def _is_close(self, marks: list[tuple[int, Floats]]) -> bool:
         """Return whether the last mark is too close to the one before to be kept."""

@@ -111,9 +111,7 @@ def read_scene(
     scenario, state = batch.scenario, batch.state
     num_worlds = len(state["world_step"])
     if not 0 <= world < num_worlds:
-        raise ValueError(
-            f"world={world} is not in the batch: it holds worlds 0 to {num_worlds - 1}"
-        )
+        raise ValueError(f"world={world} is not in the batch: it holds worlds 0 to {num_worlds - 1}")
     of = {name: array[world] for name, array in state.items()}
     if of["world_heading_cos"] == 0 and of["world_heading_sin"] == 0:
         raise ResetNeeded("nothing to draw before reset: call reset() first")
@@ -168,9 +166,7 @@ def _links(heard_at: npt.NDArray[Any], now: int, n: int) -> Floats:
     return np.asarray(np.maximum(strength, strength.T), np.float64)
 
 
-def _check_annotations(
-    annotations: Mapping[str, npt.ArrayLike] | None, shape: tuple[int, int]
-) -> dict[str, Integers]:
+def _check_annotations(annotations: Mapping[str, npt.ArrayLike] | None, shape: tuple[int, int]) -> dict[str, Integers]:
     told = {}
     for name in _ANNOTATIONS:
         if annotations is None or annotations.get(name) is None:

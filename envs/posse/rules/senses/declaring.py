@@ -47,9 +47,7 @@ class Sensor:
         return (self.sight, "truth"), *measure
 
 
-def sensor(
-    name: str, *, measure: Function | None = None, fix: str = "position"
-) -> Callable[[Function], Function]:
+def sensor(name: str, *, measure: Function | None = None, fix: str = "position") -> Callable[[Function], Function]:
     """Declare a function as the sight of a kind of sensor; its docstring is the meaning.
 
     The function takes the scenario, the world, the tracker, the vector (dx, dy) to the target in
@@ -76,9 +74,7 @@ def sensor(
             raise SENSORS.error(function, f"unknown fix={fix!r}; allowed: {', '.join(FIX_KINDS)}")
         sight = compiled(function)
         measuring = None if measure is None else compiled(measure)
-        SENSORS.add(
-            name, Sensor(name, inspect.getdoc(function) or "", sight, measuring, fix), sight
-        )
+        SENSORS.add(name, Sensor(name, inspect.getdoc(function) or "", sight, measuring, fix), sight)
         return sight
 
     return declare
@@ -105,10 +101,6 @@ def measuring(sensors: Sequence[Sensor], standard: Function) -> Any:
     for k, each in enumerate(sensors):
         if each.measure is not None:
             functions[f"measure_{k}"] = each.measure
-            lines += [
-                f"if c.sensor == {k}:",
-                f"    x, y = measure_{k}({arguments})",
-                "    return f(x), f(y)",
-            ]
+            lines += [f"if c.sensor == {k}:", f"    x, y = measure_{k}({arguments})", "    return f(x), f(y)"]
     lines.append(f"return standard({arguments})")
     return written("measure", MEASURE_PARAMETERS, lines, functions)

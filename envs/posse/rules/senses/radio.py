@@ -41,10 +41,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.fix_step < b.fix_step:
-            take_fix(
-                c, t, b.fix_step, b.fix_x, b.fix_y,
-                b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin,
-            )  # fmt: skip
+            take_fix(c, t, b.fix_step, b.fix_x, b.fix_y, b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin)
 
 
 @compiled(seldom=True)
@@ -99,10 +96,7 @@ def hear(
             for k in range(c.message_size):
                 heard_message[i, j, k] = message[slot, j, k]
             if b.fix_step > t.fix_step and c.fix_bearing == 0:
-                take_fix(
-                    c, t, b.fix_step, b.fix_x, b.fix_y,
-                    b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin,
-                )  # fmt: skip
+                take_fix(c, t, b.fix_step, b.fix_x, b.fix_y, b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin)
 
 
 @compiled(seldom=True)

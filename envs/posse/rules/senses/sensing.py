@@ -70,14 +70,7 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> b
 
 
 @compiled
-def fix_velocity(
-    c: Record,
-    since: Lanes,
-    dx: Lanes,
-    dy: Lanes,
-    old_vx: Lanes,
-    old_vy: Lanes,
-) -> tuple[Lanes, Lanes]:
+def fix_velocity(c: Record, since: Lanes, dx: Lanes, dy: Lanes, old_vx: Lanes, old_vy: Lanes) -> tuple[Lanes, Lanes]:
     """Return the target's velocity from a fix at (dx, dy) from the previous one.
 
     ``since`` counts the control steps between them; ``old_vx`` and ``old_vy`` are the previous
@@ -153,10 +146,17 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
         vx, vy = fix_velocity(c, since, x - old_x, y - old_y, old_vx, old_vy)
         fresh = (before >= _ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
         store_rows(
-            x, y, eight(w.heading_cos), eight(w.heading_sin), eight(w.frame_cos),
-            eight(w.frame_sin), choose(fresh, vx, _ZERO), choose(fresh, vy, _ZERO),
-            s.new_fix, BLOCK * i,
-        )  # fmt: skip
+            x,
+            y,
+            eight(w.heading_cos),
+            eight(w.heading_sin),
+            eight(w.frame_cos),
+            eight(w.frame_sin),
+            choose(fresh, vx, _ZERO),
+            choose(fresh, vy, _ZERO),
+            s.new_fix,
+            BLOCK * i,
+        )
     for i in range(n):
         t = trackers[i]
         if t.sees:
@@ -181,9 +181,7 @@ def note_bearings(c: Record, w: Record, trackers: Records, s: Record) -> None:
 
 
 @compiled
-def add_noise(
-    c: Record, w: Record, number: int, dx: np.float32, dy: np.float32
-) -> tuple[np.float32, np.float32]:
+def add_noise(c: Record, w: Record, number: int, dx: np.float32, dy: np.float32) -> tuple[np.float32, np.float32]:
     """Return the vector (dx, dy) from a tracker with the scenario's noise."""
     first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
     scale = _ONE + c.range_noise * first

@@ -54,9 +54,12 @@ def echo(c: Record, robot: Pose, j: int, s: Record) -> _Echo:
     radius2 = radius * radius
     narrow = radius2 < (_ONE - c.beam_cosine * c.beam_cosine) * distance * distance
     return (
-        ahead, left, choose(reached, nearest, FAR), c.beam_cosine * distance,
+        ahead,
+        left,
+        choose(reached, nearest, FAR),
+        c.beam_cosine * distance,
         choose(reached & (not narrow), radius2, -_ONE),
-    )  # fmt: skip
+    )
 
 
 @compiled
@@ -109,12 +112,7 @@ def listen_to_walls(c: Record, robot: Pose, s: Record) -> None:
 
 @compiled
 def listen_to_wall(
-    c: Record,
-    robot: Pose,
-    normal_x: np.float32,
-    normal_y: np.float32,
-    distance: np.float32,
-    s: Record,
+    c: Record, robot: Pose, normal_x: np.float32, normal_y: np.float32, distance: np.float32, s: Record
 ) -> None:
     """Update the sonar readings with a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
@@ -162,21 +160,17 @@ def listen_to_discs(c: Record, robot: Pose, number: int, s: Record) -> None:
             four = _next(near, one)
             near &= near - 1
             listen(
-                c, echo(c, robot, at + one, s), echo(c, robot, at + two, s),
-                echo(c, robot, at + three, s), echo(c, robot, at + four, s), s,
-            )  # fmt: skip
+                c,
+                echo(c, robot, at + one, s),
+                echo(c, robot, at + two, s),
+                echo(c, robot, at + three, s),
+                echo(c, robot, at + four, s),
+                s,
+            )
 
 
 @compiled
-def ping(
-    c: Record,
-    robot: Pose,
-    number: int,
-    gap: np.float32,
-    s: Record,
-    o: FloatArray,
-    first: int,
-) -> None:
+def ping(c: Record, robot: Pose, number: int, gap: np.float32, s: Record, o: FloatArray, first: int) -> None:
     """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
 
     The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`); the gap to

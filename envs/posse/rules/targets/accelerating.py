@@ -21,13 +21,10 @@ _LEAST: Final = 0.4  # least and greatest turn rate, as shares of the limit
 _MOST: Final = 0.9
 
 _MEMORY: Final = (
-    Memory(
-        "weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK,
-        "of an accelerating target",
-    ),
+    Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK, "of an accelerating target"),
     Memory("weave_rate", "rad/s", 0, 1, "of an accelerating target"),
     Memory("weave_phase", "rad", 0, 2 * math.pi * _SLACK, "of an accelerating target"),
-)  # fmt: skip
+)
 
 
 def draw(c: Record, w: Record) -> None:

@@ -102,11 +102,7 @@ def target_motion(
         meaning = inspect.getdoc(function) or ""
         goal = compiled(function)
         drawing = None if draw is None else compiled(draw)
-        TARGET_MOTIONS.add(
-            name,
-            TargetMotion(name, meaning, goal, drawing, tuple(memory), mirrored, agent),
-            goal,
-        )
+        TARGET_MOTIONS.add(name, TargetMotion(name, meaning, goal, drawing, tuple(memory), mirrored, agent), goal)
         return goal
 
     return declare

@@ -31,9 +31,12 @@ _DANGER: Final = np.float32(0.6)  # times formation_distance; a nearer tracker t
 _ALARM: Final = np.float32(1e3)
 
 _PRESSED: Final = Memory(
-    "pressed", "s", lambda s: -float(DART_TURN) / s.target_turn_rate * _SLACK, float(PATIENCE),
+    "pressed",
+    "s",
+    lambda s: -float(DART_TURN) / s.target_turn_rate * _SLACK,
+    float(PATIENCE),
     "of a smart target: time that the team has kept station; < 0: dart",
-)  # fmt: skip
+)
 
 
 @target_motion("smart", memory=(_PRESSED,), mirrored=False)

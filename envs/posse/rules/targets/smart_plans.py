@@ -7,18 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import (
-    WIDTH,
-    Record,
-    Records,
-    choose,
-    compiled,
-    eight,
-    lesser,
-    load,
-    root,
-    store,
-)
+from posse.numeric import WIDTH, Record, Records, choose, compiled, eight, lesser, load, root, store
 from posse.rules.kinematics import arc
 from posse.rules.state import NEVER
 from posse.scenarios.formation import follow_heading
@@ -100,9 +89,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
 
 
 @compiled(seldom=True)
-def free_time(
-    c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32
-) -> np.float32:
+def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
     inner = c.half_arena - c.safe_distance

@@ -23,9 +23,7 @@ def target_turn_rate(
     set_goal(c, w, trackers, obstacles, s)
     if c.mirrored:
         mirror_at_walls(c, w)
-    turn = turn_towards(
-        w.heading_cos, w.heading_sin, w.goal_cos, w.goal_sin, c.target_turn_rate, c.dt
-    )
+    turn = turn_towards(w.heading_cos, w.heading_sin, w.goal_cos, w.goal_sin, c.target_turn_rate, c.dt)
     if c.walled:
         turn = safe_turn(c, w, obstacles, turn)
     return turn

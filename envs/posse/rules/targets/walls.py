@@ -34,9 +34,7 @@ def mirror_at_walls(c: Record, w: Record) -> None:
 
 
 @compiled
-def circle_is_free(
-    c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32
-) -> bool:
+def circle_is_free(c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32) -> bool:
     """Return whether the disc of the target's turning circle is clear of walls and obstacles."""
     room = radius + c.safe_distance
     if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:

@@ -62,9 +62,12 @@ def row_writer(declarations: Declarations, parameters: tuple[str, ...]) -> Calla
             scratch memory. Fixed blocks are read from there (:func:`fixed_writer`).
     """
     names: dict[str, Any] = {
-        "block": _write_block, "copy": _copy_block, "one": _write_column, "keep": store,
+        "block": _write_block,
+        "copy": _copy_block,
+        "one": _write_column,
+        "keep": store,
         "WIDTH": WIDTH,
-    }  # fmt: skip
+    }
     blocks = _blocks(declarations)
     given, columns = _evaluation(declarations, parameters, names)
     copied = {q for b in blocks if b.number is not None for q in range(b.first, b.first + WIDTH)}

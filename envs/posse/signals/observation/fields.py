@@ -76,9 +76,8 @@ class FieldDeclaration:
         if not low <= high:
             raise self._error(f"low={low:g} is above high={high:g} in {scenario.name!r}")
         return Field(
-            self.name, self.size, self.unit, low, high, self.meaning, self.unknown,
-            of_neighbour=self.subject == "mate",
-        )  # fmt: skip
+            self.name, self.size, self.unit, low, high, self.meaning, self.unknown, of_neighbour=self.subject == "mate"
+        )
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
@@ -100,13 +99,7 @@ class FieldDeclaration:
 
 
 def field(
-    unit: str,
-    low: Bound,
-    high: Bound,
-    unknown: float | None = None,
-    *,
-    size: int = 1,
-    fixed: bool = False,
+    unit: str, low: Bound, high: Bound, unknown: float | None = None, *, size: int = 1, fixed: bool = False
 ) -> Callable[[Function], Function]:
     """Declare a function as an observation field of its name; its docstring is the meaning.
 
@@ -133,16 +126,7 @@ def field(
         FIELDS.add(
             name,
             FieldDeclaration(
-                name,
-                _SUBJECTS[count],
-                size,
-                unit,
-                low,
-                high,
-                unknown,
-                meaning,
-                working,
-                fixed or count == 1,
+                name, _SUBJECTS[count], size, unit, low, high, unknown, meaning, working, fixed or count == 1
             ),
             working,
         )

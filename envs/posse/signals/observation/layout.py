@@ -25,23 +25,22 @@ def _sonar_fields(s: Scenario) -> list[Field]:
         return []
     return [
         Field(
-            "sonar", s.sonar_beams, "m", 0, s.sonar_range * SLACK,
+            "sonar",
+            s.sonar_beams,
+            "m",
+            0,
+            s.sonar_range * SLACK,
             "Distance from its rim to the nearest disc or wall along each beam, from straight "
             "ahead to the left; sonar_range if there is none.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _message_fields(s: Scenario) -> list[Field]:
     """Return the field of a team-mate's message, written by :mod:`~.mates`."""
     if s.message_size == 0:
         return []
-    return [
-        Field(
-            "neighbour_message", s.message_size, "1", -1, 1, "Message from its policy.", 0,
-            of_neighbour=True,
-        )
-    ]  # fmt: skip
+    return [Field("neighbour_message", s.message_size, "1", -1, 1, "Message from its policy.", 0, of_neighbour=True)]
 
 
 class ObservationLayout:
@@ -57,10 +56,7 @@ class ObservationLayout:
         self.scenario = scenario
         parts = parts_for(scenario)
         single = [*(field.of(scenario) for field in parts.fields), *_sonar_fields(scenario)]
-        repeated = [
-            *(field.of(scenario) for field in parts.mate_fields),
-            *_message_fields(scenario),
-        ]
+        repeated = [*(field.of(scenario) for field in parts.mate_fields), *_message_fields(scenario)]
         self.fields: tuple[Field, ...] = (*single, *repeated)
         self.neighbours = scenario.neighbours
         self._repeated_from = sum(field.size for field in single)

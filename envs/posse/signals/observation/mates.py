@@ -75,13 +75,7 @@ def observe_mates(
 
 @compiled
 def _observe_whole_team(
-    c: Record,
-    observers: Observers,
-    v: View,
-    writers: Writers,
-    s: Record,
-    observations: FloatArray,
-    k: int,
+    c: Record, observers: Observers, v: View, writers: Writers, s: Record, observations: FloatArray, k: int
 ) -> None:
     """Write every team-mate."""
     n, size = natural(c.num_trackers), np.float32(writers.mate_width + c.message_size)
@@ -93,10 +87,17 @@ def _observe_whole_team(
         dx, dy = way_behind(i, m, across, s)
         ahead, left = seen_at(i, m, across, s)
         mate = mate_now(
-            number_behind(n, i, m, across, s), dx, dy, load(s.distance, WIDTH * m), ahead, left,
-            load(s.team_cos, at), load(s.team_sin, at),
-            load(s.team_speed, at), load(s.team_turn_rate, at),
-        )  # fmt: skip
+            number_behind(n, i, m, across, s),
+            dx,
+            dy,
+            load(s.distance, WIDTH * m),
+            ahead,
+            left,
+            load(s.team_cos, at),
+            load(s.team_sin, at),
+            load(s.team_speed, at),
+            load(s.team_turn_rate, at),
+        )
         store(s.start, 0, load(s.place, WIDTH * m) * size)
         writers.mate(c, v, mate, s, rows)
 
@@ -159,14 +160,7 @@ def _observe_listed(
 
 
 @compiled
-def _pose(
-    worlds: WorldArrays,
-    heard: bool,
-    place: int,
-    lane: int,
-    observers: Observers,
-    s: Record,
-) -> Lanes:
+def _pose(worlds: WorldArrays, heard: bool, place: int, lane: int, observers: Observers, s: Record) -> Lanes:
     """Return the pose, and the fields after it, of a lane's listed mate.
 
     Lanes beyond ``count`` repeat the last one.
@@ -221,14 +215,7 @@ def _list_heard(c: Record, worlds: WorldArrays, e: int, i: int, lane: int, s: Re
 
 @compiled
 def observe_trackers(
-    c: Record,
-    worlds: WorldArrays,
-    e: int,
-    v: View,
-    writers: Writers,
-    s: Record,
-    observations: FloatArray,
-    k: int,
+    c: Record, worlds: WorldArrays, e: int, v: View, writers: Writers, s: Record, observations: FloatArray, k: int
 ) -> None:
     """Write the nearest trackers of a target agent, without messages, from k on."""
     w, n, filled = worlds.world[e], natural(c.num_trackers), 0
@@ -244,9 +231,16 @@ def observe_trackers(
             number = natural(int(s.who[place]))
             t = worlds.tracker[e, number]
             mate = mate_heard(
-                v, eight(np.float32(number)), eight(_ZERO), t.x - v.x, t.y - v.y,
-                eight(t.heading_cos), eight(t.heading_sin), eight(t.speed), eight(t.turn_rate),
-            )  # fmt: skip
+                v,
+                eight(np.float32(number)),
+                eight(_ZERO),
+                t.x - v.x,
+                t.y - v.y,
+                eight(t.heading_cos),
+                eight(t.heading_sin),
+                eight(t.speed),
+                eight(t.turn_rate),
+            )
             rows = Rows(Observers(e, n, 1, 0), observations, start, s.start, False)
             writers.mate(c, v, mate, s, rows)
         else:
@@ -256,9 +250,7 @@ def observe_trackers(
 
 
 @compiled(seldom=True)
-def _write_the_rest(
-    c: Record, filled: int, said: FloatArray, writers: Writers, o: FloatArray, k: int
-) -> None:
+def _write_the_rest(c: Record, filled: int, said: FloatArray, writers: Writers, o: FloatArray, k: int) -> None:
     """Write the messages (N, m) of the first ``filled`` team-mates, and the empty places."""
     size = natural(writers.mate_width + c.message_size)
     for place in range(natural(c.neighbours)):

@@ -12,21 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import (
-    WIDTH,
-    Lanes,
-    Mask,
-    Record,
-    choose,
-    compiled,
-    eight,
-    greater,
-    lesser,
-    root,
-    store,
-    tag,
-    tagged,
-)
+from posse.numeric import WIDTH, Lanes, Mask, Record, choose, compiled, eight, greater, lesser, root, store, tag, tagged
 from posse.rules.discs import FAR, blocks, natural, store_each
 from posse.signals.observation.team import own_numbers, round_again, stride_of, way_behind
 
@@ -64,15 +50,27 @@ def rank_eight(n: int, i: int, across: int, s: Record) -> None:
         a, b, c, d, e, f, g, h, least = merge((a, b, c, d, e, f, g, h), others)
         ninth = lesser(ninth, least)
     doubtful = (
-        as_near(a, b) | as_near(b, c) | as_near(c, d) | as_near(d, e)
-        | as_near(e, f) | as_near(f, g) | as_near(g, h) | as_near(h, ninth)
-    )  # fmt: skip
+        as_near(a, b)
+        | as_near(b, c)
+        | as_near(c, d)
+        | as_near(d, e)
+        | as_near(e, f)
+        | as_near(f, g)
+        | as_near(g, h)
+        | as_near(h, ninth)
+    )
     store(s.certain, 0, choose(doubtful, _ZERO, _ONE))
     behind = own_numbers(i, across, s) + _ONE
     lists = (
-        whose(n, behind, a), whose(n, behind, b), whose(n, behind, c), whose(n, behind, d),
-        whose(n, behind, e), whose(n, behind, f), whose(n, behind, g), whose(n, behind, h),
-    )  # fmt: skip
+        whose(n, behind, a),
+        whose(n, behind, b),
+        whose(n, behind, c),
+        whose(n, behind, d),
+        whose(n, behind, e),
+        whose(n, behind, f),
+        whose(n, behind, g),
+        whose(n, behind, h),
+    )
     store_each(lists, s.listed, 0)
 
 
@@ -95,11 +93,15 @@ def eight_apart(n: int, i: int, m: int, all_there: bool, across: int, s: Record)
     Absent ones are far away.
     """
     return (
-        apart(n, i, m, all_there, across, s), apart(n, i, m + 1, all_there, across, s),
-        apart(n, i, m + 2, all_there, across, s), apart(n, i, m + 3, all_there, across, s),
-        apart(n, i, m + 4, all_there, across, s), apart(n, i, m + 5, all_there, across, s),
-        apart(n, i, m + 6, all_there, across, s), apart(n, i, m + 7, all_there, across, s),
-    )  # fmt: skip
+        apart(n, i, m, all_there, across, s),
+        apart(n, i, m + 1, all_there, across, s),
+        apart(n, i, m + 2, all_there, across, s),
+        apart(n, i, m + 3, all_there, across, s),
+        apart(n, i, m + 4, all_there, across, s),
+        apart(n, i, m + 5, all_there, across, s),
+        apart(n, i, m + 6, all_there, across, s),
+        apart(n, i, m + 7, all_there, across, s),
+    )
 
 
 @compiled

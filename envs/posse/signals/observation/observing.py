@@ -61,13 +61,7 @@ def _observe_some(
 
 @compiled
 def observe_together(
-    c: Record,
-    worlds: WorldArrays,
-    first: int,
-    count: int,
-    writers: Writers,
-    s: Record,
-    observations: FloatArray,
+    c: Record, worlds: WorldArrays, first: int, count: int, writers: Writers, s: Record, observations: FloatArray
 ) -> None:
     """Write the observations of ``count`` worlds, at most eight, without the sonar."""
     n = natural(c.num_trackers)
@@ -83,9 +77,7 @@ def observe_together(
 
 
 @compiled
-def observe_sonar(
-    c: Record, trackers: Records, s: Record, observations: FloatArray, first: int
-) -> None:
+def observe_sonar(c: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
     """Write the sonar of every tracker of a world to (rows, F), from ``first`` on.
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).

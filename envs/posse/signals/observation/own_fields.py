@@ -134,12 +134,7 @@ def acceleration_time(c: Record, v: View) -> Lanes:
     return v.acceleration_time
 
 
-@field(
-    "s",
-    0,
-    lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK),
-    fixed=True,
-)
+@field("s", 0, lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK), fixed=True)
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
     """Time from turn rate 0 to the greatest turn rate; 0: no acceleration limit."""
     return v.turn_acceleration_time

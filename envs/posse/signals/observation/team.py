@@ -9,19 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posse.numeric import (
-    WIDTH,
-    Lanes,
-    Record,
-    Records,
-    choose,
-    compiled,
-    eight,
-    load,
-    load_fields,
-    store,
-    transpose,
-)
+from posse.numeric import WIDTH, Lanes, Record, Records, choose, compiled, eight, load, load_fields, store, transpose
 from posse.rules.discs import columns, natural
 from posse.rules.state import POSE
 

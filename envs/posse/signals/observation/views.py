@@ -136,9 +136,18 @@ def mate_now(
     """Return a team-mate as it is now, (dx, dy) away: ``ahead`` and to the ``left``, all in m."""
     per_metre = _ONE / greater(distance, _TINY)
     return Mate(
-        number, eight(_ZERO), dx, dy, distance, ahead * per_metre, left * per_metre,
-        heading_cos, heading_sin, speed, turn_rate,
-    )  # fmt: skip
+        number,
+        eight(_ZERO),
+        dx,
+        dy,
+        distance,
+        ahead * per_metre,
+        left * per_metre,
+        heading_cos,
+        heading_sin,
+        speed,
+        turn_rate,
+    )
 
 
 @compiled
@@ -162,9 +171,18 @@ def mate_heard(
     per_metre = _ONE / choose(apart, distance, _ONE)
     ahead, left = ego(v, dx * per_metre, dy * per_metre)
     return Mate(
-        number, age, dx, dy, distance, choose(apart, ahead, _ONE), choose(apart, left, _ZERO),
-        heading_cos, heading_sin, speed, turn_rate,
-    )  # fmt: skip
+        number,
+        age,
+        dx,
+        dy,
+        distance,
+        choose(apart, ahead, _ONE),
+        choose(apart, left, _ZERO),
+        heading_cos,
+        heading_sin,
+        speed,
+        turn_rate,
+    )
 
 
 @compiled
@@ -194,25 +212,40 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
     at = natural(stride_of(across) * i)
     own_x, own_y = load(s.team_x, at), load(s.team_y, at)
     _, _, _, _, _, _, max_speed, max_turn_rate = team_columns(worlds.tracker, e, i, across, POSE)
-    x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(
-        worlds.tracker, e, i, across, FIX
-    )
-    broken_at, _, _, sees, _, touching, _, fix_step = team_columns(
-        worlds.tracker, e, i, across, CONDITION
-    )
+    x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(worlds.tracker, e, i, across, FIX)
+    broken_at, _, _, sees, _, touching, _, fix_step = team_columns(worlds.tracker, e, i, across, CONDITION)
     working = choose(counts(broken_at) == np.float32(NEVER), _ONE, _ZERO)
     dx, dy, fixed_at = x, y, counts(fix_step)
     if c.fix_bearing == 0:
         dx, dy = x - own_x, y - own_y
     return View(
-        own_numbers(i, across, s), own_x, own_y, load(s.team_cos, at), load(s.team_sin, at),
-        load(s.team_speed, at), load(s.team_turn_rate, at),
-        counts(touching), working, load(s.steps, 0),
-        max_speed, max_turn_rate,
-        max_speed * c.per_acceleration, max_turn_rate * c.per_turn_acceleration,
-        fixed_at >= _ZERO, counts(sees), fixed_at, dx, dy, root(dx * dx + dy * dy),
-        cosine, sine, frame_cos, frame_sin, vx, vy,
-    )  # fmt: skip
+        own_numbers(i, across, s),
+        own_x,
+        own_y,
+        load(s.team_cos, at),
+        load(s.team_sin, at),
+        load(s.team_speed, at),
+        load(s.team_turn_rate, at),
+        counts(touching),
+        working,
+        load(s.steps, 0),
+        max_speed,
+        max_turn_rate,
+        max_speed * c.per_acceleration,
+        max_turn_rate * c.per_turn_acceleration,
+        fixed_at >= _ZERO,
+        counts(sees),
+        fixed_at,
+        dx,
+        dy,
+        root(dx * dx + dy * dy),
+        cosine,
+        sine,
+        frame_cos,
+        frame_sin,
+        vx,
+        vy,
+    )
 
 
 @compiled
@@ -221,8 +254,30 @@ def view_of_target(c: Record, w: Record, obstacles: Records) -> View:
     touching = w.touching != _NOBODY or touches_surroundings(c, w, obstacles)
     zero, never = eight(_ZERO), eight(_MINUS_ONE)
     return View(
-        eight(_MINUS_ONE), eight(w.x), eight(w.y), eight(w.heading_cos), eight(w.heading_sin),
-        eight(w.speed), eight(w.turn_rate), eight(np.float32(touching)), eight(_ONE),
-        eight(np.float32(w.step)), eight(c.target_speed), eight(c.target_turn_rate), zero, zero,
-        never >= _ZERO, zero, never, zero, zero, zero, zero, zero, zero, zero, zero, zero,
-    )  # fmt: skip
+        eight(_MINUS_ONE),
+        eight(w.x),
+        eight(w.y),
+        eight(w.heading_cos),
+        eight(w.heading_sin),
+        eight(w.speed),
+        eight(w.turn_rate),
+        eight(np.float32(touching)),
+        eight(_ONE),
+        eight(np.float32(w.step)),
+        eight(c.target_speed),
+        eight(c.target_turn_rate),
+        zero,
+        zero,
+        never >= _ZERO,
+        zero,
+        never,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+        zero,
+    )

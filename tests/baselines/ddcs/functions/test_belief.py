@@ -26,9 +26,15 @@ def expected(m: Mind, at: complex, facing: complex, heard: list[int]) -> Any:
     if d.known:
         own = velocity / facing
         b[0:9] = [
-            1, *soft((target - at) / facing, 3.0), own.real, own.imag,
-            (frame / facing).real, (frame / facing).imag, d.psi_rate, d.age / (d.age + 1),
-        ]  # fmt: skip
+            1,
+            *soft((target - at) / facing, 3.0),
+            own.real,
+            own.imag,
+            (frame / facing).real,
+            (frame / facing).imag,
+            d.psi_rate,
+            d.age / (d.age + 1),
+        ]
     b[9 + d.task] = 1
     if d.slot >= 0:
         arm = m.slot(d.slot) * frame
@@ -44,9 +50,7 @@ def expected(m: Mind, at: complex, facing: complex, heard: list[int]) -> Any:
     for j in heard:
         mate = m.mates[j]
         age = 0.1 * (d.step - mate.step)
-        ways.append(
-            (complex(mate.x, mate.y) + age * complex(mate.speed_x, mate.speed_y) - at) / facing
-        )
+        ways.append((complex(mate.x, mate.y) + age * complex(mate.speed_x, mate.speed_y) - at) / facing)
     for k, way in enumerate(sorted(ways, key=abs)[:3]):
         b[24 + 2 * k : 26 + 2 * k] = soft(way, 1.0)
     for k in range(8):
@@ -74,12 +78,7 @@ def test_a_belief_is_what_the_memory_holds(seed: int) -> None:
     heard = [j for j in range(5) if j != m.own and rng.random() < 0.7]
     for j in range(5):
         if j != m.own:
-            m.mate(
-                j,
-                complex(*rng.normal(0, 3, 2)),
-                complex(*rng.normal(0, 1, 2)),
-                step=118 if j in heard else 30,
-            )
+            m.mate(j, complex(*rng.normal(0, 3, 2)), complex(*rng.normal(0, 1, 2)), step=118 if j in heard else 30)
     at, facing = complex(*rng.normal(0, 6, 2)), turn(rng.uniform(-3, 3))
     m.stand(at, cmath.phase(facing))
     out = np.full(belief.BELIEF_SIZE, 9.0, np.float32)
@@ -125,8 +124,7 @@ def test_the_beliefs_of_all_worlds_are_written() -> None:
         for i in range(5):
             out = np.zeros(belief.BELIEF_SIZE, np.float32)
             belief.write_belief(
-                m.f, m.s, m.slots, memory.minds[e, i], memory.mates[e, i], memory.seen[e, i],
-                observations[e, i], out,
-            )  # fmt: skip
+                m.f, m.s, m.slots, memory.minds[e, i], memory.mates[e, i], memory.seen[e, i], observations[e, i], out
+            )
             np.testing.assert_array_equal(beliefs[e, i], out)
             assert out.any()

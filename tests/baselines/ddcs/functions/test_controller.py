@@ -28,16 +28,14 @@ class Turn:
     def plan(self) -> None:
         m, n = self.m, self.m.n
         controller.plan(
-            m.f, m.s, m.slots, OUTERMOST, m.d, m.mates, m.seen, m.o, np.zeros((n, n)),
-            np.zeros((7, n + 1)), self.body,
-        )  # fmt: skip
+            m.f, m.s, m.slots, OUTERMOST, m.d, m.mates, m.seen, m.o, np.zeros((n, n)), np.zeros((7, n + 1)), self.body
+        )
 
     def carry_out(self) -> Any:
         m, action = self.m, np.zeros(7, np.float32)
         controller.carry_out(
-            m.f, m.s, m.slots, m.d, m.mates, m.o, m.memory.beams, self.discs, self.body,
-            self.plays, action,
-        )  # fmt: skip
+            m.f, m.s, m.slots, m.d, m.mates, m.o, m.memory.beams, self.discs, self.body, self.plays, action
+        )
         return action
 
 
@@ -47,15 +45,17 @@ def sees(m: Mind, target: complex, theta: float = 0.0) -> None:
     facing = complex(m.o[m.f.heading], m.o[m.f.heading + 1])
     way = (target - own) / facing
     m.fill(
-        target_known=1, target_seen=1, target_age=0, target_range=abs(way),
-        target_bearing=way / abs(way), target_heading=turn(theta) / facing,
+        target_known=1,
+        target_seen=1,
+        target_age=0,
+        target_range=abs(way),
+        target_bearing=way / abs(way),
+        target_heading=turn(theta) / facing,
         target_frame=turn(theta) / facing,
-    )  # fmt: skip
+    )
 
 
-def standing(
-    scenario: str = "constant", at: complex = 1 - 2j, theta: float = 0.4, **played: Any
-) -> Turn:
+def standing(scenario: str = "constant", at: complex = 1 - 2j, theta: float = 0.4, **played: Any) -> Turn:
     m = Mind(scenario, own=1, played=played)
     m.stand(at, theta)
     return Turn(m)
@@ -71,9 +71,7 @@ def test_a_tracker_that_knows_its_target_goes_to_its_slot() -> None:
     cost, work = np.zeros((5, 5)), np.zeros((7, 6))
     chosen, d.slot = d.slot, -1
     facing = turn(0.4)
-    slots.choose_slot(
-        m.f, m.s, d, m.mates, m.slots, 1, 1.0, -2.0, facing.real, facing.imag, 1.0, 2.0, cost, work
-    )
+    slots.choose_slot(m.f, m.s, d, m.mates, m.slots, 1, 1.0, -2.0, facing.real, facing.imag, 1.0, 2.0, cost, work)
     assert d.slot == chosen
     place = complex(d.now_x, d.now_y) + m.slot(chosen) * turn(0.3)
     assert d.error == pytest.approx(abs(place - (1 - 2j)), abs=1e-4)
@@ -163,9 +161,7 @@ def test_a_tracker_without_an_estimate_searches() -> None:
     assert d.goal_step == 20
     way = complex(d.goal_x, d.goal_y) - (2 + 1j)
     assert complex(d.wish_x, d.wish_y) == pytest.approx(way / abs(way), abs=1e-6)
-    assert (d.wish_speed, d.wish_omega) == pytest.approx(
-        heading.regulate(t.body, d.wish_x, d.wish_y, 0.0)
-    )
+    assert (d.wish_speed, d.wish_omega) == pytest.approx(heading.regulate(t.body, d.wish_x, d.wish_y, 0.0))
     assert (m.seen == 21).any()
     d.step = 25
     t.plan()
@@ -286,9 +282,7 @@ def test_halves_and_whole_play_the_same_and_restart_forgets() -> None:
         proposals, parts = policy.propose(observations, parts)
         wish = parts.minds["wish_x"] + 1j * parts.minds["wish_y"]
         facing = observations[..., m.f.heading] + 1j * observations[..., m.f.heading + 1]
-        np.testing.assert_allclose(
-            proposals[..., 0] + 1j * proposals[..., 1], wish / facing, atol=1e-5
-        )
+        np.testing.assert_allclose(proposals[..., 0] + 1j * proposals[..., 1], wish / facing, atol=1e-5)
         carried, parts = policy.carry_out(observations, parts, np.zeros((2, 5, 2)))
         np.testing.assert_array_equal(actions, carried)
     for name, array in policy.arrays(whole).items():
@@ -315,9 +309,7 @@ def test_halves_and_whole_play_the_same_and_restart_forgets() -> None:
         np.testing.assert_array_equal(array[0], before[name][0])
         np.testing.assert_array_equal(array[1], fresh[name][1])
     minds, mates = whole.minds[1, 0], whole.mates[1, 0, 0]
-    assert [
-        minds[k] for k in ("fix_step", "slot", "leader", "goal_step", "lost_step", "error")
-    ] == [-1] * 6
+    assert [minds[k] for k in ("fix_step", "slot", "leader", "goal_step", "lost_step", "error")] == [-1] * 6
     assert [mates[k] for k in ("step", "task", "leader", "term", "pulse", "slot")] == [-1] * 6
     assert minds["step"] == minds["term"] == minds["known"] == mates["x"] == 0
     notes = policy.annotations(whole)

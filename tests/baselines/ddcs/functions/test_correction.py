@@ -7,11 +7,7 @@ import pytest
 from tests.support.minds import Mind, turn
 from tests.support.plain import plain
 
-correction, controller, heading = (
-    plain("ddcs.correction"),
-    plain("ddcs.controller"),
-    plain("laws.heading"),
-)
+correction, controller, heading = (plain("ddcs.correction"), plain("ddcs.controller"), plain("laws.heading"))
 
 
 def wishing(wish: complex, theta: float) -> tuple[Mind, object]:
@@ -28,13 +24,9 @@ def test_a_proposal_is_the_wanted_velocity_in_the_robot_s_frame() -> None:
 
 
 @pytest.mark.parametrize("theta", [2.0, 0.3])
-@pytest.mark.parametrize(
-    "share", [0.1 + 0.2j, 0.3j, -0.2 + 0j, 1 + 1j, 0j, 1 + 0j, -1 + 0j, 1j, -1j]
-)
+@pytest.mark.parametrize("share", [0.1 + 0.2j, 0.3j, -0.2 + 0j, 1 + 1j, 0j, 1 + 0j, -1 + 0j, 1j, -1j])
 @pytest.mark.parametrize("wish", [0.5 - 0.2j, 0j, 1.5 + 0j])
-def test_a_correction_adds_to_it_within_the_greatest_speed(
-    wish: complex, share: complex, theta: float
-) -> None:
+def test_a_correction_adds_to_it_within_the_greatest_speed(wish: complex, share: complex, theta: float) -> None:
     m, body = wishing(wish, theta)
     correction.correct(m.d, body, share.real, share.imag)
     found = complex(m.d.wish_x, m.d.wish_y)

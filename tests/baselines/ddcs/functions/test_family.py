@@ -5,18 +5,15 @@ from __future__ import annotations
 from tests.support.minds import Mind
 from tests.support.plain import plain
 
-family, settings, tracking = (
-    plain("ddcs.family"),
-    plain("ddcs.settings"),
-    plain("ddcs.tracking.motion"),
-)
-PURSUIT = {
-    "pngl-l-phi", "pngl", "deviated-pursuit", "velocity-pursuit", "ddcs-centralized-pursuit",
-}  # fmt: skip
+family, settings, tracking = (plain("ddcs.family"), plain("ddcs.settings"), plain("ddcs.tracking.motion"))
+PURSUIT = {"pngl-l-phi", "pngl", "deviated-pursuit", "velocity-pursuit", "ddcs-centralized-pursuit"}
 CENTRALIZED = {
-    "pngl-l-phi", "ddcs-centralized-pursuit", "ddcs-centralized", "ddcs-centralized-l-l",
+    "pngl-l-phi",
+    "ddcs-centralized-pursuit",
+    "ddcs-centralized",
+    "ddcs-centralized-l-l",
     "ddcs-centralized-no-exchange",
-}  # fmt: skip
+}
 
 
 def test_pursuers_follow_a_circle_and_have_the_constants_of_the_paper() -> None:
@@ -34,10 +31,15 @@ def test_pursuers_follow_a_circle_and_have_the_constants_of_the_paper() -> None:
 
 def test_a_record_holds_choices_by_their_place_and_numbers_as_they_are() -> None:
     assert settings.settings_record(settings.Settings()).shape == (1,)
-    m = Mind(played={
-        "model": "centralized", "deviation": "occupant", "gain": 2.25, "radio": False,
-        "forbidden": ("searching>flocking", "exchange>converging", "exchange>converging"),
-    })  # fmt: skip
+    m = Mind(
+        played={
+            "model": "centralized",
+            "deviation": "occupant",
+            "gain": 2.25,
+            "radio": False,
+            "forbidden": ("searching>flocking", "exchange>converging", "exchange>converging"),
+        }
+    )
     s = m.s
     assert (s.model, s.guidance, s.deviation, s.follower_law, s.radio) == (1, 0, 2, 0, 0)
     assert (s.gain, s.near) == (2.25, 1.0)

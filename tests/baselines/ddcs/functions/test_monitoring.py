@@ -78,9 +78,7 @@ class Estimate:
                 self.measured = True
             trust = 1.0 if abs(p - guess) > s.fix_jump else s.fix_trust
             self.p = guess + trust * (p - guess)
-            self.mean += (1.0 - math.exp(-t / s.mean_memory)) * (
-                cmath.rect(self.speed, theta) - self.mean
-            )
+            self.mean += (1.0 - math.exp(-t / s.mean_memory)) * (cmath.rect(self.speed, theta) - self.mean)
         self.raw, self.theta, self.psi, self.step = p, theta, psi, step
 
     def check(self, m: Mind) -> None:
@@ -105,9 +103,7 @@ class Estimate:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_estimate_follows_from_the_fixes(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    m = Mind(
-        played={"target_lost_after": 1.45, "turn_share": 0.7, "late_fix": 0.45, "turn_memory": 0.95}
-    )
+    m = Mind(played={"target_lost_after": 1.45, "turn_share": 0.7, "late_fix": 0.45, "turn_memory": 0.95})
     m.d.step = 5
     wanted = Estimate(m.s, 2.0)
     p, theta, rate = 1 + 2j, 3.0, 0.9
@@ -129,10 +125,14 @@ def test_the_estimate_follows_from_the_fixes(seed: int) -> None:
             m.stand(own, heading)
             sight = (at - own) / turn(heading)
             m.fill(
-                target_known=1, target_seen=float(age == 0), target_age=0.1 * age,
-                target_range=abs(sight), target_bearing=sight / abs(sight),
-                target_heading=turn(at_theta - heading), target_frame=turn(at_psi - heading),
-            )  # fmt: skip
+                target_known=1,
+                target_seen=float(age == 0),
+                target_age=0.1 * age,
+                target_range=abs(sight),
+                target_bearing=sight / abs(sight),
+                target_heading=turn(at_theta - heading),
+                target_frame=turn(at_psi - heading),
+            )
             if m.d.step - age > newest:
                 newest = m.d.step - age
                 wanted.fix(newest, at, at_theta, at_psi)
@@ -149,9 +149,14 @@ def test_the_estimate_follows_from_the_fixes(seed: int) -> None:
 def show(m: Mind, at: complex, theta: float = 0.0) -> None:
     """A fix of this step, seen by a tracker at the origin that heads along x."""
     m.fill(
-        target_known=1, target_seen=1, target_age=0, target_range=abs(at),
-        target_bearing=at / abs(at), target_heading=turn(theta), target_frame=turn(theta),
-    )  # fmt: skip
+        target_known=1,
+        target_seen=1,
+        target_age=0,
+        target_range=abs(at),
+        target_bearing=at / abs(at),
+        target_heading=turn(theta),
+        target_frame=turn(theta),
+    )
     monitoring.watch_target(m.f, m.s, m.d, m.o, 2.0)
 
 
@@ -201,9 +206,7 @@ def test_fixes_of_up_to_the_bounds_are_delayed_and_followed(older: int) -> None:
 
 
 @pytest.mark.parametrize(("bounds", "turn_rate", "blended"), [(2, 0.4, True), (1, 0.0, False)])
-def test_a_fix_measures_and_is_blended_up_to_the_bounds(
-    bounds: float, turn_rate: float, blended: bool
-) -> None:
+def test_a_fix_measures_and_is_blended_up_to_the_bounds(bounds: float, turn_rate: float, blended: bool) -> None:
     m = Mind(played={"turn_memory": bounds, "target_lost_after": 1.5 * bounds, "fix_trust": 0.5})
     m.f.dt = 0.5
     show(m, 3 + 0j)
@@ -238,17 +241,20 @@ def test_messages_become_poses_in_the_common_frame() -> None:
         fresh, horizon = set(), 0.0
         gap -= gap * 0.1 / m.s.gap_memory
         for p in range(4):
-            number, age = (
-                (p + 1, int(rng.choice([0, 0, 1, 2, 20]))) if rng.random() < 0.8 else (-1, 0)
-            )
+            number, age = (p + 1, int(rng.choice([0, 0, 1, 2, 20]))) if rng.random() < 0.8 else (-1, 0)
             at, theta = complex(*rng.normal(size=2)), rng.uniform(-3, 3)
             words = [int(w) for w in rng.integers(-1, 6, 5)]
             way = at / turn(heading)
             m.fill(
-                p, neighbour_number=number, neighbour_age=0.1 * age, neighbour_range=abs(way),
-                neighbour_bearing=way / abs(way), neighbour_heading=turn(theta - heading),
-                neighbour_speed=0.5 + 0.1 * p, neighbour_turn_rate=0.3 * p,
-            )  # fmt: skip
+                p,
+                neighbour_number=number,
+                neighbour_age=0.1 * age,
+                neighbour_range=abs(way),
+                neighbour_bearing=way / abs(way),
+                neighbour_heading=turn(theta - heading),
+                neighbour_speed=0.5 + 0.1 * p,
+                neighbour_turn_rate=0.3 * p,
+            )
             start = m.f.neighbour_message + p * m.f.stride
             m.o[start : start + 5] = [(w + 1) / 512 for w in words]
             if number < 0:

@@ -21,16 +21,25 @@ def listed(m: Mind, position: complex = 0j, heading: float = 0.0, room: int = 20
     angles = 2 * np.pi * np.arange(8) / 8
     beams = np.stack([np.cos(angles), np.sin(angles)]).astype(np.float32)
     count = surroundings.surround(
-        m.f, m.s, m.d, m.mates, m.slots, m.own, position.real, position.imag,
-        facing.real, facing.imag, m.o, beams, discs,
-    )  # fmt: skip
+        m.f,
+        m.s,
+        m.d,
+        m.mates,
+        m.slots,
+        m.own,
+        position.real,
+        position.imag,
+        facing.real,
+        facing.imag,
+        m.o,
+        beams,
+        discs,
+    )
     return [[float(v) for v in discs[k].item()] for k in range(count)]
 
 
 def disc(at: complex, velocity: complex, reach: float, margin: float) -> Any:
-    return pytest.approx(
-        [at.real, at.imag, velocity.real, velocity.imag, reach, margin], rel=1e-6, abs=1e-5
-    )
+    return pytest.approx([at.real, at.imag, velocity.real, velocity.imag, reach, margin], rel=1e-6, abs=1e-5)
 
 
 def open_plane(**world: Any) -> Mind:
@@ -135,18 +144,14 @@ def test_walls_are_large_discs() -> None:
 
 @pytest.mark.parametrize("heading", [0.0, 1.0])
 @pytest.mark.parametrize("beam", [0, 2, 5])
-def test_an_echo_without_an_explanation_is_a_disc_that_fills_the_beam(
-    beam: int, heading: float
-) -> None:
+def test_an_echo_without_an_explanation_is_a_disc_that_fills_the_beam(beam: int, heading: float) -> None:
     m = open_plane()
     direction = turn(heading + beam * math.pi / 4)
     for reading in (0.4, 1.5):
         echo(m, beam, reading)
         wide = min(0.5, 0.4 * (reading + 0.15))
         away = reading + 0.15 + wide
-        assert listed(m, 1 + 1j, heading) == [
-            disc(away * direction, 0j, wide + 0.15, m.s.echo_margin)
-        ]
+        assert listed(m, 1 + 1j, heading) == [disc(away * direction, 0j, wide + 0.15, m.s.echo_margin)]
     echo(m, beam, 1.95)
     assert listed(m, 1 + 1j, heading) == []
     echo(m, beam, 1.93)
@@ -169,9 +174,7 @@ def explained(m: Mind, x: float, y: float, reading: float, robots: int = 1) -> b
     beam = turn(0.6)
     place = complex(x, y) * beam
     discs[0].x, discs[0].y = place.real, place.imag
-    return bool(
-        surroundings.is_explained(m.f, discs, robots, 0.0, 0.0, beam.real, beam.imag, reading)
-    )
+    return bool(surroundings.is_explained(m.f, discs, robots, 0.0, 0.0, beam.real, beam.imag, reading))
 
 
 def test_a_robot_explains_an_echo_from_its_distance_in_its_beam() -> None:
@@ -282,9 +285,7 @@ def test_a_slot_beside_the_beam_gives_no_echo() -> None:
         at = place - 1.2 * turn(2.0)
 
         def slot(reading: float, beam: complex = beam, at: complex = at) -> int:
-            return int(surroundings.slot_in_beam(
-                m.f, m.d, m.slots, at.real, at.imag, beam.real, beam.imag, reading
-            ))  # fmt: skip
+            return int(surroundings.slot_in_beam(m.f, m.d, m.slots, at.real, at.imag, beam.real, beam.imag, reading))
 
         assert slot(0.9) == found
         assert slot(0.66) == found

@@ -29,9 +29,7 @@ def turn(discs: list[tuple[float, float, float]], side: float, speed: float = 0.
 def test_the_way_past_a_disc_is_its_tangent(y: float, side: float) -> None:
     x, reach = 1.7, 0.6
     angle = turn([(x, y, reach)], side)
-    assert angle == pytest.approx(
-        math.atan2(y, x) + side * math.asin((reach + CLEARANCE) / math.hypot(x, y))
-    )
+    assert angle == pytest.approx(math.atan2(y, x) + side * math.asin((reach + CLEARANCE) / math.hypot(x, y)))
     # The line in that direction passes the centre at the clearance.
     miss = x * math.sin(angle) - y * math.cos(angle)
     assert side * miss == pytest.approx(reach + CLEARANCE)

@@ -98,10 +98,17 @@ def test_searchers_have_a_leader_and_who_hears_nobody_leads_itself() -> None:
     pose = [(-9.0, -9.0, 0.0), (-9.0, -7.0, 0.0), (-9.0, -5.0, 0.0), (9.0, -9.0, 1.0)]
     for k, now in enumerate(
         drive(
-            "pngl-l-phi", "search", 3, 20, num_trackers=4, tracker_pose=pose, radio_range=6.0,
-            target_pose=(6.0, 6.0, 0.0), start_distance=(4.0, 28.0),
+            "pngl-l-phi",
+            "search",
+            3,
+            20,
+            num_trackers=4,
+            tracker_pose=pose,
+            radio_range=6.0,
+            target_pose=(6.0, 6.0, 0.0),
+            start_distance=(4.0, 28.0),
         )
-    ):  # fmt: skip
+    ):
         assert (now.notes["task"] == SEARCHING).all()
         leader = now.notes["leader"]
         assert (leader[:, 3] == 3).all()
@@ -115,9 +122,18 @@ def test_who_led_itself_yields_to_a_group_that_it_meets() -> None:
     pose = [(-1.0, -1.0, 0.0), (-1.0, 1.0, 0.0), (-3.0, 0.0, 0.0), (6.0, 0.0, math.pi)]
     before, met = None, 0
     for now in drive(
-        "pngl-l-phi", "constant", 20, 250, num_trackers=4, tracker_pose=pose, radio_range=6.0,
-        sensing_range=2.0, target_pose=(8.0, 8.0, 0.0), start_distance=(4.0, 20.0), arena=24.0,
-    ):  # fmt: skip
+        "pngl-l-phi",
+        "constant",
+        20,
+        250,
+        num_trackers=4,
+        tracker_pose=pose,
+        radio_range=6.0,
+        sensing_range=2.0,
+        target_pose=(8.0, 8.0, 0.0),
+        start_distance=(4.0, 20.0),
+        arena=24.0,
+    ):
         leader = now.notes["leader"]
         searching = (now.notes["task"] == SEARCHING).all(axis=1)
         if before is None:
@@ -136,10 +152,18 @@ def test_two_halves_out_of_reach_have_a_leader_each_and_agree_when_they_meet() -
     right = [(14.0, 0.0, 3.1), (14.0, 1.0, 3.1), (14.0, -1.0, 3.1)]
     for k, now in enumerate(
         drive(
-            "pngl-l-phi", "constant", 6, 500, radio_range=6.0, radio_loss=0.2, split="train",
-            start_distance=(4.0, 16.0), tracker_pose=[*left, *right], target_pose=(0.0, 0.0, 1.57),
+            "pngl-l-phi",
+            "constant",
+            6,
+            500,
+            radio_range=6.0,
+            radio_loss=0.2,
+            split="train",
+            start_distance=(4.0, 16.0),
+            tracker_pose=[*left, *right],
+            target_pose=(0.0, 0.0, 1.57),
         )
-    ):  # fmt: skip
+    ):
         leader = now.notes["leader"]
         if k == 30:
             assert np.isin(leader[:, :2], [0, 1]).all()
@@ -150,10 +174,7 @@ def test_two_halves_out_of_reach_have_a_leader_each_and_agree_when_they_meet() -
 
 
 def test_a_lossy_radio_seldom_parts_the_team() -> None:
-    agreed = [
-        agree(now).mean()
-        for now in drive("pngl-l-phi", "radio", 30, 300, split="train", radio_range=40.0)
-    ]
+    agreed = [agree(now).mean() for now in drive("pngl-l-phi", "radio", 30, 300, split="train", radio_range=40.0)]
     assert np.mean(agreed[20:]) > 0.9
 
 

@@ -84,9 +84,16 @@ def test_a_straggler_that_is_told_of_the_flock_speeds_up_and_heads_for_it() -> N
     for name, task in (("pngl-l-phi", CONVERGING), ("ddcs-no-radio", SEARCHING)):
         far, speeds = [], []
         for now in drive(
-            name, "constant", 1, 100, num_trackers=3, tracker_pose=pose, sensing_range=3.0,
-            target_pose=(0.0, 0.0, 0.0), start_distance=(1.0, 12.0),
-        ):  # fmt: skip
+            name,
+            "constant",
+            1,
+            100,
+            num_trackers=3,
+            tracker_pose=pose,
+            sensing_range=3.0,
+            target_pose=(0.0, 0.0, 0.0),
+            start_distance=(1.0, 12.0),
+        ):
             assert now.notes["task"][0, 2] == task
             far.append(abs(now.line_of_sight[0, 2]))
             speeds.append(now.commands[0, 2, 0])
@@ -161,11 +168,20 @@ def test_without_searching_a_lost_target_is_not_found_again() -> None:
     for forbidden in ((), LOSS):
         searched = False
         for now in drive(
-            with_settings("ddcs-distributed", forbidden=forbidden), "constant", 40, 700,
-            tracker_pose=pose, target_pose=(-6.0, -6.0, 0.0), target=swerve, num_trackers=2,
-            target_speed=0.95, sensing_range=3.0, arena=24.0, tracker_turn_rate=0.5,
+            with_settings("ddcs-distributed", forbidden=forbidden),
+            "constant",
+            40,
+            700,
+            tracker_pose=pose,
+            target_pose=(-6.0, -6.0, 0.0),
+            target=swerve,
+            num_trackers=2,
+            target_speed=0.95,
+            sensing_range=3.0,
+            arena=24.0,
+            tracker_turn_rate=0.5,
             start_distance=(2.0, 4.0),
-        ):  # fmt: skip
+        ):
             searched |= bool((now.notes["task"] == SEARCHING).any())
         found.append((np.abs(now.line_of_sight) < 3.0).any(axis=1).mean())
         assert searched == (forbidden == ())

@@ -19,9 +19,7 @@ def test_both_rates_are_as_asked_for_unless_the_lines_hardly_cross_on_the_wanted
 ) -> None:
     gamma_i, gamma_k = 0.4, 0.4 + crossing
     l_i, l_k = (1.0, 2.0) if nearer == "i" else (2.0, 1.0)
-    found = complex(
-        *l_l.l_l_velocity(l_i, 0.3, 0.7, gamma_i, l_k, -0.5, 0.2, gamma_k, wanted, 0.15)
-    )
+    found = complex(*l_l.l_l_velocity(l_i, 0.3, 0.7, gamma_i, l_k, -0.5, 0.2, gamma_k, wanted, 0.15))
     if math.copysign(1.0, wanted) * math.sin(crossing) < 0.15:
         demand, gamma = (0.3 + 0.7j, gamma_i) if nearer == "i" else (-0.5 + 0.2j, gamma_k)
         assert found == pytest.approx(demand * turn(gamma))

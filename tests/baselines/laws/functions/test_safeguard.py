@@ -29,9 +29,7 @@ def body_of(theta: float, speed: float = 0.6, omega: float = 0.3, **limits: floa
 def discs_of(*found: Disc) -> Any:
     discs = np.zeros(len(found), safeguard.DISC)
     for k, (at, v, reach, margin) in enumerate(found):
-        assert (
-            safeguard.put_disc(discs, k, at.real, at.imag, v.real, v.imag, reach, margin) == k + 1
-        )
+        assert safeguard.put_disc(discs, k, at.real, at.imag, v.real, v.imag, reach, margin) == k + 1
     return discs
 
 
@@ -74,9 +72,13 @@ def drawn(rng: np.random.Generator) -> tuple[Any, list[Disc], complex]:
         for _ in range(rng.integers(1, 5))
     ]
     body = body_of(
-        rng.uniform(-3, 3), rng.uniform(0, 1), rng.uniform(-1, 1),
-        top=rng.uniform(0.7, 1.3), a=rng.choice([1.5, 50.0]), w=rng.choice([3.0, 50.0]),
-    )  # fmt: skip
+        rng.uniform(-3, 3),
+        rng.uniform(0, 1),
+        rng.uniform(-1, 1),
+        top=rng.uniform(0.7, 1.3),
+        a=rng.choice([1.5, 50.0]),
+        w=rng.choice([3.0, 50.0]),
+    )
     return body, found, cmath.rect(rng.uniform(0.3, 1.0), rng.uniform(-3, 3))
 
 
@@ -86,9 +88,7 @@ def test_the_price_is_that_of_the_simulated_motion(seed: int) -> None:
     body, found, wanted = drawn(rng)
     speed, turn = abs(wanted), cmath.phase(wanted / complex(body.heading_cos, body.heading_sin))
     cost, danger, *_ = price(body, found, speed, turn, wanted)
-    own = safeguard.cost_of(
-        body, discs_of(*found), len(found), speed, turn, wanted.real, wanted.imag, 1e9
-    )
+    own = safeguard.cost_of(body, discs_of(*found), len(found), speed, turn, wanted.real, wanted.imag, 1e9)
     assert own == pytest.approx((cost, danger), abs=2e-3)
     if danger > 0.02:
         stopped = safeguard.cost_of(
@@ -111,9 +111,7 @@ def choices(body: Any, found: list[Disc], wanted: complex) -> list[tuple[float, 
         for share in (1.0, 0.5):
             goal = math.remainder(turn + away, math.tau)
             cost, *_ = price(body, found, share * body.max_speed, goal, wanted)
-            options.append(
-                (cost + 0.02 * (k % 2), share * body.max_speed * theta * cmath.exp(1j * goal))
-            )
+            options.append((cost + 0.02 * (k % 2), share * body.max_speed * theta * cmath.exp(1j * goal)))
     return options
 
 
@@ -123,9 +121,7 @@ def test_the_cheapest_velocity_is_taken(seed: int) -> None:
     body, found, wanted = drawn(rng)
     theta = complex(body.heading_cos, body.heading_sin)
     plays = np.zeros(1, safeguard.PLAYS)[0]
-    x, y, changed = safeguard.safe_velocity(
-        body, discs_of(*found), len(found), wanted.real, wanted.imag, plays
-    )
+    x, y, changed = safeguard.safe_velocity(body, discs_of(*found), len(found), wanted.real, wanted.imag, plays)
     danger = price(body, found, abs(wanted), cmath.phase(wanted / theta), wanted)[1]
     options = choices(body, found, wanted)
     if not changed:
@@ -173,9 +169,7 @@ def test_a_velocity_is_clear_near_the_present_one_with_nothing_on_its_way(theta:
     def clear(wanted: complex, *found: Disc, speed: float = 0.6) -> bool:
         turned = discs_of(*((at * facing, v * facing, r, m) for at, v, r, m in found))
         way = wanted * facing
-        return bool(safeguard.is_clear(
-            body_of(theta, speed), turned, len(found), abs(wanted), way.real, way.imag
-        ))  # fmt: skip
+        return bool(safeguard.is_clear(body_of(theta, speed), turned, len(found), abs(wanted), way.real, way.imag))
 
     far: Disc = (9 + 0j, 0j, 0.3, 0.1)
     assert clear(0.6 + 0j, far)
@@ -219,9 +213,7 @@ def test_what_is_safe_is_left_alone_and_walls_are_flat() -> None:
 
 def choose(body: Any, found: list[Disc], wanted: complex) -> tuple[complex, bool]:
     plays = np.zeros(1, safeguard.PLAYS)[0]
-    x, y, changed = safeguard.safe_velocity(
-        body, discs_of(*found), len(found), wanted.real, wanted.imag, plays
-    )
+    x, y, changed = safeguard.safe_velocity(body, discs_of(*found), len(found), wanted.real, wanted.imag, plays)
     return complex(x, y), changed
 
 

@@ -107,18 +107,28 @@ def test_the_way_round_leads_by_the_tangent_point(heading: float) -> None:
     assert short == pytest.approx(0.8 * cmath.rect(1.0, cmath.phase(-0.81 - 0.01j) + 0.6))
     inside = way(-0.5 + 0.1j, 3 + 0j)
     assert inside == pytest.approx(0.8 * cmath.rect(1.0, cmath.phase(-0.5 + 0.1j) - 0.6))
-    assert way(-0.81 - 0.01j, 3 + 0j) == pytest.approx(
-        0.8 * cmath.rect(1.0, cmath.phase(-0.81 - 0.01j) + 0.6)
-    )
+    assert way(-0.81 - 0.01j, 3 + 0j) == pytest.approx(0.8 * cmath.rect(1.0, cmath.phase(-0.81 - 0.01j) + 0.6))
 
 
 @pytest.mark.parametrize("place", [-6 + 0.4j, 1.0 + 0.5j, -1.25 - 1j, -30 + 5j])
 def test_a_course_to_a_slot_blends_present_and_mean_velocity(place: complex) -> None:
     arm, velocity, mean, rate, weave = 1.2 - 0.9j, 0.5 + 0.1j, 0.1 - 0.2j, 0.2, 1.5
     found = steering.meeting_velocity(
-        place.real, place.imag, arm.real, arm.imag, velocity.real, velocity.imag,
-        mean.real, mean.imag, rate, weave, 0.7, 1e6, 1.0, 1e4,
-    )  # fmt: skip
+        place.real,
+        place.imag,
+        arm.real,
+        arm.imag,
+        velocity.real,
+        velocity.imag,
+        mean.real,
+        mean.imag,
+        rate,
+        weave,
+        0.7,
+        1e6,
+        1.0,
+        1e4,
+    )
     way = complex(*steering.way_round(place.real, place.imag, arm.real, arm.imag, 0.7)) - place
     time = min(20.0, earliest(way, velocity, 1.0))
     share = weave * (1.0 - math.exp(-time / weave)) / time if time > 0.1 else 1.0
@@ -129,13 +139,9 @@ def test_a_course_to_a_slot_blends_present_and_mean_velocity(place: complex) -> 
 
 
 def test_a_slot_in_reach_moves_as_it_does_now() -> None:
-    found = steering.meeting_velocity(
-        1.19, -0.9, 1.2, -0.9, 0.5, 0.1, -0.4, 0.0, 0.2, 1.5, 0.0, 0.5, 1.0, 1e4
-    )
+    found = steering.meeting_velocity(1.19, -0.9, 1.2, -0.9, 0.5, 0.1, -0.4, 0.0, 0.2, 1.5, 0.0, 0.5, 1.0, 1e4)
     assert found == pytest.approx((0.5 + 0.2 * 0.9 + 0.5 * 0.01, 0.1 + 0.2 * 1.2))
-    found = steering.meeting_velocity(
-        0.8, -0.9, 1.2, -0.9, -0.6, 0.1, 0.4, 0.0, 0.0, 1.5, 0.0, 0.1, 1.0, 1e4
-    )
+    found = steering.meeting_velocity(0.8, -0.9, 1.2, -0.9, -0.6, 0.1, 0.4, 0.0, 0.0, 1.5, 0.0, 0.1, 1.0, 1e4)
     time = earliest(0.4 + 0j, -0.6 + 0.1j, 1.0)
     share = 1.5 * (1.0 - math.exp(-time / 1.5)) / time
     assert found == pytest.approx((share * -0.6 + (1 - share) * 0.4 + 0.04, share * 0.1))
@@ -144,9 +150,12 @@ def test_a_slot_in_reach_moves_as_it_does_now() -> None:
 def test_an_action_has_speed_from_minus_one_and_turn_rate_from_its_limit() -> None:
     action = np.zeros(4)
     for speed, omega, wanted in (
-        (0.0, 0.0, (-1, 0)), (0.6, 1.0, (0.5, 0.5)), (0.8, -2.0, (1, -1)), (9, 9, (1, 1)),
+        (0.0, 0.0, (-1, 0)),
+        (0.6, 1.0, (0.5, 0.5)),
+        (0.8, -2.0, (1, -1)),
+        (9, 9, (1, 1)),
         (-1, -9, (-1, -1)),
-    ):  # fmt: skip
+    ):
         steering.write_motion(action, speed, omega, 0.8, 2.0)
         assert tuple(action) == pytest.approx((*wanted, 0, 0))
 
@@ -162,9 +171,7 @@ def test_offsets_are_those_of_the_layout(name: str) -> None:
             assert f[field] == at
     assert (f.neighbours, f.stride) == (layout.neighbours, layout.stride)
     assert (f.sonar_beams, f.message_size) == (s.sonar_beams, 5)
-    assert (f.dt, f.radius, f.extent) == pytest.approx(
-        (s.control_step, s.robot_radius, s.position_bound)
-    )
+    assert (f.dt, f.radius, f.extent) == pytest.approx((s.control_step, s.robot_radius, s.position_bound))
     assert f.sonar_range == pytest.approx(s.sonar_range)
     assert f.wide_beam == pytest.approx(math.cos(1.2 * math.pi / 8))
     assert f.sight == pytest.approx(min(s.sensing_range, 8.0))

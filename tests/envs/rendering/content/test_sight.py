@@ -45,11 +45,8 @@ def seen(
 
 @pytest.mark.parametrize(
     ("reach", "view", "arena"),
-    [
-        (6.0, 2 * math.pi, math.inf), (6.0, 2.0, math.inf),
-        (math.inf, 2 * math.pi, 14.0), (9.0, 1.2, 14.0),
-    ],
-)  # fmt: skip
+    [(6.0, 2 * math.pi, math.inf), (6.0, 2.0, math.inf), (math.inf, 2 * math.pi, 14.0), (9.0, 1.2, 14.0)],
+)
 def test_the_area_is_what_can_be_seen(reach: float, view: float, arena: float) -> None:
     rng = np.random.default_rng(3)
     compared = 0

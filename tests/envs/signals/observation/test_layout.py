@@ -179,9 +179,7 @@ def test_views_share_memory_and_flatten_is_their_inverse(name: str) -> None:
         if not field.of_neighbour:
             at = layout.offsets[field.name]
             part = observations[..., at : at + field.size]
-            np.testing.assert_array_equal(
-                part.squeeze(-1) if field.size == 1 else part, views[field.name]
-            )
+            np.testing.assert_array_equal(part.squeeze(-1) if field.size == 1 else part, views[field.name])
 
 
 def test_layout_errors() -> None:

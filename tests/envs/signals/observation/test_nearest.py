@@ -26,9 +26,8 @@ Teams = npt.NDArray[Any]
 
 @kernel
 def make_lists(
-    config: Any, trackers: Any, beams: Numbers, across: int, places: int, scratch: Any,
-    lists: Numbers, certain: Numbers,
-) -> None:  # fmt: skip
+    config: Any, trackers: Any, beams: Numbers, across: int, places: int, scratch: Any, lists: Numbers, certain: Numbers
+) -> None:
     """List the nearest of every tracker, of eight worlds at once or of one, as observed."""
     n, s = trackers.shape[1], scratch[0]
     lay_out_constants(config[0], beams, s)
@@ -85,9 +84,7 @@ TEAMS += [(1, 8, n) for n in (2, 3, 5, 8, 9, 10, MOST_IN_TEAM)]
 
 @pytest.mark.parametrize("places", [1, 2, 3, 8, 9])
 @pytest.mark.parametrize(("across", "worlds", "number"), TEAMS)
-def test_the_nearest_are_listed_in_order(
-    across: int, worlds: int, number: int, places: int
-) -> None:
+def test_the_nearest_are_listed_in_order(across: int, worlds: int, number: int, places: int) -> None:
     rng = np.random.default_rng(number)
     x, y = rng.uniform(-20, 20, (2, worlds, number)).astype(np.float32)
     trackers = team(x, y, rng.uniform(-3, 3, (worlds, number)).astype(np.float32))
@@ -100,14 +97,9 @@ def test_the_nearest_are_listed_in_order(
 
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(
-    st.sampled_from([0, 1]),
-    st.integers(3, 64),
-    st.sampled_from([0.0, 1e-7, 1e-6, 1e-5, 1e-4]),
-    st.integers(0, 2**31),
+    st.sampled_from([0, 1]), st.integers(3, 64), st.sampled_from([0.0, 1e-7, 1e-6, 1e-5, 1e-4]), st.integers(0, 2**31)
 )
-def test_equal_and_nearly_equal_distances_are_told_apart(
-    across: int, number: int, apart: float, seed: int
-) -> None:
+def test_equal_and_nearly_equal_distances_are_told_apart(across: int, number: int, apart: float, seed: int) -> None:
     """On a grid each has many team-mates that are as far; jitter makes them nearly so."""
     rng = np.random.default_rng(seed)
     worlds, number = (8, min(number, MOST_IN_TEAM)) if across else (1, number)

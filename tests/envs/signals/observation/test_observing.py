@@ -44,9 +44,7 @@ def test_worlds_that_are_observed_together_are_as_each_alone(team: dict[str, Any
         np.testing.assert_array_equal(observed, expected)
         actions = rng.uniform(-1, 1, together.action_shape).astype(np.float32)
         observed = together.step(actions)[0]
-        expected = np.concatenate(
-            [world.step(actions[e : e + 1])[0] for e, world in enumerate(alone)]
-        )
+        expected = np.concatenate([world.step(actions[e : e + 1])[0] for e, world in enumerate(alone)])
         if step == 12:  # some start anew, in their midst some that are only looked at
             mask = rng.random(WORLDS) < 0.5
             observed = together.reset(options={"reset_mask": mask})
@@ -74,8 +72,11 @@ def test_the_largest_worlds_fit_their_memory() -> None:
     """Compiled code does not check array bounds; plain Python does."""
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", LARGEST],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
 
 

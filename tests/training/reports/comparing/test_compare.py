@@ -20,9 +20,7 @@ from posse_training.reports.statistics import difference
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     names = ("idle", "pursuit")
-    settings = Settings(
-        names, ("constant",), episodes=20, out=tmp_path, figures=False, planner_episodes=0
-    )
+    settings = Settings(names, ("constant",), episodes=20, out=tmp_path, figures=False, planner_episodes=0)
     rows = compare(settings).rows
     scores = {}
     for name in names:
@@ -34,22 +32,17 @@ def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     assert rows[1]["improvement"].value == pytest.approx(((gap > 0) + 0.5 * (gap == 0)).mean())
     assert rows[1]["difference"].count == 20
     written = json.loads((tmp_path / "summary.json").read_text())
-    assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(
-        scores["pursuit"].mean()
-    )
+    assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(scores["pursuit"].mean())
     assert (written["seed"], written["split"]) == (7, "test")
 
 
 def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
     settings = Settings(
-        ("idle", "pursuit", "ddcs-distributed"), ("smart",), episodes=4, out=tmp_path,
-        figures=False, planner_episodes=3,
-    )  # fmt: skip
+        ("idle", "pursuit", "ddcs-distributed"), ("smart",), episodes=4, out=tmp_path, figures=False, planner_episodes=3
+    )
     found = compare(settings)
     assert [row["policy"] for row in found.rows][-1] == "planner"
-    safe = {
-        row["policy"]: found.plays["smart", row["policy"]]["safe_score"][0] for row in found.rows
-    }
+    safe = {row["policy"]: found.plays["smart", row["policy"]]["safe_score"][0] for row in found.rows}
     assert len(safe["planner"]) == 3, "it plays the first worlds of the others"
     for row in found.rows:
         share = safe[row["policy"]][:3].mean() / safe["planner"].mean()
@@ -79,9 +72,7 @@ def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None
 
 def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
-    assert (
-        main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
-    )
+    assert main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     row = next(line for line in lines if " pursuit " in line)
     assert "constant" in row, "no cell is broken where lines have no end"
@@ -103,9 +94,14 @@ def learned(seed: int, trained: str = "train") -> LearnedPolicy:
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "plain")
     weight = np.random.default_rng(seed).normal(size=(2, encoding.size)).astype(np.float32)
     network = Network(
-        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
-        (weight / np.float32(8),), (np.array([0.5, 0], np.float32),), "tanh", "clip",
-    )  # fmt: skip
+        np.zeros(encoding.size, np.float32),
+        np.ones(encoding.size, np.float32),
+        5.0,
+        (weight / np.float32(8),),
+        (np.array([0.5, 0], np.float32),),
+        "tanh",
+        "clip",
+    )
     return LearnedPolicy(network, encoding, {"name": f"any-{seed}", "trained_splits": [trained]})
 
 
@@ -120,12 +116,7 @@ def files(tmp_path: Path) -> list[str]:
 def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> None:
     group = f"mine={','.join(files)}"
     settings = Settings(
-        ("pursuit", group),
-        ("constant",),
-        episodes=15,
-        out=tmp_path / "out",
-        figures=False,
-        planner_episodes=0,
+        ("pursuit", group), ("constant",), episodes=15, out=tmp_path / "out", figures=False, planner_episodes=0
     )
     found = compare(settings)
     assert [(row["policy"], row["seeds"]) for row in found.rows] == [("pursuit", 1), ("mine", 3)]
@@ -147,15 +138,7 @@ def test_who_cannot_play_is_left_out_with_a_line(
     _named()["few-beams"] = scenario
     try:
         command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
-        options = [
-            "--episodes",
-            "2",
-            "--no-figures",
-            "--planner-episodes",
-            "0",
-            "--out",
-            str(tmp_path / "out"),
-        ]
+        options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
         assert main([*command, *options]) == 0
     finally:
         del _named()["few-beams"]
@@ -171,19 +154,9 @@ def test_who_cannot_play_is_left_out_with_a_line(
     assert summary["comparison"][2]["difference"] is not None
 
 
-def test_a_split_that_was_trained_on_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_split_that_was_trained_on_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     learned(1, "test").save(tmp_path / "mine.safetensors")
-    options = [
-        "--scenarios",
-        "constant",
-        "--no-figures",
-        "--planner-episodes",
-        "0",
-        "--out",
-        str(tmp_path),
-    ]
+    options = ["--scenarios", "constant", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]
     assert main(["compare", str(tmp_path / "mine.safetensors"), *options]) == 2
     assert "was trained on the split 'test'" in capsys.readouterr().err
 
@@ -205,9 +178,7 @@ def test_figures_are_drawn_with_the_planner_beside(
         assert {row["policy"] for row in csv.DictReader(file)} == {"pursuit", "planner", BOUND}
 
 
-def test_a_scenario_alone_is_played_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scenario_alone_is_played_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--scenarios", "constant", "--episodes", "2", "--planner-episodes", "0"]
     assert main(["compare", "idle", *options, "--out", str(tmp_path / "out")]) == 0
     files = {path.name for path in (tmp_path / "out").iterdir()}

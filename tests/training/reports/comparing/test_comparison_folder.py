@@ -67,9 +67,7 @@ def test_an_interrupted_one_leaves_the_old_one(tmp_path: Path, error: Any) -> No
     only(out)
 
 
-def test_a_full_disk_is_named_and_the_old_one_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_named_and_the_old_one_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     given = Settings(("idle",), ("constant",), 2, out=out, figures=False, planner_episodes=0)
     compare(given)
@@ -85,9 +83,7 @@ def test_a_full_disk_is_named_and_the_old_one_is_kept(
     only(out)
 
 
-def test_a_disk_that_is_full_from_the_start_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_is_full_from_the_start_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     write(out, "a.csv")
 
@@ -111,9 +107,7 @@ def test_other_peoples_files_are_refused_before_anything_is_played(tmp_path: Pat
     (out / "notes.txt").write_text("mine")
     (out / "summary.json").write_text(json.dumps({"files": ["notes.txt"]}))
     with pytest.raises(ComparisonError, match=r"'notes\.txt', for example.*move them"):
-        compare(
-            Settings(("idle",), ("constant",), 10**6, out=out, figures=False, planner_episodes=0)
-        )
+        compare(Settings(("idle",), ("constant",), 10**6, out=out, figures=False, planner_episodes=0))
     assert (out / "notes.txt").read_text() == "mine"
     only(out)
 
@@ -233,11 +227,7 @@ def test_kill_9_leaves_the_old_comparison_and_a_rerun_is_as_if_nothing_was(tmp_p
 
 def test_files_are_readable_like_any_others(tmp_path: Path) -> None:
     (tmp_path / "plain").touch()
-    compare(
-        Settings(
-            ("idle",), ("constant",), 1, out=tmp_path / "out", figures=False, planner_episodes=0
-        )
-    )
+    compare(Settings(("idle",), ("constant",), 1, out=tmp_path / "out", figures=False, planner_episodes=0))
     wanted = (tmp_path / "plain").stat().st_mode & 0o777
     assert {path.stat().st_mode & 0o777 for path in (tmp_path / "out").iterdir()} == {wanted}
 
@@ -260,11 +250,7 @@ class TestNames:
         compare(Settings(policies, ("constant",), 2, out=out, figures=False, planner_episodes=0))
         summary = json.loads((out / "summary.json").read_text())
         files = {row["policy"]: row["files"] for row in summary["comparison"]}
-        assert files == {
-            "a/b": ["constant-a_b.csv"],
-            "a:b": ["constant-a_b-2.csv"],
-            "A_B": ["constant-A_B-3.csv"],
-        }
+        assert files == {"a/b": ["constant-a_b.csv"], "a:b": ["constant-a_b-2.csv"], "A_B": ["constant-A_B-3.csv"]}
         for policy, (file,) in files.items():
             played = dict(zip(("a/b", "a:b", "A_B"), ("idle", "pursuit", "random"), strict=True))
             assert played[policy] in (out / file).read_text()

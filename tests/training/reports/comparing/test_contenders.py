@@ -41,9 +41,7 @@ def test_a_file_may_have_an_equals_sign_in_its_path(tmp_path: Path) -> None:
     assert contender.label == "mine"
 
 
-def test_brackets_and_dollars_are_shown_as_they_are(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_brackets_and_dollars_are_shown_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     labels = ("[bold]a[/bold]", "[/]", "$x^{$", "_hidden")
     policies = [f"{label}=idle" for label in labels]
     options = ["--scenarios", "constant", "--episodes", "1", "--sweep-episodes", "0"]

@@ -13,10 +13,15 @@ def test_the_export_holds_every_worlds_metrics(tmp_path: Path) -> None:
     out = tmp_path / "out"
     compare(
         Settings(
-            policies=("idle", "pursuit"), scenarios=("constant",), episodes=3, out=out,
-            figures=False, planner_episodes=0, export=("marl-eval",),
+            policies=("idle", "pursuit"),
+            scenarios=("constant",),
+            episodes=3,
+            out=out,
+            figures=False,
+            planner_episodes=0,
+            export=("marl-eval",),
         )
-    )  # fmt: skip
+    )
     whole = json.loads((out / "marl-eval.json").read_text(encoding="utf-8"))
     assert list(whole) == ["posse"]
     assert set(whole["posse"]["constant"]) == {"idle", "pursuit"}
@@ -33,8 +38,7 @@ def test_the_export_holds_every_worlds_metrics(tmp_path: Path) -> None:
 def test_nothing_is_exported_unasked(tmp_path: Path) -> None:
     out = tmp_path / "out"
     settings = Settings(
-        policies=("idle",), scenarios=("constant",), episodes=1, out=out, figures=False,
-        planner_episodes=0,
-    )  # fmt: skip
+        policies=("idle",), scenarios=("constant",), episodes=1, out=out, figures=False, planner_episodes=0
+    )
     compare(settings)
     assert not (out / "marl-eval.json").exists()

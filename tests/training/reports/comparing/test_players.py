@@ -31,13 +31,7 @@ def compiled() -> None:
 def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
     policies = ("idle", *(f"{BAD}{name}" for name in names), "pursuit")
     return Settings(
-        policies,
-        ("constant",),
-        episodes=2,
-        out=tmp_path / "out",
-        figures=False,
-        planner_episodes=0,
-        time_limit=limit,
+        policies, ("constant",), episodes=2, out=tmp_path / "out", figures=False, planner_episodes=0, time_limit=limit
     )
 
 
@@ -65,9 +59,13 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
 def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
     """A separate process does not change results."""
     settings = Settings(
-        ("posse_baselines.policies.pursuit:Pursuit", "pursuit"), ("constant",), episodes=3,
-        out=tmp_path / "out", figures=False, planner_episodes=0,
-    )  # fmt: skip
+        ("posse_baselines.policies.pursuit:Pursuit", "pursuit"),
+        ("constant",),
+        episodes=3,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+    )
     there, here = compare(settings).plays.values()
     assert (there["score"] == here["score"]).all()
 
@@ -129,38 +127,35 @@ def alive(pid: int) -> bool:
 @pytest.mark.long
 def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
     settings = Settings(
-        (f"{BAD}Sleeps", "idle"), ("constant", "smart"), episodes=1, out=tmp_path / "out",
-        figures=False, planner_episodes=0, time_limit=10.0,
-    )  # fmt: skip
+        (f"{BAD}Sleeps", "idle"),
+        ("constant", "smart"),
+        episodes=1,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+        time_limit=10.0,
+    )
     first, second = compare(settings).failed
     assert first["what"] == "constant"
-    assert (second["what"], second["why"].partition(" it ")[0]) == (
-        "smart", "not played: on constant",
-    )  # fmt: skip
+    assert (second["what"], second["why"].partition(" it ")[0]) == ("smart", "not played: on constant")
 
 
 def test_a_failure_in_one_scenario_leaves_the_others(tmp_path: Path) -> None:
     settings = Settings(
-        (f"{BAD}FailsOnSmart",), ("smart", "constant"), episodes=1, out=tmp_path / "out",
-        figures=False, planner_episodes=0,
-    )  # fmt: skip
+        (f"{BAD}FailsOnSmart",),
+        ("smart", "constant"),
+        episodes=1,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+    )
     found = compare(settings)
-    assert [(row["what"], "not this one" in row["why"]) for row in found.failed] == [
-        ("smart", True)
-    ]
+    assert [(row["what"], "not this one" in row["why"]) for row in found.failed] == [("smart", True)]
     assert [row["scenario"] for row in found.rows] == ["constant"]
 
 
 def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = [
-        "--scenarios",
-        "constant",
-        "--episodes",
-        "1",
-        "--no-figures",
-        "--planner-episodes",
-        "0",
-    ]
+    options = ["--scenarios", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
     assert main(["compare", f"{BAD}Raises", "idle", *options, "--out", str(tmp_path / "a")]) == 1
     shown = " ".join(capsys.readouterr().out.split())
     assert f"failed: {BAD}Raises on constant: ZeroDivisionError: [bold]by zero[/bold]" in shown

@@ -30,8 +30,6 @@ def test_points_are_scores_at_their_settings() -> None:
     assert [(p.value, p.policy) for p in points] == [
         (size, policy) for size in (3, 12) for policy in ("idle", "pursuit", BOUND)
     ]
-    alone = evaluate(
-        "pursuit", "constant", 4, 5, split="validation", num_trackers=12, progress=False
-    )
+    alone = evaluate("pursuit", "constant", 4, 5, split="validation", num_trackers=12, progress=False)
     assert points[4].score.value == pytest.approx(alone["safe_score"].mean())
     assert points[5].score.value == pytest.approx(alone["bound"].mean())

@@ -70,9 +70,14 @@ def test_a_comparison_plays_every_team_against_the_target(
 ) -> None:
     code = "posse_baselines.policies.simple:Idle"
     settings = Settings(
-        ("ddcs-distributed", code), ("smart",), episodes=2, out=tmp_path / "out", figures=False,
-        planner_episodes=1, target=str(file),
-    )  # fmt: skip
+        ("ddcs-distributed", code),
+        ("smart",),
+        episodes=2,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=1,
+        target=str(file),
+    )
     found = compare(settings)
     played = {plays.results[0].target for plays in found.plays.values()}
     assert played == {"evading"}

@@ -29,12 +29,15 @@ def plays_of(label: str, scenario: str, **columns: list[float] | list[list[float
         label,
         tuple(
             Results(
-                label, posse.get_scenario(scenario), 7, "test",
+                label,
+                posse.get_scenario(scenario),
+                7,
+                "test",
                 {name: np.asarray(values[k], np.float64) for name, values in given.items()},
             )
             for k in range(seeds)
         ),
-    )  # fmt: skip
+    )
 
 
 def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
@@ -54,8 +57,7 @@ def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
 def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
     scores = [0.2, 0.4, 0.4, 0.9]
     figure = figures.profile(
-        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)},
-        LOOKS,
+        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}, LOOKS
     )
     x, y = line(figure, "pursuit")
     at = dict(zip(np.round(x, 4), y, strict=True))
@@ -77,10 +79,7 @@ def test_scores_and_bounds_stand_where_they_should() -> None:
     (axis,) = figure.axes
     assert [label.get_text() for label in axis.get_yticklabels()] == ["smart v1", "radio v1"]
     points = [
-        (
-            round(float(np.ravel(drawn.get_xdata())[0]), 6),
-            round(float(np.ravel(drawn.get_ydata())[0])),
-        )
+        (round(float(np.ravel(drawn.get_xdata())[0]), 6), round(float(np.ravel(drawn.get_ydata())[0])))
         for drawn in axis.lines
         if drawn.get_marker() == STYLES["planner"].marker
     ]
@@ -145,35 +144,32 @@ def test_figures_say_what_was_played() -> None:
 def learned(curve: object) -> Contender:
     encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "plain")
     network = Network(
-        np.zeros(encoding.size, np.float32), np.ones(encoding.size, np.float32), 5.0,
-        (np.zeros((2, encoding.size), np.float32),), (np.zeros(2, np.float32),), "tanh", "clip",
-    )  # fmt: skip
+        np.zeros(encoding.size, np.float32),
+        np.ones(encoding.size, np.float32),
+        5.0,
+        (np.zeros((2, encoding.size), np.float32),),
+        (np.zeros(2, np.float32),),
+        "tanh",
+        "clip",
+    )
     card = {
-        "name": "mine", "curve": curve, "seed": 3, "settings": {"evaluate_worlds": 64},
+        "name": "mine",
+        "curve": curve,
+        "seed": 3,
+        "settings": {"evaluate_worlds": 64},
         "scenarios": [posse.get_scenario("smart").to_dict()],
-    }  # fmt: skip
+    }
     return Contender("mine", (LearnedPolicy(network, encoding, card),))
 
 
 def test_learning_curves_are_those_of_the_cards() -> None:
-    points = [
-        {"steps": 1e6 * k, "score": 0.2 * k, "low": 0.1 * k, "high": 0.3 * k, "seconds": 1.0}
-        for k in (1, 2, 3)
-    ]
+    points = [{"steps": 1e6 * k, "score": 0.2 * k, "low": 0.1 * k, "high": 0.3 * k, "seconds": 1.0} for k in (1, 2, 3)]
     figure = learning(curves_of([learned(points), Contender("idle", ("idle",))]), LOOKS)
     x, y = line(figure, "mine")
     assert x == [1, 2, 3]
     assert y == pytest.approx([0.2, 0.4, 0.6])
-    assert said(figure) == [
-        "mine: score, smart v1, training seed 3, 64 worlds of the validation split"
-    ]
-    damaged: tuple[object, ...] = (
-        [],
-        points[:1],
-        "none",
-        [{"steps": 1}],
-        [{**points[0], "score": float("nan")}] * 2,
-    )
+    assert said(figure) == ["mine: score, smart v1, training seed 3, 64 worlds of the validation split"]
+    damaged: tuple[object, ...] = ([], points[:1], "none", [{"steps": 1}], [{**points[0], "score": float("nan")}] * 2)
     for curve in damaged:
         assert curves_of([learned(curve)]) == []
 
@@ -183,9 +179,7 @@ def test_the_same_figure_is_the_same_file(tmp_path: Path) -> None:
     for name in "ab":
         (tmp_path / name).mkdir()
         files = figures.draw(tmp_path / name, plays)
-        assert [path.name for path in files] == [
-            "scenarios.png", "scenarios.svg", "profile.png", "profile.svg",
-        ]  # fmt: skip
+        assert [path.name for path in files] == ["scenarios.png", "scenarios.svg", "profile.png", "profile.svg"]
     for path in files:
         assert path.read_bytes() == (tmp_path / "a" / path.name).read_bytes()
     assert ">smart v1</text>" in files[1].read_text(), "text is text"

@@ -89,9 +89,15 @@ def test_frames_left_out_make_a_shorter_film_of_the_same_time(tmp_path: Path) ->
 
 def test_a_film_ends_with_the_episode(tmp_path: Path) -> None:
     path = film(
-        [("a", load("idle"))], "constant", path=tmp_path / "a.gif", horizon=50, settle_time=1.0,
-        seconds=60, every=10, size=200,
-    )  # fmt: skip
+        [("a", load("idle"))],
+        "constant",
+        path=tmp_path / "a.gif",
+        horizon=50,
+        settle_time=1.0,
+        seconds=60,
+        every=10,
+        size=200,
+    )
     assert len(read(path)[0]) == 6
 
 
@@ -99,9 +105,7 @@ def test_a_film_may_begin_later(tmp_path: Path) -> None:
     policies = [("a", load("pursuit"))]
     settings: dict[str, Any] = {"seed": 3, "size": 200, "speed": 1.0}
     whole, _ = read(film(policies, "smart", path=tmp_path / "a.gif", seconds=3.0, **settings))
-    later, _ = read(
-        film(policies, "smart", path=tmp_path / "b.gif", start=2.0, seconds=1.0, **settings)
-    )
+    later, _ = read(film(policies, "smart", path=tmp_path / "b.gif", start=2.0, seconds=1.0, **settings))
     assert (len(whole), len(later)) == (31, 11)
     for k in (0, 5, 10):  # each has a palette of its own
         assert (np.abs(whole[20 + k].astype(int) - later[k]) <= 24).mean() > 0.99
@@ -133,9 +137,7 @@ def test_one_camera_shows_every_panel_on_one_scale(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("policy", "leads"), [("ddcs-distributed", 0), ("ddcs-centralized", 1)])
-def test_only_a_team_with_a_leader_has_one_in_its_film(
-    policy: str, leads: int, tmp_path: Path
-) -> None:
+def test_only_a_team_with_a_leader_has_one_in_its_film(policy: str, leads: int, tmp_path: Path) -> None:
     path = film([("a", load(policy))], "smart", path=tmp_path / "a.gif", seconds=0.3, size=560)
     footer = read(path)[0][-1][-26:].astype(int)
     exchange = np.abs(footer - TASK_COLOURS[3]).max(axis=-1) <= 6
@@ -152,8 +154,9 @@ def played(path: Path) -> tuple[Frames, float]:
     assert found, about.stderr
     raw = subprocess.run(
         [ffmpeg, "-loglevel", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
-        capture_output=True, check=True,
-    ).stdout  # fmt: skip
+        capture_output=True,
+        check=True,
+    ).stdout
     shape = (-1, int(found[2]), int(found[1]), 3)
     return np.frombuffer(raw, np.uint8).reshape(shape), float(found[3])
 
@@ -174,9 +177,7 @@ def test_an_mp4_holds_the_same_pictures(tmp_path: Path) -> None:
 
 def test_an_mp4_of_slow_motion_repeats_its_frames(tmp_path: Path) -> None:
     pytest.importorskip("imageio_ffmpeg")
-    path = film(
-        [("a", load("idle"))], "smart", path=tmp_path / "a.mp4", seconds=1.0, speed=0.25, size=200
-    )
+    path = film([("a", load("idle"))], "smart", path=tmp_path / "a.mp4", seconds=1.0, speed=0.25, size=200)
     frames, rate = played(path)
     assert rate == 10.0
     assert len(frames) == 11 * 4
@@ -190,9 +191,7 @@ def test_what_ffmpeg_cannot_write_is_said_and_leaves_nothing(tmp_path: Path) -> 
     assert not list(tmp_path.iterdir())
 
 
-def test_an_mp4_without_its_extra_says_how_to_install_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_mp4_without_its_extra_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'posse\[video\]'"):
         film([("a", load("idle"))], "smart", path=tmp_path / "a.mp4", seconds=1.0)

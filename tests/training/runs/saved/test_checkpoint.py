@@ -139,9 +139,7 @@ def test_forged_optimisers_and_weights(run: Path, tmp_path: Path, change: str) -
         del moments[-1]
     else:
         weights = dict(dict(state["model"]["parts"]["items"])["policy"]["items"])
-        name = moments[-1][1]["tensor"] if change == "nan moment" else (
-            next(iter(weights.values()))["tensor"]
-        )  # fmt: skip
+        name = moments[-1][1]["tensor"] if change == "nan moment" else (next(iter(weights.values()))["tensor"])
         arrays[f"model/{name}"] = np.full_like(arrays[f"model/{name}"], np.nan)
     write_checkpoint(tmp_path, arrays, state)
     with pytest.raises(CheckpointError, match="does not fit its settings"):

@@ -139,9 +139,7 @@ def _check(settings: Settings) -> tuple[tuple[str, ...], tuple[Sweep, ...]]:
     Raises:
         SettingsError, ScenarioError: As :func:`compare`.
     """
-    for name, least in (
-        ("episodes", 1), ("sweep_episodes", 0), ("planner_episodes", 0), ("replays", 0),
-    ):  # fmt: skip
+    for name, least in (("episodes", 1), ("sweep_episodes", 0), ("planner_episodes", 0), ("replays", 0)):
         value = getattr(settings, name)
         if not least <= value <= 10**8:
             raise SettingsError(f"{name}={value:g} must be at least {least} and at most 10**8")
@@ -171,8 +169,7 @@ def asked_sweeps(settings: Settings) -> tuple[Sweep, ...]:
             near = difflib.get_close_matches(name[:80], known, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
             raise SettingsError(
-                f"sweeps={name!r:.80} is not known: {hint}name some of {', '.join(known)}, or "
-                "'all', or 'none'"
+                f"sweeps={name!r:.80} is not known: {hint}name some of {', '.join(known)}, or 'all', or 'none'"
             )
     return tuple(known[name] for name in dict.fromkeys(asked)) if settings.sweep_episodes else ()
 

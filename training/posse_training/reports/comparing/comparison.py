@@ -72,10 +72,7 @@ def summary(plays: Plays, reference: Plays | None) -> dict[str, Estimate | int |
 
 def write_summary(found: Comparison, path: Path, worlds: _Worlds) -> None:
     """Write all estimates as JSON."""
-    rows = [
-        {k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()}
-        for row in found.rows
-    ]
+    rows = [{k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in found.rows]
     whole = {
         "seed": worlds.seed,
         "split": worlds.split,
@@ -90,8 +87,7 @@ def write_summary(found: Comparison, path: Path, worlds: _Worlds) -> None:
 
 _WIDE: Final = 200
 """Columns of a terminal that the whole table needs."""
-_LONG: Final = ("safe_score", "of_planner", "score", "contact_free", "bound", "settled",
-                "difference", "improvement")  # fmt: skip
+_LONG: Final = ("safe_score", "of_planner", "score", "contact_free", "bound", "settled", "difference", "improvement")
 _SHORT: Final = {
     "safe_score": "safe score",
     "of_planner": "of the\nplanner",
@@ -117,9 +113,7 @@ def table(found: Comparison, worlds: _Worlds, width: int) -> Table:
         f"95 % intervals; differences of the safe score to {found.reference}, paired by world"
     )
     played = list(dict.fromkeys(row["scenario"] for row in found.rows))
-    ranked = sorted(
-        found.rows, key=lambda row: (played.index(row["scenario"]), -row["safe_score"].value)
-    )
+    ranked = sorted(found.rows, key=lambda row: (played.index(row["scenario"]), -row["safe_score"].value))
     return _long(ranked, title) if width >= _WIDE else _short(ranked, title)
 
 

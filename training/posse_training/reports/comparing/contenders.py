@@ -46,14 +46,10 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
     for text in texts:
         label, sign, members = (text, "", "") if is_file(text) else text.partition("=")
         if sign and not (label and all(members.split(","))):
-            raise PolicyError(
-                f"{text!r:.120} is not a group of policies: write LABEL=FILE,FILE,..."
-            )
+            raise PolicyError(f"{text!r:.120} is not a group of policies: write LABEL=FILE,FILE,...")
         taken = {other.label for other in found}
         if label in taken:
-            raise PolicyError(
-                f"two policies have the label {label!r:.120}: give one another label, LABEL=..."
-            )
+            raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
         policies = tuple(name if is_code(name) else load(name) for name in names)
         if not sign and is_file(text) and not isinstance(policies[0], str):
@@ -92,9 +88,8 @@ def play(
         contender.label,
         tuple(
             evaluate(
-                policy, scenario, episodes, seed, split=split, progress=progress,
-                time_limit=time_limit, **overrides,
+                policy, scenario, episodes, seed, split=split, progress=progress, time_limit=time_limit, **overrides
             )
             for policy in contender.policies
         ),
-    )  # fmt: skip
+    )

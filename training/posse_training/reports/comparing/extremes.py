@@ -55,11 +55,7 @@ def extremes(found: Comparison, count: int) -> tuple[list[Extreme], list[Extreme
         gains = mine[:, :both] - theirs[:both]
         for kept, place in ((wins, gains.argmax()), (losses, gains.argmin())):
             seed, world = divmod(int(place), both)
-            kept.append(
-                Extreme(
-                    scenario, policy, seed, world, float(mine[seed, world]), float(theirs[world])
-                )
-            )
+            kept.append(Extreme(scenario, policy, seed, world, float(mine[seed, world]), float(theirs[world])))
     wins = sorted((one for one in wins if one.gain > 0), key=lambda one: -one.gain)
     losses = sorted((one for one in losses if one.gain < 0), key=lambda one: one.gain)
     return wins[:count], losses[:count]

@@ -87,8 +87,7 @@ def _check_place(out: Path) -> None:
         raise ComparisonError(f"{out} is a file: choose another --out")
     if Path.cwd().is_relative_to(out) or os.path.ismount(out):
         raise ComparisonError(
-            f"{out} cannot be replaced as a whole: choose a folder in it, for example --out "
-            f"{out / 'comparison'}"
+            f"{out} cannot be replaced as a whole: choose a folder in it, for example --out {out / 'comparison'}"
         )
 
 
@@ -173,9 +172,7 @@ def _swap(partial: Path, out: Path, previous: Path) -> None:
 
 def _keep(partial: Path, out: Path) -> Path:
     """Rename a finished comparison to an unused name next to ``out``."""
-    kept = next(
-        path for k in range(2, 10_000) if not (path := out.with_name(f"{out.name}-{k}")).exists()
-    )
+    kept = next(path for k in range(2, 10_000) if not (path := out.with_name(f"{out.name}-{k}")).exists())
     partial.rename(kept)
     (kept / LOCK).unlink(missing_ok=True)
     return kept
@@ -184,6 +181,5 @@ def _keep(partial: Path, out: Path) -> Path:
 def _cannot_write(out: Path, error: OSError) -> ComparisonError:
     kept = "; the earlier comparison in it is unchanged" if (out / MARKER).exists() else ""
     return ComparisonError(
-        f"cannot write the comparison to {out}: {error.strerror or error}{kept}. Make room or "
-        "choose another --out"
+        f"cannot write the comparison to {out}: {error.strerror or error}{kept}. Make room or choose another --out"
     )

@@ -23,17 +23,11 @@ def write_marl_eval(found: Comparison, path: Path) -> None:
     """Write everything that was played on the scenarios, but not the sweeps."""
     tasks: dict[str, dict[str, Any]] = {}
     for (scenario, policy), plays in found.plays.items():
-        tasks.setdefault(scenario, {})[policy] = {
-            f"seed_{k}": _run(results) for k, results in enumerate(plays.results)
-        }
+        tasks.setdefault(scenario, {})[policy] = {f"seed_{k}": _run(results) for k, results in enumerate(plays.results)}
     text = json.dumps({"posse": tasks}, indent=2, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
 
 
 def _run(results: Results) -> dict[str, Any]:
-    metrics = {
-        name: column.tolist()
-        for name, column in results.columns.items()
-        if np.isfinite(column).all()
-    }
+    metrics = {name: column.tolist() for name, column in results.columns.items() if np.isfinite(column).all()}
     return {"step_0": {"step_count": 0, **metrics}, "absolute_metrics": metrics}

@@ -25,9 +25,7 @@ from posse_training.reports.comparing.worker import Worker
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.results import Results
 
-_OURS: Final = tuple(
-    str(Path(module.__file__ or "").parent) for module in (posse, posse_baselines, posse_training)
-)
+_OURS: Final = tuple(str(Path(module.__file__ or "").parent) for module in (posse, posse_baselines, posse_training))
 _LONGEST: Final = 300  # characters of an error in a summary
 
 Play = tuple[Contender, Scenario, int]
@@ -123,9 +121,8 @@ class Players:
             found: Results = self._worker.call(_evaluate, given, self._limit, advance)
             return found
         return evaluate(
-            policy, scenario, episodes, seed, split=split, target=self._target, progress=advance,
-            time_limit=self._limit,
-        )  # fmt: skip
+            policy, scenario, episodes, seed, split=split, target=self._target, progress=advance, time_limit=self._limit
+        )
 
     def _load_elsewhere(self, policy: str) -> tuple[str, int]:
         """Load a code policy in the worker's process; return its name and message size."""
@@ -136,13 +133,7 @@ class Players:
         return name, size
 
     def record(
-        self,
-        contender: Contender,
-        member: int,
-        scenario: Scenario,
-        seed: int,
-        world: int,
-        split: str,
+        self, contender: Contender, member: int, scenario: Scenario, seed: int, world: int, split: str
     ) -> Replay:
         """Play one world again and record it, without observations.
 
@@ -157,9 +148,7 @@ class Players:
         Raises:
             PlayError: The policy failed.
         """
-        given = (
-            contender.label, contender.policies[member], scenario, seed, world, split, self._target
-        )  # fmt: skip
+        given = (contender.label, contender.policies[member], scenario, seed, world, split, self._target)
         try:
             if isinstance(given[1], str):
                 found: Replay = self._worker.call(_record, given, self._limit)
@@ -179,21 +168,11 @@ def _check(report: Any, policy: str) -> tuple[str, int]:
 
 
 def _evaluate(
-    report: Any,
-    policy: str,
-    scenario: Scenario,
-    episodes: int,
-    seed: int,
-    split: str,
-    limit: float,
-    target: str | None,
+    report: Any, policy: str, scenario: Scenario, episodes: int, seed: int, split: str, limit: float, target: str | None
 ) -> Results:
     """Evaluate in the worker's process."""
     try:
-        return evaluate(
-            policy, scenario, episodes, seed, split=split, target=target, progress=report,
-            time_limit=limit,
-        )  # fmt: skip
+        return evaluate(policy, scenario, episodes, seed, split=split, target=target, progress=report, time_limit=limit)
     except TimeLimitError:
         raise
     except PolicyError as error:
@@ -216,9 +195,8 @@ def _record(
     try:
         loaded = posse_baselines.load(policy) if isinstance(policy, str) else policy
         return record(
-            [(label, loaded)], scenario, target=target, seed=seed, world=world, split=split,
-            observations=False,
-        )  # fmt: skip
+            [(label, loaded)], scenario, target=target, seed=seed, world=world, split=split, observations=False
+        )
     except Exception as error:
         raise PlayError(describe(error)) from None
 

@@ -46,9 +46,7 @@ class Plays:
     def interquartile_mean(self, metric: str) -> Estimate:
         """Return the mean of the middle half of all episodes."""
         values = self[metric]
-        return (
-            interquartile_mean(values[0]) if len(values) == 1 else over_seeds(values, middle_mean)
-        )
+        return interquartile_mean(values[0]) if len(values) == 1 else over_seeds(values, middle_mean)
 
     def share(self, happened: Sequence[npt.NDArray[np.bool_]]) -> Estimate:
         """Return the share of episodes in which something happened; (W,) for each seed."""

@@ -108,11 +108,15 @@ class ComparisonRun:
             self.found.points = play_sweeps(
                 ordered,
                 lambda contender, sweep, value: self._attempt(
-                    contender, sweep.scenario, self.settings.sweep_episodes,
-                    f"{sweep.name} {value:g}", progress, **{sweep.setting: value},
+                    contender,
+                    sweep.scenario,
+                    self.settings.sweep_episodes,
+                    f"{sweep.name} {value:g}",
+                    progress,
+                    **{sweep.setting: value},
                 ),
                 self.sweeps,
-            )  # fmt: skip
+            )
             write_points(self.folder / POINTS, self.found.points)
 
     def plays(self) -> Iterator[Play]:
@@ -131,13 +135,7 @@ class ComparisonRun:
         return episodes
 
     def _attempt(
-        self,
-        contender: Contender,
-        name: str,
-        episodes: int,
-        what: str,
-        progress: Progress,
-        **overrides: Any,
+        self, contender: Contender, name: str, episodes: int, what: str, progress: Progress, **overrides: Any
     ) -> Plays | None:
         """Play; return ``None`` and note why if the contender cannot or fails."""
         s, worlds, seeds = self.settings, self._worlds(contender, episodes), len(contender.policies)
@@ -145,9 +143,7 @@ class ComparisonRun:
         steps = len(cut(worlds, WORLDS)) * scenario.horizon
         progress.begin(contender.label, what, worlds * seeds, steps * seeds)
         try:
-            return self._players.play(
-                contender, scenario, worlds, s.seed, s.split, progress.advance
-            )
+            return self._players.play(contender, scenario, worlds, s.seed, s.split, progress.advance)
         except PolicyError as error:
             self.found.left_out.append({"policy": contender.label, "what": what, "why": str(error)})
         except PlayError as error:
@@ -198,15 +194,12 @@ class ComparisonRun:
         found = self.found
         losses = [plays for (name, _), plays in found.plays.items() if name == LEADER_LOSS]
         curves = learning.curves_of(self.contenders)
-        drawn = figures.draw(
-            self.folder, found.plays, found.points, losses, curves, sweep_facts=self._sweep_facts()
-        )
+        drawn = figures.draw(self.folder, found.plays, found.points, losses, curves, sweep_facts=self._sweep_facts())
         found.figures = [self.settings.out / path.name for path in drawn]
         if self.settings.replays:
             progress.note("recording the replays of the report")
         best, worst = (
-            [Shown(one, *self._record(one)) for one in some]
-            for some in extremes(found, self.settings.replays)
+            [Shown(one, *self._record(one)) for one in some] for some in extremes(found, self.settings.replays)
         )
         shown = [path for path in drawn if path.suffix == ".svg"]
         text = report(found, self._facts(), shown, best, worst)
@@ -230,8 +223,7 @@ class ComparisonRun:
         s, scenarios = self.settings, {name: get_scenario(name).version for name in self.scenarios}
         beside = self._worlds(self.contenders[-1], s.episodes)
         return {
-            "worlds": f"{s.episodes:,} each"
-            + (f", planner {beside:,}" if beside < s.episodes else ""),
+            "worlds": f"{s.episodes:,} each" + (f", planner {beside:,}" if beside < s.episodes else ""),
             "split": s.split,
             "seed": str(s.seed),
             "baseline": self.found.reference,

@@ -39,15 +39,15 @@ class Sweep:
 
 SWEEPS: Final = (
     Sweep("team-size", "smart", "num_trackers", (3, 4, 5, 6, 8, 10, 12), "trackers in the team"),
+    Sweep("radio-loss", "radio", "radio_loss", (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9), "share of messages lost"),
     Sweep(
-        "radio-loss", "radio", "radio_loss", (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9),
-        "share of messages lost",
-    ),
-    Sweep(
-        "target-speed", "smart", "target_speed", (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+        "target-speed",
+        "smart",
+        "target_speed",
+        (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
         "speed of the target, m/s (trackers: 1.0)",
     ),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

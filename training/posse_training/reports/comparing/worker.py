@@ -51,9 +51,7 @@ class Worker:
             connection.send((function, arguments, time_limit + _ORPHAN))
             while True:
                 if not connection.poll(max(0.0, ends - time.monotonic())):
-                    raise TimeLimitError(
-                        f"it exceeded the time limit of {time_limit:g} s, and its process was ended"
-                    )
+                    raise TimeLimitError(f"it exceeded the time limit of {time_limit:g} s, and its process was ended")
                 kind, value = connection.recv()
                 if kind == "progress":
                     report(value)

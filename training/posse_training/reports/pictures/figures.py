@@ -18,23 +18,8 @@ from posse_training.reports.comparing.plays import Plays
 from posse_training.reports.comparing.sweeps import BOUND, SWEEPS, Point, Sweep
 from posse_training.reports.pictures.learning import Curve, learning
 from posse_training.reports.pictures.palette import BAND, NOTE, OWN
-from posse_training.reports.pictures.parts import (
-    facts_of,
-    legend,
-    names_of,
-    note,
-    panels,
-    steps,
-    versions_of,
-)
-from posse_training.reports.pictures.style import (
-    RC,
-    Looks,
-    in_order,
-    looks_of,
-    marker_of,
-    reference_of,
-)
+from posse_training.reports.pictures.parts import facts_of, legend, names_of, note, panels, steps, versions_of
+from posse_training.reports.pictures.style import RC, Looks, in_order, looks_of, marker_of, reference_of
 from posse_training.reports.statistics import Estimate, share
 
 CAPTIONS: Final = {
@@ -156,9 +141,12 @@ def scores(plays: Mapping[tuple[str, str], Plays], looks: Looks) -> Figure:
             if policy == reference_of(policies):
                 bound = found.mean("bound").value
                 axis.plot(
-                    [bound, bound], [row - 0.42, row + 0.42], color=looks[BOUND].colour,
-                    linestyle=looks[BOUND].line, linewidth=1.6,
-                )  # fmt: skip
+                    [bound, bound],
+                    [row - 0.42, row + 0.42],
+                    color=looks[BOUND].colour,
+                    linestyle=looks[BOUND].line,
+                    linewidth=1.6,
+                )
     axis.set_yticks(range(len(names)), [versions[name] for name in names])
     axis.tick_params(axis="y", length=0)
     axis.grid(visible=False, axis="y")
@@ -179,25 +167,28 @@ def sweep_figure(sweep: Sweep, points: Sequence[Point], looks: Looks, facts: str
         style = looks[policy]
         x = [p.value for p in mine]
         axis.plot(
-            x, [p.score.value for p in mine], color=style.colour, linestyle=style.line,
-            zorder=2 + (policy != BOUND),
-        )  # fmt: skip
+            x, [p.score.value for p in mine], color=style.colour, linestyle=style.line, zorder=2 + (policy != BOUND)
+        )
         if policy == BOUND:
             continue
-        axis.vlines(
-            x, [p.score.low for p in mine], [p.score.high for p in mine],
-            color=style.colour, linewidth=1.4,
-        )  # fmt: skip
+        axis.vlines(x, [p.score.low for p in mine], [p.score.high for p in mine], color=style.colour, linewidth=1.4)
         look = marker_of(policy, style) | {"linestyle": ""}
         axis.plot(x, [p.score.value for p in mine], **look)
     axis.set(
-        ylim=(0, 1), xticks=sweep.values, xlabel=sweep.label,
+        ylim=(0, 1),
+        xticks=sweep.values,
+        xlabel=sweep.label,
         ylabel=f"mean safe score on {scenario.name} v{scenario.version}",
-    )  # fmt: skip
+    )
     axis.annotate(
-        f"as in {sweep.scenario}", (sweep.own, 1), (0, 3), textcoords="offset points",
-        color=NOTE, fontsize=8, ha="center",
-    )  # fmt: skip
+        f"as in {sweep.scenario}",
+        (sweep.own, 1),
+        (0, 3),
+        textcoords="offset points",
+        color=NOTE,
+        fontsize=8,
+        ha="center",
+    )
     note(figure, facts)
     legend(figure, policies, looks)
     return figure
@@ -215,15 +206,19 @@ def recovery(losses: Sequence[Plays], looks: Looks) -> Figure:
         bands = [_recovered(plays, time) for time in times]
         style = looks[plays.label]
         axis.fill_between(
-            times, [b.low for b in bands], [b.high for b in bands], step="post",
-            color=style.colour, alpha=0.15, linewidth=0,
-        )  # fmt: skip
+            times,
+            [b.low for b in bands],
+            [b.high for b in bands],
+            step="post",
+            color=style.colour,
+            alpha=0.15,
+            linewidth=0,
+        )
         phase = (policies.index(plays.label) + 0.5) / len(policies)
         steps(axis, times, [b.value for b in bands], plays.label, looks, phase)
     axis.set(
-        xlim=(0, latest), ylim=(-0.02, 1.02), xlabel="time since the loss, s",
-        ylabel="share of teams settled again",
-    )  # fmt: skip
+        xlim=(0, latest), ylim=(-0.02, 1.02), xlabel="time since the loss, s", ylabel="share of teams settled again"
+    )
     note(figure, f"{scenario.name} v{scenario.version}: {facts_of(losses)}")
     legend(figure, policies, looks)
     return figure

@@ -87,8 +87,7 @@ def film(
     first = round(start / dt)
     if first >= settings.horizon:
         raise SettingsError(
-            f"start={start!r} (--from) must be below {settings.duration:g} s, the duration of "
-            f"{settings.name!r}"
+            f"start={start!r} (--from) must be below {settings.duration:g} s, the duration of {settings.name!r}"
         )
     boxes = _boxes(size, len(policies))
     last = min(settings.horizon, first + max(1, round(seconds / dt)))
@@ -102,9 +101,7 @@ def film(
     try:
         opening = next(frames)
     except StopIteration:
-        raise SettingsError(
-            f"start={start!r} (--from) lies behind the end of every episode: start earlier"
-        ) from None
+        raise SettingsError(f"start={start!r} (--from) lies behind the end of every episode: start earlier") from None
     path.parent.mkdir(parents=True, exist_ok=True)
     frame_time = every * dt / speed
     if path.suffix.lower() == ".mp4":
@@ -135,20 +132,11 @@ class _Panel:
 
     @classmethod
     def begin(
-        cls,
-        label: str,
-        policy: Policy,
-        scenario: Scenario,
-        box: Box,
-        seed: int,
-        world: int,
-        split: str,
+        cls, label: str, policy: Policy, scenario: Scenario, box: Box, seed: int, world: int, split: str
     ) -> _Panel:
         """Return a panel at the start of the episode."""
         settings = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
-        batch = Batch(
-            settings, 1, seed=seed, split=split, first_world=world, autoreset="disabled"
-        )  # fmt: skip
+        batch = Batch(settings, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
         memory = begin(policy, batch)
         return cls(label, policy, batch, box, History(), memory, batch.reset(), {})
 
@@ -168,9 +156,7 @@ class _Panel:
             self.observations, *_ = self.batch.step(actions)
 
 
-def _frames(
-    panels: Sequence[_Panel], first: int, last: int, every: int, remark: str
-) -> Iterator[Frame]:
+def _frames(panels: Sequence[_Panel], first: int, last: int, every: int, remark: str) -> Iterator[Frame]:
     """Play all panels in step; yield one frame in ``every`` from a step on, and the last one.
 
     A team whose episode has ended stays as it was.
@@ -191,9 +177,7 @@ def _frames(
             canvas.fill(GRID)
             for panel, camera, scene in zip(panels, cameras, scenes, strict=True):
                 camera.look(lead.centre, lead.scale)
-                draw_picture(
-                    canvas, panel.box, camera, scene, panel.history, point, panel.label, remark
-                )
+                draw_picture(canvas, panel.box, camera, scene, panel.history, point, panel.label, remark)
             yield pixels(canvas.finish())
         if ended:
             return
@@ -210,28 +194,19 @@ def _boxes(size: int | tuple[int, int] | None, count: int) -> list[Box]:
     if not isinstance(size, int):
         width = (width - _SEAM * (count - 1)) // count
     if min(width, height) < LEAST_SIZE:
-        raise SettingsError(
-            f"size={size!r} must be at least {LEAST_SIZE} px, in width for each of {count} policies"
-        )
+        raise SettingsError(f"size={size!r} must be at least {LEAST_SIZE} px, in width for each of {count} policies")
     if max(height, count * (width + _SEAM)) > LARGEST:
         raise SettingsError(f"size={size!r} makes a film of more than {LARGEST} px: lower it")
     return [(k * (width + _SEAM), 0, width, height) for k in range(count)]
 
 
 def _check(
-    policies: Sequence[tuple[str, Policy]],
-    path: Path,
-    start: float,
-    seconds: float,
-    speed: float,
-    every: int,
+    policies: Sequence[tuple[str, Policy]], path: Path, start: float, seconds: float, speed: float, every: int
 ) -> None:
     if not policies:
         raise SettingsError("No policies given. Pass at least one (label, policy).")
     if path.suffix.lower() not in FORMATS:
-        raise SettingsError(
-            f"path={str(path)!r} must end in {' or '.join(FORMATS)}: no other format is written"
-        )
+        raise SettingsError(f"path={str(path)!r} must end in {' or '.join(FORMATS)}: no other format is written")
     for name, value in (("seconds", seconds), ("speed", speed)):
         if not (math.isfinite(value) and value > 0):
             raise SettingsError(f"{name}={value!r} must be a finite number above 0")

@@ -77,9 +77,13 @@ def learning(curves: Sequence[Curve], looks: Looks) -> Figure:
         style = looks[curve.policy]
         millions = [steps / 1e6 for steps in curve.steps]
         axis.fill_between(
-            millions, [s.low for s in curve.scores], [s.high for s in curve.scores],
-            color=style.colour, alpha=0.15, linewidth=0,
-        )  # fmt: skip
+            millions,
+            [s.low for s in curve.scores],
+            [s.high for s in curve.scores],
+            color=style.colour,
+            alpha=0.15,
+            linewidth=0,
+        )
         axis.plot(millions, [s.value for s in curve.scores], **marker_of(curve.policy, style))
     axis.set(xlabel="training steps, millions", ylabel="validation score")
     axis.set_xlim(left=0)

@@ -50,16 +50,31 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_time: float) -> None:
     repeats = max(1, math.ceil(_LEAST_RATE * frame_time - 1e-9))
     part = path.with_name(f".{path.stem}.part.mp4")
     command = [
-        imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error",
-        "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-        "-r", f"{repeats / frame_time:.6f}", "-i", "-",
-        "-c:v", "libx264", "-crf", _QUALITY, "-pix_fmt", "yuv420p", "-movflags", "+faststart",
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-y",
+        "-loglevel",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        f"{repeats / frame_time:.6f}",
+        "-i",
+        "-",
+        "-c:v",
+        "libx264",
+        "-crf",
+        _QUALITY,
+        "-pix_fmt",
+        "yuv420p",
+        "-movflags",
+        "+faststart",
         str(part),
-    ]  # fmt: skip
-    padded = (
-        np.pad(frame, even, mode="edge").tobytes() * repeats
-        for frame in itertools.chain([first], rest)
-    )
+    ]
+    padded = (np.pad(frame, even, mode="edge").tobytes() * repeats for frame in itertools.chain([first], rest))
     try:
         with tempfile.TemporaryFile() as messages:
             if not _pipe(command, padded, messages):

@@ -45,9 +45,7 @@ def facts_of(plays: Sequence[Plays]) -> str:
     ((usual, _),) = Counter(counts.values()).most_common(1)
     other = ", ".join(f"{plain(label)} {n:,}" for label, n in counts.items() if n != usual)
     first = plays[0].results[0]
-    return (
-        f"{usual:,} worlds{f' ({other})' if other else ''}, {first.split} split, seed {first.seed}"
-    )
+    return f"{usual:,} worlds{f' ({other})' if other else ''}, {first.split} split, seed {first.seed}"
 
 
 def note(figure: Figure, text: str) -> None:
@@ -55,15 +53,10 @@ def note(figure: Figure, text: str) -> None:
     figure.supxlabel(text, fontsize=8, color=NOTE, x=0.99, ha="right")
 
 
-def steps(
-    axis: Axes, x: Any, y: Any, policy: str, looks: Looks, phase: float | None = None
-) -> None:
+def steps(axis: Axes, x: Any, y: Any, policy: str, looks: Looks, phase: float | None = None) -> None:
     """Draw a step function; with a phase in [0, 1), also markers spread along it."""
     style = looks[policy]
-    axis.step(
-        x, y, where="post", zorder=1.5 if policy == BOUND else 2, linestyle=style.line,
-        color=style.colour,
-    )  # fmt: skip
+    axis.step(x, y, where="post", zorder=1.5 if policy == BOUND else 2, linestyle=style.line, color=style.colour)
     if phase is not None:
         at = ((np.arange(_MARKERS) + phase) / _MARKERS * len(x)).astype(int)
         look = marker_of(policy, style) | {"linestyle": ""}
@@ -82,10 +75,13 @@ def legend(figure: Figure, policies: Sequence[str], looks: Looks, *, lines: bool
         handles.append(Line2D([], [], label=_label(policy), **look))
     longest = max(len(str(handle.get_label())) for handle in handles)
     figure.legend(
-        handles=handles, loc="outside upper center", frameon=False,
+        handles=handles,
+        loc="outside upper center",
+        frameon=False,
         ncols=max(1, min(4, len(handles), _LEGEND // (longest + 7))),
-        handlelength=3.2, columnspacing=1.6,
-    )  # fmt: skip
+        handlelength=3.2,
+        columnspacing=1.6,
+    )
 
 
 def plain(text: str) -> str:

@@ -100,11 +100,17 @@ STYLES: Final[dict[str, Style]] = {
 _OTHERS: Final = tuple(
     Style(colour, marker, line)
     for marker, line in (
-        (">", _SOLID), ((4, 1, 0), _DASHED), ((6, 2, 0), _SHORT), ((7, 1, 0), _DASH_DOT),
-        ("|", _SOLID), ((5, 0, 180), _DASHED), ((4, 1, 45), _SHORT), (".", _DOTTED),
+        (">", _SOLID),
+        ((4, 1, 0), _DASHED),
+        ((6, 2, 0), _SHORT),
+        ((7, 1, 0), _DASH_DOT),
+        ("|", _SOLID),
+        ((5, 0, 180), _DASHED),
+        ((4, 1, 45), _SHORT),
+        (".", _DOTTED),
     )
     for colour in (RED, GREEN, ORANGE, PURPLE)
-)  # fmt: skip
+)
 """Styles of all other policies."""
 
 Looks = Mapping[str, Style]

@@ -94,9 +94,7 @@ def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
         "policy": policy,
         "model": "centralized" if FAMILY[policy].model == "centralized" else "distributed",
         "paper_settling_time": model.paper_settling_time if model else None,
-        "settling_time_quartiles": (
-            np.percentile(known, [25, 50, 75]).tolist() if len(known) else [None] * 3
-        ),
+        "settling_time_quartiles": (np.percentile(known, [25, 50, 75]).tolist() if len(known) else [None] * 3),
         "settled": len(known),
         "in_slots": int((error < 0.2).all(axis=1).sum()),
         "starts": len(times),
@@ -148,8 +146,11 @@ def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
     shown = Table(
         title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
         f"{settings.starts:,} starts of {played(posse.get_scenario(PLAYED), settings.seed)}",
-        box=box.HORIZONTALS, show_edge=False, pad_edge=False, padding=0,
-    )  # fmt: skip
+        box=box.HORIZONTALS,
+        show_edge=False,
+        pad_edge=False,
+        padding=0,
+    )
     shown.add_column("policy", overflow="fold")
     for column in ("model", "paper", "median\n[quartiles]", "settled", "all in\nslots"):
         shown.add_column(Text(column), no_wrap=True)  # brackets are not markup

@@ -20,12 +20,7 @@ from posse_baselines.ddcs import TASKS
 from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, GRID, ORANGE
 from posse_training.reports.pictures.parts import note
 from posse_training.reports.reproduce.motion import COLOURS, TARGET, draw_robots, look_of
-from posse_training.reports.reproduce.recording import (
-    Recording,
-    median_world,
-    played,
-    record,
-)
+from posse_training.reports.reproduce.recording import Recording, median_world, played, record
 
 _HEADING: Final = 2.6  # rad; of the target in the tracks
 _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
@@ -33,9 +28,7 @@ _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
 
 def tracks(seed: int) -> Figure:
     """Draw one tracker for three K with c = 0, and a team with different K and c."""
-    figure, axes = plt.subplots(
-        2, 3, figsize=(10, 5.2), layout="constrained", gridspec_kw={"height_ratios": (1.3, 1)}
-    )
+    figure, axes = plt.subplots(2, 3, figsize=(10, 5.2), layout="constrained", gridspec_kw={"height_ratios": (1.3, 1)})
     alone = posse.get_scenario("constant", num_trackers=1, horizon=300)
     start = {"tracker_pose": [(6.0, -1.5, 3.0)], "target_pose": (0.0, 0.0, _HEADING)}
     for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
@@ -95,9 +88,8 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     run = record(policy, scenario, worlds, seed)
     world, broke, recovered = _shown(run)
     figure, axes = plt.subplots(
-        4, 1, figsize=(8.4, 8.2), layout="constrained",
-        gridspec_kw={"height_ratios": (2.6, 2, 1, 1)},
-    )  # fmt: skip
+        4, 1, figsize=(8.4, 8.2), layout="constrained", gridspec_kw={"height_ratios": (2.6, 2, 1, 1)}
+    )
     start = max(0.0, broke - 5.0)
     end = min(run.time[-1], max(recovered, broke) + 5.0)
     keep = (run.time >= start) & (run.time <= end)
@@ -117,14 +109,24 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     working = run.working[keep, world].T
     tasks = np.ma.masked_where(~working, run.task[keep, world].T)
     axes[2].imshow(
-        tasks, aspect="auto", extent=extent, interpolation="nearest",
-        cmap=ListedColormap(_TASK_COLOURS), vmin=-0.5, vmax=3.5,
-    )  # fmt: skip
+        tasks,
+        aspect="auto",
+        extent=extent,
+        interpolation="nearest",
+        cmap=ListedColormap(_TASK_COLOURS),
+        vmin=-0.5,
+        vmax=3.5,
+    )
     leaders = np.ma.masked_where(~working, run.leader[keep, world].T)
     axes[3].imshow(
-        leaders, aspect="auto", extent=extent, interpolation="nearest",
-        cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=4.5,
-    )  # fmt: skip
+        leaders,
+        aspect="auto",
+        extent=extent,
+        interpolation="nearest",
+        cmap=ListedColormap(COLOURS),
+        vmin=-0.5,
+        vmax=4.5,
+    )
     for axis, label in ((axes[2], "task of\nrobot"), (axes[3], "leader of\nrobot")):
         axis.set_ylabel(label)
         axis.set_yticks(range(robots))
@@ -135,9 +137,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
         if np.isfinite(recovered):
             axis.axvline(recovered, color=TARGET, lw=1.0, ls=":")
     axes[3].set_xlabel("time, s (line: the leader breaks; dotted: all slots are held again)")
-    handles: list[Artist] = [
-        Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)
-    ]
+    handles: list[Artist] = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)]
     handles += [Patch(fc=c, label=t) for c, t in zip(_TASK_COLOURS, TASKS, strict=True)]
     note(figure, f"world {world}, the median of {worlds:,} worlds, {played(scenario, seed)}")
     figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)

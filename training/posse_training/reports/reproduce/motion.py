@@ -16,13 +16,7 @@ from posse_training.reports.pictures.parts import note
 from posse_training.reports.reproduce.recording import Recording
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
-LINES: Final[tuple[Any, ...]] = (
-    "-",
-    (0, (5, 2)),
-    (0, (1, 1.2)),
-    (0, (5, 1.5, 1, 1.5)),
-    (0, (8, 3)),
-)
+LINES: Final[tuple[Any, ...]] = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3)))
 TARGET: Final = INK
 _AFTER: Final = 1.5  # share of the settling time that curves go on for
 _LEAST: Final = 5.0  # s
@@ -38,9 +32,7 @@ def frames(shown: list[tuple[str, Recording, int, float]], played: str) -> Figur
 
     ``played`` is written below: world, split, seed and version.
     """
-    figure, axes = plt.subplots(
-        len(shown), 3, figsize=(9.6, 3.3 * len(shown)), layout="constrained", squeeze=False
-    )
+    figure, axes = plt.subplots(len(shown), 3, figsize=(9.6, 3.3 * len(shown)), layout="constrained", squeeze=False)
     for row, (name, recording, world, settled) in zip(axes, shown, strict=True):
         last = settled if np.isfinite(settled) else recording.time[-1]
         for axis, time in zip(row, (0.0, last / 2, last), strict=True):
@@ -96,13 +88,21 @@ def draw_robots(axis: Axes, recording: Recording, world: int, instant: int, sinc
 def curves(shown: list[tuple[str, Recording, int, float]], paper: float, played: str) -> Figure:
     """Draw every tracker against time, a column for each (name, recording, world, settled)."""
     rows = (
-        "x from the\ntarget, m", "y from the\ntarget, m", "speed V, m/s",
-        "heading from the\ntarget's, rad", "distance from\nthe slot, m",
-    )  # fmt: skip
+        "x from the\ntarget, m",
+        "y from the\ntarget, m",
+        "speed V, m/s",
+        "heading from the\ntarget's, rad",
+        "distance from\nthe slot, m",
+    )
     figure, axes = plt.subplots(
-        len(rows), len(shown), figsize=(4.6 * len(shown), 8.6), layout="constrained",
-        sharex="col", sharey="row", squeeze=False,
-    )  # fmt: skip
+        len(rows),
+        len(shown),
+        figsize=(4.6 * len(shown), 8.6),
+        layout="constrained",
+        sharex="col",
+        sharey="row",
+        squeeze=False,
+    )
     for column, (name, recording, world, settled) in zip(axes.T, shown, strict=True):
         end = max(_LEAST, _AFTER * settled) if np.isfinite(settled) else recording.time[-1]
         keep = recording.time <= end + 1e-9
@@ -110,9 +110,12 @@ def curves(shown: list[tuple[str, Recording, int, float]], paper: float, played:
         turned = recording.trackers[keep, world, :, 2] - recording.target[keep, world, None, 2]
         heading = np.unwrap((turned + np.pi) % (2 * np.pi) - np.pi, axis=0)
         values = (
-            relative[..., 0], relative[..., 1], recording.speeds[keep, world], heading,
+            relative[..., 0],
+            relative[..., 1],
+            recording.speeds[keep, world],
+            heading,
             recording.error[keep, world],
-        )  # fmt: skip
+        )
         for axis, what in zip(column, values, strict=True):
             for number in range(what.shape[1]):
                 axis.plot(recording.time[keep], what[:, number], lw=1.3, **look_of(number))

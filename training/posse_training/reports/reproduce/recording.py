@@ -90,11 +90,7 @@ def played(scenario: posse.Scenario, seed: int) -> str:
 
 
 def record(
-    policy: str | Policy,
-    scenario: posse.Scenario,
-    worlds: int,
-    seed: int,
-    options: Mapping[str, Any] | None = None,
+    policy: str | Policy, scenario: posse.Scenario, worlds: int, seed: int, options: Mapping[str, Any] | None = None
 ) -> Recording:
     """Play a whole episode of ``worlds`` worlds of :data:`SPLIT`."""
     team = load(policy) if isinstance(policy, str) else policy
@@ -109,12 +105,8 @@ def record(
         if step < scenario.horizon:
             observations, *_ = batch.step(actions)
     time = np.arange(scenario.horizon + 1) * scenario.control_step
-    trackers, target, speeds, slots, leader, task, working = (
-        np.stack(part) for part in zip(*instants, strict=True)
-    )
-    return Recording(
-        time, trackers, target, speeds, slots, leader, task, working, scenario.robot_radius
-    )
+    trackers, target, speeds, slots, leader, task, working = (np.stack(part) for part in zip(*instants, strict=True))
+    return Recording(time, trackers, target, speeds, slots, leader, task, working, scenario.robot_radius)
 
 
 def _poses(state: Mapping[str, Any], who: str) -> Floats:
@@ -122,9 +114,7 @@ def _poses(state: Mapping[str, Any], who: str) -> Floats:
     return np.stack([state[f"{who}_x"], state[f"{who}_y"], theta], axis=-1).astype(np.float64)
 
 
-def _instant(
-    batch: posse.Batch, offsets: Floats, notes: Mapping[str, Any], observations: Any
-) -> tuple[Any, ...]:
+def _instant(batch: posse.Batch, offsets: Floats, notes: Mapping[str, Any], observations: Any) -> tuple[Any, ...]:
     state = batch.state
     trackers, target = _poses(state, "tracker"), _poses(state, "world")
     c, s = state["world_frame_cos"][:, None], state["world_frame_sin"][:, None]
@@ -133,9 +123,14 @@ def _instant(
     none = np.full(trackers.shape[:2], -1)
     working = batch.layout.views(observations)["working"] > 0.0
     return (
-        trackers, target, state["tracker_speed"].astype(np.float64), slots,
-        notes.get("leader", none), notes.get("task", none), working,
-    )  # fmt: skip
+        trackers,
+        target,
+        state["tracker_speed"].astype(np.float64),
+        slots,
+        notes.get("leader", none),
+        notes.get("task", none),
+        working,
+    )
 
 
 def settling_times(recording: Recording, tolerance: float) -> Floats:

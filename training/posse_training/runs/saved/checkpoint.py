@@ -61,10 +61,7 @@ def read_checkpoint(folder: Path) -> tuple[Arrays, dict[str, Any]]:
             metadata = file.metadata() or {}
         text = metadata["state"]
         if metadata["format"] != _FORMAT:
-            raise CheckpointError(
-                f"the format of {path} is {metadata['format']!r:.80}, this version reads "
-                f"{_FORMAT!r}"
-            )
+            raise CheckpointError(f"the format of {path} is {metadata['format']!r:.80}, this version reads {_FORMAT!r}")
         whole = metadata["digest"] == _digest(arrays, text)
         state = json.loads(text)
     except (SafetensorError, OSError, KeyError, TypeError, ValueError, RecursionError) as error:

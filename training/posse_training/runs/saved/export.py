@@ -88,9 +88,7 @@ def _lstm(model: BaseAlgorithm) -> LSTM | None:
     if layer.num_layers != 1 or layer.bidirectional or layer.proj_size:
         raise TypeError(f"no policy file holds {layer}")
     return LSTM(
-        _numbers(layer.weight_ih_l0),
-        _numbers(layer.weight_hh_l0),
-        _numbers(layer.bias_ih_l0 + layer.bias_hh_l0),
+        _numbers(layer.weight_ih_l0), _numbers(layer.weight_hh_l0), _numbers(layer.bias_ih_l0 + layer.bias_hh_l0)
     )
 
 
@@ -102,13 +100,7 @@ def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
     return tensor.detach().cpu().numpy().astype(np.float32)
 
 
-def make_card(
-    settings: TrainSettings,
-    encoding: Encoding,
-    *,
-    steps: int,
-    curve: list[Point],
-) -> dict[str, Any]:
+def make_card(settings: TrainSettings, encoding: Encoding, *, steps: int, curve: list[Point]) -> dict[str, Any]:
     """Return a policy's card: its training scenarios, settings, software and scores."""
     scenarios = settings.scenarios
     return {

@@ -32,9 +32,7 @@ def named_files(settings: TrainSettings) -> Arrays:
     if settings.start is not None:
         named.append(str(Path(settings.start) / CHECKPOINT))
     return {
-        name: np.frombuffer(Path(name).read_bytes(), np.uint8)
-        for name in named
-        if name is not None and is_file(name)
+        name: np.frombuffer(Path(name).read_bytes(), np.uint8) for name in named if name is not None and is_file(name)
     }
 
 

@@ -31,17 +31,13 @@ def locked_run(folder: Path) -> Iterator[None]:
         try:
             stack.enter_context(locked(folder))
         except InUseError as error:
-            raise RunFolderError(
-                f"run folder {error}: wait for it, stop it, or choose another --folder"
-            ) from error
+            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --folder") from error
         except OSError as error:
             raise RunFolderError(f"cannot write to run folder {folder}: {error}") from error
         yield
 
 
-def open_run(
-    folder: Path, settings: TrainSettings, resume: bool
-) -> tuple[Arrays, dict[str, Any]] | None:
+def open_run(folder: Path, settings: TrainSettings, resume: bool) -> tuple[Arrays, dict[str, Any]] | None:
     """Write the settings to a run folder; return its checkpoint, or ``None`` to start from scratch.
 
     Raises:

@@ -129,10 +129,7 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     model._episode_num = int(state["episode_num"])
     model._n_updates = int(state["n_updates"])
     model._current_progress_remaining = float(state["progress"])
-    episodes = [
-        {key: _checked_number(key, info[key]) for key in ("r", "l", "score")}
-        for info in state["episodes"]
-    ]
+    episodes = [{key: _checked_number(key, info[key]) for key in ("r", "l", "score")} for info in state["episodes"]]
     model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
     successes = [bool(success) for success in state["successes"]]
     model.ep_success_buffer = deque(successes, maxlen=model._stats_window_size)
@@ -181,21 +178,14 @@ def _check_optimiser(name: str, part: torch.optim.Optimizer, fresh: list[dict[st
             raise ValueError(f"{name} holds {sorted(values)!s:.200}, wanted {sorted(_MOMENTS)}")
         for key, value in values.items():
             if value.numel() != 1 if key == "step" else value.shape != parameter.shape:
-                raise ValueError(
-                    f"{key} of {name} has the shape {tuple(value.shape)}, wanted "
-                    f"{tuple(parameter.shape)}"
-                )
+                raise ValueError(f"{key} of {name} has the shape {tuple(value.shape)}, wanted {tuple(parameter.shape)}")
             _check_finite(f"{key} of {name}", value)
 
 
 def _is_alike(value: Any, wanted: Any) -> bool:
     """Return whether a value is a finite number where one is wanted, and else the wanted one."""
     if isinstance(wanted, (list, tuple)):
-        return (
-            isinstance(value, (list, tuple))
-            and len(value) == len(wanted)
-            and all(map(_is_alike, value, wanted))
-        )
+        return isinstance(value, (list, tuple)) and len(value) == len(wanted) and all(map(_is_alike, value, wanted))
     if isinstance(wanted, float):
         return isinstance(value, float) and math.isfinite(value)
     return type(value) is type(wanted) and bool(value == wanted)

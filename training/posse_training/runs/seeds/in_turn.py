@@ -23,11 +23,7 @@ def with_seeds(settings: TrainSettings, seeds: Sequence[int]) -> list[TrainSetti
     if len(set(seeds)) < len(seeds):
         raise SettingsError(f"seeds={' '.join(map(str, seeds))} names one twice: leave it out")
     return [
-        replace(
-            settings,
-            seed=seed,
-            folder=None if settings.folder is None else settings.folder / f"seed-{seed}",
-        )
+        replace(settings, seed=seed, folder=None if settings.folder is None else settings.folder / f"seed-{seed}")
         for seed in seeds
     ]
 
@@ -74,9 +70,5 @@ def _check_folder(settings: TrainSettings) -> None:
     except (OSError, ValueError, RecursionError) as error:
         raise RunFolderError(f"{path} is damaged: {error}") from error
     if found != wanted:
-        other = next(
-            (n for n in wanted if not isinstance(found, dict) or found.get(n) != wanted[n]), "?"
-        )
-        raise RunFolderError(
-            f"{folder} holds a run with another {other}: remove it, or choose another --folder"
-        )
+        other = next((n for n in wanted if not isinstance(found, dict) or found.get(n) != wanted[n]), "?")
+        raise RunFolderError(f"{folder} holds a run with another {other}: remove it, or choose another --folder")

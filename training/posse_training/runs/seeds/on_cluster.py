@@ -20,11 +20,7 @@ from posse_training.runs.settings import TrainSettings
 
 
 def train_on_cluster(
-    runs: Mapping[str, TrainSettings],
-    backend: Backend,
-    attempts: int,
-    *,
-    console: Console | None = None,
+    runs: Mapping[str, TrainSettings], backend: Backend, attempts: int, *, console: Console | None = None
 ) -> dict[str, Exception]:
     """Train every run, or resume it where its folder holds it; return those that failed.
 
@@ -49,12 +45,7 @@ def train_on_cluster(
             Job(
                 f"training {label}",
                 train_on_worker,
-                (
-                    label,
-                    replace(settings, folder=None),
-                    read_files(settings.run_folder),
-                    named_files(settings),
-                ),
+                (label, replace(settings, folder=None), read_files(settings.run_folder), named_files(settings)),
                 (Shard(settings.seed, 1),),
             ): label
             for label, settings in runs.items()

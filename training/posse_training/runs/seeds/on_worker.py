@@ -20,9 +20,7 @@ from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import train
 
 
-def train_on_worker(
-    label: str, settings: TrainSettings, files: Arrays, named: Arrays, shard: Shard
-) -> Arrays:
+def train_on_worker(label: str, settings: TrainSettings, files: Arrays, named: Arrays, shard: Shard) -> Arrays:
     """Train, or resume what the files of a run folder hold; return its files when finished.
 
     Args:
@@ -44,10 +42,7 @@ def train_on_worker(
         write_files(folder, files)
         console = Console(file=_Prefixed(f"{label}: "), width=100)
         with contextlib.chdir(work):  # where relative paths of the settings lead
-            train(
-                replace(settings, folder=folder), console=console, num_threads=1,
-                resume=(folder / SETTINGS).exists(),
-            )  # fmt: skip
+            train(replace(settings, folder=folder), console=console, num_threads=1, resume=(folder / SETTINGS).exists())
         return read_files(folder)
 
 

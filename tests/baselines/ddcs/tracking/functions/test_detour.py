@@ -12,15 +12,11 @@ from tests.support.plain import plain
 detour, safeguard = plain("ddcs.tracking.detour"), plain("laws.safeguard")
 
 
-def past(
-    m: Mind, velocity: complex, *obstacles: tuple[complex, float], speed: float = 0.0
-) -> complex:
+def past(m: Mind, velocity: complex, *obstacles: tuple[complex, float], speed: float = 0.0) -> complex:
     discs = np.zeros(16, safeguard.DISC)
     for k, (at, reach) in enumerate(obstacles):
         safeguard.put_disc(discs, k, at.real, at.imag, 0.0, speed, reach, 0.1)
-    return complex(
-        *detour.way_past(m.f, m.s, m.d, discs, len(obstacles), velocity.real, velocity.imag)
-    )
+    return complex(*detour.way_past(m.f, m.s, m.d, discs, len(obstacles), velocity.real, velocity.imag))
 
 
 def tangent(at: complex, reach: float, side: float) -> float:
@@ -87,12 +83,7 @@ def test_what_is_near_has_its_tangents_too(m: Mind) -> None:
 
 def test_a_disc_blocks_the_way_within_its_reach_and_the_clearance() -> None:
     discs = np.zeros(1, safeguard.DISC)
-    for x, y, blocked in (
-        (1.0, 0.68, True),
-        (1.0, -0.68, True),
-        (1.0, 0.69, False),
-        (-1.0, 0.0, False),
-    ):
+    for x, y, blocked in ((1.0, 0.68, True), (1.0, -0.68, True), (1.0, 0.69, False), (-1.0, 0.0, False)):
         safeguard.put_disc(discs, 0, x, y, 0.0, 0.0, 0.5, 0.1)
         assert detour.blocks(discs[0], 0.2, 1.0, 0.0) == blocked
     safeguard.put_disc(discs, 0, 1.0, 0.0, 0.1, 0.0, 0.5, 0.1)

@@ -25,9 +25,9 @@ def near(value: Any) -> Any:
 
 def follower(frame: str = "leader", law: str = "l-phi") -> Mind:
     """Tracker 1, whose leader 0 turns at 0.4 rad/s, 0.2 s ago at 1 + 1j; slots of a wedge."""
-    m = Mind("constant", own=1, played={
-        "model": "centralized", "follower_frame": frame, "follower_law": law, "alpha_1": 1.5,
-    })  # fmt: skip
+    m = Mind(
+        "constant", own=1, played={"model": "centralized", "follower_frame": frame, "follower_law": law, "alpha_1": 1.5}
+    )
     m.d.step, m.d.slot, m.d.leader, m.d.task = 40, 3, 0, FLOCKING
     m.mate(0, 1 + 1j, cmath.rect(0.6, 2.0), turn=0.4, step=38, slot=0, task=FLOCKING)
     m.target(3 + 1j, cmath.rect(0.5, 1.9), 1.8, psi_rate=0.3)
@@ -70,16 +70,12 @@ def test_a_place_on_the_leader_is_the_difference_of_the_slots(frame: str) -> Non
     assert (complex(*found[:2]), complex(*found[2:])) == (near(LEADER + arm), near(velocity))
 
 
-def demand(
-    m: Mind, body: Any, frame: str, leader: complex, theta: float, rate: float, k: int
-) -> Any:
+def demand(m: Mind, body: Any, frame: str, leader: complex, theta: float, rate: float, k: int) -> Any:
     """l, A, B and the two directions of a demand on a robot of slot k."""
     angle, rate = (theta, rate) if frame == "leader" else (1.8, 0.3)
     arm = (m.slot(3) - m.slot(k)) * turn(angle)
     moving = cmath.rect(0.6, theta) + 1j * rate * arm
-    point = complex(m.o[m.f.position], m.o[m.f.position + 1]) + 0.15 * complex(
-        body.heading_cos, body.heading_sin
-    )
+    point = complex(m.o[m.f.position], m.o[m.f.position + 1]) + 0.15 * complex(body.heading_cos, body.heading_sin)
     wanted = arm + 0.15 * moving / abs(moving)
     seen = point - leader
     alphas = [(1.0 - np.exp(-a * 0.1)) / 0.1 for a in (1.5, 2.0)]
@@ -96,14 +92,10 @@ def test_a_follower_under_l_phi_closes_in_at_its_rates(frame: str, heading: floa
     place = LEADER + (m.slot(3) - m.slot(0)) * turn(2.0) + 0.3 - 0.2j
     body = m.body(place, heading)
     wanted = demand(m, body, frame, LEADER, THETA, 0.4, 0)
-    found = following.demand_on(
-        m.f, m.s, m.d, m.mates[0], m.slots[3], m.slots[0], place.real, place.imag, body
-    )
+    found = following.demand_on(m.f, m.s, m.d, m.mates[0], m.slots[3], m.slots[0], place.real, place.imag, body)
     assert found[:3] == near(wanted[:3])
     assert [turn(a) for a in found[3:]] == near([turn(a) for a in wanted[3:]])
-    vx, vy, speed, omega = following.on_leader(
-        m.f, m.s, m.d, m.mates, m.slots, 1, place.real, place.imag, body
-    )
+    vx, vy, speed, omega = following.on_leader(m.f, m.s, m.d, m.mates, m.slots, 1, place.real, place.imag, body)
     velocity = complex(wanted[1], wanted[2]) * turn(wanted[3])
     assert complex(vx, vy) == near(velocity)
     own = velocity / turn(heading)
@@ -136,17 +128,11 @@ def test_a_follower_under_l_l_keeps_its_distances_from_two(leader: int, number: 
     first = demand(m, body, "slot-frame", LEADER, THETA, 0.4, 0)
     second = demand(m, body, "slot-frame", other, THETA, 0.4, 2)
     gammas = [short_way(d[3] - 2.2) for d in (first, second)]
-    ahead, across = laws_l_l.l_l_velocity(
-        *first[:3], gammas[0], *second[:3], gammas[1], second[4] - first[4], 0.15
-    )
-    vx, vy, *_ = following.on_leader(
-        m.f, m.s, m.d, m.mates, m.slots, 1, place.real, place.imag, body
-    )
+    ahead, across = laws_l_l.l_l_velocity(*first[:3], gammas[0], *second[:3], gammas[1], second[4] - first[4], 0.15)
+    vx, vy, *_ = following.on_leader(m.f, m.s, m.d, m.mates, m.slots, 1, place.real, place.imag, body)
     assert complex(vx, vy) == near(complex(ahead, across) * turn(2.2))
     m.s.follower_law = 0  # l-φ takes no second one
-    vx, vy, *_ = following.on_leader(
-        m.f, m.s, m.d, m.mates, m.slots, 1, place.real, place.imag, body
-    )
+    vx, vy, *_ = following.on_leader(m.f, m.s, m.d, m.mates, m.slots, 1, place.real, place.imag, body)
     assert complex(vx, vy) == near(complex(first[1], first[2]) * turn(first[3]))
 
 
@@ -184,9 +170,7 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
     m.mate(0, 0j, slot=3, task=FLOCKING)
     m.mates[2].slot = 1
     assert second(4) == 0
-    square = Mind(
-        "constant", own=1, played={"follower_law": "l-l"}, num_trackers=6, formation="rows"
-    )
+    square = Mind("constant", own=1, played={"follower_law": "l-l"}, num_trackers=6, formation="rows")
     square.d.slot, square.d.leader = 5, 0
     for j, k in ((2, 3), (3, 4), (4, 2)):
         square.mate(j, 0j, slot=k, task=FLOCKING)
@@ -199,9 +183,7 @@ def test_the_second_robot_has_the_last_slot_before_the_own_that_lies_aside() -> 
 
 @pytest.mark.parametrize("scale", [0.2, 1.0, 5.0])
 @pytest.mark.parametrize("shift", [0j, 3 - 2j])
-def test_the_second_robot_is_the_same_wherever_and_however_large_the_formation_is(
-    scale: float, shift: complex
-) -> None:
+def test_the_second_robot_is_the_same_wherever_and_however_large_the_formation_is(scale: float, shift: complex) -> None:
     m = follower("slot-frame", "l-l")
     places = [1 + 1j, 0.2 + 0.5j, -0.6 + 0.8j, -1 + 0j]  # of the leader, the others, the own
     for k, place in enumerate(places):

@@ -70,9 +70,21 @@ def test_to_a_slot_leads_the_slot_law_and_before_it_an_intercept(task: int, at: 
     converging = task == CONVERGING
     own = at - TARGET
     v = steering.meeting_velocity(
-        own.real, own.imag, arm.real, arm.imag, float(m.d.speed_x), float(m.d.speed_y), 0.2, 0.1,
-        RATE, 1.5, 0.9 if converging else 0.0, 1e6 if converging else 1.5, 1.0, 1e4,
-    )  # fmt: skip
+        own.real,
+        own.imag,
+        arm.real,
+        arm.imag,
+        float(m.d.speed_x),
+        float(m.d.speed_y),
+        0.2,
+        0.1,
+        RATE,
+        1.5,
+        0.9 if converging else 0.0,
+        1e6 if converging else 1.5,
+        1.0,
+        1e4,
+    )
     found = tracking.to_slot(m.s, m.d, m.slots, at.real, at.imag, body)
     check(found, complex(*v), body, 0.0 if converging else 0.5 * RATE)
 
@@ -191,9 +203,7 @@ def test_each_task_has_its_law() -> None:
 
     def wanted(m: Mind) -> Any:
         body = m.body(at, 0.3)
-        return tracking.wanted_motion(
-            m.f, m.s, m.d, m.mates, m.slots, 1, at.real, at.imag, body
-        ), body  # fmt: skip
+        return tracking.wanted_motion(m.f, m.s, m.d, m.mates, m.slots, 1, at.real, at.imag, body), body
 
     m = mind(EXCHANGING)
     m.d.turn, m.d.age = 0.35, 9.0
@@ -225,14 +235,10 @@ def test_a_follower_goes_to_its_place_on_the_leader(task: int) -> None:
     body = m.body(-2 + 3j, 0.3)
     found = tracking.wanted_motion(m.f, m.s, m.d, m.mates, m.slots, 1, -2.0, 3.0, body)
     if task == FLOCKING:
-        same = plain("ddcs.tracking.following").on_leader(
-            m.f, m.s, m.d, m.mates, m.slots, 1, -2.0, 3.0, body
-        )
+        same = plain("ddcs.tracking.following").on_leader(m.f, m.s, m.d, m.mates, m.slots, 1, -2.0, 3.0, body)
         assert found == near(same)
         return
-    x, y, vx, vy = plain("ddcs.tracking.following").place_on_leader(
-        m.f, m.s, m.d, m.mates[0], m.slots[3], m.slots[0]
-    )
+    x, y, vx, vy = plain("ddcs.tracking.following").place_on_leader(m.f, m.s, m.d, m.mates[0], m.slots[3], m.slots[0])
     v = steering.approach_velocity(x + 2, y - 3, vx, vy, 1e6, 1.0, 1e4)
     assert abs(complex(*v)) == pytest.approx(1.0)
     check(found, complex(*v), body, 0.0)

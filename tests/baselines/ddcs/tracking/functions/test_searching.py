@@ -69,9 +69,7 @@ def test_the_map_holds_what_this_one_and_those_that_it_hears_covered() -> None:
 
 
 def test_the_map_holds_whom_it_heard_up_to_the_timeout_and_from_the_first_step_on() -> None:
-    for dt, step, told, counts in (
-        (0.5, 3, 0, True), (0.5, 4, 0, False), (0.1, 10, 0, True), (0.1, 10, -1, False),
-    ):  # fmt: skip
+    for dt, step, told, counts in ((0.5, 3, 0, True), (0.5, 4, 0, False), (0.1, 10, 0, True), (0.1, 10, -1, False)):
         m = Mind(own=0)
         m.f.dt, m.d.step = dt, step
         m.mate(2, -6 + 0j, step=told)
@@ -124,11 +122,7 @@ def best_cell(m: Mind, at: complex, heading: float, heard: list[int], size: int 
     inner = m.f.area - min(1.5, m.f.area / 2)
     middle = complex(d.area_x, d.area_y)
     from_middle = cells(m, size) - middle
-    centre = (
-        middle
-        + np.clip(from_middle.real, -inner, inner)
-        + 1j * np.clip(from_middle.imag, -inner, inner)
-    )
+    centre = middle + np.clip(from_middle.real, -inner, inner) + 1j * np.clip(from_middle.imag, -inner, inner)
     looked = grid(m, size).astype(float) - 1
     ages = np.where(looked < 0, s.stale_after, np.minimum(s.stale_after, 0.1 * (d.step - looked)))
     age, value = ages.copy(), np.zeros((size, size))
@@ -148,9 +142,7 @@ def best_cell(m: Mind, at: complex, heading: float, heard: list[int], size: int 
     value -= abs(way) + s.turn_weight * (1.0 - (there / turn(heading)).real)
     for j in heard:
         mate = m.mates[j]
-        ahead = complex(mate.x, mate.y) + (0.1 * (d.step - mate.step) + 2.0) * complex(
-            mate.speed_x, mate.speed_y
-        )
+        ahead = complex(mate.x, mate.y) + (0.1 * (d.step - mate.step) + 2.0) * complex(mate.speed_x, mate.speed_y)
         value -= np.maximum(0.0, abs(way) - abs(centre - ahead))
     return complex(centre[np.unravel_index(value.argmax(), value.shape)])
 
@@ -159,10 +151,11 @@ def best_cell(m: Mind, at: complex, heading: float, heard: list[int], size: int 
 def test_the_goal_is_the_cell_of_the_greatest_value(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m = Mind(
-        "field" if seed % 3 else "constant", own=3,
+        "field" if seed % 3 else "constant",
+        own=3,
         played={"swath": 0.6 * (seed % 2), "middle_weight": 2.0, "turn_weight": 3.0},
         sensing_range=2.2 if seed % 2 else 4.0,
-    )  # fmt: skip
+    )
     m.d.step = 150
     m.d.area_x, m.d.area_y = rng.normal(0, 2, 2) * (m.f.walled == 0)
     m.seen[:] = rng.integers(0, 150, m.seen.size) * (rng.random(m.seen.size) < 0.7)
@@ -175,27 +168,26 @@ def test_the_goal_is_the_cell_of_the_greatest_value(seed: int) -> None:
         m.mate(j, place, velocity, step=149 if j in heard else 20)
     at, heading = complex(*rng.normal(0, 5, 2)), rng.uniform(-3, 3)
     facing = turn(heading)
-    searching.choose_goal(
-        m.f, m.s, m.d, m.mates, m.seen, 3, at.real, at.imag, facing.real, facing.imag
-    )
-    assert complex(m.d.goal_x, m.d.goal_y) == pytest.approx(
-        best_cell(m, at, heading, heard), abs=1e-4
-    )
+    searching.choose_goal(m.f, m.s, m.d, m.mates, m.seen, 3, at.real, at.imag, facing.real, facing.imag)
+    assert complex(m.d.goal_x, m.d.goal_y) == pytest.approx(best_cell(m, at, heading, heard), abs=1e-4)
     assert m.d.goal_step == 150
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])
 @pytest.mark.parametrize("seed", range(24))
-def test_the_goal_is_that_cell_on_a_coarse_map_too(
-    seed: int, size: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_goal_is_that_cell_on_a_coarse_map_too(seed: int, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """As above, with fewer cells, of smaller areas, for teams of ``size``."""
     rng, cut = np.random.default_rng(seed), 5
     monkeypatch.setattr(searching, "GRID", cut)
     m = Mind(
-        "constant", own=0, num_trackers=size, num_neighbours=6, breaks=0, sensing_range=4.0,
+        "constant",
+        own=0,
+        num_trackers=size,
+        num_neighbours=6,
+        breaks=0,
+        sensing_range=4.0,
         played={"swath": 0.8 * (seed % 2), "middle_weight": 2.0, "turn_weight": 4.0},
-    )  # fmt: skip
+    )
     m.f.area, m.f.sight = rng.choice([1.8, 6.0]), rng.choice([0.5, 3.0])
     m.d.step = 150
     m.d.area_x, m.d.area_y = rng.normal(0, 2, 2)
@@ -210,12 +202,8 @@ def test_the_goal_is_that_cell_on_a_coarse_map_too(
         m.mate(j, place, velocity, step=149 if j in heard else 20)
     at, heading = complex(*rng.normal(0, 1, 2)), rng.uniform(-3, 3)
     facing = turn(heading)
-    searching.choose_goal(
-        m.f, m.s, m.d, m.mates, m.seen, 0, at.real, at.imag, facing.real, facing.imag
-    )
-    assert complex(m.d.goal_x, m.d.goal_y) == pytest.approx(
-        best_cell(m, at, heading, heard, cut), abs=1e-4
-    )
+    searching.choose_goal(m.f, m.s, m.d, m.mates, m.seen, 0, at.real, at.imag, facing.real, facing.imag)
+    assert complex(m.d.goal_x, m.d.goal_y) == pytest.approx(best_cell(m, at, heading, heard, cut), abs=1e-4)
 
 
 @pytest.mark.parametrize("along", [1, 1j])
@@ -242,9 +230,7 @@ def test_one_in_the_middle_of_a_cell_need_not_turn_to_it(monkeypatch: pytest.Mon
 
 
 def test_a_searcher_goes_to_its_goal_at_full_speed_and_then_chooses_another() -> None:
-    def goes(
-        at: complex, since: int, goal: complex = 6 + 8j, step: int = 100, dt: float = 0.1
-    ) -> tuple[complex, bool]:
+    def goes(at: complex, since: int, goal: complex = 6 + 8j, step: int = 100, dt: float = 0.1) -> tuple[complex, bool]:
         m = Mind(sensing_range=3.0)
         m.seen[:], m.f.dt = 1, dt
         m.d.step, m.d.goal_x, m.d.goal_y, m.d.goal_step = step, goal.real, goal.imag, since

@@ -24,21 +24,24 @@ def chosen(m: Mind, at: complex, heading: float) -> Any:
     cost, work = np.full((n, n), np.nan), np.full((7, n + 1), np.nan)
     facing = turn(heading)
     slots.choose_slot(
-        m.f, m.s, m.d, m.mates, m.slots, m.own, at.real, at.imag, facing.real, facing.imag,
-        1.0, 2.0, cost, work,
-    )  # fmt: skip
+        m.f, m.s, m.d, m.mates, m.slots, m.own, at.real, at.imag, facing.real, facing.imag, 1.0, 2.0, cost, work
+    )
     return int(m.d.slot), cost
 
 
-def arrival(
-    m: Mind, k: int, at: complex, heading: complex, held: int, taken: bool = False
-) -> float:
+def arrival(m: Mind, k: int, at: complex, heading: complex, held: int, taken: bool = False) -> float:
     """The time that a tracker takes to a slot, with what speaks for and against it."""
     way = complex(m.d.now_x, m.d.now_y) + m.slot(k) * turn(PSI) - at
     time = steering.time_to_slot(
-        way.real, way.imag, float(m.d.speed_x), float(m.d.speed_y), float(m.d.mean_x),
-        float(m.d.mean_y), m.s.weave_time, 1.0,
-    )  # fmt: skip
+        way.real,
+        way.imag,
+        float(m.d.speed_x),
+        float(m.d.speed_y),
+        float(m.d.mean_x),
+        float(m.d.mean_y),
+        m.s.weave_time,
+        1.0,
+    )
     angle = (way / abs(way) / heading).real
     time += 0.25 * np.pi * (1.0 - angle) / 2.0 * min(1.0, time)
     time -= m.s.loyalty * (held == k)
@@ -52,9 +55,13 @@ def arrival(
 def test_the_slot_is_that_of_the_least_total_arrival_time(seed: int, model: str) -> None:
     rng = np.random.default_rng(seed)
     m = Mind(
-        "constant", own=2, played={"model": model, "equally_near": 0.0},
-        num_trackers=6, sensing_range=float(rng.choice([2.5, 4.0])), start_distance=(1.0, 2.0),
-    )  # fmt: skip
+        "constant",
+        own=2,
+        played={"model": model, "equally_near": 0.0},
+        num_trackers=6,
+        sensing_range=float(rng.choice([2.5, 4.0])),
+        start_distance=(1.0, 2.0),
+    )
     m.d.step = 50
     m.target(complex(*rng.normal(size=2)), 0.5 * turn(1.0), PSI)
     m.d.mean_x, m.d.mean_y = 0.1, -0.2
@@ -69,10 +76,9 @@ def test_the_slot_is_that_of_the_least_total_arrival_time(seed: int, model: str)
     m.d.slot, m.d.leader = held[2], heard[0]
     full = rng.integers(0, 6)
     m.d.taken = np.uint64(1 << int(full))
-    cost = np.array([
-        [arrival(m, k, places[j], headings[j], held[j], j == 2 and k == full) for k in range(6)]
-        for j in heard
-    ])  # fmt: skip
+    cost = np.array(
+        [[arrival(m, k, places[j], headings[j], held[j], j == 2 and k == full) for k in range(6)] for j in heard]
+    )
     if model == "centralized":
         for row, j in enumerate(heard):
             cost[row] += [1e4 * ((k == 0) != (j == heard[0])) for k in range(6)]
@@ -108,9 +114,7 @@ def test_the_nearer_one_keeps_a_slot_that_two_claim(own: float, mate: float, los
         at = MIDDLE + m.slot(0) - own * 1j
 
         def lost(slot: int = 0, m: Mind = m, at: complex = at) -> bool:
-            return bool(slots.loses_slot(
-                m.f, m.s, m.d, m.mates, m.slots, m.own, slot, at.real, at.imag
-            ))  # fmt: skip
+            return bool(slots.loses_slot(m.f, m.s, m.d, m.mates, m.slots, m.own, slot, at.real, at.imag))
 
         within = abs(own - mate) < 0.1
         assert lost() == ((number == 1) if within else loses)
@@ -165,9 +169,7 @@ def crowd(places: int = 2) -> Mind:
 
 @pytest.mark.parametrize("places", [2, 4])
 @pytest.mark.parametrize("slot", [3, 0])
-def test_a_claim_of_one_that_has_no_place_in_the_observation_is_respected(
-    slot: int, places: int
-) -> None:
+def test_a_claim_of_one_that_has_no_place_in_the_observation_is_respected(slot: int, places: int) -> None:
     m = crowd(places)
     at = CENTRE + m.slot(slot) * 1.1
     first = choose(m, at, 0.0)
@@ -213,8 +215,7 @@ def test_a_slot_is_an_arm_in_the_slot_frame() -> None:
 
 
 def test_a_slot_counts_as_seeing_the_target_within_its_share_of_the_range() -> None:
-    m = Mind("constant", own=1, num_trackers=6, formation="ring", sensing_range=2.5,
-             start_distance=(1.0, 2.0))  # fmt: skip
+    m = Mind("constant", own=1, num_trackers=6, formation="ring", sensing_range=2.5, start_distance=(1.0, 2.0))
     m.d.step = 50
     m.target(0j, 0j)
     at = 1.0

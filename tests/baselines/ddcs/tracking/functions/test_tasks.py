@@ -54,9 +54,7 @@ def test_a_message_says_task_leader_term_pulse_and_slot() -> None:
     action = np.zeros(7, np.float32)
     messages.write_message(m.d, action)
     assert [messages.decode(float(word)) for word in action[2:]] == [*said.values()]
-    np.testing.assert_array_equal(
-        action, np.array([0, 0, *((v + 1) / 512 for v in said.values())], np.float32)
-    )
+    np.testing.assert_array_equal(action, np.array([0, 0, *((v + 1) / 512 for v in said.values())], np.float32))
 
 
 def test_a_count_is_newer_by_the_shorter_way() -> None:
