@@ -18,7 +18,8 @@ from PIL import Image
 
 import posse
 from posse.rendering.renderer import Renderer
-from posse_baselines import begin, load
+from posse_baselines import load
+from posse_training.film import Team
 from posse_training.leaderboard import read_result
 from posse_training.replay import record, write_replay
 
@@ -66,16 +67,12 @@ class _Arguments:
 
 def picture(scenario: str, shown: Shown) -> Image.Image:
     """Return a picture of the last team of a scenario's replay."""
-    policy = load(shown.teams[-1])
-    settings = posse.get_scenario(scenario)
-    settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
-    batch = posse.Batch(settings, 1, seed=SEED, split="test", first_world=shown.world)
-    renderer = Renderer(settings, size=(SIDE, SIDE), title="")
-    memory, observations = begin(policy, batch), batch.reset()
-    for _ in range(round(shown.picture / settings.control_step)):
-        actions, memory = policy.act(observations, memory)
-        frame = renderer.draw(batch, annotations=policy.annotations(memory))
-        observations, *_ = batch.step(actions)
+    team = Team(load(shown.teams[-1]), posse.get_scenario(scenario), SEED, shown.world, "test")
+    renderer = Renderer(team.batch.scenario, size=(SIDE, SIDE))
+    for _ in range(round(shown.picture / team.batch.scenario.control_step)):
+        renderer.follow(team.batch)
+        team.step()
+    frame = renderer.draw(team.batch, colours=team.colours)
     assert frame is not None
     return Image.fromarray(frame).quantize(64)
 

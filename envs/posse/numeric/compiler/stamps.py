@@ -33,7 +33,6 @@ _NO_KERNELS: Final = {
         "runs",
         "shipping",
         "tuning",
-        "viewer",
     ),
 }
 """Rooms without compiled code, by package; kernels do not depend on them."""
