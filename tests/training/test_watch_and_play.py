@@ -73,10 +73,7 @@ def test_a_page_is_recorded_and_opened(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["watch"], "No policies given"),
-        (["watch", "idle", "--speed", "2"], "--speed 2 is for films"),
         (["watch", "idle", "--page", "--film", "a.gif"], "exclude each other"),
-        (["watch", "idle", "--size", "10", "10"], "--size 10 10 must be 200 to 4096 px"),
         (["watch", "idle"], "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): --page records"),
         (["play", "--as", "tracker_9"], "--as tracker_9 is no robot; there are: tracker_0"),
         (["play", "--against", "planner"], "cannot play against a person"),

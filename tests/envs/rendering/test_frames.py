@@ -94,18 +94,6 @@ def test_robots_slots_and_headings_are_drawn_where_they_are() -> None:
     assert above < low
 
 
-def test_a_robot_that_moves_changes_the_picture_where_it_was_and_is() -> None:
-    batches = [placed((x, 2, 0), (-6, -6, 0), (6, 6, 0)) for x in (-4.0, -3.0)]  # the others keep the view in place
-    renderers = [Renderer(batch.scenario, size=SIZE) for batch in batches]
-    first, second = (frame_of(renderer, batch) for renderer, batch in zip(renderers, batches, strict=True))
-    rows, columns = np.nonzero((first != second).any(axis=-1))
-    scale = renderers[0].project([1, 0])[0] - renderers[0].project([0, 0])[0]
-    metres = (np.stack([columns, rows], -1) - renderers[0].project([-3.5, 2.0])) / scale
-    assert (metres.min(axis=0) < (-0.5, -0.05)).all()
-    assert (metres.max(axis=0) > (0.5, 0.05)).all()
-    assert np.abs(metres).max() < 1.1
-
-
 def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
     batch = worlds("obstacles", 6, num_trackers=1, sensing_range=5.0)
     looked = 0
