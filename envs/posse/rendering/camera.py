@@ -1,7 +1,7 @@
 """The view of a frame: world metres to pixels.
 
 The view contains all working robots, changes its scale rarely, and moves smoothly in *simulated*
-time, so that it depends only on the states drawn. In an arena it shows no more than the arena.
+time, so that it depends only on the states drawn. In an arena it stays on the arena.
 """
 
 from __future__ import annotations
@@ -49,13 +49,12 @@ class Camera:
         lowest, highest = points.min(axis=0), points.max(axis=0)
         middle = (lowest + highest) / 2
         least = _LEAST_SPAN / min(pixels)  # m per pixel
-        most = max(least, (self._arena + 2 * _MARGIN) / min(pixels))
-        needed = float(((highest - lowest + 2 * _MARGIN) / pixels).max())
-        level = math.ceil(math.log(min(max(needed, least), most) / least, _LEVEL) - 1e-9)
+        needed = max(least, float(((highest - lowest + 2 * _MARGIN) / pixels).max()))
+        level = math.ceil(math.log(needed / least, _LEVEL) - 1e-9)
         # Zoom out at once when necessary; zoom in only by a full level.
         if time is None or self._level is None or level > self._level or level < self._level - 1:
             self._level = level
-        wanted = min(least * _LEVEL**self._level, most)
+        wanted = least * _LEVEL**self._level
         if math.isfinite(self._arena):  # nothing outside the arena
             slack = np.maximum(self._arena / 2 + _MARGIN - pixels * wanted / 2, 0)
             middle = np.clip(middle, -slack, slack)

@@ -19,10 +19,8 @@ if TYPE_CHECKING:
 _LEAST_RADIUS: Final = 5.0  # points, of a drawn robot
 _MOST_LINKED: Final = 12  # trackers
 _GRID_STEP: Final = 2.0  # m
-HEADER: Final = 40
-"""Height of the line above the picture, points."""
-FOOTER: Final = 30
-"""Height of the line below it, points."""
+HEADER: Final = 40  # points, height of the line above the picture
+FOOTER: Final = 30  # points, height of the line below it
 _TITLE, _TEXT, _SMALL, _EDGE = 21, 17, 14, 14  # points: sizes of text, and a margin
 _BAR_LENGTHS: Final = (0.5, 1, 2, 5, 10, 20, 50, 100)  # m
 _BAR_MOST: Final = 110  # points
@@ -91,13 +89,12 @@ def grid(d: Drawing) -> None:
 
     Grid lines would change every row of a video with a moving view; crosses compress better.
     """
-    arm = 4 * d.point
     low, high = np.ceil(d.camera.floor() / _GRID_STEP)
     columns, rows = (np.arange(a, b) * _GRID_STEP for a, b in zip(low, high, strict=True))
     crosses = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    for x, y in d.camera.project(crosses):
-        d.canvas.line((x - arm, y), (x + arm, y), d.point, style.GRID)
-        d.canvas.line((x, y - arm), (x, y + arm), d.point, style.GRID)
+    for place in d.camera.project(crosses):
+        for arm in ((4 * d.point, 0), (0, 4 * d.point)):
+            d.canvas.line(place - arm, place + arm, d.point, style.GRID)
 
 
 def trails(d: Drawing) -> None:
@@ -121,8 +118,7 @@ def frame(d: Drawing) -> None:
 def slots(d: Drawing) -> None:
     """Draw each slot as a circle of the tolerance, filled when it is occupied."""
     radius = d.scene.scenario.tolerance * d.camera.scale
-    places = d.camera.project(d.scene.slots)
-    for place, occupied in zip(places, d.scene.occupied, strict=True):
+    for place, occupied in zip(d.camera.project(d.scene.slots), d.scene.occupied, strict=True):
         if occupied:
             d.canvas.disc(place, radius, style.SLOT_FILLED)
         d.canvas.disc(place, radius, style.SLOT, 1.5 * d.point)
@@ -186,11 +182,9 @@ def flashes(d: Drawing) -> None:
 def header(d: Drawing) -> None:
     """Write the title on the left, time and score on the right."""
     middle, edge = HEADER * d.point / 2, _EDGE * d.point
-    canvas, right = d.canvas, d.canvas.size[0] - edge
-    canvas.text(d.title, (edge, middle), _TITLE * d.point, style.INK)
-    canvas.text(f"score {d.scene.score:.2f}", (right, middle), _TEXT * d.point, style.INK, anchor=1)
-    # A column of fixed width, so that changing digits do not move the text.
-    canvas.text(f"{d.scene.time:.1f} s", (right - 88 * d.point, middle), _TEXT * d.point, style.FAINT_INK, anchor=1)
+    d.canvas.text(d.title, (edge, middle), _TITLE * d.point, style.INK)
+    figures = f"{d.scene.time:.1f} s    score {d.scene.score:.2f}"
+    d.canvas.text(figures, (d.canvas.size[0] - edge, middle), _TEXT * d.point, style.INK, anchor=1)
 
 
 def footer(d: Drawing) -> None:
@@ -198,9 +192,9 @@ def footer(d: Drawing) -> None:
     point, scale, middle = d.point, d.camera.scale, d.canvas.size[1] - FOOTER * d.point / 2
     length = max((v for v in _BAR_LENGTHS if v * scale <= _BAR_MOST * point), default=_BAR_LENGTHS[0])
     left, right = _EDGE * point, _EDGE * point + length * scale
-    d.canvas.line((left, middle), (right, middle), 1.6 * point, style.INK)
-    for end in (left, right):
-        d.canvas.line((end, middle - 4 * point), (end, middle + 4 * point), 1.6 * point, style.INK)
+    for start, end in ((left, right), (left, left), (right, right)):
+        arm = 4 * point if start == end else 0
+        d.canvas.line((start, middle - arm), (end, middle + arm), 1.6 * point, style.INK)
     d.canvas.text(f"{length:g} m", (right + 7 * point, middle), _SMALL * point, style.INK)
 
 

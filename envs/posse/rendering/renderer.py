@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from posse.engine.batch import Batch
 
 RENDER_MODES: Final = ("human", "rgb_array")
-LEAST_SIZE: Final = 200
-"""Least width and height of a frame, px."""
+LEAST_SIZE: Final = 200  # px, of width and height
 
 
 class Renderer:
@@ -108,13 +107,12 @@ class Renderer:
             colours: Red, green, blue of each tracker, 0 to 255; default: grey.
 
         Returns:
-            A frame (H, W, 3) uint8 in the mode ``"rgb_array"``. ``None`` in the mode ``"human"``:
-            after the time of a frame at the window's speed; where it is paused, once the user steps
-            or goes on; at once after the user has closed it.
+            A frame (H, W, 3) uint8 in the mode ``"rgb_array"``; ``None`` in the mode ``"human"``,
+            once the frame's time is over or, in a paused window, the user steps or goes on.
 
         Raises:
-            ValueError: The batch is of another scenario, has no such world, or another number of
-                trackers; or the renderer was closed and the mode is ``"rgb_array"``.
+            ValueError: The batch is of another scenario or has no such world, another number of
+                colours, or the renderer of the mode ``"rgb_array"`` was closed.
             ResetNeeded: The batch has not been reset.
         """
         if self._closed:

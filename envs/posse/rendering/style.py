@@ -11,8 +11,7 @@ from typing import Final
 
 Colour = tuple[int, int, int]
 
-DESIGN_SIZE: Final = 640
-"""Shorter side of a frame in which a point is a pixel, px."""
+DESIGN_SIZE: Final = 640  # px
 
 PAPER: Final[Colour] = (255, 255, 255)
 GROUND: Final[Colour] = (248, 249, 251)
