@@ -36,7 +36,6 @@ BENCHMARL_PYTHON: Final = Path(".venv-recipes/bin/python")
 CHANGES: Final[dict[str, dict[str, Any]]] = {
     "ppo": {},
     "mappo": {"algorithm": "mappo"},
-    "recurrent-ppo": {"algorithm": "recurrent-ppo"},
     "sac": {"algorithm": "sac"},
     "td3": {"algorithm": "td3"},
     "ppo-imitation": {"imitate": "ddcs-tuned"},

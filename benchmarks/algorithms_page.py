@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY
+from posse_training.reports.pictures.palette import BLUE, GREY, ORANGE, PURPLE, RED, SKY
 from posse_training.reports.pictures.parts import legend, note
 from posse_training.reports.pictures.style import RC, WIDTH, Style, marker_of
 from posse_training.reports.statistics import mean
@@ -38,7 +38,6 @@ COLUMNS: Final = (
 LOOKS: Final = {
     "ppo": Style(BLUE, "o"),
     "mappo": Style(SKY, "s", (0, (5, 2))),
-    "recurrent-ppo": Style(GREEN, "^"),
     "ppo-imitation": Style(ORANGE, "D", (0, (3, 1.5))),
     "sac": Style(RED, "v"),
     "qmix": Style(GREY, "P", (0, (1, 1))),

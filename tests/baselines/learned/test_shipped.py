@@ -19,7 +19,6 @@ from posse_training.shipping.check import CHECK_WORLDS, check_scenarios, make_ch
 from posse_training.shipping.ship import LARGEST
 
 FILES = sorted(SHIPPED.glob("*.safetensors"))
-CARDS = sorted(SHIPPED.glob("*.json"))
 
 TOLERANCE = 0.003
 """Allowed difference between the mean score of a check and that of its card.
@@ -35,7 +34,6 @@ what a machine can do, and what is really wrong moves it farther: ``test_what_is
 def test_every_file_is_known_by_its_name() -> None:
     assert sorted(shipped()) == [path.stem for path in FILES]
     assert set(shipped()) <= set(policy_names())
-    assert [card.stem for card in CARDS] == [path.stem for path in FILES]
 
 
 def test_a_name_that_is_not_shipped_is_refused_with_those_that_are() -> None:
@@ -51,10 +49,6 @@ def problems_of(path: Path) -> list[str]:
         found.append(f"{path.stat().st_size:,} bytes")
     policy = LearnedPolicy.from_file(path)
     card = policy.card
-    if not path.with_suffix(".json").is_file():
-        return [*found, "no card beside it"]
-    if json.loads(path.with_suffix(".json").read_text()) != card:
-        found.append("the card beside it is not the one inside")
     needed = {
         "check",
         "choice",
@@ -192,8 +186,6 @@ def test_what_is_missing_is_noticed(made_up: Path, monkeypatch: pytest.MonkeyPat
     assert "version 0 of 'constant'" in problems(check=stale)
     policy.with_card({"name": "bare"}).save(made_up)
     assert "its card lacks check" in "; ".join(problems_of(made_up))
-    made_up.with_suffix(".json").unlink()
-    assert problems_of(made_up) == ["no card beside it"]
 
 
 def test_what_is_wrong_shows(made_up: Path) -> None:

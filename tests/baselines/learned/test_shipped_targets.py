@@ -30,7 +30,6 @@ def test_a_shipped_target_is_what_its_card_says(path: Path) -> None:
     policy = LearnedPolicy.from_file(path)
     card = policy.card
     assert path.stat().st_size <= LARGEST
-    assert json.loads(path.with_suffix(".json").read_text(encoding="utf-8")) == card
     assert card["encoding_hash"] == policy.encoding.digest
     assert not re.search(r"(?<![\w.])/(tmp|home|root|work|Users)/", json.dumps(card))
     comparison = card["comparison"]

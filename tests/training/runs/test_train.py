@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -55,14 +54,14 @@ def test_an_advised_training_exports_what_it_played(tmp_path: Path, changes: dic
 
 def test_the_card_says_what_it_is(tmp_path: Path) -> None:
     best = train(small(tmp_path), console=quiet())
-    card = json.loads(best.with_suffix(".json").read_text())
+    policy = LearnedPolicy.from_file(best)
+    card = policy.card
     assert card["scenarios"][0]["name"] == "constant"
     assert card["scenarios"][0]["num_trackers"] == 2
     assert card["trained_splits"] == ["train"]
     assert card["seed"] == 3
-    policy = LearnedPolicy.from_file(best)
     assert card["encoding_hash"] == policy.encoding.digest
-    curve = json.loads((tmp_path / "last.json").read_text())["curve"]
+    curve = LearnedPolicy.from_file(tmp_path / "last.safetensors").card["curve"]
     assert [point["steps"] for point in curve] == [640, 1280]
     assert card["validation_safe_score"] == max(p["safe_score"] for p in curve)
     table = (tmp_path / "curve.csv").read_text().splitlines()

@@ -8,7 +8,6 @@ from typing import Final
 
 from posse import ObservationLayout
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.lstm import GATES
 from posse_training.errors import SettingsError
 from posse_training.runs.settings import TrainSettings
 
@@ -26,11 +25,8 @@ def memory_needed(s: TrainSettings) -> int:
     each = min(scenario.num_trackers for scenario in scenarios) if s.side == "trackers" else 1
     slots = s.num_worlds * each
     rows = slots * s.rollout * (inputs + _OWN) if s.on_policy else s.replay * 2 * (inputs + _OWN)
-    read = s.lstm_size if s.recurrent else inputs
-    widths = (read, *s.hidden, 2 + s.message_size)
+    widths = (inputs, *s.hidden, 2 + s.message_size)
     weights = sum(a * b for a, b in itertools.pairwise(widths))
-    if s.recurrent:
-        weights += GATES * s.lstm_size * (inputs + s.lstm_size)
     worlds = s.num_worlds * trackers * 2 * layout.size
     return _FLOAT * (rows + _COPIES * weights + worlds)
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from posse_training.errors import SettingsError
 
-ALGORITHMS: Final = ("ppo", "mappo", "recurrent-ppo", "sac", "td3")
+ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
 _WIDEST: Final = 8192
 _CHOICES: Final = {
     "algorithm": ALGORITHMS,
@@ -25,7 +25,6 @@ _INTEGERS: Final = {
     "message_size": (0, 64),
     "minibatch": (2, 10**9),
     "rollout": (1, 10**6),
-    "lstm_size": (1, _WIDEST),
     "epochs": (1, 1000),
     "replay": (1, 10**9),
     "learning_starts": (0, 10**12),

@@ -9,7 +9,6 @@ cores, start it several times with different ``--only``.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,8 @@ from typing import Final
 import tyro
 from rich.console import Console
 
+from posse_baselines import PolicyError
+from posse_baselines.learned import LearnedPolicy
 from posse_training.errors import SettingsError
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.saved.folder import LAST, SETTINGS
@@ -75,9 +76,8 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
 def steps_of(run: TrainSettings) -> int:
     """Return the steps of a run's last policy, 0 if it has not ended."""
     try:
-        card = json.loads((run.run_folder / LAST).with_suffix(".json").read_text(encoding="utf-8"))
-        return int(card["steps"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return int(LearnedPolicy.from_file(run.run_folder / LAST).card["steps"])
+    except PolicyError:
         return 0
 
 

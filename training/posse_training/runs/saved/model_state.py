@@ -86,7 +86,6 @@ def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:
     }
     arrays["last_obs"] = np.asarray(model._last_obs)
     arrays["last_starts"] = np.asarray(model._last_episode_starts)
-    arrays |= {name: state.numpy() for name, state in _lstm_states(model).items()}
     buffer = getattr(model, "replay_buffer", None)
     if buffer is not None:
         state["replay"] = [buffer.pos, buffer.full]
@@ -101,11 +100,9 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     Raises:
         ValueError: Arrays of other shapes.
     """
-    states = _lstm_states(model)
     for name, shape in (
         ("last_obs", (model.n_envs, *(model.observation_space.shape or ()))),
         ("last_starts", (model.n_envs,)),
-        *((name, tuple(tensor.shape)) for name, tensor in states.items()),
     ):
         if arrays[name].shape != shape:
             raise ValueError(f"{name} has the shape {arrays[name].shape}, wanted {shape}")
@@ -136,24 +133,11 @@ def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]
     model.action_space.np_random.bit_generator.state = state["action_space"]
     model._last_obs = arrays["last_obs"].copy()
     model._last_episode_starts = arrays["last_starts"].copy()
-    for name, tensor in states.items():
-        tensor.copy_(torch.from_numpy(arrays[name]))
-        _check_finite(name, tensor)
     buffer = getattr(model, "replay_buffer", None)
     if buffer is not None:
         buffer.pos, buffer.full = state["replay"]
         for name in _REPLAY:
             getattr(buffer, name)[: buffer.size()] = arrays[f"replay.{name}"]
-
-
-def _lstm_states(model: BaseAlgorithm) -> dict[str, torch.Tensor]:
-    """Return the states of recurrent networks by name, (1, slots, cells) each; none: empty."""
-    states = getattr(model, "_last_lstm_states", None)
-    if states is None:
-        return {}
-    (h, c), (value_h, value_c) = states.pi, states.vf
-    named = {"hidden": h, "cell": c, "value_hidden": value_h, "value_cell": value_c}
-    return {f"lstm.{name}": tensor for name, tensor in named.items()}
 
 
 def _checked_number(name: str, value: Any) -> float:
