@@ -89,7 +89,7 @@ def judge(name: str, folder: Path, ended: Ended) -> None:
     if ended.status:
         assert str(folder) in ended.printed, f"{name} names no place: {ended}"
         judge_unfinished(name, folder)
-        left = [path.name for path in folder.rglob(".*.partial")]
+        left = [path.name for path in folder.rglob(".posse-*")]
         assert not left, f"{name}: {left}"
         ended = run(command.again(folder))
         assert ended.status == 0, f"{name}: {ended}"

@@ -41,7 +41,7 @@ def case(seed: int, number: int) -> None:
         results = (whole.left, whole.left if command.old is None else whole.old)
         possible = [result for result, each in zip(results, ended, strict=True) if not each.status]
         assert command.left(folder) in possible, f"{name}: neither one's result"
-        left = [path.name for path in folder.rglob(".*.partial")]
+        left = [path.name for path in folder.rglob(".posse-*")]
         assert not left, f"{name}: {left}"
         if command.never_fails:
             again = run(command.first(folder))

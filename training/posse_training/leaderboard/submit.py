@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import tyro
 
 import posse
 from posse_baselines import Policy, load, policy_names
+from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_code
 from posse_training.errors import ResultFileError
 from posse_training.leaderboard.result_file import COLUMNS, DIGITS, ResultFile, write_result
@@ -153,7 +153,7 @@ def main(arguments: Sequence[str]) -> None:
     write_result(result, which.out)
     copy = which.out.parent / result.policy
     if result.policy_kind == "file" and not (copy.exists() and copy.samefile(which.policy)):
-        shutil.copyfile(which.policy, copy)
+        write_atomically(copy, Path(which.policy).read_bytes())
     print(
         f"{which.out}: {result.label} on {result.scenario}, safe score "
         f"{mean(result.column('safe_score'))} over {result.worlds:,} worlds\n"

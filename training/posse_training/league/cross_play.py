@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
+from posse_training.files import read_json
 from posse_training.league.members import TARGET, Member
 from posse_training.league.settings import LeagueSettings
 from posse_training.league.work import Pair, Work
@@ -94,6 +95,6 @@ class CrossPlay:
 
 
 def _read(path: Path) -> Cell:
-    values = json.loads(path.read_text(encoding="utf-8"))
+    values = read_json(path)
     estimates = {name: Estimate(**values[name]) for name in _ESTIMATES}
     return Cell(values["team"], values["target"], **estimates)

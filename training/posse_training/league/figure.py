@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from posse import get_scenario
+from posse_baselines.files import replacing
 from posse_training.league.cross_play import TEST_SEED
 from posse_training.league.results import League
 from posse_training.reports.pictures.parts import note, plain
@@ -49,8 +50,9 @@ def draw_matrix(found: League) -> list[Path]:
         figure.colorbar(image, label="score of the team", shrink=0.8)
         note(figure, _played(found))
         files = [found.settings.path / f"{NAME}.{suffix}" for suffix in ("png", "svg")]
-        figure.savefig(files[0], dpi=150)
-        figure.savefig(files[1], metadata=_META)
+        for path, stated in zip(files, ({"dpi": 150}, {"metadata": _META}), strict=True):
+            with replacing(path) as part:
+                figure.savefig(part, **stated)
     return files
 
 

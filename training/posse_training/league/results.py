@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from rich.table import Table
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.league.cross_play import Cell
 from posse_training.league.members import TARGET, TEAM, Member
 from posse_training.league.settings import LeagueSettings

@@ -10,8 +10,9 @@ from typing import Any, Final, Literal
 
 from posse import get_scenario
 from posse_baselines import load, load_target
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.errors import RunFolderError, SettingsError
+from posse_training.files import read_json
 
 FILE: Final = "league.json"
 _FREE: Final = ("generations", "responses", "response_steps", "episodes", "folder")
@@ -118,7 +119,7 @@ def keep(settings: LeagueSettings) -> None:
     path, mine = settings.path / FILE, settings.to_dict()
     if path.is_file():
         try:
-            theirs = json.loads(path.read_text(encoding="utf-8"))
+            theirs = read_json(path)
             differing = [n for n in mine if n not in _FREE and mine[n] != theirs[n]]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise RunFolderError(f"{path} is damaged: {error!r:.200}") from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
@@ -110,9 +109,6 @@ def _check_integer(name: str, value: Any, low: int, high: int) -> None:
 
 
 def _fail(name: str, value: Any, why: str) -> None:
-    try:
-        shown = repr(value)
-    except ValueError:  # integers of more than 4,300 digits have no text
-        shown = f"{'-' if value < 0 else ''}10**{math.floor(value.bit_length() * math.log10(2))}"
+    shown = repr(value)
     short = shown if len(shown) <= 80 else f"{shown[:60]}... ({len(shown):,} characters)"
     raise SettingsError(f"{name}={short} is invalid: {why}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from posse import Scenario, ScenarioError, get_scenario
 from posse_baselines import PolicyError, load, target_names
 from posse_baselines.registry import ships_or_is_file
 from posse_training.errors import SettingsError
+from posse_training.files import read_json
 from posse_training.runs.ranges import check_ranges
 
 __all__ = ["SettingsError", "TrainSettings", "read_settings"]
@@ -278,14 +278,12 @@ def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
         SettingsError: There is no such file, it is damaged, or it names code to import.
     """
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = read_json(path)
         if not trust_code:
             _refuse_code(path, values)
         return TrainSettings.from_dict(values)
     except FileNotFoundError:
         raise SettingsError(f"{path.parent} is not a run folder: it has no {path.name}") from None
-    except RecursionError:
-        raise SettingsError(f"{path} is damaged: its values are nested too deeply") from None
     except (SettingsError, ScenarioError, PolicyError):
         raise
     except (OSError, TypeError, ValueError) as error:

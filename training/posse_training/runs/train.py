@@ -15,7 +15,6 @@ from posse_training.errors import DivergedError
 from posse_training.runs.callback import TrainingCallback
 from posse_training.runs.display import Display
 from posse_training.runs.logs import check_wandb, make_logger
-from posse_training.runs.memory import check_memory
 from posse_training.runs.models import make_adviser, make_env, make_model
 from posse_training.runs.saved.checkpoint import read_checkpoint
 from posse_training.runs.saved.folder import BEST, LAST, SETTINGS, locked_run, open_run
@@ -47,7 +46,7 @@ def train(
         num_threads: Threads that step the worlds; default: one per core. Never changes the result.
 
     Raises:
-        SettingsError: More memory than there is, or a package that is not installed.
+        SettingsError: A package that is not installed.
         PolicyError: An unknown policy, or one that cannot be an adviser.
         RunFolderError: The folder is in use, or already holds a run.
         CheckpointError: A checkpoint cannot be written or read.
@@ -59,7 +58,7 @@ def train(
         saved = open_run(folder, settings, resume)
         env = make_env(settings, num_threads)
         model = make_model(settings, env)
-        model.set_logger(make_logger(folder, settings, display.note))
+        model.set_logger(make_logger(folder, settings))
         steps = steps_made(settings, env.num_envs)
         if steps != settings.steps:
             display.note(f"rollouts are completed: {steps:,} steps in all")
@@ -109,7 +108,6 @@ def resume(folder: Path, *, console: Console | None = None, steps: int | None = 
 def check_before(settings: TrainSettings) -> None:
     """Raise what can be known to be wrong before the run folder is made."""
     check_wandb(settings)
-    check_memory(settings)
     make_adviser(settings)
     check_opponents(settings)
     for policy in (settings.imitate, settings.beside):

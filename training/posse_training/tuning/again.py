@@ -5,7 +5,6 @@ Each card states the command that made it. A run that was interrupted resumes.
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,6 +15,7 @@ import tyro
 from rich.console import Console
 
 from posse_baselines.tuned import TUNED, tuned_files
+from posse_training.files import read_json
 from posse_training.tuning.settings import TuneSettings
 from posse_training.tuning.tune import tune
 
@@ -34,7 +34,7 @@ def repeat_all(console: Console) -> Iterator[Path]:
     """Repeat the runs of all shipped files, and write these again; yield the results."""
     for name in TUNED:
         for path in tuned_files(name).values():
-            settings = settings_of_card(json.loads(path.read_text(encoding="utf-8")))
+            settings = settings_of_card(read_json(path))
             console.print(f"{name} on {settings.scenario}", style="bold")
             yield tune(settings, console=console)
 

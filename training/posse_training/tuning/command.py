@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 
 import tyro
 
 from posse_training.errors import require
+from posse_training.files import read_json
 from posse_training.tuning.settings import TuneSettings
 
 
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str]) -> None:
     except KeyboardInterrupt:
         print("\nto resume: run the same command again", file=sys.stderr)
         raise
-    card = json.loads(path.read_text(encoding="utf-8"))
+    card = read_json(path)
     scores = card["scores"]
     for which in ("untuned", "tuned"):
         found = scores[which]

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError, RunFolderError
+from posse_training.files import read_json
 from posse_training.tuning.search import Generation
 
 STATE: Final = "state.json"
@@ -71,7 +72,7 @@ def read_state(folder: Path, identity: dict[str, Any]) -> State | None:
             )
         return None
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         if content["format"] != _FORMAT:
             raise CheckpointError(f"the format of {path} is {content['format']!r:.80}, this version reads {_FORMAT!r}")
         text = content["state"]

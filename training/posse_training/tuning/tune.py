@@ -13,7 +13,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from posse_baselines import Tunable
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_baselines.tuned import TUNED
 from posse_baselines.tuned.files import SHIPPED_TUNED
 from posse_training.cluster.settings import of_option

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from posse import get_scenario
+from posse_baselines.files import replacing
 from posse_training.reports.comparing.plays import Plays
 from posse_training.reports.comparing.sweeps import BOUND, SWEEPS, Point, Sweep
 from posse_training.reports.pictures.learning import Curve, learning
@@ -77,7 +78,8 @@ def draw(
             for suffix in (".png", ".svg"):
                 path = folder / f"{name}{suffix}"
                 dated = {"Date": None} if suffix == ".svg" else None
-                figure.savefig(path, dpi=160, metadata=dated)
+                with replacing(path) as part:
+                    figure.savefig(part, dpi=160, metadata=dated)
                 files.append(path)
         return files
 
