@@ -31,7 +31,7 @@ from posse_training.league.members import TARGET, TEAM, founders
 from posse_training.league.on_cluster import ClusterWork
 from posse_training.league.settings import LeagueSettings
 from posse_training.league.work import Work
-from posse_training.reports.comparing.players import PlayError
+from posse_training.reports.failures import PlayError
 from posse_training.runs.saved.folder import LAST
 
 SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}

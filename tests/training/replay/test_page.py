@@ -19,9 +19,9 @@ from tests.support.replays import ATTACK, hostile, short
 
 from posse.rendering import style
 from posse_training.cli import main
+from posse_training.errors import SettingsError
 from posse_training.replay import read_replay, record, write_replay
 from posse_training.replay.page import MODULES, colours, page
-from posse_training.runs.settings import SettingsError
 
 WEB = resources.files("posse_training.replay") / "web"
 

@@ -50,9 +50,9 @@ def draw_matrix(found: League) -> list[Path]:
         figure.colorbar(image, label="score of the team", shrink=0.8)
         note(figure, _played(found))
         files = [found.settings.path / f"{NAME}.{suffix}" for suffix in ("png", "svg")]
-        for path, stated in zip(files, ({"dpi": 150}, {"metadata": _META}), strict=True):
+        for path in files:
             with replacing(path) as part:
-                figure.savefig(part, **stated)
+                figure.savefig(part, dpi=150, metadata=_META if path.suffix == ".svg" else None)
     return files
 
 

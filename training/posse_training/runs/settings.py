@@ -16,8 +16,6 @@ from posse_training.errors import SettingsError
 from posse_training.files import read_json
 from posse_training.runs.ranges import check_ranges
 
-__all__ = ["SettingsError", "TrainSettings", "read_settings"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class TrainSettings:

@@ -14,6 +14,7 @@ from posse_baselines import PolicyError, load
 from posse_training.errors import DivergedError
 from posse_training.runs.callback import TrainingCallback
 from posse_training.runs.display import Display
+from posse_training.runs.imitation import imitate
 from posse_training.runs.logs import check_wandb, make_logger
 from posse_training.runs.models import make_adviser, make_env, make_model
 from posse_training.runs.saved.checkpoint import read_checkpoint
@@ -22,7 +23,6 @@ from posse_training.runs.settings import TrainSettings, read_settings
 from posse_training.runs.sides import check_opponents, load_own
 from posse_training.runs.start import start_from
 from posse_training.runs.validation import first_statistics, score_beside
-from posse_training.sb3.imitation import imitate
 from posse_training.sb3.normalisation import RunningStatistics
 
 _NOT_FINITE = (

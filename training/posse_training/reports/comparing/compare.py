@@ -25,7 +25,7 @@ from posse_training.reports.comparing.players import Players
 from posse_training.reports.comparing.progress import Progress
 from posse_training.reports.comparing.run import MARL_EVAL, PLANNER, REPORT, SUMMARY, ComparisonRun
 from posse_training.reports.comparing.sweeps import SWEEPS, Sweep
-from posse_training.reports.evaluation import refuse_trained_split
+from posse_training.reports.episodes import refuse_trained_split
 
 _ALL: Final = ("all",)
 _PIPED: Final = 240

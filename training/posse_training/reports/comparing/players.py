@@ -7,14 +7,10 @@ exceeds the time limit.
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable, Iterable
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-import posse
 import posse_baselines
-import posse_training
 from posse import Scenario
 from posse_baselines import Policy, PolicyError
 from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
@@ -23,17 +19,11 @@ from posse_training.reports.comparing.contenders import Contender
 from posse_training.reports.comparing.plays import Plays
 from posse_training.reports.comparing.worker import Worker
 from posse_training.reports.evaluation import evaluate
+from posse_training.reports.failures import PlayError, describe
 from posse_training.reports.results import Results
-
-_OURS: Final = tuple(str(Path(module.__file__ or "").parent) for module in (posse, posse_baselines, posse_training))
-_LONGEST: Final = 300  # characters of an error in a summary
 
 Play = tuple[Contender, Scenario, int]
 """A contender, a scenario and a number of episodes."""
-
-
-class PlayError(RuntimeError):
-    """A policy that raised, returned invalid actions, exceeded the time limit or crashed."""
 
 
 class Players:
@@ -199,18 +189,3 @@ def _record(
         )
     except Exception as error:
         raise PlayError(describe(error)) from None
-
-
-def describe(error: BaseException) -> str:
-    """Return an error in one line: its message, and where in the policy's code it was raised."""
-    if isinstance(error, PlayError):
-        return str(error)
-    message = " ".join(str(error).split())
-    if len(message) > _LONGEST:
-        message = f"{message[:_LONGEST]}..."
-    where = ""
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        if not frame.filename.startswith(_OURS):
-            where = f" ({frame.filename}, line {frame.lineno})"
-            break
-    return f"{type(error).__name__}: {message}{where}"

@@ -17,10 +17,11 @@ from posse_training.reports.comparing.comparison import Comparison, summary
 from posse_training.reports.comparing.contenders import Contender
 from posse_training.reports.comparing.extremes import Extreme, extremes
 from posse_training.reports.comparing.folder import FileNames
-from posse_training.reports.comparing.players import Play, PlayError, Players
+from posse_training.reports.comparing.players import Play, Players
 from posse_training.reports.comparing.plays import Plays
 from posse_training.reports.comparing.progress import Progress
 from posse_training.reports.comparing.sweeps import LEADER_LOSS, Sweep, play_sweeps, write_points
+from posse_training.reports.failures import PlayError
 
 PLANNER: Final = "planner"
 """The reference that is shown with every team."""

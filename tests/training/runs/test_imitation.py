@@ -11,11 +11,11 @@ from tests.support.runs import HORIZON, assert_equal, numbers, quiet, small
 
 import posse
 from posse_baselines import BasePolicy, PolicyError
+from posse_training.runs.imitation import imitate
 from posse_training.runs.models import make_env, make_model
 from posse_training.runs.saved.export import export
 from posse_training.runs.train import train
 from posse_training.sb3 import Normaliser, RunningStatistics
-from posse_training.sb3.imitation import imitate
 
 
 class _Circle(BasePolicy):

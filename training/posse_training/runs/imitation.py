@@ -17,8 +17,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_baselines.learned import Encoding
 from posse_baselines.policy import Policy
+from posse_training.runs.expert_play import play_round
 from posse_training.runs.settings import TrainSettings
-from posse_training.sb3.expert_play import play_round
 from posse_training.sb3.normalisation import RunningStatistics
 
 WORLDS: Final = 64
