@@ -17,6 +17,7 @@ from posse import Batch, get_scenario, scenario_names
 from posse_baselines import load_target
 from posse_training.cluster.settings import RayOption, how_to_resume, of_option, work_of
 from posse_training.errors import SettingsError
+from posse_training.processes import refuse_unguarded
 from posse_training.reports.comparing.comparison import Comparison, table, write_summary
 from posse_training.reports.comparing.contenders import read_contenders
 from posse_training.reports.comparing.folder import replaced
@@ -97,6 +98,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
         ClusterError: There is no such cluster.
         ComparisonError: The folder cannot be replaced; what it held is unchanged.
     """
+    refuse_unguarded()
     scenarios, sweeps = _check(settings)
     contenders = read_contenders(settings.policies)
     if settings.planner_episodes > 0 and PLANNER not in settings.policies:

@@ -11,7 +11,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
-from posse_training.errors import TimeLimitError
+from posse_training.errors import SettingsError, TimeLimitError
+from posse_training.processes import UNGUARDED
 
 _GRACE: Final = 2.0  # s beyond the limit, in which the call may notice it by itself
 _ORPHAN: Final = 4.0  # s beyond the limit, after which the process ends without its parent
@@ -43,6 +44,7 @@ class Worker:
         Raises:
             TimeLimitError: The process was killed.
             EOFError: The process ended unexpectedly.
+            SettingsError: It could not begin, as in a script without a main guard.
             Exception: As raised by the function.
         """
         connection = self._start()
@@ -86,12 +88,21 @@ class Worker:
         self._process = context.Process(target=_serve, args=(other,), daemon=True)
         self._process.start()
         other.close()
+        try:
+            self._connection.recv()
+        except EOFError:
+            self.end()
+            raise SettingsError(
+                "the process that plays package.module:Class ended before it could begin. If a script "
+                f"started it: {UNGUARDED}"
+            ) from None
         return self._connection
 
 
 def _serve(connection: Connection) -> None:
     """Make calls until the parent closes the connection."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this
+    connection.send("ready")
     nowhere = Path("/dev/null" if Path("/dev/null").exists() else "NUL").open("w")  # noqa: SIM115
     while True:
         try:
