@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from posse_training.errors import SettingsError
 
-ALGORITHMS: Final = ("ppo", "mappo", "sac", "td3")
+ON_POLICY: Final = ("ppo", "mappo")
+ALGORITHMS: Final = (*ON_POLICY, "sac", "td3")
 _WIDEST: Final = 8192
 _CHOICES: Final = {
     "algorithm": ALGORITHMS,

@@ -14,7 +14,7 @@ from posse_baselines import PolicyError, load, target_names
 from posse_baselines.registry import ships_or_is_file
 from posse_training.errors import SettingsError
 from posse_training.files import read_json
-from posse_training.runs.ranges import check_ranges
+from posse_training.runs.ranges import ON_POLICY, check_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +159,7 @@ class TrainSettings:
     @property
     def on_policy(self) -> bool:
         """Whether the algorithm learns from its latest rollout only."""
-        return self.algorithm in ("ppo", "mappo")
+        return self.algorithm in ON_POLICY
 
     @property
     def run_folder(self) -> Path:
