@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import ClassVar
 
@@ -20,8 +19,6 @@ from posse_training.reports.evaluation import evaluate
 from posse_training.reports.reproduce import Settings
 from posse_training.reports.reproduce import table as settling_times
 from posse_training.reports.statistics import Estimate
-from posse_training.runs.display import Display as TrainDisplay
-from posse_training.runs.settings import TrainSettings
 from posse_training.tuning.display import Display
 from posse_training.tuning.settings import TuneSettings
 from posse_training.tuning.state import State
@@ -106,31 +103,6 @@ def test_a_tuning(tmp_path: Path) -> None:
     display.begin(state, knobs)
     text = on_a_terminal(display._render())
     holds(text, "tuning ddcs-centralized-no-exchange on paper-distributed, seed", "0.500")
-
-
-def test_a_training() -> None:
-    settings = TrainSettings(
-        scenario="constant,accelerating,smart,search,obstacles,radio,leader-loss,field",
-        imitate="ddcs-distributed",
-        imitate_rounds=6,
-        steps=1_000_000,
-        beside="ddcs-tuned",
-    )
-    display = TrainDisplay(settings, Console(width=WIDTH, file=io.StringIO()))
-    display.copying(2, 0.0125)
-    text = on_a_terminal(display._render())
-    holds(text, "copying ddcs-distributed: 2 of 6 rounds, squared error 0.0125", "0 of 1,000,000")
-    holds(text, "ppo on constant,accelerating,smart,search,obstacles,radio,leader-loss,field, seed 1")
-    display.beside(0.65)
-    display.begin(0, 1_048_576, [])
-    for k in range(1, 61):
-        point = {"steps": 1e4 * k, "safe_score": 0.01 * k, "low": 0.0, "high": 1.0}
-        display.evaluated({**point, "score": 0.5, "contact_free": 0.25, "seconds": 1.0})
-    text = on_a_terminal(display._render())
-    assert "copying" not in text
-    holds(text, "600,000 of 1,048,576", "0.600 [0.000, 1.000]", "ddcs-tuned 0.650", "best 0.600")
-    assert "╌" * 5 in text
-    assert text.count("0.650") == 2, "beside the line, and with its name"
 
 
 def test_the_bar_of_a_comparison() -> None:

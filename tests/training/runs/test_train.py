@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from rich.console import Console
 from stable_baselines3 import PPO
 from tests.support.runs import ADVISED, ALGORITHM_CASES, BELIEVING, assert_equal, numbers, quiet, small
 
@@ -50,6 +52,16 @@ def test_an_advised_training_exports_what_it_played(tmp_path: Path, changes: dic
     assert again == pytest.approx(max(float(row["safe_score"]) for row in curve), abs=1e-12)
     with pytest.raises(SettingsError, match="neither imitate nor message_size"):
         small(tmp_path, advise="ddcs-distributed", message_size=1)
+
+
+def test_a_line_is_printed_for_each_evaluation(tmp_path: Path) -> None:
+    console = Console(file=StringIO(), width=20)
+    train(small(tmp_path, beside="pursuit", imitate="pursuit", imitate_rounds=1), console=console)
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert "copying pursuit: 1 of 1 rounds" in lines[1]
+    found = [line.split(" steps ")[0].strip() for line in lines if "safe score" in line]
+    assert found == ["0", "640", "1,280"]
+    assert "pursuit 0." in lines[-1]
 
 
 def test_the_card_says_what_it_is(tmp_path: Path) -> None:

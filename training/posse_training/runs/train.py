@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,10 +74,9 @@ def train(
                 start_from(Path(settings.start), model, statistics, settings.log_deviation)
             statistics.apply(model.policy)
             if settings.imitate is not None:
-                display.copying(0)
                 expert = load(settings.imitate)
-                imitate(model, settings, env.encoding, expert, statistics, copy_report(display))
-        display.begin(model.num_timesteps, steps, callback.curve)
+                imitate(model, settings, env.encoding, expert, statistics, display.copied)
+        display.begin(model.num_timesteps, steps)
         with _divergence(callback):
             model.learn(settings.steps - model.num_timesteps, callback=callback, reset_num_timesteps=saved is None)
             callback.finish()
@@ -143,8 +142,3 @@ def torch_threads(count: int) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
-
-
-def copy_report(display: Display) -> Callable[[int, int, float], None]:
-    """Return a function that shows a round of imitation."""
-    return lambda done, rounds, error: display.copying(done, error)
