@@ -16,7 +16,12 @@ GUIDANCE_LAWS: Final = ("slot", "pngl")
 DEVIATIONS: Final = ("none", "slot", "occupant")
 FOLLOWER_LAWS: Final = ("l-phi", "l-l")
 FOLLOWER_FRAMES: Final = ("leader", "slot-frame")
-TASK_NAMES: Final = ("searching", "converging", "flocking", "exchange")
+SEARCHING: Final = 0
+CONVERGING: Final = 1
+FLOCKING: Final = 2
+EXCHANGING: Final = 3
+TASKS: Final = ("searching", "converging", "flocking", "exchange")
+"""The four tasks of section 3.1 (:mod:`posse_baselines.ddcs.tasks`); a tracker's memory holds the position."""
 TRANSITIONS: Final = (
     "searching>converging",
     "searching>flocking",
@@ -260,4 +265,4 @@ def settings_record(settings: Settings) -> Records:
 
 def _bit(transition: str) -> int:
     before, after = transition.split(">")
-    return 4 * TASK_NAMES.index(before) + TASK_NAMES.index(after)
+    return 4 * TASKS.index(before) + TASKS.index(after)
