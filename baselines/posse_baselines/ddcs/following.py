@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
-from posse_baselines.ddcs.settings import FLOCKING
+from posse_baselines.ddcs.settings import BY_SLOT_FRAME, FLOCKING, L_L
 from posse_baselines.laws.geometry import length, line_of_sight, wrap
 from posse_baselines.laws.l_l import l_l_velocity
 from posse_baselines.laws.l_phi import held_command, l_phi_demand, limit_command, point_velocity, sampled_rate
 from posse_baselines.laws.slots import rotate, slot_heading, slot_velocity
-
-BY_SLOT_FRAME: Final = 1
-L_L: Final = 1
 
 
 @compiled

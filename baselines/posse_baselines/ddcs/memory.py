@@ -10,16 +10,20 @@ import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray, Record, Records, compiled
+from posse.numeric import MOST_THREADS, FloatArray, Record, Records, compiled
 from posse.rules import beam_directions, slot_records
 from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs.settings import Settings, settings_record
+from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.heading import BODY
 from posse_baselines.laws.offsets import constants_of, offsets_of
+from posse_baselines.laws.safeguard import DISC, PLAYS
 
 _F, _I = np.float32, np.int32
+_MOST_DISCS: Final = 32
 _UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
@@ -41,11 +45,31 @@ class Team(NamedTuple):
 
 
 def team_of(layout: ObservationLayout, settings: Settings) -> Team:
-    """Return what a team has in common for kernels, which take the only record of ``at``, ``world`` and ``settings``."""
+    """Return what a team has in common; ``at``, ``world`` and ``settings`` are arrays of one record."""
     scenario = layout.scenario
     outermost = max(math.hypot(x, y) for x, y in slot_offsets(scenario))
     at, world, played = offsets_of(layout), constants_of(scenario), settings_record(settings)
     return Team(at, world, played, slot_records(scenario), outermost, beam_directions(scenario))
+
+
+class Work(NamedTuple):
+    """Arrays that a step works in, one of each for a thread."""
+
+    cost: npt.NDArray[np.float64]
+    """(N, N) cost of each slot for each tracker, s."""
+    assigning: npt.NDArray[np.float64]
+    """(WORK_ROWS, N + 1) for the assignment."""
+    discs: Records
+    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
+    plays: Record
+    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
+
+
+def work_for(num_trackers: int) -> Work:
+    """Return the arrays of all threads."""
+    n, threads = num_trackers, MOST_THREADS
+    cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
+    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC), np.empty(threads, PLAYS))
 
 
 def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:

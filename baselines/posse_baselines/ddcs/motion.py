@@ -13,18 +13,13 @@ from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.following import on_leader, place_on_leader
 from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.monitoring import is_there
-from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING
+from posse_baselines.ddcs.settings import CENTRALIZED, CONVERGING, EXCHANGING, FLOCKING, NO_DEVIATION, OF_OCCUPANT, PNGL
 from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.laws.geometry import bearing_rate, clip, deviation, length, line_of_sight
 from posse_baselines.laws.guidance import MIN_COSINE, lawful_heading, lawful_rate, maintenance_speed
 from posse_baselines.laws.heading import regulate
 from posse_baselines.laws.slots import slot_heading
 from posse_baselines.laws.steering import approach_velocity, meeting_velocity
-
-CENTRALIZED: Final = 1
-PNGL: Final = 1
-NO_DEVIATION: Final = 0
-OF_OCCUPANT: Final = 2
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed

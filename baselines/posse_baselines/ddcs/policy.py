@@ -12,10 +12,10 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse_baselines.ddcs.belief import BELIEF_SIZE
-from posse_baselines.ddcs.memory import GRID, MATE, MATE_AT_START, MIND, MIND_AT_START, Team, team_of
+from posse_baselines.ddcs.memory import GRID, MATE, MATE_AT_START, MIND, MIND_AT_START, Team, team_of, work_for
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.ddcs.step import carry_out_all, propose_all, work_for, write_beliefs
+from posse_baselines.ddcs.step import carry_out_all, propose_all, write_beliefs
 from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of
 
 

@@ -11,9 +11,10 @@ import math
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import Team
+from posse.numeric import Record, Records, compiled
+from posse_baselines.ddcs.memory import Team, Work
 from posse_baselines.ddcs.monitoring import is_there, mate_now
+from posse_baselines.ddcs.settings import CENTRALIZED
 from posse_baselines.laws.assignment import assign
 from posse_baselines.laws.geometry import length
 from posse_baselines.laws.slots import rotate
@@ -33,7 +34,7 @@ def slot_place(me: Record, slot: Record) -> tuple[float, float, float, float]:
 
 
 @compiled(seldom=True)
-def choose_slot(team: Team, me: Record, mates: Records, cost: FloatArray, work: FloatArray) -> None:
+def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     """Set the own slot by the assignment of least total arrival time."""
     at, world, settings = team.at, team.world, team.settings
     n = len(team.slots)
@@ -59,7 +60,7 @@ def choose_slot(team: Team, me: Record, mates: Records, cost: FloatArray, work: 
                 mates[j].slot = -1
                 continue
             for k in range(n):
-                cost[rows, k] = 0.0 if k == mates[j].slot else _RESERVED
+                work.cost[rows, k] = 0.0 if k == mates[j].slot else _RESERVED
             rows += 1
             continue
         else:
@@ -80,15 +81,15 @@ def choose_slot(team: Team, me: Record, mates: Records, cost: FloatArray, work: 
             if slot.x * slot.x + slot.y * slot.y < (settings.in_sight * world.sight) ** 2:
                 time -= settings.sight_worth
             # The leader of the centralized model takes the first slot.
-            if settings.model == 1 and me.leader >= 0 and (k == 0) != (j == me.leader):
+            if settings.model == CENTRALIZED and me.leader >= 0 and (k == 0) != (j == me.leader):
                 time += _RESERVED
-            cost[rows, k] = time + 1e-4 * j
+            work.cost[rows, k] = time + 1e-4 * j
         rows += 1
-    assign(cost, rows, n, work)
-    if loses_slot(team, me, mates, int(work[0, mine])):
-        cost[mine, int(work[0, mine])] = _RESERVED
-        assign(cost, rows, n, work)
-    me.slot = int(work[0, mine])
+    assign(work.cost, rows, n, work.assigning)
+    if loses_slot(team, me, mates, int(work.assigning[0, mine])):
+        work.cost[mine, int(work.assigning[0, mine])] = _RESERVED
+        assign(work.cost, rows, n, work.assigning)
+    me.slot = int(work.assigning[0, mine])
 
 
 @compiled

@@ -6,51 +6,26 @@ team avoids contact as well as the team itself does.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import MOST_THREADS, Blocks, FloatArray, Record, Records, compiled, kernel, worlds_of
+from posse.numeric import Blocks, FloatArray, Record, Records, compiled, kernel, worlds_of
 from posse_baselines.ddcs.belief import write_belief
 from posse_baselines.ddcs.detour import detour
 from posse_baselines.ddcs.leadership import settle_lead
-from posse_baselines.ddcs.memory import Team, read_body
+from posse_baselines.ddcs.memory import Team, Work, read_body
 from posse_baselines.ddcs.messages import write_message
 from posse_baselines.ddcs.monitoring import update_mates, watch_target
-from posse_baselines.ddcs.motion import CENTRALIZED, command, update_error, wanted_motion
+from posse_baselines.ddcs.motion import command, update_error, wanted_motion
 from posse_baselines.ddcs.searching import begin_search, look_around, wander
-from posse_baselines.ddcs.settings import FLOCKING, SEARCHING
+from posse_baselines.ddcs.settings import CENTRALIZED, FLOCKING, SEARCHING
 from posse_baselines.ddcs.slots import choose_slot
 from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.ddcs.tasks import next_task
-from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.geometry import length
 from posse_baselines.laws.heading import regulate
-from posse_baselines.laws.safeguard import DISC, PLAYS, safe_velocity
+from posse_baselines.laws.safeguard import safe_velocity
 from posse_baselines.laws.steering import write_motion
-
-_MOST_DISCS: Final = 32
-
-
-class Work(NamedTuple):
-    """Arrays that a step works in, one of each for a thread."""
-
-    cost: npt.NDArray[np.float64]
-    """(N, N) cost of each slot for each tracker, s."""
-    assigning: npt.NDArray[np.float64]
-    """(WORK_ROWS, N + 1) for the assignment."""
-    discs: Records
-    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
-    plays: Record
-    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
-
-
-def work_for(num_trackers: int) -> Work:
-    """Return the arrays of all threads."""
-    n, threads = num_trackers, MOST_THREADS
-    cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
-    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC), np.empty(threads, PLAYS))
 
 
 @compiled
@@ -71,7 +46,7 @@ def plan(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16], r
             begin_search(team, me, seen)
     else:
         if me.slot < 0 or me.step % max(1, round(team.settings.replan_time / team.world.dt)) == 0:
-            choose_slot(team, me, mates, work.cost, work.assigning)
+            choose_slot(team, me, mates, work)
         update_error(team, me, mates)
     me.task = next_task(team, me)
     if me.task == SEARCHING or me.slot < 0:

@@ -11,7 +11,7 @@ from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.monitoring import mate_now, patience
 from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.laws.geometry import length
-from posse_baselines.laws.safeguard import put_disc, put_wall
+from posse_baselines.laws.safeguard import put_disc, put_walls, wall_normal
 
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
@@ -61,12 +61,6 @@ def is_explained(
 
 
 @compiled
-def wall_normal(k: int) -> tuple[float, float]:
-    """Return the outward normal of one of the four walls."""
-    return (1.0 if k == 0 else (-1.0 if k == 1 else 0.0), 1.0 if k == 2 else (-1.0 if k == 3 else 0.0))
-
-
-@compiled
 def slot_in_beam(team: Team, me: Record, beam_x: float, beam_y: float, reading: float) -> int:
     """Return the slot whose occupant would give this echo, or -1.
 
@@ -113,11 +107,7 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
             count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
     robots = count
     if world.walled:
-        for k in range(4):
-            nx, ny = wall_normal(k)
-            away = world.extent - nx * me.x - ny * me.y
-            if away < _NEAR:
-                count = put_wall(discs, count, away, nx, ny, world.radius, settings.margin)
+        count = put_walls(discs, count, me.x, me.y, world.extent, _NEAR, world.radius, settings.margin)
     strangers = me.known != 0 and few
     if not strangers or me.step % max(1, round(settings.taken_memory / world.dt)) == 0:
         me.taken = _NO_BITS
