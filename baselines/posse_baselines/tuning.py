@@ -53,6 +53,10 @@ def choice(default: str, choices: tuple[str, ...]) -> Any:
     return dataclasses.field(default=default, metadata={"choices": choices})
 
 
+def _text(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:g}"
+
+
 def check(settings: Any) -> None:
     """Check the fields of a settings object against what they declare.
 
@@ -71,7 +75,7 @@ def check(settings: Any) -> None:
             raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
         if not meta["low"] <= value <= meta["high"]:
             unit = f" {meta['unit']}" if meta["unit"] else ""
-            raise ValueError(f"{name}={value!r} must lie in [{meta['low']:g}, {meta['high']:g}]{unit}")
+            raise ValueError(f"{name}={value!r} must lie in [{_text(meta['low'])}, {_text(meta['high'])}]{unit}")
         if meta["above"] and not getattr(settings, meta["above"]) < value:
             low = getattr(settings, meta["above"])
             raise ValueError(f"{meta['above']}={low!r} must be below {name}={value!r}: a hysteresis")
