@@ -43,8 +43,8 @@ _CENTRALIZED: Final[dict[str, Any]] = {"model": "centralized", "follower_frame":
 
 FAMILY: Final[dict[str, Settings]] = {
     "pngl-l-phi": BASELINE,
-    # As printed: c = 0 and φ from the leader's heading. The leader then follows from any side, the wedge turns with each
-    # of its turns, and only a target that drives straight ahead is held.
+    # As printed: c = 0, and φ from the leader's heading. The leader then follows from any side and the wedge turns with
+    # it, so that only a target that drives straight ahead is held.
     "pngl-l-phi-literal": BASELINE.replace(deviation="none", follower_frame="leader"),
     "pngl": Settings(deviation="slot", spread=0.1, **_PURSUIT),
     "deviated-pursuit": Settings(deviation="slot", **_PURSUIT),
