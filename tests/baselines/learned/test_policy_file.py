@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +49,16 @@ def test_playing_a_file_needs_no_torch(tmp_path: Path) -> None:
     assert done.stdout.strip() == "False"
 
 
+class _Planted:
+    """Makes a file when it is unpickled."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (self._file,)
+
+
 class TestDamage:
     @pytest.fixture
     def path(self, tmp_path: Path) -> Path:
@@ -81,6 +93,13 @@ class TestDamage:
         save_file({"a": np.zeros(3)}, path)
         with pytest.raises(PolicyError, match="holds no policy"):
             LearnedPolicy.from_file(path)
+
+    def test_a_pickle_is_refused_and_not_run(self, tmp_path: Path) -> None:
+        path = tmp_path / "pickled.safetensors"
+        path.write_bytes(pickle.dumps(_Planted(tmp_path / "it_ran")))
+        with pytest.raises(PolicyError, match="not a policy file"):
+            LearnedPolicy.from_file(path)
+        assert list(tmp_path.iterdir()) == [path]
 
     def test_no_file(self, tmp_path: Path) -> None:
         with pytest.raises(PolicyError, match="there is no policy file"):
