@@ -18,7 +18,7 @@ def test_compiled_and_plain_agree(kind: str, activation: str, output: str) -> No
     actions, _ = policy.act(observations, policy.begin(batch.layout, 6))
     rows = Encoder(policy.encoding, batch.layout).encode(observations)
     expected = policy.network.forward(rows).reshape(actions.shape)
-    np.testing.assert_allclose(actions, expected, atol=2e-5)
+    np.testing.assert_allclose(actions, expected, rtol=1e-4, atol=1e-4)
     assert np.abs(actions).max() <= 1
     assert np.ptp(actions) > 0.5  # the networks say something
 
