@@ -24,7 +24,7 @@ def test_every_field_equals_an_independent_working(case: Any) -> None:
     s, senses = recording.scenario, Senses(recording.scenario)
     for step, state in enumerate(recording.states):
         senses.follow(state, recording.actions[step - 1] if step else None)
-        if step % 6 and step not in (1, 2):
+        if step % (6 if s.num_trackers < 12 else 24) and step not in (1, 2):
             continue
         views = recording.batch.layout.views(recording.observations[step])
         for i in range(s.num_trackers):
