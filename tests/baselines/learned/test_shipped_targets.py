@@ -16,7 +16,8 @@ from posse_training.shipping.ship import LARGEST
 from posse_training.shipping.ship_target import make_target_check
 
 FILES = sorted(SHIPPED_TARGETS.glob("*.safetensors"))
-TOLERANCE = 0.01
+TOLERANCE = 0.03
+"""About two standard errors of the mean of a check."""
 
 
 def test_every_file_is_known_by_its_name() -> None:
