@@ -22,7 +22,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes fuzz mutants lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes fuzz mutants lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -65,13 +65,10 @@ docs: $(FULL) ## Build the manual into site/
 bench: $(FULL) ## Measure throughput on this machine
 	$(BIN)/python benchmarks/speed.py
 
-bench-costs: $(FULL) ## Measure the time of each part of a step, and how it scales
-	$(BIN)/python benchmarks/costs.py
-
-bench-training: $(FULL) ## Measure throughput and time shares of PPO training
+bench-training: $(FULL) ## Measure throughput of PPO training, and the time to beat the script
 	$(BIN)/python benchmarks/training.py
 
-algorithms: $(FULL) $(RECIPES)/recipes.stamp ## Train the field's algorithms and write docs/algorithms.md (hours); resumes
+algorithms: $(FULL) ## Train the field's algorithms from nothing (hours); resumes
 	$(BIN)/python benchmarks/algorithms.py
 
 bench-peers: $(FULL) ## Compare throughput with other simulators
@@ -79,10 +76,7 @@ bench-peers: $(FULL) ## Compare throughput with other simulators
 
 results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 	$(BIN)/python benchmarks/results.py
-	$(BIN)/python benchmarks/leaderboard.py
 	$(BIN)/python docs/drawing/readme_table.py
-	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
-	$(BIN)/python benchmarks/behaviour.py
 
 reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce

@@ -8,7 +8,17 @@ from pathlib import Path
 
 import pytest
 
-EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "moviepy", "wandb")
+EXTRA = (
+    "torch",
+    "stable_baselines3",
+    "sb3_contrib",
+    "tensordict",
+    "torchrl",
+    "tensorboard",
+    "moviepy",
+    "wandb",
+    "minari",
+)
 BLOCKED = f"""
 import sys
 
@@ -71,6 +81,14 @@ def test_all_else_works_without_extras(tmp_path: Path, arguments: list[str]) -> 
     done = run(MAIN, *arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_recording_says_what_to_install(tmp_path: Path) -> None:
+    assert run(MAIN, "record", "--help", cwd=tmp_path).returncode == 0
+    done = run(MAIN, "record", "idle", "--scenario", "constant", "--out", "here", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "pip install 'posse[datasets]'" in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_shipping_needs_no_torch(tmp_path: Path) -> None:
