@@ -26,12 +26,12 @@ from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.cluster import Cluster
 from posse_training.cluster.ray_backend import RayBackend
+from posse_training.compare.playing import PlayError
 from posse_training.league.cross_play import Cell, CrossPlay
 from posse_training.league.members import TARGET, TEAM, founders
 from posse_training.league.on_cluster import ClusterWork
 from posse_training.league.settings import LeagueSettings
 from posse_training.league.work import Work
-from posse_training.reports.comparing.players import PlayError
 from posse_training.runs.saved.folder import LAST
 
 SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}
@@ -132,21 +132,14 @@ def test_an_error_of_a_policy_says_where(nodes: Nodes, tmp_path: Path) -> None:
 def test_commands_give_the_same_files(nodes: Nodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     commands = {
-        "compare idle pursuit --scenarios smart constant --episodes 3 --sweep-episodes 0 "
+        "compare idle pursuit --scenarios smart constant --episodes 3 "
         "--planner-episodes 0 --no-figures --out {}/compare": ("smart-idle.csv", "summary.json"),
-        "compare idle --target evader --scenarios duel --episodes 3 --sweep-episodes 0 "
-        "--planner-episodes 1 --no-figures --out {}/duel": ("duel-idle.csv", "summary.json"),
-        "record idle pursuit --scenario constant --episodes 2 --out {}/record": (
-            "posse/constant/idle-and-pursuit-v0/data/main_data.hdf5",
+        "compare idle --target evader --scenarios duel --episodes 3 --planner-episodes 1 --no-figures --out {}/duel": (
+            "duel-idle.csv",
+            "summary.json",
         ),
-        "tune ddcs-distributed --generations 1 --population 4 --worlds 2 --validation-worlds 4 "
-        "--only gain --out {}/tune": ("tuned.json",),
         "train --seeds 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None "
         "--advise None --imitate None --encoding plain --no-tensorboard --folder {}/train": ("seed-1/settings.json",),
-        "league --scenario smart --generations 1 --teams idle pursuit --target-steps 16 "
-        "--team-steps 16 --response-steps 16 --episodes 2 --overrides horizon 20 settle_time 0.5 "
-        "num_trackers 2 --training num_worlds 2 rollout 8 evaluate_worlds 1 imitate_rounds 1 "
-        "--folder {}/league": ("matrix.csv", "summary.json"),
     }
     for command, files in commands.items():
         name = command.split("{}/")[1]

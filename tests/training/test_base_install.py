@@ -58,7 +58,7 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     assert "pip install 'posse[training]'" in done.stderr.splitlines()[-1]
 
 
-COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0"]
+COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "train": _Command("train a team", "commands.train"),
     "tune": _Command("tune the settings of a scripted team", "tuning.command"),
     "league": _Command("train teams and targets in turns against each other", "league.command"),
-    "compare": _Command("score policies on the same worlds", "reports.comparing.compare"),
+    "compare": _Command("score policies on the same worlds", "compare.compare"),
     "watch": _Command("show a policy in a window, or film it", "commands.watch"),
     "play": _Command("drive the target, or a tracker, in a window", "commands.play"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from posse import get_scenario
 from posse_training.league.cross_play import TEST_SEED
 from posse_training.league.results import League
-from posse_training.reports.pictures.parts import note, plain
-from posse_training.reports.pictures.style import RC, WIDTH
+from posse_training.reports.pictures.style import RC, WIDTH, note, plain
 
 NAME: Final = "matrix"
 _ROW: Final = 0.42  # inches

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -115,7 +116,7 @@ def evaluate(
     return Results(policy.name, settings, seed, split, columns, named)
 
 
-def progress_bar(*, disable: bool = False) -> Progress:
+def progress_bar(*, disable: bool = False, console: Console | None = None) -> Progress:
     """Return a progress bar, as all commands show it."""
     return Progress(
         TextColumn("{task.description}"),
@@ -124,6 +125,7 @@ def progress_bar(*, disable: bool = False) -> Progress:
         TimeRemainingColumn(),
         transient=True,
         disable=disable,
+        console=console,
     )
 
 

@@ -6,7 +6,7 @@ import csv
 import json
 from pathlib import Path
 
-from posse_training.reports.comparing.compare import Settings, compare
+from posse_training.compare.compare import Settings, compare
 
 
 def test_the_export_holds_every_worlds_metrics(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ import pytest
 from posse_baselines import PolicyError
 from posse_training import evaluate
 from posse_training.cli import main
+from posse_training.compare.compare import Settings, compare
 from posse_training.errors import SettingsError
-from posse_training.reports.comparing.compare import Settings, compare
 
 ROOT = Path(__file__).parents[4]
 BAD = "tests.support.bad_policies:"
@@ -52,7 +52,7 @@ def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["failed"] == found.failed
     # The rows are those of a comparison without the failures.
-    alone = compare(settings_for(tmp_path))
+    alone = compare(settings_for(tmp_path / "alone"))
     assert [row for row in found.rows if row["policy"] != f"{BAD}Still"] == alone.rows
 
 
@@ -86,7 +86,7 @@ def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
 HANG = """
 import sys
 from pathlib import Path
-from posse_training.reports.comparing.compare import Settings, compare
+from posse_training.compare.compare import Settings, compare
 if __name__ == "__main__":
     compare(Settings(("tests.support.bad_policies:HangsWithPid",), ("constant",), 1,
                      out=Path(sys.argv[1], "out"), figures=False, planner_episodes=0,

@@ -11,10 +11,10 @@ from posse.scenarios.named import _named
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
-from posse_training.reports.comparing.compare import Settings, asked_sweeps, compare
-from posse_training.reports.comparing.comparison import table
-from posse_training.reports.comparing.contenders import read_contenders
-from posse_training.reports.comparing.sweeps import BOUND, SWEEPS
+from posse_training.compare.compare import Settings, compare
+from posse_training.compare.contenders import read_contenders
+from posse_training.compare.table import ranked
+from posse_training.errors import ComparisonError
 from posse_training.reports.statistics import difference
 
 
@@ -48,10 +48,9 @@ def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
         share = safe[row["policy"]][:3].mean() / safe["planner"].mean()
         assert row["of_planner"] == pytest.approx(share)
         assert row["contact_free"].value in np.arange(5) / 4 or row["policy"] == "planner"
-    shown = list(table(found, settings, 240).columns[1].cells)
-    ranked = sorted(safe, key=lambda policy: -safe[policy].mean())
-    assert [str(cell) for cell in shown] == ranked
-    assert ranked[0] == "planner"
+    best = sorted(safe, key=lambda policy: -safe[policy].mean())
+    assert [row["policy"] for row in ranked(found.rows)] == best
+    assert best[0] == "planner"
 
 
 def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None:
@@ -74,9 +73,8 @@ def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixtur
     arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
     assert main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    row = next(line for line in lines if " pursuit " in line)
-    assert "constant" in row, "no cell is broken where lines have no end"
-    assert row.count("]") == 6, "six estimates with their intervals"
+    row = next(k for k, line in enumerate(lines) if line.split()[:1] == ["pursuit"])
+    assert lines[row + 1].count("]") == 2, "safe score and difference with their intervals"
     assert not list(tmp_path.glob("*.png"))
 
 
@@ -134,7 +132,7 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
 def test_who_cannot_play_is_left_out_with_a_line(
     files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    scenario = replace(posse.get_scenario("constant"), sonar_beams=4)
+    scenario = replace(posse.get_scenario("constant"), name="few-beams", sonar_beams=4)
     _named()["few-beams"] = scenario
     try:
         command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
@@ -162,42 +160,39 @@ def test_a_split_that_was_trained_on_is_named(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.long
-def test_figures_are_drawn_with_the_planner_beside(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    few = tuple(replace(sweep, values=sweep.values[:1]) for sweep in SWEEPS)
-    monkeypatch.setattr("posse_training.reports.comparing.compare.SWEEPS", few)
+def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--scenarios", "constant", "leader-loss", "--episodes", "3"]
-    options += ["--sweeps", "team-size", "radio-loss", "--sweep-episodes", "2"]
     assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
-    names = {"profile", "scenarios", "team-size", "radio-loss", "recovery"}
-    assert {path.stem for path in tmp_path.glob("*.png")} == names
-    assert {path.stem for path in tmp_path.glob("*.svg")} == names
+    for suffix in ("png", "svg"):
+        assert {path.stem for path in tmp_path.glob(f"*.{suffix}")} == {"profile", "scenarios", "recovery"}
     assert "planner" in capsys.readouterr().out
-    with (tmp_path / "sweeps.csv").open(newline="") as file:
-        assert {row["policy"] for row in csv.DictReader(file)} == {"pursuit", "planner", BOUND}
 
 
-def test_a_scenario_alone_is_played_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--scenarios", "constant", "--episodes", "2", "--planner-episodes", "0"]
-    assert main(["compare", "idle", *options, "--out", str(tmp_path / "out")]) == 0
-    files = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {name for name in files if name.endswith(".csv")} == {"constant-idle.csv"}
-    assert {name for name in files if name.endswith(".png")} == {"scenarios.png", "profile.png"}
-    for asked, message in (("team-sise", "did you mean 'team-size'"), ("9", "or 'all', or 'none'")):
-        assert main(["compare", "idle", *options, "--sweeps", asked]) == 2
-        assert message in capsys.readouterr().err
+def test_a_folder_with_any_file_is_refused_before_anything_is_played(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def played(*arguments: object, **settings: object) -> None:
+        raise AssertionError("it was played")
+
+    monkeypatch.setattr("posse_training.compare.compare.play", played)
+    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(ComparisonError, match="not an empty folder"):
+        compare(Settings(("idle",), ("constant",), out=tmp_path))
+    with pytest.raises(ComparisonError, match="not an empty folder"):
+        compare(Settings(("idle",), ("constant",), out=tmp_path / "mine.txt"))
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_sweeps_are_played_when_asked_or_with_all_scenarios() -> None:
-    everything = tuple(sweep.name for sweep in SWEEPS)
-    for given, wanted in (
-        (Settings(("idle",)), everything),
-        (Settings(("idle",), figures=False), ()),
-        (Settings(("idle",), sweeps=("none",)), ()),
-        (Settings(("idle",), sweep_episodes=0), ()),
-        (Settings(("idle",), ("smart",)), ()),
-        (Settings(("idle",), ("smart",), sweeps=("all",)), everything),
-        (Settings(("idle",), ("smart",), sweeps=("radio-loss",)), ("radio-loss",)),
-    ):
-        assert tuple(sweep.name for sweep in asked_sweeps(given)) == wanted
+def test_without_a_folder_the_next_free_one_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    settings = Settings(("idle",), ("constant",), episodes=1, figures=False, planner_episodes=0)
+    assert [str(compare(settings).folder) for _ in range(2)] == ["runs/compare", "runs/compare-2"]
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["compare", "compare-2"]
+
+
+def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None:
+    policies = ("a/b=idle", "a?b=idle", "A/B=pursuit")
+    found = compare(Settings(policies, ("constant",), 1, out=tmp_path, figures=False, planner_episodes=0))
+    files = [name for row in found.rows for name in row["files"]]
+    assert files == ["constant-a_b.csv", "constant-a_b-2.csv", "constant-A_B-3.csv"]
+    assert all((tmp_path / name).is_file() for name in files)

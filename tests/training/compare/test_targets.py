@@ -15,13 +15,12 @@ import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
 from posse_training.commands import watch
+from posse_training.compare.compare import SUMMARY, Settings, compare
+from posse_training.compare.compare import main as compare_main
+from posse_training.compare.contenders import Contender
+from posse_training.compare.playing import replay as play_again
 from posse_training.errors import TrainedSplitError
 from posse_training.replay import record
-from posse_training.reports.comparing.compare import Settings, compare
-from posse_training.reports.comparing.compare import main as compare_main
-from posse_training.reports.comparing.contenders import Contender
-from posse_training.reports.comparing.players import Players
-from posse_training.reports.comparing.run import SUMMARY
 from posse_training.viewer.viewer import Viewer
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -92,8 +91,8 @@ def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None
     replay = record(["pursuit"], SHORT, target=str(file), seconds=2.0)
     actions = replay.players[0].columns["action"].values
     assert actions.shape[1] == SHORT.num_trackers + 1, "the target's action as well"
-    with Players(60.0, str(file)) as players:  # as a comparison's report does
-        shown = players.record(Contender("p", (load("pursuit"),)), 0, SHORT, 7, 0, "test")
+    # As a comparison's report does.
+    shown = play_again(Contender("p", (load("pursuit"),)), 0, SHORT, 7, 0, "test", target=str(file), limit=60.0)
     assert shown.players[0].columns["action"].values.shape[1] == SHORT.num_trackers + 1
     film = tmp_path / "film.gif"
     asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--num-trackers", "3"]

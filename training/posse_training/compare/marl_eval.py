@@ -10,20 +10,21 @@ out, since JSON has no nan.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posse_training.reports.comparing.comparison import Comparison
+from posse_training.compare.plays import Plays
 from posse_training.reports.results import Results
 
 
-def write_marl_eval(found: Comparison, path: Path) -> None:
-    """Write everything that was played on the scenarios, but not the sweeps."""
+def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:
+    """Write everything that was played, by scenario and policy."""
     tasks: dict[str, dict[str, Any]] = {}
-    for (scenario, policy), plays in found.plays.items():
-        tasks.setdefault(scenario, {})[policy] = {f"seed_{k}": _run(results) for k, results in enumerate(plays.results)}
+    for (scenario, policy), found in plays.items():
+        tasks.setdefault(scenario, {})[policy] = {f"seed_{k}": _run(results) for k, results in enumerate(found.results)}
     text = json.dumps({"posse": tasks}, indent=2, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
 

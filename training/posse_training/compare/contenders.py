@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
-from posse import Scenario
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.registry import is_code, is_file
-from posse_training.reports.comparing.plays import Plays
-from posse_training.reports.evaluation import evaluate
 
 LONGEST_LABEL: Final = 100
 """Characters of a label, at most."""
@@ -66,30 +63,3 @@ def _check_label(label: str) -> None:
             f"the label {label[:60]!r}... ({len(label):,} characters) must have at most "
             f"{LONGEST_LABEL} printable characters: give it another one, LABEL=..."
         )
-
-
-def play(
-    contender: Contender,
-    scenario: str | Scenario,
-    episodes: int,
-    seed: int,
-    split: str,
-    *,
-    progress: bool = True,
-    time_limit: float | None = None,
-    **overrides: Any,
-) -> Plays:
-    """Play the same worlds with every policy of a contender; see :func:`evaluate`.
-
-    Raises:
-        PolicyError: A policy that cannot play this scenario.
-    """
-    return Plays(
-        contender.label,
-        tuple(
-            evaluate(
-                policy, scenario, episodes, seed, split=split, progress=progress, time_limit=time_limit, **overrides
-            )
-            for policy in contender.policies
-        ),
-    )
