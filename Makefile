@@ -82,7 +82,7 @@ reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce
 
 tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted, it resumes
-	$(BIN)/python -m posse_training.tuning.again
+	$(BIN)/python scripts/tune_shipped.py
 
 train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
 	$(BIN)/python -m posse_training.shipping.train_all $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from rich.console import Console
 from tests.support.tunable import BEST, POLICY, quiet, small
 
-from posse_baselines import PolicyError
+from posse_baselines import PolicyError, Tunable, settings_of, tunable
 from posse_training.cli import main
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError
 from posse_training.files import locked
-from posse_training.tuning import TuneSettings
-from posse_training.tuning import tune as tune_module
-from posse_training.tuning.again import repeat_all
-from posse_training.tuning.tune import tune
+from posse_training.tune import Space, TuneSettings, _Run, tune
 
 
 def card_of(settings: TuneSettings) -> dict[str, Any]:
@@ -46,17 +42,17 @@ class Killed(BaseException):
 @pytest.mark.parametrize("after", [1, 3])
 def test_a_killed_run_resumes_to_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> None:
     whole = card_of(small(tmp_path / "whole"))
-    generation = tune_module._generation
+    generation = _Run._generation
     made: list[int] = []
 
-    def kill(*arguments: Any) -> None:
+    def kill(*arguments: Any) -> Any:
         if len(made) == after:
             raise Killed
         made.append(1)
-        generation(*arguments)
+        return generation(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(tune_module, "_generation", kill)
+        patch.setattr(_Run, "_generation", kill)
         with pytest.raises(Killed):
             tune(small(tmp_path / "killed"), console=quiet())
     assert not (tmp_path / "killed/tuned.json").exists()
@@ -140,18 +136,17 @@ def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:
     "damage",
     [
         lambda text: text[: len(text) // 2],
-        lambda text: text.replace("0.", "1.", 1),
+        lambda text: text.replace('"points": [[0.', '"points": [[1.', 1),
         lambda text: "[" * 100_000,
         lambda text: "{}",
-        lambda text: text.replace("posse-tune-1", "posse-tune-0"),
         lambda text: "\udcff",
     ],
 )
 def test_a_damaged_state_is_named(tmp_path: Path, damage: Any) -> None:
     tune(small(tmp_path / "run", generations=1), console=quiet())
-    path = tmp_path / "run/state.json"
+    path = tmp_path / "run/state.jsonl"
     path.write_text(damage(path.read_text()), errors="surrogateescape")
-    with pytest.raises(CheckpointError, match=r"state\.json.*(is damaged|the format of)|format"):
+    with pytest.raises(CheckpointError, match=r"state\.jsonl is damaged"):
         tune(small(tmp_path / "run"), console=quiet())
 
 
@@ -168,17 +163,11 @@ def test_nothing_has_an_effect(tmp_path: Path) -> None:
         tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
 
 
-def test_shipped_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for module in ("posse_baselines.tuned.files", "posse_training.tuning.tune"):
-        monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")
+def test_the_result_ships_where_the_tuned_policy_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posse_training.tune.SHIPPED_TUNED", tmp_path / "shipped")
     settings = small(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1)
     card = json.loads(tune(replace(settings, ship=True), console=quiet()).read_text())
-    shipped = tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json"
-    assert json.loads(shipped.read_text()) == card
-    shipped.write_text(json.dumps({**card, "settings": {}}))
-    (result,) = repeat_all(quiet())
-    assert json.loads(result.read_text()) == json.loads(shipped.read_text()) == card
+    assert json.loads((tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json").read_text()) == card
 
 
 def test_code_that_is_no_policy(tmp_path: Path) -> None:
@@ -186,10 +175,28 @@ def test_code_that_is_no_policy(tmp_path: Path) -> None:
         tune(small(tmp_path / "run", policy="no_such_module:Team"), console=quiet())
 
 
-def test_a_terminal_shows_progress_and_what_changed_most(tmp_path: Path) -> None:
-    shown = StringIO()
-    tune(small(tmp_path / "run"), console=Console(file=shown, force_terminal=True, width=90))
-    text = shown.getvalue()
-    assert "tuning tests.support.tunable:Biased on paper-distributed, seed 3" in text
-    assert "validation score" in text
-    assert "(was 0.8)" in text
+def test_every_point_is_a_setting_that_can_be_played() -> None:
+    tunables = tunable("ddcs-distributed")
+    space = Space(tunables)
+    rng = np.random.default_rng(1)
+    for point in [*rng.random((200, len(tunables))), np.zeros(len(tunables)), np.ones(len(tunables))]:
+        settings_of("ddcs-distributed").replace(**space.values(point))
+
+
+def test_a_setting_that_must_exceed_one_that_is_not_searched() -> None:
+    for name in ("near", "far"):
+        found = tunable("ddcs-distributed")
+        space = Space(tuple(t for t in found if t.name == name), tuple(t for t in found if t.name != name))
+        for end in (0.0, 1.0):
+            settings_of("ddcs-distributed").replace(**space.values(np.array([end])))
+
+
+def test_the_start_is_the_default_and_wide_ranges_are_logarithmic() -> None:
+    for t in tunable("pngl-l-phi"):
+        space = Space((t,), ())
+        values = Space((t,), tuple(o for o in tunable("pngl-l-phi") if o is not t)).values(space.start)
+        assert values[t.name] == pytest.approx(t.default, rel=1e-5, abs=1e-9)
+    wide = Space((Tunable("x", 1.0, 0.1, 10.0, "s"),))
+    assert wide.values(np.array([0.25]))["x"] == pytest.approx(10**-0.5, rel=1e-5)
+    narrow = Space((Tunable("x", 1.0, 0.5, 2.5, "s"),))
+    assert narrow.values(np.array([0.25]))["x"] == pytest.approx(1.0)
