@@ -27,7 +27,7 @@ COMMANDS: Final[dict[str, _Command]] = {
     "demo": _Command("a table of scores, films and a replay page", "commands.demo"),
     "train": _Command("train a team", "commands.train"),
     "tune": _Command("tune the settings of a scripted team", "tune"),
-    "league": _Command("train teams and targets in turns against each other", "league.command"),
+    "league": _Command("train teams and targets in turns against each other", "league"),
     "compare": _Command("score policies on the same worlds", "compare.compare"),
     "watch": _Command("show a policy in a window, or film it", "commands.watch"),
     "play": _Command("drive the target, or a tracker, in a window", "commands.play"),

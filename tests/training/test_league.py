@@ -12,14 +12,20 @@ from safetensors.numpy import load_file
 from tests.support.runs import HORIZON, quiet
 
 from posse_baselines import PolicyError
+from posse_training import league
 from posse_training.errors import RunFolderError, SettingsError
-from posse_training.league import work
-from posse_training.league.command import main
-from posse_training.league.figure import draw_matrix
-from posse_training.league.league import play_league
-from posse_training.league.members import against, shares
-from posse_training.league.results import MATRIX, SUMMARY, tables
-from posse_training.league.settings import FILE, LeagueSettings
+from posse_training.league import (
+    FILE,
+    MATRIX,
+    SUMMARY,
+    LeagueSettings,
+    against,
+    draw_matrix,
+    main,
+    play_league,
+    shares,
+    tables,
+)
 from posse_training.runs.callback import TrainingCallback
 
 
@@ -87,7 +93,7 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path, monkeypatch: p
     for owner, name, call in (
         (TrainingCallback, "_on_rollout_start", 4),
         (TrainingCallback, "_checkpoint", 7),
-        (work, "evaluate", 9),
+        (league, "evaluate", 9),
     ):
         with monkeypatch.context() as patched:
             die_at(patched, owner, name, call)
@@ -150,10 +156,10 @@ def test_harder_opponents_get_more_of_the_worlds() -> None:
 def test_the_command_says_how_to_resume(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(settings: LeagueSettings, ray: bool) -> None:
+    def interrupted(settings: LeagueSettings) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("posse_training.league.league.play_league", interrupted)
+    monkeypatch.setattr("posse_training.league.play_league", interrupted)
     with pytest.raises(KeyboardInterrupt):
         main(["--generations", "1", "--folder", str(tmp_path)])
     assert "run the same command again" in capsys.readouterr().err
