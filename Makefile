@@ -53,7 +53,7 @@ lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py
+	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py scripts/*.py
 
 format: $(FULL) ## Format the sources
 	$(BIN)/ruff check --fix
@@ -85,7 +85,7 @@ tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted,
 	$(BIN)/python scripts/tune_shipped.py
 
 train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
-	$(BIN)/python -m posse_training.shipping.train_all $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
+	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

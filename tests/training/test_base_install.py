@@ -66,7 +66,6 @@ COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]
     [
         ["scenarios"],
         ["train", "--help"],
-        ["ship", "--help"],
         pytest.param(COMPARE, marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
@@ -89,9 +88,3 @@ def test_recording_says_what_to_install(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "pip install 'posse[datasets]'" in done.stderr
     assert list(tmp_path.iterdir()) == []
-
-
-def test_shipping_needs_no_torch(tmp_path: Path) -> None:
-    done = run(MAIN, "ship", "nowhere", "--name", "learned-x", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "nowhere is not a run folder" in done.stderr

@@ -1,4 +1,4 @@
-"""The command line: ``posse train | tune | compare | watch | replay | ship | ...``.
+"""The command line: ``posse train | tune | compare | watch | replay | ...``.
 
 Each command is imported when it is called: listing the scenarios does not import torch.
 """
@@ -32,7 +32,6 @@ COMMANDS: Final[dict[str, _Command]] = {
     "watch": _Command("show a policy in a window, or film it", "commands.watch"),
     "play": _Command("drive the target, or a tracker, in a window", "commands.play"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),
-    "ship": _Command("make the best of several runs a policy of the package", "shipping.ship"),
     "submit": _Command("play for the leaderboard and write the claim", "leaderboard:submit_command"),
     "verify": _Command("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
     "record": _Command("record episodes as a data set for offline learning", "datasets"),

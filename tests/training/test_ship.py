@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 from dataclasses import replace
@@ -11,16 +12,21 @@ from pathlib import Path
 import pytest
 import tyro
 from rich.console import Console
+from scripts.ship import CHOICE_SEED, Settings, replay, ship
+from scripts.train_shipped import ALGORITHMS, all_runs
+from scripts.train_shipped import Settings as Runs
+from scripts.tune_shipped import repeat_all
+from tests.support.runs import HORIZON, quiet, small
+from tests.support.tunable import small as small_tuning
 
+from posse_baselines import load_target
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
-from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.runs import TrainSettings, default_settings
 from posse_training.runs.saved.command import command_of
 from posse_training.runs.train import train
-from posse_training.shipping.check import replay
-from posse_training.shipping.ship import CHOICE_SEED, Settings, ship
+from posse_training.tune import tune
 
 SETTINGS = TrainSettings(
     scenario="constant",
@@ -89,24 +95,17 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], 
     assert path.stat().st_mode & 0o044 == 0o044
 
 
-def test_a_run_that_learned_nothing_is_not_shipped(
-    runs: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its best policy is that of step 0; it stays on record, and may be kept."""
+def test_a_run_that_learned_nothing_is_not_shipped(runs: tuple[Path, ...], tmp_path: Path) -> None:
+    """Its best policy is that of step 0; it stays on record."""
     first = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
     best = LearnedPolicy.from_file(first).card["seed"]
     copies = tuple(Path(shutil.copytree(run, tmp_path / f"run-{run.name}")) for run in runs)
     path = copies[best - 1] / "best.safetensors"
     policy = LearnedPolicy.from_file(path)
     policy.with_card({**policy.card, "steps": 0}).save(path)
-    kept = tmp_path / "kept"
-    card = LearnedPolicy.from_file(ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path, keep=kept))).card
+    card = LearnedPolicy.from_file(ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path))).card
     assert card["seed"] != best
     assert [run["steps"] for run in card["training_seeds"]][best - 1] == 0
-    names = {f"learned-trial-{seed}" for seed in (1, 2, 3)}
-    assert {file.stem for file in kept.iterdir()} == names
-    again = LearnedPolicy.from_file(kept / f"learned-trial-{best}.safetensors")
-    assert (again.network.weights[0] == policy.network.weights[0]).all()
 
 
 def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Path) -> None:
@@ -117,7 +116,7 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
 
     assert "must have different training seeds" in refused(runs[0], runs[0])
     assert "must begin with 'learned-'" in refused(*runs, name="smart")
-    assert "No run folders given" in refused()
+    assert "no run folders given" in refused()
     assert "is not a run folder" in refused(tmp_path)
     other = tmp_path / "other"
     train(replace(SETTINGS, seed=4, hidden=(4,), folder=other), console=Console(file=StringIO()))
@@ -128,7 +127,7 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
 def test_a_file_too_large_is_not_left_behind(
     runs: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posse_training.shipping.ship.LARGEST", 1000)
+    monkeypatch.setattr("scripts.ship.LARGEST", 1000)
     with pytest.raises(SettingsError, match="1,000 are allowed"):
         ship(Settings(runs[:1], "learned-x", worlds=2, out=tmp_path))
     assert not list(tmp_path.iterdir())
@@ -156,12 +155,52 @@ def test_the_command_on_record_gives_the_settings_again() -> None:
             assert tyro.cli(TrainSettings, default=default, args=words) == settings
 
 
-def test_the_command_says_how_each_seed_did(
-    runs: tuple[Path, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    options = ["--name", "learned-trial", "--worlds", "3", "--out", str(tmp_path)]
-    assert main(["ship", *map(str, runs), *options]) == 0
-    shown = capsys.readouterr().out
-    assert all(f"training seed {seed}: " in shown for seed in (1, 2, 3))
-    assert main(["ship", str(tmp_path), *options]) == 2
-    assert "is not a run folder" in capsys.readouterr().err
+def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = tmp_path / "run"
+    settings = small(
+        run,
+        side="target",
+        encoding="plain",
+        against="idle",
+        scenario="smart",
+        team_sizes=(),
+        steps=80,
+        evaluate_every=80,
+        overrides={"horizon": HORIZON, "settle_time": 1.0},
+        reward_weights={"team": -1.0},
+    )
+    train(settings, console=quiet())
+    asked = Settings((run,), "mine", worlds=4, out=tmp_path / "out")
+    monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", 0.1))
+    with pytest.raises(SettingsError, match=r"costs idle .* more than 'smart': at least 0.1"):
+        ship(asked)
+    assert not (tmp_path / "out").exists()
+    monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", -1.0))
+    target = load_target(ship(asked))
+    card = target.policy.card  # type: ignore[union-attr]
+    assert target.name == "mine"
+    assert str(tmp_path) not in str(card)
+    assert card["comparison"]["cost"]["count"] == 4
+    assert card["check"]["score"] >= 0
+
+
+def test_every_scenario_has_its_own_training() -> None:
+    runs = all_runs(Runs(folder=Path("x")))
+    assert {(run.scenario, run.algorithm) for run in runs} == set(ALGORITHMS.items())
+    assert [run.seed for run in runs if run.scenario == "smart"] == [1, 2, 3, 4, 5]
+    assert [run.seed for run in runs if run.scenario == "radio"] == [1, 2, 3]
+    for run in runs:
+        # The corrections of a tuned team, before its safeguard, with a bound on contact.
+        assert (run.advise, run.correction, run.encoding) == ("ddcs-tuned", "velocity", "belief")
+        assert run.contact_bound is not None
+
+
+def test_tuning_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("posse_baselines.tuned.files", "posse_training.tune"):
+        monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")
+    settings = small_tuning(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1, ship=True)
+    card = json.loads(tune(settings, console=quiet()).read_text())
+    shipped = tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json"
+    shipped.write_text(json.dumps({**card, "settings": {}}))
+    (result,) = repeat_all(tmp_path / "again", quiet())
+    assert json.loads(result.read_text()) == json.loads(shipped.read_text()) == card
