@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scripts.ship import CHECK_WORLDS, LARGEST, check_scenarios, make_check, replay
 
 import posse
 from posse_baselines import PolicyError, load, policy_names
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.registry import SHIPPED, shipped
 from posse_training import evaluate
-from posse_training.shipping.check import CHECK_WORLDS, check_scenarios, make_check, replay
-from posse_training.shipping.ship import LARGEST
 
 FILES = sorted(SHIPPED.glob("*.safetensors"))
 
@@ -113,7 +112,7 @@ def test_worlds_that_it_was_trained_on_are_refused(path: Path) -> None:
 
 @pytest.fixture
 def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A file as ``posse ship`` writes it, in the folder where the package looks."""
+    """A file as ``scripts/ship.py`` writes it, in the folder where the package looks."""
     monkeypatch.setattr("posse_baselines.registry.SHIPPED", tmp_path)
     path = tmp_path / "learned-made-up.safetensors"
     policy = seeker()
