@@ -6,7 +6,6 @@ import dataclasses
 import fcntl
 import html
 import importlib
-import json
 import os
 import re
 import subprocess
@@ -97,18 +96,6 @@ def test_every_setting_is_in_the_table(site: Path) -> None:
     for field in dataclasses.fields(posse.Scenario):
         if isinstance(field.default, int) and not isinstance(field.default, bool):
             assert shown[field.name][1] == str(field.default)
-
-
-def test_the_search_index_has_names_of_settings_and_errors(site: Path) -> None:
-    index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
-    separator = re.compile(index["config"]["separator"])
-    words: dict[str, set[str]] = {}
-    for entry in index["docs"]:
-        plain = html.unescape(re.sub(r"<.*?>", " ", entry["title"] + " " + entry["text"]))
-        for word in separator.split(plain):
-            words.setdefault(word, set()).add(entry["location"].partition("#")[0])
-    assert "settings/" in words["sonar_range"]
-    assert {"settings/", "reference/posse/"} <= words["ScenarioError"]
 
 
 def test_no_page_loads_anything_from_another_host(site: Path) -> None:

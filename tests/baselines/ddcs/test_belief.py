@@ -102,7 +102,7 @@ def test_a_belief_is_what_the_memory_holds(scenario: str) -> None:
             for e in range(3):
                 for i in range(5):
                     wanted = expected(batch, ddcs, memory, observations[e, i], e, i)
-                    np.testing.assert_allclose(beliefs[e, i], wanted, atol=2e-4)
+                    np.testing.assert_allclose(beliefs[e, i], wanted, rtol=1e-4, atol=2e-4)
                     seen.append(wanted)
         actions, memory = ddcs.carry_out(observations, memory, np.zeros((3, 5, 2), np.float32))
         observations = batch.step(actions)[0]

@@ -33,7 +33,7 @@ def test_a_large_team_of_which_each_knows_eight_settles() -> None:
     # Team-mates that are no longer in the observation must not stay as obstacles where they were.
     batch = posse.batch(
         "constant",
-        20,
+        10,
         split="validation",
         message_size=5,
         autoreset="disabled",

@@ -33,9 +33,9 @@ def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
 
 @pytest.mark.parametrize("name", ["smart", pytest.param("obstacles", marks=pytest.mark.long)])
 def test_playing_ahead_is_worth_more_than_the_scripted_team(name: str) -> None:
-    planned = play(posse.batch(name, 6, split="validation"), load("planner"))
+    planned = play(posse.batch(name, 6, split="validation", horizon=300), load("planner"))
     team = load("ddcs-distributed")
-    scripted = play(posse.batch(name, 6, split="validation", message_size=team.message_size), team)
+    scripted = play(posse.batch(name, 6, split="validation", horizon=300, message_size=team.message_size), team)
     assert planned["safe_score"].mean() >= scripted["safe_score"].mean() + 0.05
     assert planned["contact_free"].all()
 

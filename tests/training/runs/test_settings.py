@@ -145,7 +145,7 @@ class TestSomebodyElsesFolder:
         assert not (planted / "it_ran").exists()
         assert [file.name for file in (planted / "run").iterdir()] == ["settings.json"]
 
-    @pytest.mark.parametrize("command", [["train", "--resume"], ["ship", "--name", "learned-x"]])
+    @pytest.mark.parametrize("command", [["train", "--resume"]])
     def test_no_command_imports_it(self, planted: Path, command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
         write(planted / "run", beside="planted:Thing")
         assert main([*command, str(planted / "run")]) == 2

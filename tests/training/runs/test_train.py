@@ -183,6 +183,6 @@ def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
         logged = [(event.step, event.value) for event in log.Scalars(f"validation/{name}")]
         wanted = [(int(float(row["steps"])), float(row[name])) for row in curve]
         assert [step for step, _ in logged] == [step for step, _ in wanted] == [640, 1280]
-        assert [v for _, v in logged] == pytest.approx([v for _, v in wanted], abs=1e-6)
+        assert [v for _, v in logged] == pytest.approx([v for _, v in wanted], rel=1e-5, abs=1e-6)
     assert {"reward/slot", "reward/contact", "training/score", "rollout/success_rate"} <= set(log.Tags()["scalars"])
     assert {"contact/share", "contact/multiplier"} <= set(log.Tags()["scalars"])

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -113,7 +114,7 @@ def evaluate(
     return Results(policy.name, settings, seed, split, columns, named)
 
 
-def progress_bar(*, disable: bool = False) -> Progress:
+def progress_bar(*, disable: bool = False, console: Console | None = None) -> Progress:
     """Return a progress bar, as all commands show it."""
     return Progress(
         TextColumn("{task.description}"),
@@ -122,6 +123,7 @@ def progress_bar(*, disable: bool = False) -> Progress:
         TimeRemainingColumn(),
         transient=True,
         disable=disable,
+        console=console,
     )
 
 
