@@ -77,7 +77,7 @@ raise SystemExit(main(["compare", *policies, "--scenarios", "constant", "--episo
 """
 
 
-def test_a_script_without_a_main_guard_is_told_to_add_one(tmp_path: Path) -> None:
+def test_a_script_without_a_main_guard_may_compare(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(UNGUARDED)
     sources = [ROOT / root for root in ("envs", "baselines", "training")]
     done = subprocess.run(
@@ -89,11 +89,8 @@ def test_a_script_without_a_main_guard_is_told_to_add_one(tmp_path: Path) -> Non
         check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources))},
     )
-    assert done.returncode == 2
-    assert done.stderr.startswith("this script starts processes of its own")
-    assert 'below a line `if __name__ == "__main__":`' in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out").exists()
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out").is_dir()
 
 
 @pytest.mark.long
