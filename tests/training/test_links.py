@@ -82,9 +82,20 @@ def test_a_replay_and_a_film(tmp_path: Path, elsewhere: Path, name: str) -> None
     assert untouched(elsewhere)
 
 
-def test_a_submission(tmp_path: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "mine.json").symlink_to(elsewhere)
-    out = str(tmp_path / "mine.json")
-    assert main(["submit", "pursuit", "--scenario", "constant", "--worlds", "2", "--out", out]) == 2
-    assert "symbolic link" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["submit", "pursuit", "--scenario", "constant", "--worlds", "2"],
+        ["compare", "pursuit", "--scenarios", "constant", "--episodes", "2"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_a_submission_and_a_comparison(
+    tmp_path: Path, elsewhere: Path, command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both write to a new or an empty folder, which holds no links."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "summary.json").symlink_to(elsewhere)
+    assert main([*command, "--out", str(tmp_path / "out")]) == 2
+    assert str(tmp_path / "out") in capsys.readouterr().err
     assert untouched(elsewhere)
