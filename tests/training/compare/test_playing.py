@@ -103,7 +103,7 @@ def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     assert len(found.failed) == 3
     assert all("exceeded the time limit of 12 s" in row["why"] for row in found.failed)
     with pytest.raises(PolicyError, match="HangsOnLoad' cannot be loaded: it exceeded the time"):
-        compare(settings_for(tmp_path, "HangsOnLoad", limit=12.0))
+        compare(settings_for(tmp_path / "load", "HangsOnLoad", limit=12.0))
 
 
 HANG = """
