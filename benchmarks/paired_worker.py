@@ -21,8 +21,7 @@ def of_batch(case: dict[str, Any]) -> Step:
     """Return a step of a batch with random actions."""
     import posse
 
-    own: dict[str, Any] = {"own_kernel": True} if case["kernel"] == "own" else {}
-    batch = posse.batch(case["scenario"], case["worlds"], num_threads=case["threads"], **own)
+    batch = posse.batch(case["scenario"], case["worlds"], num_threads=case["threads"])
     batch.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1, 1, batch.action_shape).astype(np.float32)
     return lambda: batch.step(actions)

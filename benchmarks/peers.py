@@ -60,7 +60,6 @@ class Peer:
 
 PEERS = (
     Peer("posse", "posse_batch", None, "smart"),
-    Peer("posse, own kernel", "posse_batch", None, "smart, own kernel"),
     Peer("posse, field", "posse_batch", None, "field"),
     Peer("posse, PettingZoo", "posse_pettingzoo", None, batches=(1,), threaded=False),
     Peer("mpe2 simple_tag", "mpe2_tag", "mpe2", batches=(1,), threaded=False),

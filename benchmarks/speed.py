@@ -1,8 +1,7 @@
 """``make bench``: throughput on this machine.
 
 Agent-steps/s of batches, compared with a plain copy of the observations; steps/s of single-world
-environments, alone and with other busy processes; time of the first step of a new process. With
-``--device cuda``: batches on the GPU, and their share of its memory bandwidth.
+environments, alone and with other busy processes; time of the first step of a new process.
 """
 
 from __future__ import annotations
@@ -19,11 +18,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 import machine
-import numba
 import numpy as np
 import tyro
 from rich.console import Console
@@ -47,9 +45,8 @@ class Settings:
     scenario: str = "smart"
     overrides: dict[str, int] = field(default_factory=dict)
     """Integer settings that override those of the scenario."""
-    device: Literal["cpu", "cuda"] = "cpu"
     worlds: tuple[int, ...] | None = None
-    """Default: 1 to 16,384 on the CPU, 1,024 to 4 million on a GPU."""
+    """Numbers of worlds; default: 1 to 16,384."""
     seconds: float = 1.0
     """Total time of the five runs of each figure, s."""
     cold: bool = True
@@ -76,18 +73,11 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
 
 
 def batches(settings: Settings) -> list[dict[str, Any]]:
-    """Measure batches with one thread and with all, and a plain copy of their observations.
-
-    With the general kernel, then with one compiled for this scenario.
-    """
+    """Measure batches with one thread and with all, and a plain copy of their observations."""
     rows = []
-    kinds = itertools.product(
-        (False, True), settings.worlds or (1, 32, 1024, 4096, 16384), sorted({1, os.cpu_count() or 1})
-    )
-    for own_kernel, count, threads in kinds:
-        batch = posse.batch(
-            settings.scenario, count, num_threads=threads, own_kernel=own_kernel, **dict[str, Any](settings.overrides)
-        )
+    kinds = itertools.product(settings.worlds or (1, 32, 1024, 4096, 16384), sorted({1, os.cpu_count() or 1}))
+    for count, threads in kinds:
+        batch = posse.batch(settings.scenario, count, num_threads=threads, **dict[str, Any](settings.overrides))
         observations = batch.reset(seed=0)
         rng = np.random.default_rng(0)
         actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
@@ -97,7 +87,6 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
         plain = per_second(partial(np.copyto, copy, observations), settings.seconds)
         rows.append(
             {
-                "kernel": "own" if own_kernel else "general",
                 "worlds": count,
                 "threads": threads,
                 "agent_steps": [r * agents for r in rate],
@@ -108,81 +97,6 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def finished(step: Callable[[], object], times: int) -> None:
-    """Call a GPU function several times and synchronise."""
-    for _ in range(times):
-        step()
-    numba.cuda.synchronize()  # type: ignore[no-untyped-call]
-
-
-def bandwidth(seconds: float) -> float:
-    """Return bytes per second, read and written, of a plain copy in GPU memory."""
-    source, target = (numba.cuda.device_array(1 << 28, np.float32) for _ in range(2))
-    copies = per_second(lambda: finished(lambda: target.copy_to_device(source), 10), seconds)
-    return float(copies[0] * 10 * 2 * source.nbytes)
-
-
-def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
-    """Measure batches on the GPU, compared with a plain copy in its memory."""
-    limit = bandwidth(settings.seconds)
-    rows = []
-    for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
-        batch: Any = posse.batch(settings.scenario, count, device="cuda", **dict[str, Any](settings.overrides))
-        batch.reset(seed=0)
-        rng = np.random.default_rng(0)
-        actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
-        once = partial(batch.step, actions, check=False)
-        rate = [10 * r for r in per_second(partial(finished, once, 10), settings.seconds)]
-        checked = per_second(partial(batch.step, actions), settings.seconds)
-        agents = count * batch.observation_shape[1]
-        # State read and written, actions read, results written.
-        outputs = agents * (batch.observation_shape[2] + 1 + len(posse.REWARD_TERMS)) * 4
-        moved = 2 * count * batch.bytes_per_world + actions.nbytes + outputs
-        rows.append(
-            {
-                "worlds": count,
-                "agent_steps": [r * agents for r in rate],
-                "agent_steps_checked": [r * agents for r in checked],
-                "share_of_bandwidth": rate[0] * moved / limit,
-                "observation_length": batch.observation_shape[2],
-                "bytes_a_world": batch.bytes_per_world,
-            }
-        )
-    return rows
-
-
-def report_gpu(settings: Settings) -> None:
-    """Measure a GPU, print, and write the figures."""
-    from posse.engine.cuda import check_device  # imports numba.cuda
-
-    check_device()
-    rows = gpu_batches(settings)
-    name = numba.cuda.get_current_device().name  # type: ignore[no-untyped-call]
-    figures = {
-        "device": name.decode() if isinstance(name, bytes) else str(name),
-        "machine": machine.describe(),
-        "scenario": settings.scenario,
-        "overrides": settings.overrides,
-        "batches": rows,
-    }
-    table = Table(title=f"{settings.scenario} on {figures['device']}")
-    for column in ("worlds", "million agent-steps/s [range]", "waiting for each", "share of bandwidth"):
-        table.add_column(column, justify="right")
-    for row in rows:
-        median, low, high = (x / 1e6 for x in row["agent_steps"])
-        table.add_row(
-            f"{row['worlds']:,}",
-            f"{median:.1f} [{low:.1f}, {high:.1f}]",
-            f"{row['agent_steps_checked'][0] / 1e6:.1f}",
-            f"{row['share_of_bandwidth']:.1%}",
-        )
-    console = Console()
-    console.print(table)
-    settings.out.parent.mkdir(parents=True, exist_ok=True)
-    settings.out.write_text(json.dumps(figures, indent=2) + "\n")
-    console.print(f"figures: {settings.out}")
 
 
 def interfaces(settings: Settings) -> dict[str, list[float]]:
@@ -299,9 +213,6 @@ def first_steps() -> dict[str, float]:
 def main() -> None:
     """Measure, print, and write the figures."""
     settings = tyro.cli(Settings)
-    if settings.device == "cuda":
-        report_gpu(settings)
-        return
     others = machine.OtherWork()
     own = time.process_time()
     rows, single = batches(settings), interfaces(settings)
@@ -320,12 +231,11 @@ def main() -> None:
     console = Console()
     length, size = rows[0]["observation_length"], rows[0]["bytes_a_world"]
     table = Table(title=f"{settings.scenario}: {length} floats an observation, {size} bytes a world")
-    for column in ("kernel", "worlds", "threads", "million agent-steps/s [range]", "times a plain copy"):
+    for column in ("worlds", "threads", "million agent-steps/s [range]", "times a plain copy"):
         table.add_column(column, justify="right")
     for row in rows:
         median, low, high = (x / 1e6 for x in row["agent_steps"])
         table.add_row(
-            row["kernel"],
             f"{row['worlds']:,}",
             str(row["threads"]),
             f"{median:.2f} [{low:.2f}, {high:.2f}]",

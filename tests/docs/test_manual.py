@@ -33,7 +33,7 @@ LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "sourc
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the manual, once for all modules and processes of a run."""
-    pytest.importorskip("mkdocs", reason="no mkdocs: pip install posse[docs]")
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
     base = tmp_path_factory.getbasetemp()
     shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
     folder, partial = shared / "manual", shared / "manual.partial"
@@ -41,7 +41,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
             done = subprocess.run(
-                [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", partial],
+                [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", partial],
                 cwd=ROOT,
                 capture_output=True,
                 text=True,

@@ -16,7 +16,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 @pytest.fixture
 def readme_table(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    pytest.importorskip("mkdocs", reason="no mkdocs: pip install posse[docs]")
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "drawing"))
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "hooks"))
     yield importlib.import_module("readme_table")

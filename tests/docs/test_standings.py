@@ -23,7 +23,7 @@ WORLDS = 1000
 
 @pytest.fixture
 def standings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[ModuleType]:
-    pytest.importorskip("mkdocs", reason="no mkdocs: pip install posse[docs]")
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
     monkeypatch.syspath_prepend(str(DOCS / "hooks"))
     module = importlib.import_module("standings")
     monkeypatch.setattr(module, "FOLDER", tmp_path)

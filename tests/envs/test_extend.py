@@ -61,7 +61,7 @@ settings = dict(
     breaks=BREAKS, num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
 )
 
-batch = posse.batch("obstacles", 11, own_kernel=OWN, **settings)
+batch = posse.batch("obstacles", 11, **settings)
 alone = [posse.batch("obstacles", 1, first_world=e, **settings) for e in (0, 9)]
 s, layout = batch.scenario, batch.layout
 plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": (), "reward_weights": {}})
@@ -141,9 +141,9 @@ print("hits", sum(batch._untyped.stats.cache_hits.values()))
 """
 
 
-def play(folder: Path, own_kernel: bool, breaks: int, **changed: str) -> tuple[str, str]:
+def play(folder: Path, breaks: int, **changed: str) -> tuple[str, str]:
     """Return the output and the errors of a game with the examples."""
-    code = PLAY.replace("OWN", str(own_kernel)).replace("BREAKS", str(breaks))
+    code = PLAY.replace("BREAKS", str(breaks))
     done = run(folder, code, **{**examples(CHAPTER), "twice": TWICE, **changed})
     return done.stdout, done.stderr
 
@@ -152,23 +152,17 @@ def play(folder: Path, own_kernel: bool, breaks: int, **changed: str) -> tuple[s
 def test_the_examples_are_part_of_the_kernel(tmp_path: Path) -> None:
     """Of that of any scenario, which is also that of the environments and kept on disk."""
     for breaks in (0, 1):
-        said, errors = play(tmp_path, False, breaks)
+        said, errors = play(tmp_path, breaks)
         assert said.startswith("hits"), errors
     assert said == "hits 1\n"
 
 
 @pytest.mark.long
-def test_the_examples_are_part_of_the_batch_s_own_kernel(tmp_path: Path) -> None:
-    said, errors = play(tmp_path, True, 0)
-    assert said.startswith("hits"), errors
-
-
-@pytest.mark.long
 def test_an_edited_term_is_compiled_anew(tmp_path: Path) -> None:
-    said, errors = play(tmp_path, False, 0)
+    said, errors = play(tmp_path, 0)
     assert said.startswith("hits"), errors
     steady = examples(CHAPTER)["steady"].replace("return 1 -", "return 2 -")
-    _, errors = play(tmp_path, False, 0, steady=steady)
+    _, errors = play(tmp_path, 0, steady=steady)
     assert "Not equal to tolerance" in errors
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posse_baselines.ddcs import Settings
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.policy import PolicyError
 from posse_baselines.tuning import tunables
 

@@ -39,7 +39,7 @@ def test_a_command_names_the_extra(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(command.split()) == 2
-    assert "pip install 'posse[cluster]'" in capsys.readouterr().err
+    assert "pip install '.[cluster]'" in capsys.readouterr().err
 
 
 @without_ray

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import posse
 from posse import Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, Tunable, load, play
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.tuning import tunables
 
 _SCREENED_ON: Final = 8  # worlds

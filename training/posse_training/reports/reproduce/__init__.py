@@ -22,7 +22,7 @@ from rich.table import Table
 from rich.text import Text
 
 import posse
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_training.reports.pictures.style import RC
 from posse_training.reports.reproduce.laws import leader_loss, tracks
 from posse_training.reports.reproduce.motion import curves, frames

@@ -11,6 +11,7 @@ import math
 from typing import Final
 
 from posse.numeric import Record, Records, compiled
+from posse_baselines.ddcs.memory import Team
 from posse_baselines.laws.geometry import length
 
 _SIDE_KEPT: Final = 1.5  # s
@@ -58,23 +59,24 @@ def turn_past(discs: Records, count: int, clearance: float, ux: float, uy: float
 
 
 @compiled
-def way_past(f: Record, s: Record, d: Record, discs: Records, count: int, vx: float, vy: float) -> tuple[float, float]:
+def detour(team: Team, me: Record, discs: Records, count: int, vx: float, vy: float) -> tuple[float, float]:
     """Return the wanted velocity (m/s), turned past what stands in its way."""
+    world, settings = team.world, team.settings
     speed = length(vx, vy)
     if speed < 1e-6:
         return vx, vy
     ux, uy = vx / speed, vy / speed
-    left = turn_past(discs, count, s.detour, ux, uy, 1.0)
-    right = turn_past(discs, count, s.detour, ux, uy, -1.0)
+    left = turn_past(discs, count, settings.detour, ux, uy, 1.0)
+    right = turn_past(discs, count, settings.detour, ux, uy, -1.0)
     if left == 0.0 and right == 0.0:
         return vx, vy
-    kept = d.side if (d.step - d.side_step) * f.dt <= _SIDE_KEPT else 0
+    kept = me.side if (me.step - me.side_step) * world.dt <= _SIDE_KEPT else 0
     goes_left = abs(left) < abs(right)
     if kept != 0 and abs(left if kept > 0 else right) <= _MOST_TURN:
         goes_left = kept > 0
     turn = left if goes_left else right
     if abs(turn) > _MOST_TURN:
         return vx, vy
-    d.side, d.side_step = 1 if goes_left else -1, d.step
+    me.side, me.side_step = 1 if goes_left else -1, me.step
     c, sine = math.cos(turn), math.sin(turn)
     return vx * c - vy * sine, vx * sine + vy * c

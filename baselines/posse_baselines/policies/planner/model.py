@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, Scenario
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse.rules import config_record, slot_records
-from posse_baselines.laws.assignment import WORK_ROWS
-from posse_baselines.laws.heading import BODY
-from posse_baselines.laws.safeguard import DISC, PLAYS
-from posse_baselines.policies.planner.law import drive_all
+from posse_baselines.policies.planner.law import WAY, Played, drive_all, work_for
 
-_MOST_DISCS = 32
-_CONTACTS = ("contacts_tracker", "contacts_obstacle", "contacts_target")
-_PATH = ("x", "y", "frame_cos", "frame_sin")
+_CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
+_PATH: Final = ("x", "y", "frame_cos", "frame_sin")
+_STANDARD: Final = (
+    # ahead, left, gain, foresees
+    (0.0, 0.0, 1.5, 0.0),
+    (-0.2, 0.0, 1.5, 0.0),
+    (0.2, 0.0, 1.5, 0.0),
+    (0.0, 0.0, 0.7, 0.0),
+    (0.0, 0.0, 3.0, 0.0),
+    (0.0, 0.0, 1.5, 1.0),
+    (0.0, 0.0, 3.0, 1.0),
+)
+RANGES: Final = {"ahead": (-0.25, 0.25), "left": (-0.2, 0.2), "gain": (0.7, 4.0)}
+TRIES: Final = len(_STANDARD) + 1
+"""Tries in each round: the standard ways and what was kept; or the best so far, and variations."""
+
+
+def standard_ways(num_trackers: int) -> Records:
+    """Return the ways that whole teams play alike, (TRIES - 1, N) :data:`WAY`."""
+    ways = np.array(list(_STANDARD), WAY)
+    return np.repeat(ways[:, None], num_trackers, axis=1)
 
 
 @dataclass
@@ -35,16 +50,8 @@ class Law(OwnArrays):
     """The planner's law for the teams of one scenario, with the memory that it works in."""
 
     def __init__(self, scenario: Scenario) -> None:
-        n, parts = scenario.num_trackers, MOST_THREADS
-        self._tables = (
-            config_record(scenario),
-            slot_records(scenario),
-            np.zeros((parts, n, n), np.float32),
-            np.zeros((parts, WORK_ROWS, n + 1), np.float32),
-            np.zeros((parts, _MOST_DISCS), DISC),
-            np.zeros(parts, BODY),
-            np.zeros(parts, PLAYS),
-        )
+        self._config, self._slots = config_record(scenario), slot_records(scenario)
+        self._work = work_for(scenario.num_trackers)
 
     def drive(
         self, batch: Batch, going: BoolArray, ways: Records, plans: Records, seen: Foresight, actions: FloatArray
@@ -54,32 +61,27 @@ class Law(OwnArrays):
         Args:
             batch: E worlds: those of ``seen``, or the same number of copies of each.
             going: Which worlds.
-            ways: (E, N) :data:`~posse_baselines.policies.planner.ways.WAY`.
-            plans: (E, N) :data:`~posse_baselines.policies.planner.assigning.PLAN`, brought up to
+            ways: (E, N) :data:`~posse_baselines.policies.planner.law.WAY`.
+            plans: (E, N) :data:`~posse_baselines.policies.planner.law.PLAN`, brought up to
                 date.
             seen: What was foreseen.
             actions: What is written to.
         """
         arrays = batch.arrays
-        per_path = batch.num_worlds // len(seen.begun)
-        over_worlds(
-            drive_all,
-            (
-                *self._tables,
-                arrays.world,
-                arrays.tracker,
-                arrays.obstacle,
-                going,
-                ways,
-                plans,
-                seen.paths,
-                seen.begun,
-                per_path,
-                actions,
-            ),
-            batch.num_worlds,
-            batch.scenario.num_trackers,
+        played = Played(
+            self._config,
+            self._slots,
+            arrays.world,
+            arrays.tracker,
+            arrays.obstacle,
+            going,
+            ways,
+            plans,
+            seen.paths,
+            seen.begun,
         )
+        arguments = (played, self._work, batch.num_worlds // len(seen.begun), actions)
+        over_worlds(drive_all, arguments, batch.num_worlds, batch.scenario.num_trackers)
 
 
 def play_ahead(

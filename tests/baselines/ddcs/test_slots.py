@@ -9,7 +9,7 @@ import pytest
 
 import posse
 from posse_baselines import load, play
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,11 @@ several hops away know that the leader is alive.
 from __future__ import annotations
 
 from posse.numeric import Record, Records, compiled
-from posse_baselines.ddcs.memory import EXCHANGING, SEARCHING
+from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.messages import COUNT, is_newer
 from posse_baselines.ddcs.monitoring import is_there, mate_now, patience
-from posse_baselines.ddcs.tracking.tasks import may_change
+from posse_baselines.ddcs.settings import EXCHANGING, SEARCHING
+from posse_baselines.ddcs.tasks import may_change
 from posse_baselines.laws.geometry import length
 
 
@@ -36,57 +37,53 @@ def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool
 
 
 @compiled
-def appoint(d: Record, leader: int, term: int, pulse: int) -> None:
+def appoint(me: Record, leader: int, term: int, pulse: int) -> None:
     """Adopt a claim."""
-    if d.leader >= 0 and leader != d.leader:
-        d.exchanges += 1
-    if leader != d.leader:
-        d.confirmed = 0
-    d.leader, d.term, d.pulse, d.pulse_step = leader, term, pulse, d.step
+    if me.leader >= 0 and leader != me.leader:
+        me.exchanges += 1
+    if leader != me.leader:
+        me.confirmed = 0
+    me.leader, me.term, me.pulse, me.pulse_step = leader, term, pulse, me.step
 
 
 @compiled
-def nearest_tracker(
-    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int
-) -> tuple[int, float, float]:
+def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tuple[int, float, float]:
     """Return the tracker nearest to the target, its distance, and the own distance (m).
 
     Among all that count as working, except ``barred`` (-1: none).
     """
-    own_distance = length(d.now_x - x, d.now_y - y)
-    best, least = own, own_distance
+    own_distance = length(me.target_x - me.x, me.target_y - me.y)
+    best, least = me.number, own_distance
     for j in range(len(mates)):
-        if j != own and j != barred and is_there(f, s, d, mates[j], len(mates)):
-            mate_x, mate_y = mate_now(f, s, d, mates[j])
-            distance = length(d.now_x - mate_x, d.now_y - mate_y)
+        if j != me.number and j != barred and is_there(team, me, mates[j]):
+            mate_x, mate_y = mate_now(team, me, mates[j])
+            distance = length(me.target_x - mate_x, me.target_y - mate_y)
             if distance < least:
                 best, least = j, distance
     return best, least, own_distance
 
 
 @compiled
-def place_of(
-    f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, j: int
-) -> tuple[float, float]:
+def place_of(team: Team, me: Record, mates: Records, j: int) -> tuple[float, float]:
     """Return the current position of tracker j, m; (x, y) is the own one."""
-    return (x, y) if j == own else mate_now(f, s, d, mates[j])
+    return (me.x, me.y) if j == me.number else mate_now(team, me, mates[j])
 
 
 @compiled(seldom=True)
-def central_tracker(f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float) -> tuple[int, int]:
+def central_tracker(team: Team, me: Record, mates: Records) -> tuple[int, int]:
     """Return the tracker with the least sum of distances to all heard, and their number."""
     n, others = len(mates), 0
-    best, least = own, 1e30
+    best, least = me.number, 1e30
     for i in range(n):
-        if i != own:
-            if not is_there(f, s, d, mates[i], n):
+        if i != me.number:
+            if not is_there(team, me, mates[i]):
                 continue
             others += 1
-        x_i, y_i = place_of(f, s, d, mates, own, x, y, i)
+        x_i, y_i = place_of(team, me, mates, i)
         total = 0.0
         for j in range(n):
-            if j != i and (j == own or is_there(f, s, d, mates[j], n)):
-                x_j, y_j = place_of(f, s, d, mates, own, x, y, j)
+            if j != i and (j == me.number or is_there(team, me, mates[j])):
+                x_j, y_j = place_of(team, me, mates, j)
                 total += length(x_i - x_j, y_i - y_j)
         # Ties within rounding go to the lower number.
         if total < least - 1e-3:
@@ -95,44 +92,45 @@ def central_tracker(f: Record, s: Record, d: Record, mates: Records, own: int, x
 
 
 @compiled
-def select_leader(f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float, barred: int) -> None:
+def select_leader(team: Team, me: Record, mates: Records, barred: int) -> None:
     """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
-    if d.known:
-        best, _, _ = nearest_tracker(f, s, d, mates, own, x, y, barred)
-        appoint(d, best, (d.term + 1) % COUNT, 0)
+    if me.known:
+        best, _, _ = nearest_tracker(team, me, mates, barred)
+        appoint(me, best, (me.term + 1) % COUNT, 0)
         return
-    best, others = central_tracker(f, s, d, mates, own, x, y)
+    best, others = central_tracker(team, me, mates)
     if others == 0:
-        appoint(d, own, (d.term - 1) % COUNT, 0)
+        appoint(me, me.number, (me.term - 1) % COUNT, 0)
     else:
-        appoint(d, best if best != barred else own, (d.term + 1) % COUNT, 0)
+        appoint(me, best if best != barred else me.number, (me.term + 1) % COUNT, 0)
 
 
 @compiled
-def settle_lead(f: Record, s: Record, d: Record, mates: Records, own: int, x: float, y: float) -> None:
+def settle_lead(team: Team, me: Record, mates: Records) -> None:
     """Process received claims; hand over or appoint if due; (x, y) is the own position."""
+    world, settings = team.world, team.settings
     for j in range(len(mates)):
         mate = mates[j]
         if mate.fresh == 0 or mate.leader < 0:
             continue
-        if mate.leader == d.leader and mate.term == d.term:
-            if is_newer(mate.pulse, d.pulse):
-                d.pulse, d.pulse_step = mate.pulse, d.step
-                d.confirmed = 1
-        elif better_claim(mate.term, mate.leader, d.term, d.leader):
-            appoint(d, mate.leader, mate.term, mate.pulse)
-    if d.leader == own:
-        d.pulse, d.pulse_step, d.confirmed = (d.pulse + 1) % COUNT, d.step, 1
-    if d.leader < 0:
-        select_leader(f, s, d, mates, own, x, y, -1)
+        if mate.leader == me.leader and mate.term == me.term:
+            if is_newer(mate.pulse, me.pulse):
+                me.pulse, me.pulse_step = mate.pulse, me.step
+                me.confirmed = 1
+        elif better_claim(mate.term, mate.leader, me.term, me.leader):
+            appoint(me, mate.leader, mate.term, mate.pulse)
+    if me.leader == me.number:
+        me.pulse, me.pulse_step, me.confirmed = (me.pulse + 1) % COUNT, me.step, 1
+    if me.leader < 0:
+        select_leader(team, me, mates, -1)
         return
     # In the search there are no followers, and leadership changes without the exchange task.
-    if d.task != SEARCHING and not may_change(s, d.task, EXCHANGING):
+    if me.task != SEARCHING and not may_change(team, me.task, EXCHANGING):
         return
-    if d.leader == own:
-        if d.known and d.step % max(1, round(s.time_lag / f.dt)) == 0:
-            best, least, distance = nearest_tracker(f, s, d, mates, own, x, y, -1)
-            if best != own and least < distance - s.lead_hysteresis:
-                appoint(d, best, (d.term + 1) % COUNT, 0)
-    elif (d.step - d.pulse_step) * f.dt > patience(s, d) + s.lead_patience:
-        select_leader(f, s, d, mates, own, x, y, d.leader)
+    if me.leader == me.number:
+        if me.known and me.step % max(1, round(settings.time_lag / world.dt)) == 0:
+            best, least, distance = nearest_tracker(team, me, mates, -1)
+            if best != me.number and least < distance - settings.lead_hysteresis:
+                appoint(me, best, (me.term + 1) % COUNT, 0)
+    elif (me.step - me.pulse_step) * world.dt > patience(team, me) + settings.lead_patience:
+        select_leader(team, me, mates, me.leader)
