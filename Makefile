@@ -22,7 +22,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -46,7 +46,7 @@ lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py
+	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py scripts/*.py
 
 format: $(FULL) ## Format the sources
 	$(BIN)/ruff check --fix
@@ -58,13 +58,10 @@ docs: $(FULL) ## Build the manual into site/
 bench: $(FULL) ## Measure throughput on this machine
 	$(BIN)/python benchmarks/speed.py
 
-bench-costs: $(FULL) ## Measure the time of each part of a step, and how it scales
-	$(BIN)/python benchmarks/costs.py
-
-bench-training: $(FULL) ## Measure throughput and time shares of PPO training
+bench-training: $(FULL) ## Measure throughput of PPO training, and the time to beat the script
 	$(BIN)/python benchmarks/training.py
 
-algorithms: $(FULL) $(RECIPES)/recipes.stamp ## Train the field's algorithms and write docs/algorithms.md (hours); resumes
+algorithms: $(FULL) ## Train the field's algorithms from nothing (hours); resumes
 	$(BIN)/python benchmarks/algorithms.py
 
 bench-peers: $(FULL) ## Compare throughput with other simulators
@@ -72,19 +69,16 @@ bench-peers: $(FULL) ## Compare throughput with other simulators
 
 results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 	$(BIN)/python benchmarks/results.py
-	$(BIN)/python benchmarks/leaderboard.py
 	$(BIN)/python docs/drawing/readme_table.py
-	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
-	$(BIN)/python benchmarks/behaviour.py
 
 reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce
 
 tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted, it resumes
-	$(BIN)/python -m posse_training.tuning.again
+	$(BIN)/python scripts/tune_shipped.py
 
 train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
-	$(BIN)/python -m posse_training.shipping.train_all $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
+	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -12,8 +12,7 @@ import posse
 
 def build(worlds: int, variant: str) -> Built:
     """Return a batch with one thread per available core."""
-    threads = len(os.sched_getaffinity(0))
-    batch = posse.batch(variant, worlds, seed=0, num_threads=threads)
+    batch = posse.batch(variant, worlds, seed=0, num_threads=len(os.sched_getaffinity(0)))
     draws = np.random.default_rng(0).uniform(-1, 1, (ACTION_SETS, *batch.action_shape))
     actions = draws.astype(np.float32)
     batch.reset()

@@ -14,7 +14,7 @@ RECIPES = ROOT / "docs" / "recipes"
 OWN_ENVIRONMENT = {"benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared"}
 """Recipes with libraries that pin other versions than ours: ``make recipes`` installs those."""
 ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
-LEARN = {"minari_clone", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
+LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
 """Recipes that train, which takes long."""
 LONGEST = 15
 

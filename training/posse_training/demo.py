@@ -18,6 +18,7 @@ from rich.table import Table
 
 from posse import ObservationLayout, get_scenario
 from posse_baselines import Policy, load, policy_names
+from posse_training.processes import refuse_unguarded
 from posse_training.replay import record, write_replay
 from posse_training.reports import Results, evaluate
 from posse_training.reports.evaluation import progress_bar
@@ -45,6 +46,7 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
         episodes: Worlds for each policy and scenario.
         seconds: Simulated time of a film, s.
     """
+    refuse_unguarded()
     console = Console()
     started = time.perf_counter()
     plays = [(scenario, policy) for scenario in SCENARIOS for policy in POLICIES]

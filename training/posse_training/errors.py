@@ -35,7 +35,7 @@ class TimeLimitError(RuntimeError):
 
 
 class ResultFileError(ValueError):
-    """A result file of the leaderboard that is damaged, forged, or cannot be checked."""
+    """A claim for the leaderboard that is invalid or cannot be checked."""
 
 
 class ClusterError(RuntimeError):

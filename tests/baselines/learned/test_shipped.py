@@ -9,17 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scripts.ship import CHECK_WORLDS, LARGEST, check_scenarios, make_check, replay
 
 import posse
 from posse_baselines import PolicyError, load, policy_names
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 from posse_baselines.registry import SHIPPED, shipped
 from posse_training import evaluate
-from posse_training.shipping.check import CHECK_WORLDS, check_scenarios, make_check, replay
-from posse_training.shipping.ship import LARGEST
 
 FILES = sorted(SHIPPED.glob("*.safetensors"))
-CARDS = sorted(SHIPPED.glob("*.json"))
 
 TOLERANCE = 0.03
 """Two standard errors of a mean over the worlds of a check (32 scores, 0.08 apart).
@@ -31,7 +29,6 @@ Another processor rounds otherwise, so that worlds decide otherwise once in a wh
 def test_every_file_is_known_by_its_name() -> None:
     assert sorted(shipped()) == [path.stem for path in FILES]
     assert set(shipped()) <= set(policy_names())
-    assert [card.stem for card in CARDS] == [path.stem for path in FILES]
 
 
 def test_a_name_that_is_not_shipped_is_refused_with_those_that_are() -> None:
@@ -47,10 +44,6 @@ def problems_of(path: Path) -> list[str]:
         found.append(f"{path.stat().st_size:,} bytes")
     policy = LearnedPolicy.from_file(path)
     card = policy.card
-    if not path.with_suffix(".json").is_file():
-        return [*found, "no card beside it"]
-    if json.loads(path.with_suffix(".json").read_text()) != card:
-        found.append("the card beside it is not the one inside")
     needed = {
         "check",
         "choice",
@@ -119,7 +112,7 @@ def test_worlds_that_it_was_trained_on_are_refused(path: Path) -> None:
 
 @pytest.fixture
 def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A file as ``posse ship`` writes it, in the folder where the package looks."""
+    """A file as ``scripts/ship.py`` writes it, in the folder where the package looks."""
     monkeypatch.setattr("posse_baselines.registry.SHIPPED", tmp_path)
     path = tmp_path / "learned-made-up.safetensors"
     policy = seeker()
@@ -187,8 +180,6 @@ def test_what_is_missing_is_noticed(made_up: Path, monkeypatch: pytest.MonkeyPat
     assert "version 0 of 'constant'" in problems(check=stale)
     policy.with_card({"name": "bare"}).save(made_up)
     assert "its card lacks check" in "; ".join(problems_of(made_up))
-    made_up.with_suffix(".json").unlink()
-    assert problems_of(made_up) == ["no card beside it"]
 
 
 def test_what_is_wrong_shows(made_up: Path) -> None:

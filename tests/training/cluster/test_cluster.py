@@ -25,10 +25,7 @@ from posse_training.runs.settings import TrainSettings
 without_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
 COMMANDS = (
     "compare idle --scenarios smart --episodes 2 --no-figures --planner-episodes 0 --ray",
-    "record idle --episodes 2 --ray 10.0.0.1:6379",
-    "tune ddcs-distributed --generations 1 --ray",
     "train --steps 1000 --seeds 1 2 --ray",
-    "league --generations 1 --ray",
 )
 
 
