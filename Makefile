@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 INSTALL := install --no-compile --constraint
 # pip compiles modules on one core; this does on all. Left out is what the tests hardly import: others' tests,
 # torch's compiler, and tools. One module of torch is for another Python.
-COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|sqlalchemy|debugpy|mypy|mypyc|pip|setuptools)/'
+COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|debugpy|mypy|mypyc|pip|setuptools)/'
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone.
@@ -22,7 +22,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes fuzz mutants lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,13 +41,6 @@ test-long: $(FULL) ## Run the long tests: kills, full trainings, kernels compile
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
 recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
-
-fuzz: $(FULL) ## Run randomised tests in parallel, MINUTES=1 per campaign
-	$(BIN)/python -m tests.fuzz $(ONLY) --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0) $(if $(JOBS),--jobs $(JOBS))
-
-mutants: $(FULL) ## Try mutants of the laws and the DDCS (one to two hours for all), SAMPLE=400 SEED=1; resumes
-	$(BIN)/python -m tests.mutation $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) --jobs $(or $(JOBS),2)
-	$(BIN)/python -m tests.mutation.page
 
 lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check

@@ -1,4 +1,4 @@
-"""Tables of what the code declares: settings, observation fields, metrics, reward terms."""
+"""Tables of what the code declares: settings, observation fields, metrics, reward terms, defaults of a training."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 import posse
+from posse_training.runs.defaults import default_settings
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -34,6 +35,19 @@ def all_settings() -> str:
         meaning = setting.meaning + (f" (paper, {setting.source})" if setting.source else "")
         rows.append((code(name), shown, setting.unit, setting.range, meaning))
     return table(("setting", "default", "unit", "range", "meaning"), rows)
+
+
+def training_defaults() -> str:
+    """Return the settings of a training by ``ppo`` that differ most between scenarios."""
+    names = ("steps", "encoding", "advise", "correction", "contact_bound")
+    rows = []
+    for scenario in posse.scenario_names():
+        chosen = default_settings(scenario).to_dict()
+        shown = {name: "" if chosen[name] is None else code(chosen[name]) for name in names}
+        if chosen["advise"] is None:
+            shown["correction"] = ""
+        rows.append((code(scenario), f"{chosen['steps']:,}", *(shown[name] for name in names[1:])))
+    return table(("scenario", *(f"--{name.replace('_', '-')}" for name in names)), rows)
 
 
 def settings(scenario: str) -> str:

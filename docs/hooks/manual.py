@@ -27,6 +27,7 @@ PARTS: Final[dict[str, Callable[..., str]]] = {
     "all_settings": declared_tables.all_settings,
     "observation_fields": declared_tables.observation_fields,
     "metrics": declared_tables.metrics,
+    "training_defaults": declared_tables.training_defaults,
     "reward_terms": declared_tables.reward_terms,
     "replay": replays.replay,
     "gallery": standings.gallery,

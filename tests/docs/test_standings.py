@@ -21,7 +21,7 @@ ROW = Standing("a team", "a.b:C", False, "smart", 1, "test", 2026, 1000, 0.5, 0.
 
 @pytest.fixture
 def hooks(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[tuple[ModuleType, ModuleType]]:
-    pytest.importorskip("mkdocs", reason="no mkdocs: pip install posse[docs]")
+    pytest.importorskip("mkdocs", reason="no mkdocs: pip install '.[docs]'")
     monkeypatch.syspath_prepend(str(DOCS / "hooks"))
     standings, replays = importlib.import_module("standings"), importlib.import_module("replays")
     monkeypatch.setattr(standings, "STANDINGS", tmp_path / "standings.csv")

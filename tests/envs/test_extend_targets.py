@@ -49,7 +49,7 @@ for step in range(100):
     assert np.abs(error).max() <= 0.0601
     assert error.std() > 0.01
     kept = known & ~seen  # the direction stands, whoever moves
-    np.testing.assert_allclose(told[kept], np.broadcast_to(bearings, told.shape)[kept], atol=1e-4)
+    np.testing.assert_allclose(told[kept], np.broadcast_to(bearings, told.shape)[kept], rtol=1e-4, atol=1e-4)
     bearings, losses = told.copy(), losses + kept.sum()
     assert (o["target_range"] == -1).all()
     assert (abs(told[~known]) == 0).all()
@@ -69,7 +69,7 @@ assert set(side) == {-1.0, 1.0}
 times = s.control_step * np.arange(100)
 rates = s.target_turn_rate / (1 + 0.1 * times)
 expected = np.append(0, np.cumsum(rates[:-1] * s.control_step))
-np.testing.assert_allclose(turned, side * expected[:, None], atol=1e-3)
+np.testing.assert_allclose(turned, side * expected[:, None], rtol=1e-4, atol=1e-3)
 np.testing.assert_array_equal(
     layout.views(layout.vector(batch.arrays))["spiral_side"], side
 )

@@ -45,7 +45,7 @@ MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"
 def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> None:
     done = run(MAIN, *arguments, cwd=tmp_path)
     assert done.returncode == 2
-    assert "pip install 'posse[training]'" in done.stderr
+    assert "pip install '.[training]'" in done.stderr
     assert "torch cannot be imported" in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
@@ -55,7 +55,7 @@ def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> 
 def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     done = run(f"import {package}", cwd=tmp_path)
     assert done.returncode == 1
-    assert "pip install 'posse[training]'" in done.stderr.splitlines()[-1]
+    assert "pip install '.[training]'" in done.stderr.splitlines()[-1]
 
 
 COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]

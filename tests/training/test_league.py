@@ -163,3 +163,10 @@ def test_the_command_says_how_to_resume(
     with pytest.raises(KeyboardInterrupt):
         main(["--generations", "1", "--folder", str(tmp_path)])
     assert "run the same command again" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{", "[]", "{}"])
+def test_damaged_settings_are_named(tmp_path: Path, text: str) -> None:
+    (tmp_path / FILE).write_text(text)
+    with pytest.raises(RunFolderError, match=rf"{FILE} is damaged"):
+        play_league(tiny(tmp_path), console=quiet())

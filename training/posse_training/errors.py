@@ -72,5 +72,6 @@ def require(extra: str, *packages: str) -> None:
             importlib.import_module(package)
         except ImportError as error:
             raise MissingExtraError(
-                f"{package} cannot be imported ({error}). Install what this needs: pip install 'posse[{extra}]'"
+                f"{package} cannot be imported ({error}). Install the extra {extra!r} of posse-rl; from a clone: "
+                f"pip install '.[{extra}]'"
             ) from error

@@ -20,7 +20,7 @@ import tyro
 
 from posse import get_scenario, scenario_names
 from posse_baselines import Policy, load, policy_names
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_code
 from posse_training.errors import ResultFileError
 from posse_training.provenance import commit

@@ -21,9 +21,9 @@ from rich.table import Table
 
 from posse import get_scenario
 from posse_baselines import load, load_target
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import replacing, write_atomically
 from posse_training.errors import RunFolderError, SettingsError, require
-from posse_training.files import InUseError, locked
+from posse_training.files import InUseError, locked, read_json
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.results import Results
 from posse_training.reports.statistics import Estimate
@@ -225,9 +225,9 @@ def _keep(settings: LeagueSettings) -> None:
     path, mine = settings.path / FILE, settings.to_dict()
     if path.is_file():
         try:
-            theirs = json.loads(path.read_text(encoding="utf-8"))
+            theirs = read_json(path)
             differing = [n for n in mine if n not in _FREE and mine[n] != theirs[n]]
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise RunFolderError(f"{path} is damaged: {error!r:.200}") from error
         if differing:
             shown = ", ".join(f"{n}={theirs[n]!r:.60}" for n in differing)
@@ -348,7 +348,7 @@ class _Run:
             found = Cell(team.label, target.label, *(results.estimate(name) for name in _ESTIMATES))
             path.parent.mkdir(exist_ok=True)
             write_atomically(path, (json.dumps(found.to_dict(), indent=2) + "\n").encode())
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = read_json(path)
         return Cell(values["team"], values["target"], *(Estimate(**values[name]) for name in _ESTIMATES))
 
     def _play(self, pair: Pair, episodes: int, seed: int, split: str) -> Results:
@@ -431,8 +431,9 @@ def draw_matrix(found: League) -> list[Path]:
         played = f"{s.scenario} v{get_scenario(s.scenario).version}{changed}: {s.episodes:,} worlds a pair"
         note(figure, plain(f"{played}, test split, seed {TEST_SEED}; training seed {s.seed}"))
         files = [s.path / "matrix.png", s.path / "matrix.svg"]
-        figure.savefig(files[0], dpi=150)
-        figure.savefig(files[1], metadata={"Date": None})
+        for path in files:
+            with replacing(path) as part:
+                figure.savefig(part, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
     return files
 
 

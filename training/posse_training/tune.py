@@ -22,13 +22,13 @@ from rich.console import Console
 import posse
 from posse import Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, Tunable, load, play
-from posse_baselines.ddcs.family import FAMILY
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.files import write_atomically
 from posse_baselines.tuned import TUNED
 from posse_baselines.tuned.files import FORMAT, SHIPPED_TUNED
 from posse_baselines.tuning import tunables
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError, require
-from posse_training.files import InUseError, locked
+from posse_training.files import InUseError, locked, read_json
 from posse_training.provenance import commit
 from posse_training.reports.evaluation import progress_bar
 from posse_training.reports.statistics import mean
@@ -446,7 +446,7 @@ def _shipped_path(settings: TuneSettings) -> Path | None:
 def main(arguments: Sequence[str]) -> None:
     """Tune a policy, and print what was found."""
     path = tune(tyro.cli(TuneSettings, prog="posse tune", args=arguments))
-    scores = json.loads(path.read_text(encoding="utf-8"))["scores"]
+    scores = read_json(path)["scores"]
     for which in ("untuned", "tuned"):
         safe, contact = scores[which]["safe_score"], 1 - scores[which]["contact_free"]
         interval = f"{safe['value']:.3f} [{safe['low']:.3f}, {safe['high']:.3f}]"

@@ -54,9 +54,6 @@ class Batch(Stepping):
             once and the last observation is ``infos["final_obs"]``; ``"disabled"``: the caller
             resets, with ``options={"reset_mask": mask}``.
         num_threads: Threads that step the worlds; default: one per core. Never changes a result.
-        own_kernel: Whether to use a kernel compiled for this scenario: about a third faster, with
-            the same results. It takes as long to compile as the kernel for all scenarios, once per
-            scenario, and is cached on disk.
 
     Attributes:
         layout: Position of each field in an observation.
@@ -65,8 +62,7 @@ class Batch(Stepping):
         action_shape: (E, rows, 2 + message_size).
 
     Raises:
-        ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode,
-            an ``own_kernel`` that is not a boolean.
+        ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode.
     """
 
     def __init__(
@@ -79,9 +75,8 @@ class Batch(Stepping):
         first_world: int = 0,
         autoreset: str = "next_step",
         num_threads: int | None = None,
-        own_kernel: bool = False,
     ) -> None:
-        check_settings(num_worlds, first_world, split, autoreset, num_threads, own_kernel)
+        check_settings(num_worlds, first_world, split, autoreset, num_threads)
         self.scenario = scenario
         self.num_worlds = int(num_worlds)
         self.seed = check_seed(seed)
@@ -89,7 +84,6 @@ class Batch(Stepping):
         self.first_world = int(first_world)
         self.autoreset = autoreset
         self.num_threads = num_threads or os.cpu_count() or 1
-        self.own_kernel = own_kernel
         self.layout = ObservationLayout(scenario)
         rows = scenario.num_agents
         self.observation_shape = (num_worlds, rows, self.layout.size)
@@ -169,7 +163,7 @@ class Batch(Stepping):
                 self.scenario, self.num_worlds * count, seed=self.seed, split=self.split, num_threads=self.num_threads
             )
         elif type(into) is not Batch or into is self:
-            raise ValueError(f"copies go into another Batch on the CPU, got {shown(into)}")
+            raise ValueError(f"copies go into another Batch, got {shown(into)}")
         else:
             check_fit(self.scenario, self.num_worlds, count, into.scenario, into.num_worlds)
         write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)

@@ -178,7 +178,7 @@ def test_slots_are_filled_where_a_tracker_holds_them(heading: float) -> None:
     renderer = Renderer(batch.scenario, size=SIZE)
     frame = picture(renderer, batch)
     scene = read_scene(batch)
-    np.testing.assert_allclose(scene.slots[0], behind[:2], atol=1e-5)
+    np.testing.assert_allclose(scene.slots[0], behind[:2], rtol=1e-5, atol=1e-4)
     np.testing.assert_array_equal(scene.occupied, [True, False])
     inside = scene.slots + 0.225 * np.array([-math.sin(heading), math.cos(heading)])
     assert like(colour_at(renderer, frame, *inside[0]), SLOT_FILLED)

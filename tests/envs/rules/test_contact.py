@@ -114,7 +114,7 @@ def test_a_robot_that_is_blocked_stands_and_can_leave() -> None:
         act(batch, [1.0, 0.0], [-1.0, 0.0])
     state = one_world(snapshot(batch), 0)
     assert state["tracker_speed"][0] == 0
-    assert state["tracker_x"][0] == pytest.approx(0.2 - 0.0005, abs=1e-5)
+    assert state["tracker_x"][0] == pytest.approx(0.2 - 0.0005, abs=1e-4)
     assert (state["tracker_touching"] == 1).all()
     for _ in range(20):
         act(batch, [1.0, 1.0], [-1.0, 0.0])  # turns on the spot until the way is free
@@ -181,7 +181,7 @@ def test_the_least_gap_is_to_anything_however_slow_the_robots() -> None:
     state = snapshot(batch)
     for e in range(16):
         least = float(free_gaps(batch.scenario, one_world(state, e)).min())
-        assert batch.metrics()["least_gap"][e] == pytest.approx(least, abs=1e-4)
+        assert batch.metrics()["least_gap"][e] == pytest.approx(least, rel=1e-4, abs=1e-4)
 
 
 def test_termination_on_contact_and_only_then() -> None:

@@ -29,9 +29,9 @@ def test_fixes_and_what_was_heard_equal_an_independent_working(case: Any) -> Non
                     k: complex(state[f"tracker_fix_{k[0]}"][i], state[f"tracker_fix_{k[1]}"][i])
                     for k in (("x", "y"), ("cos", "sin"), ("vx", "vy"))
                 }
-                assert t["x", "y"] == pytest.approx(fix.place, abs=1e-4)
-                assert t["cos", "sin"] == pytest.approx(fix.heading, abs=1e-5)
-                assert t["vx", "vy"] == pytest.approx(fix.velocity, abs=2e-3)
+                assert t["x", "y"] == pytest.approx(fix.place, rel=1e-4, abs=1e-4)
+                assert t["cos", "sin"] == pytest.approx(fix.heading, rel=1e-4, abs=1e-4)
+                assert t["vx", "vy"] == pytest.approx(fix.velocity, rel=1e-4, abs=2e-3)
         if "heard_step" in state and state["heard_step"].shape == (n, n):
             for i in range(n):
                 for j in range(n):
@@ -40,7 +40,7 @@ def test_fixes_and_what_was_heard_equal_an_independent_working(case: Any) -> Non
                     if words:
                         heard += 1
                         place = complex(state["heard_x"][i, j], state["heard_y"][i, j])
-                        assert place == pytest.approx(words.place, abs=1e-6)
+                        assert place == pytest.approx(words.place, rel=1e-6, abs=1e-6)
                         np.testing.assert_array_equal(state["heard_message"][i, j], words.message.astype(np.float32))
     assert heard > 0 or state["heard_step"].size == 0
 
@@ -58,7 +58,7 @@ def test_what_is_said_arrives_after_exactly_the_delay(delay: int) -> None:
             # What was sent at the start, before anything could be said, holds zeros.
             expected = (step - delay) / 100
             np.testing.assert_allclose(mates["neighbour_message"][0], expected)
-            np.testing.assert_allclose(mates["neighbour_age"][0], delay * 0.1, atol=1e-6)
+            np.testing.assert_allclose(mates["neighbour_age"][0], delay * 0.1, rtol=1e-5, atol=1e-6)
         else:
             assert (mates["neighbour_number"] == -1).all()
 
@@ -123,7 +123,7 @@ def test_a_fix_goes_from_hop_to_hop_and_keeps_its_time() -> None:
         assert fixes.tolist() == [max(-1, step - lag) if step >= lag else -1 for lag in (0, 2, 5, 8)]
         views = batch.layout.views(observations)
         known = fixes >= 0
-        np.testing.assert_allclose(views["target_age"][0][known], 0.1 * (step - fixes[known]), atol=1e-6)
+        np.testing.assert_allclose(views["target_age"][0][known], 0.1 * (step - fixes[known]), rtol=1e-5, atol=1e-6)
         np.testing.assert_allclose(views["target_range"][0][known], 2 + 4 * np.flatnonzero(known))
         assert views["target_seen"][0].tolist() == [1, 0, 0, 0]
 

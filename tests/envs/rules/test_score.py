@@ -21,7 +21,7 @@ def test_every_step_s_score_equals_an_independent_working(case: Any) -> None:
     episode.follow(recording.states[0])
     for state, infos in zip(recording.states[1:], recording.infos, strict=True):
         episode.follow(state)
-        assert infos["score"][0] == pytest.approx(episode.score, abs=1e-6)
+        assert infos["score"][0] == pytest.approx(episode.score, rel=1e-5, abs=1e-6)
         holds = state["tracker_slot"] >= 0
         assert set(state["tracker_slot"][holds].tolist()) == set(episode.occupied.values())
 
@@ -73,7 +73,7 @@ def test_who_stands_where_is_free_and_two_in_one_slot_count_once() -> None:
     left_over = int(np.flatnonzero(held < 0)[0])
     place = positions(one_world(snapshot(batch), 0))
     away = abs(place[left_over] - place[5] - last)
-    assert batch.state["tracker_slot_distance"][0, left_over] == pytest.approx(away, abs=1e-5)
+    assert batch.state["tracker_slot_distance"][0, left_over] == pytest.approx(away, rel=1e-4, abs=1e-4)
 
 
 def test_who_touches_anything_occupies_nothing() -> None:

@@ -86,7 +86,7 @@ def test_without_noise_a_fix_is_exact() -> None:
     batch = posse.batch(num_worlds=20)
     batch.reset(seed=3)
     true, measured = offsets(batch)
-    np.testing.assert_allclose(measured, true, atol=1e-5)
+    np.testing.assert_allclose(measured, true, rtol=1e-5, atol=1e-5)
 
 
 def test_noise_is_unbiased_has_its_deviation_and_is_cut_at_three() -> None:
@@ -117,8 +117,8 @@ def test_a_velocity_comes_from_successive_fixes() -> None:
     batch.reset(options={"target_pose": [0, 0, 0.5], "tracker_pose": [[5, 0, 0], [-5, 0, 0]]})
     assert (batch.state["tracker_fix_vx"] == 0).all()
     batch.step([[[-1.0, 0.0], [-1.0, 0.0]]])
-    np.testing.assert_allclose(batch.state["tracker_fix_vx"], 0.6 * math.cos(0.5), atol=1e-4)
-    np.testing.assert_allclose(batch.state["tracker_fix_vy"], 0.6 * math.sin(0.5), atol=1e-4)
+    np.testing.assert_allclose(batch.state["tracker_fix_vx"], 0.6 * math.cos(0.5), rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(batch.state["tracker_fix_vy"], 0.6 * math.sin(0.5), rtol=1e-4, atol=1e-4)
 
 
 def test_a_smoothed_velocity_settles_with_its_time_constant() -> None:
@@ -146,7 +146,7 @@ def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
             world = one_world(state, e)
             for i in range(9):
                 found = sonar(batch.scenario, world, i)
-                np.testing.assert_allclose(readings[e, i], found, atol=2e-3)
+                np.testing.assert_allclose(readings[e, i], found, rtol=1e-4, atol=2e-3)
                 near += int((found < 2.0).sum())
         for _ in range(30):
             observations = batch.step(np.full(batch.action_shape, 0.3))[0]
@@ -157,6 +157,6 @@ def test_the_sonar_reads_the_free_width_straight_ahead() -> None:
     batch = posse.batch(num_trackers=2, sonar_beams=4, arena=20.0)
     observations = batch.reset(options={"target_pose": [5, 5, 0], "tracker_pose": [[0, 0, 0], [1.0, 0.0, 0]]})
     readings = batch.layout.views(observations)["sonar"][0]
-    np.testing.assert_allclose(readings[0], [0.7, 2.0, 2.0, 2.0], atol=1e-6)
-    np.testing.assert_allclose(readings[1], [2.0, 2.0, 0.7, 2.0], atol=1e-6)
+    np.testing.assert_allclose(readings[0], [0.7, 2.0, 2.0, 2.0], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(readings[1], [2.0, 2.0, 0.7, 2.0], rtol=1e-5, atol=1e-5)
     assert positions(one_world(snapshot(batch), 0))[1] == 1.0

@@ -118,8 +118,8 @@ def start(
 
 @functools.cache
 def pursued(motion: str) -> Play:
-    """500 worlds of a pursuing team; the same starts, speeds and limits for every motion."""
-    return Play(start(500, target_motion=motion), pursuing, 600)
+    """200 worlds of a pursuing team; the same starts, speeds and limits for every motion."""
+    return Play(start(200, target_motion=motion), pursuing, 600)
 
 
 def in_slots(worlds: int) -> tuple[Floats, Floats]:

@@ -230,7 +230,7 @@ def wide_settings(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @hypothesis.settings(
-    derandomize=True, max_examples=100, deadline=None, suppress_health_check=[hypothesis.HealthCheck.filter_too_much]
+    derandomize=True, max_examples=40, deadline=None, suppress_health_check=[hypothesis.HealthCheck.filter_too_much]
 )
 @given(
     name=st.sampled_from(posse.scenario_names()),
@@ -259,7 +259,7 @@ def test_what_is_allowed_is_finite_and_within_its_bounds(name: str, chosen: dict
         assert np.isfinite(total).all()
 
 
-@hypothesis.settings(derandomize=True, max_examples=40, deadline=None)
+@hypothesis.settings(derandomize=True, max_examples=25, deadline=None)
 @given(
     name=st.sampled_from(posse.scenario_names()),
     target_motion=st.sampled_from(["constant", "accelerating", "smart", "agent"]),

@@ -36,14 +36,14 @@ def test_a_command_names_the_extra(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(command.split()) == 2
-    assert "pip install 'posse[cluster]'" in capsys.readouterr().err
+    assert "pip install '.[cluster]'" in capsys.readouterr().err
 
 
 @without_ray
 @pytest.mark.parametrize("ray", [True, "auto", Cluster()])
 def test_evaluate_names_the_extra(ray: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(MissingExtraError, match=r"posse\[cluster\]"):
+    with pytest.raises(MissingExtraError, match=r"extra 'cluster' of posse-rl"):
         evaluate("idle", "smart", 2, ray=ray)
     assert list(tmp_path.iterdir()) == []
 

@@ -70,6 +70,29 @@ def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
     assert (there["score"] == here["score"]).all()
 
 
+UNGUARDED = """
+from posse_training.cli import main
+policies = ["posse_baselines.policies.pursuit:Pursuit", "--planner-episodes", "0", "--no-figures"]
+raise SystemExit(main(["compare", *policies, "--scenarios", "constant", "--episodes", "2", "--out", "out"]))
+"""
+
+
+def test_a_script_without_a_main_guard_may_compare(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(UNGUARDED)
+    sources = [ROOT / root for root in ("envs", "baselines", "training")]
+    done = subprocess.run(
+        [sys.executable, "script.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources))},
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out").is_dir()
+
+
 @pytest.mark.long
 def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     started = time.monotonic()

@@ -22,13 +22,15 @@ from posse_training.cluster import Cluster
 from posse_training.cluster.settings import RayOption, of_option, work_of
 from posse_training.compare.contenders import Contender, read_contenders
 from posse_training.compare.marl_eval import write_marl_eval
-from posse_training.compare.playing import PlayError, check, play, replay
+from posse_training.compare.playing import check, play, replay
 from posse_training.compare.plays import Plays
 from posse_training.compare.table import Row, row_of, table
 from posse_training.errors import ComparisonError, SettingsError, TimeLimitError, require
 from posse_training.provenance import commit
 from posse_training.replay import join, write_replay
-from posse_training.reports.evaluation import progress_bar, refuse_trained_split
+from posse_training.reports.episodes import refuse_trained_split
+from posse_training.reports.evaluation import progress_bar
+from posse_training.reports.failures import PlayError
 from posse_training.reports.statistics import Estimate
 
 PLANNER: Final = "planner"

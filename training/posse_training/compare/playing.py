@@ -12,44 +12,22 @@ import pickle
 import subprocess
 import sys
 import tempfile
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-import posse
-import posse_baselines
-import posse_training
 from posse import Scenario, ScenarioError
-from posse_baselines import Policy, PolicyError
+from posse_baselines import Policy, PolicyError, load
 from posse_training.cluster import Cluster
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
 from posse_training.errors import ClusterError, SettingsError, TimeLimitError, TrainedSplitError
 from posse_training.replay import Replay, record
 from posse_training.reports.evaluation import evaluate
+from posse_training.reports.failures import PlayError, describe
 from posse_training.reports.results import Results
 
-_OURS: Final = tuple(str(Path(module.__file__ or "").parent) for module in (posse, posse_baselines, posse_training))
-_LONGEST: Final = 300  # characters of an error in a summary
 _GRACE: Final = 3.0  # s beyond the limit, in which the policy may notice it by itself
-
-
-class PlayError(RuntimeError):
-    """A policy that raised, returned invalid actions, exceeded the time limit or died."""
-
-
-def describe(error: BaseException) -> str:
-    """Return an error in one line: its message, and where in the policy's code it was raised."""
-    if isinstance(error, PlayError):
-        return str(error)
-    message = " ".join(str(error).split())
-    if len(message) > _LONGEST:
-        message = f"{message[:_LONGEST]}..."
-    frames = reversed(traceback.extract_tb(error.__traceback__))
-    theirs = next((frame for frame in frames if not frame.filename.startswith(_OURS)), None)
-    where = "" if theirs is None else f" ({theirs.filename}, line {theirs.lineno})"
-    return f"{type(error).__name__}: {message}{where}"
 
 
 def check(contender: Contender, limit: float) -> None:
@@ -120,7 +98,7 @@ def replay(
 
 def _load(policy: str) -> str:
     try:
-        return posse_baselines.load(policy).name
+        return load(policy).name
     except PolicyError as error:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
 
@@ -159,7 +137,7 @@ def _record(
     label: str, policy: str | Policy, scenario: Scenario, seed: int, world: int, split: str, target: str | None
 ) -> Replay:
     try:
-        loaded = posse_baselines.load(policy) if isinstance(policy, str) else policy
+        loaded = load(policy) if isinstance(policy, str) else policy
         played = {"target": target, "seed": seed, "world": world, "split": split, "observations": False}
         return record([(label, loaded)], scenario, **played)  # type: ignore[arg-type]
     except Exception as error:

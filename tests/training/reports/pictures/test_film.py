@@ -193,7 +193,7 @@ def test_what_ffmpeg_cannot_write_is_said_and_leaves_nothing(tmp_path: Path) -> 
 
 def test_an_mp4_without_its_extra_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'posse\[video\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install '\.\[video\]'"):
         film([("a", load("idle"))], "smart", path=tmp_path / "a.mp4", seconds=1.0)
     assert not list(tmp_path.iterdir())
 

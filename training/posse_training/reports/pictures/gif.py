@@ -11,6 +11,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from posse.rendering.style import PALETTE
+from posse_baselines.files import replacing
 
 Frame = npt.NDArray[np.uint8]
 
@@ -43,16 +44,17 @@ def write_gif(path: Path, frames: Sequence[Frame], frame_time: float) -> None:
     shown_for = max(2, round(frame_time * 100)) * 10
     times = [shown_for] * len(images)
     times[-1] = max(shown_for, round(_LAST_SHOWN * 1000))
-    images[0].save(
-        path,
-        save_all=True,
-        append_images=images[1:],
-        duration=times,
-        loop=0,
-        disposal=1,  # each frame is drawn over the previous one
-        transparency=clear,
-        optimize=False,
-    )
+    with replacing(path) as part:
+        images[0].save(
+            part,
+            save_all=True,
+            append_images=images[1:],
+            duration=times,
+            loop=0,
+            disposal=1,  # each frame is drawn over the previous one
+            transparency=clear,
+            optimize=False,
+        )
 
 
 class _Palette:

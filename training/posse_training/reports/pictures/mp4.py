@@ -13,6 +13,7 @@ from typing import IO, Final
 
 import numpy as np
 
+from posse_baselines.files import replacing
 from posse_training.errors import SettingsError, require
 from posse_training.reports.pictures.gif import Frame
 
@@ -48,7 +49,6 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_time: float) -> None:
     height, width = (side + side % 2 for side in first.shape[:2])
     even = ((0, height - first.shape[0]), (0, width - first.shape[1]), (0, 0))
     repeats = max(1, math.ceil(_LEAST_RATE * frame_time - 1e-9))
-    part = path.with_name(f".{path.stem}.part.mp4")
     command = [
         imageio_ffmpeg.get_ffmpeg_exe(),
         "-y",
@@ -72,18 +72,13 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_time: float) -> None:
         "yuv420p",
         "-movflags",
         "+faststart",
-        str(part),
     ]
     padded = (np.pad(frame, even, mode="edge").tobytes() * repeats for frame in itertools.chain([first], rest))
-    try:
-        with tempfile.TemporaryFile() as messages:
-            if not _pipe(command, padded, messages):
-                messages.seek(0)
-                said = messages.read().decode(errors="replace").strip()
-                raise SettingsError(f"ffmpeg could not write {path}: {said or 'no reason given'}")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(path) as part, tempfile.TemporaryFile() as messages:
+        if not _pipe([*command, str(part)], padded, messages):
+            messages.seek(0)
+            said = messages.read().decode(errors="replace").strip()
+            raise SettingsError(f"ffmpeg could not write {path}: {said or 'no reason given'}")
 
 
 def _pipe(command: list[str], data: Iterable[bytes], messages: IO[bytes]) -> bool:
