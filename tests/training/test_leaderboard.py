@@ -111,7 +111,7 @@ def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
     def played(*arguments: object, **settings: object) -> None:
         raise AssertionError("it was played")
 
-    monkeypatch.setattr("posse_training.reports.evaluation.play_episode", played)
+    monkeypatch.setattr(posse.Batch, "step", played)
     kept = tmp_path / "kept.txt"
     kept.write_text("mine", encoding="utf-8")
     for wrong in (
