@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import BasePolicy
+from posse_baselines import BasePolicy, PolicyError
 from posse_baselines.registry import shipped
 from posse_training import cli, evaluate
 from posse_training.errors import ResultFileError
@@ -89,6 +89,20 @@ def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dic
         verify(sent(tmp_path, claim, **changes), progress=False)
 
 
+def test_a_folder_with_a_colon_in_its_name_is_no_code(
+    claim: Standing, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "planted.py").write_text("raise SystemExit('it ran')\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    folder = Path("planted:Team")
+    folder.mkdir()
+    with pytest.raises(ResultFileError, match="neither shipped nor a policy file"):
+        verify(sent(folder, claim, policy="mine"), progress=False)
+    with pytest.raises(PolicyError, match="there is no policy file"):
+        verify(sent(folder, claim, policy="mine.safetensors"), progress=False)
+
+
 def test_a_table_is_read_as_it_was_written(claim: Standing, tmp_path: Path) -> None:
     rows = [claim, dataclasses.replace(claim, label="other 2", reads_state=True)]
     (tmp_path / "t.csv").write_text(standings_text(rows), encoding="utf-8")
@@ -111,7 +125,7 @@ def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
     def played(*arguments: object, **settings: object) -> None:
         raise AssertionError("it was played")
 
-    monkeypatch.setattr("posse_training.reports.evaluation.play_episode", played)
+    monkeypatch.setattr(posse.Batch, "step", played)
     kept = tmp_path / "kept.txt"
     kept.write_text("mine", encoding="utf-8")
     for wrong in (
