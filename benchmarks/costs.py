@@ -108,7 +108,7 @@ def best(call: Callable[[], object], seconds: float) -> float:
 
 def moving(scenario: str, count: int, **overrides: Any) -> tuple[posse.Batch, Any]:
     """Return worlds in mid-episode, and actions for them."""
-    batch = posse.batch(scenario, count, num_threads=1, horizon=15_000, **overrides)
+    batch = posse.batch(scenario, count, num_threads=1, horizon=4_000, **overrides)
     batch.reset(seed=0)
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)

@@ -101,7 +101,7 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
 
 def interfaces(settings: Settings) -> dict[str, list[float]]:
     """Measure steps per second of single-world environments, including dictionaries and checks."""
-    parallel = posse.parallel_env(settings.scenario, horizon=15_000)
+    parallel = posse.parallel_env(settings.scenario, horizon=4_000)
     parallel.reset(seed=0)
     rng = np.random.default_rng(0)
     actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents}
@@ -120,7 +120,7 @@ def interfaces(settings: Settings) -> dict[str, list[float]]:
 
 def team_step(scenario: str, action: Any) -> Callable[[], None]:
     """Return a function that steps one world through Gymnasium."""
-    env: Any = gym.make("posse/Team-v0", scenario=scenario, horizon=15_000).unwrapped
+    env: Any = gym.make("posse/Team-v0", scenario=scenario, horizon=4_000).unwrapped
     env.reset(seed=0)
 
     def step() -> None:

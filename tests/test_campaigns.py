@@ -92,7 +92,7 @@ def test_scenarios_are_drawn_over_every_setting() -> None:
         for name, setting in posse.Scenario.settings().items()
         if setting.choices is None or len(tuple(setting.choices())) > 1
     }
-    assert seen >= several - {"name", "version", "extra_fields", "metrics"}
+    assert seen >= several - {"name", "meaning", "version", "extra_fields", "metrics"}
 
 
 def test_a_failure_is_told_with_the_case_that_plays_it_again() -> None:

@@ -65,7 +65,7 @@ def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, mov
     if c.break_nearest:
         w.break_step = _drawn_step(c, w, earliest, _BREAKS)
         return
-    if c.break_number >= 0:
+    if c.break_given:
         trackers[c.break_number].breaks_at = _drawn_step(c, w, earliest, _BREAKS)
         return
     for k in range(w.breaks_left):

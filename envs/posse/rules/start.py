@@ -1,12 +1,13 @@
 """How an episode starts: obstacles, the target, the trackers, each drawn clear of the others.
 
-Places are drawn until one is clear. The scenario's checks leave room enough that the number of
-tries below is never used up.
+Places are drawn until one is clear. What finds none in so many tries is noted in the world
+(``undrawn``), and :func:`check_drawn` raises.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +16,7 @@ from posse.numeric import Record, Records, compiled
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, between, episode_key, uniform
 from posse.rules.targets.walls import has_free_circle
+from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import START_CLEARANCE
 
 _TRIES: Final = 2000
@@ -22,6 +24,10 @@ _TWO_PI: Final = np.float32(2 * math.pi)
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _CLEARANCE: Final = np.float32(START_CLEARANCE)
+_OBSTACLES: Final = 1
+_TARGET: Final = 2
+_TRACKERS: Final = 4
+"""Bits of ``undrawn``."""
 _TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come first
 
 
@@ -50,16 +56,16 @@ def is_clear(
 @compiled
 def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
     """Draw the obstacles, ``obstacle_gap`` apart and clear of the walls."""
-    index = 0
+    index, clear = 0, True
     for k in range(c.num_obstacles):
         o = obstacles[k]
-        o.radius = between(c.obstacle_least, c.obstacle_most, w.key, 0, OBSTACLES, index)
+        o.radius = between(c.obstacle_radius_least, c.obstacle_radius_most, w.key, 0, OBSTACLES, index)
         room = c.half_arena - o.radius - c.obstacle_gap
-        for _ in range(_TRIES):
+        for _ in range(_TRIES if clear else 0):
             o.x = between(-room, room, w.key, 0, OBSTACLES, index + 1)
             o.y = between(-room, room, w.key, 0, OBSTACLES, index + 2)
             index += 3
-            clear = True
+            clear = room > _ZERO
             for j in range(k):
                 p = obstacles[j]
                 reach = o.radius + p.radius + c.obstacle_gap
@@ -67,6 +73,8 @@ def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
                     clear = False
             if clear:
                 break
+    if not clear:
+        w.undrawn |= _OBSTACLES
 
 
 @compiled
@@ -89,35 +97,36 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
                 c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
             )
         if clear:
-            break
+            return
+    w.undrawn |= _TARGET
 
 
 @compiled
 def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Draw the trackers' poses round the target, uniform in distance, bearing and heading."""
-    index = _TRACKER_DRAWS
+    index, clear = _TRACKER_DRAWS, True
     for i in range(c.num_trackers):
         t = trackers[i]
-        for _ in range(_TRIES):
-            distance = between(c.start_least, c.start_most, w.key, 0, START, index)
+        for _ in range(_TRIES if clear else 0):
+            distance = between(c.start_distance_least, c.start_distance_most, w.key, 0, START, index)
             bearing = _TWO_PI * uniform(w.key, 0, START, index + 1)
             index += 2
             t.x = w.x + distance * np.float32(math.cos(bearing))
             t.y = w.y + distance * np.float32(math.sin(bearing))
-            if is_clear(c, w, trackers, i, obstacles, t.x, t.y):
+            clear = is_clear(c, w, trackers, i, obstacles, t.x, t.y)
+            if clear:
                 break
         heading = _TWO_PI * uniform(w.key, 0, START, index)
         index += 1
         t.heading_cos = np.float32(math.cos(heading))
         t.heading_sin = np.float32(math.sin(heading))
+    if not clear:
+        w.undrawn |= _TRACKERS
 
 
 @compiled
 def rest(c: Record, w: Record, trackers: Records) -> None:
-    """Set everything that does not depend on a draw to what it is when an episode starts.
-
-    But for the sums behind the metrics.
-    """
+    """Reset the robots and the world to the start of an episode, but for poses, faults and sums of metrics."""
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
     w.speed = c.target_speed if c.target_agent == 0 else _ZERO
     w.turn_rate = _ZERO
@@ -147,8 +156,35 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
 def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)
+    w.undrawn = 0
     draw_obstacles(c, w, obstacles)
     draw_target(c, w, obstacles)
     draw_trackers(c, w, trackers, obstacles)
     draw_motion(c, w)
     draw_faults(c, w, trackers)
+
+
+def check_drawn(s: Scenario, world: Records, given: Container[str] = ()) -> None:
+    """Raise if the start of any of these worlds could not be drawn, but for poses that are given.
+
+    Raises:
+        ScenarioError: Names the settings that are too tight.
+    """
+    undrawn = np.bitwise_or.reduce(world["undrawn"]) if len(world) else 0
+    walls = f" in arena={s.arena:g}" if math.isfinite(s.arena) else ""
+    enlarge = ", or enlarge arena" if walls else ""
+    if undrawn & _OBSTACLES:
+        raise ScenarioError(
+            f"could not place num_obstacles={s.num_obstacles} of obstacle_radius={s.obstacle_radius} with "
+            f"obstacle_gap={s.obstacle_gap:g}{walls}: lower their number, radius or gap{enlarge}"
+        )
+    if undrawn & _TARGET and "target_pose" not in given:
+        raise ScenarioError(
+            f"could not place the target{walls} with room to turn between num_obstacles={s.num_obstacles}: lower "
+            f"num_obstacles or target_speed={s.target_speed:g}, raise target_turn_rate={s.target_turn_rate:g}{enlarge}"
+        )
+    if undrawn & _TRACKERS and "tracker_pose" not in given:
+        raise ScenarioError(
+            f"could not place num_trackers={s.num_trackers} at start_distance={s.start_distance} of the "
+            f"target{walls}: widen start_distance, lower num_trackers or robot_radius={s.robot_radius:g}{enlarge}"
+        )

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Record, Records
+from posse.numeric import FloatArray, Records
 from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
-from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
+from posse.scenarios.limits import FAR, SAFE_MARGIN
 
 SPLITS: Final = ("train", "validation", "test")
 NEVER: Final = np.int32(2**30)
@@ -43,76 +44,91 @@ def _offset(record: np.dtype[Any], name: str) -> int:
 
 _F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
 
-CONFIG: Final = _record(
-    ("num_trackers", _I),
-    ("num_agents", _I),
-    ("num_obstacles", _I),
-    ("neighbours", _I),
-    ("message_size", _I),
-    ("physics_steps", _I),
-    ("horizon", _I),
-    ("settle_steps", _I),
-    ("outage_steps", _I),
-    ("break_from", _I),
-    ("break_until", _I),
-    ("forget_steps", _I),
-    ("radio_delay", _I),
-    ("breaks", _I),
-    ("break_nearest", _I),
-    ("break_number", _I),
-    ("motion", _I),
-    ("mirrored", _I),
-    ("target_agent", _I),
-    ("sensor", _I),
-    ("fix_bearing", _I),  # 1: a fix is a bearing, else a position
-    ("measured", _I),  # 0: sensors return the target's true position
-    ("terminate_on_contact", _I),
-    ("walled", _I),
-    ("sonar_beams", _I),
-    ("all_round", _I),
-    ("perfect_radio", _I),
-    ("formation", _I),
-    ("whole_arcs", _I),
-    ("dt", _F),
-    ("physics_dt", _F),
-    ("fastest", _F),  # greatest speed of any tracker
-    ("speed_change", _F),
-    ("turn_change", _F),
-    ("target_speed", _F),
-    ("target_turn_rate", _F),
-    ("target_least_speed", _F),
-    ("radius", _F),
-    ("tolerance", _F),
-    ("frame_c", _F),
-    ("frame_s", _F),
-    ("slots_reach", _F),
-    ("half_arena", _F),
-    ("obstacle_least", _F),
-    ("obstacle_most", _F),
-    ("obstacle_gap", _F),
-    ("start_least", _F),
-    ("start_most", _F),
-    ("target_extent", _F),
-    ("safe_distance", _F),
-    ("sensing_range", _F),
-    ("view_cosine", _F),
-    ("range_noise", _F),
-    ("bearing_noise", _F),
-    ("smoothing", _F),
-    ("sonar_range", _F),
-    ("beam_cosine", _F),
-    ("radio_range", _F),
-    ("radio_loss", _F),
-    ("sensor_outages", _F),
-    ("radio_outages", _F),
-    ("formation_distance", _F),
-    ("formation_spacing", _F),
-    ("per_acceleration", _F),
-    ("per_turn_acceleration", _F),  # 1 / limit; 0: no limit
-    ("told_sensing_range", _F),
-    ("told_arena", _F),  # as observed; -1: unlimited
-)
-"""The scenario, for kernels."""
+_NUMERIC: Final = {"int": _I, "bool": _I, "float": _F}
+
+
+def perfect_radio(s: Scenario) -> bool:
+    """Return whether working trackers always receive each other's messages without delay."""
+    reliable = s.radio_delay == 0 and s.radio_loss == 0 and s.radio_outages == 0 and s.breaks == 0
+    return reliable and math.isinf(s.radio_range)
+
+
+def _slots_reach(s: Scenario) -> float:
+    return max(math.hypot(x, y) for x, y in slot_offsets(s))
+
+
+def _frame_turn(s: Scenario) -> float:
+    """Return the greatest turn of the slot frame in a control step, rad."""
+    return min(s.slot_turn_rate * s.control_step, math.pi / 2)
+
+
+def _physics_step(s: Scenario) -> np.float32:
+    return np.float32(s.control_step / s.physics_steps)
+
+
+def _measured(s: Scenario) -> bool:
+    return s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None
+
+
+DERIVED: Final[dict[str, tuple[type, Callable[[Scenario], Any]]]] = {
+    "num_agents": (_I, lambda s: s.num_agents),
+    "neighbours": (_I, lambda s: s.neighbours),
+    "physics_steps": (_I, lambda s: s.physics_steps),
+    "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
+    "outage_steps": (_I, lambda s: max(1, round(s.outage_time / s.control_step))),
+    "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
+    "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
+    "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
+    "break_nearest": (_I, lambda s: s.break_choice == "nearest"),
+    "break_given": (_I, lambda s: s.break_choice == "given"),
+    "motion": (_I, lambda s: TARGET_MOTIONS.with_added(s.target_motion).index(TARGET_MOTIONS[s.target_motion])),
+    "mirrored": (_I, lambda s: TARGET_MOTIONS[s.target_motion].mirrored and math.isfinite(s.arena)),
+    "target_agent": (_I, lambda s: s.target_is_agent),
+    "sensor": (_I, lambda s: SENSORS.with_added(s.sensor).index(SENSORS[s.sensor])),
+    "fix_bearing": (_I, lambda s: SENSORS[s.sensor].fix == "bearing"),  # 1: a fix is a bearing, else a position
+    "measured": (_I, _measured),  # 0: sensors return the target's true position
+    "walled": (_I, lambda s: math.isfinite(s.arena)),
+    "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
+    "perfect_radio": (_I, perfect_radio),
+    "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
+    "whole_arcs": (_I, lambda s: s.whole_arcs),
+    "dt": (_F, lambda s: s.control_step),
+    "physics_dt": (_F, _physics_step),
+    "radius": (_F, lambda s: s.robot_radius),
+    "fastest": (_F, lambda s: max(s.tracker_speeds)),
+    "speed_change": (_F, lambda s: min(s.tracker_acceleration * _physics_step(s), FAR)),
+    "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * _physics_step(s), FAR)),
+    "per_acceleration": (_F, lambda s: 1 / s.tracker_acceleration),  # 0: no limit
+    "per_turn_acceleration": (_F, lambda s: 1 / s.tracker_turn_acceleration),
+    "frame_c": (_F, lambda s: math.cos(_frame_turn(s))),
+    "frame_s": (_F, lambda s: math.sin(_frame_turn(s))),
+    "slots_reach": (_F, _slots_reach),
+    "half_arena": (_F, lambda s: min(s.arena / 2, FAR)),
+    "target_extent": (_F, lambda s: s.target_extent),
+    "safe_distance": (_F, lambda s: s.robot_radius + SAFE_MARGIN),
+    "view_cosine": (_F, lambda s: math.cos(s.field_of_view / 2)),
+    "beam_cosine": (_F, lambda s: math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0),
+    "smoothing": (
+        _F,
+        lambda s: 1 - math.exp(-s.control_step / s.velocity_smoothing) if s.velocity_smoothing > 0 else 1.0,
+    ),
+}
+"""What kernels read of a scenario beside its numbers: type and value."""
+
+
+def _config() -> np.dtype[Any]:
+    fields: list[tuple[str, type]] = []
+    for name, setting in Scenario.settings().items():
+        if setting.kind in _NUMERIC:
+            fields.append((name, _NUMERIC[setting.kind]))
+        elif setting.kind == "tuple[float, float]":
+            fields += [(f"{name}_least", _F), (f"{name}_most", _F)]
+    return _record(*fields, *((name, kind) for name, (kind, _) in DERIVED.items()))
+
+
+CONFIG: Final = _config()
+"""The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
+``_most``), then :data:`DERIVED`."""
 
 _WORLD: Final = (
     ("seed", _U),  # as given by the user
@@ -137,6 +153,7 @@ _WORLD: Final = (
     ("touching", _U),  # bit mask of the trackers that touch the target
     ("onsets", _I),  # contacts of the target with trackers that began in the current step
     ("near", _I),  # 1: something may touch the target in the next step
+    ("undrawn", _I),  # bits of what found no place at the start (posse.rules.start)
     ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
     ("breaks_left", _I),
     # inputs of the metrics
@@ -336,17 +353,6 @@ def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
     return WorldArrays(*arrays).copy()
 
 
-def perfect_radio(scenario: Scenario) -> bool:
-    """Return whether working trackers always receive each other's messages without delay."""
-    return (
-        math.isinf(scenario.radio_range)
-        and scenario.radio_delay == 0
-        and scenario.radio_loss == 0
-        and scenario.radio_outages == 0
-        and scenario.breaks == 0
-    )
-
-
 def slot_records(scenario: Scenario) -> Records:
     """Return the slots as (N,) :data:`SLOT`."""
     return np.array(slot_offsets(scenario), np.float32).view(SLOT).reshape(-1)
@@ -360,63 +366,13 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
-    s = scenario
     config = np.zeros(1, CONFIG)
-    c: Record = config[0]
-    c.num_trackers, c.num_agents, c.num_obstacles = s.num_trackers, s.num_agents, s.num_obstacles
-    c.neighbours, c.message_size = s.neighbours, s.message_size
-    c.physics_steps, c.horizon = s.physics_steps, s.horizon
-    c.settle_steps = max(1, round(s.settle_time / s.control_step))
-    c.outage_steps = max(1, round(s.outage_time / s.control_step))
-    c.break_from, c.break_until = (round(share * s.horizon) for share in s.break_window)
-    c.forget_steps = int(s.forget_after / s.control_step + 1e-6)
-    c.radio_delay, c.breaks = s.radio_delay, s.breaks
-    c.break_nearest = s.break_choice == BREAK_CHOICES[0]
-    c.break_number = s.break_number if s.break_choice == BREAK_CHOICES[2] else -1
-    motions = TARGET_MOTIONS.with_added(s.target_motion)
-    motion = TARGET_MOTIONS[s.target_motion]
-    c.motion, c.target_agent = motions.index(motion), motion.agent
-    c.mirrored = motion.mirrored and math.isfinite(s.arena)
-    sensor = SENSORS[s.sensor]
-    c.sensor = SENSORS.with_added(s.sensor).index(sensor)
-    c.fix_bearing = sensor.fix == "bearing"
-    c.measured = s.range_noise > 0 or s.bearing_noise > 0 or sensor.measure is not None
-    c.terminate_on_contact, c.walled = s.terminate_on_contact, math.isfinite(s.arena)
-    c.sonar_beams = s.sonar_beams
-    c.whole_arcs = s.whole_arcs
-    c.all_round = s.field_of_view >= 2 * math.pi - 1e-9
-    c.perfect_radio = perfect_radio(s)
-    c.dt, c.physics_dt = s.control_step, s.control_step / s.physics_steps
-    c.fastest = max(s.tracker_speeds)
-    c.speed_change = min(s.tracker_acceleration * c.physics_dt, FAR)
-    c.turn_change = min(s.tracker_turn_acceleration * c.physics_dt, FAR)
-    c.target_speed, c.target_turn_rate = s.target_speed, s.target_turn_rate
-    c.target_least_speed = s.target_least_speed
-    c.radius = s.robot_radius
-    c.tolerance = s.tolerance
-    most = min(s.slot_turn_rate * s.control_step, math.pi / 2)
-    c.frame_c, c.frame_s = math.cos(most), math.sin(most)
-    c.slots_reach = max(math.hypot(x, y) for x, y in slot_offsets(s))
-    c.half_arena = min(s.arena / 2, FAR)
-    c.obstacle_least, c.obstacle_most = s.obstacle_radius
-    c.obstacle_gap = s.obstacle_gap
-    c.start_least, c.start_most = s.start_distance
-    c.safe_distance = s.robot_radius + SAFE_MARGIN
-    c.target_extent = s.target_extent
-    c.sensing_range = min(s.sensing_range, FAR)
-    c.view_cosine = math.cos(s.field_of_view / 2)
-    c.range_noise, c.bearing_noise = s.range_noise, s.bearing_noise
-    c.smoothing = 1.0
-    if s.velocity_smoothing > 0:
-        c.smoothing = 1 - math.exp(-s.control_step / s.velocity_smoothing)
-    c.sonar_range = s.sonar_range
-    c.beam_cosine = math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0
-    c.radio_range, c.radio_loss = min(s.radio_range, FAR), s.radio_loss
-    c.sensor_outages, c.radio_outages = s.sensor_outages, s.radio_outages
-    c.formation = FORMATIONS.index(s.formation)
-    c.formation_distance, c.formation_spacing = s.formation_distance, s.formation_spacing
-    c.per_acceleration = 1 / s.tracker_acceleration
-    c.per_turn_acceleration = 1 / s.tracker_turn_acceleration
-    c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
-    c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
+    for name, setting in Scenario.settings().items():
+        given = getattr(scenario, name)
+        if setting.kind in _NUMERIC:
+            config[name] = min(given, FAR) if setting.infinite else given
+        elif setting.kind == "tuple[float, float]":
+            config[f"{name}_least"], config[f"{name}_most"] = given
+    for name, (_, value) in DERIVED.items():
+        config[name] = value(scenario)
     return config

@@ -8,11 +8,14 @@ follow every slot (:attr:`posse.scenarios.scenario.Scenario.slot_turn_rate`).
 from __future__ import annotations
 
 import math
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from posse.numeric import compiled
+
+if TYPE_CHECKING:
+    from posse.scenarios.scenario import Scenario
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
@@ -22,20 +25,7 @@ _ZERO: Final = np.float32(0.0)
 _DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
-class FormationSettings(Protocol):
-    """The settings of a scenario that its slots follow from."""
-
-    @property
-    def num_trackers(self) -> int: ...  # noqa: D102
-    @property
-    def formation(self) -> str: ...  # noqa: D102
-    @property
-    def formation_distance(self) -> float: ...  # noqa: D102
-    @property
-    def formation_spacing(self) -> float: ...  # noqa: D102
-
-
-def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
+def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
     """Return the (x, y) of each slot in the slot frame, m; x points ahead.
 
     ========== ====================================================================================
@@ -47,12 +37,9 @@ def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
     rows       a block behind the target, as wide as deep, ``formation_spacing`` apart
     ========== ====================================================================================
     """
-    n, distance = scenario.num_trackers, scenario.formation_distance
-    spacing = scenario.formation_spacing
+    n, distance, spacing = scenario.num_trackers, scenario.formation_distance, scenario.formation_spacing
     if scenario.formation == "ring":
-        radius = distance
-        if n > 1:
-            radius = max(radius, spacing / (2 * math.sin(math.pi / n)))
+        radius = max(distance, spacing / (2 * math.sin(math.pi / n))) if n > 1 else distance
         bearings = [math.pi + 2 * math.pi * i / n for i in range(n)]
         return [(radius * math.cos(b), radius * math.sin(b)) for b in bearings]
     if scenario.formation == "rows":
