@@ -12,17 +12,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import ONE, ZERO, Record, Records, compiled
+from posse.rules.discs import obstacle_within
 from posse.rules.faults import draw_faults
-from posse.rules.randomness import OBSTACLES, START, between, episode_key, uniform
-from posse.rules.targets.walls import has_free_circle
+from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
+from posse.rules.targets.steering import has_free_circle
 from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import START_CLEARANCE
 
 _TRIES: Final = 2000
-_TWO_PI: Final = np.float32(2 * math.pi)
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 _CLEARANCE: Final = np.float32(START_CLEARANCE)
 _OBSTACLES: Final = 1
 _TARGET: Final = 2
@@ -36,15 +34,10 @@ def is_clear(
     c: Record, w: Record, trackers: Records, placed: int, obstacles: Records, x: np.float32, y: np.float32
 ) -> bool:
     """Return whether a tracker at (x, y) is clear of walls, obstacles and ``placed`` trackers."""
-    if c.walled:
-        inner = c.half_arena - c.radius - _CLEARANCE
-        if abs(x) > inner or abs(y) > inner:
-            return False
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
-        reach = o.radius + c.radius + _CLEARANCE
-        if (o.x - x) * (o.x - x) + (o.y - y) * (o.y - y) < reach * reach:
-            return False
+    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.radius - _CLEARANCE:
+        return False
+    if obstacle_within(obstacles, c.num_obstacles, x, y, c.radius + _CLEARANCE):
+        return False
     reach = c.radius + c.radius + _CLEARANCE
     for j in range(placed):
         t = trackers[j]
@@ -65,12 +58,7 @@ def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
             o.x = between(-room, room, w.key, 0, OBSTACLES, index + 1)
             o.y = between(-room, room, w.key, 0, OBSTACLES, index + 2)
             index += 3
-            clear = room > _ZERO
-            for j in range(k):
-                p = obstacles[j]
-                reach = o.radius + p.radius + c.obstacle_gap
-                if (o.x - p.x) * (o.x - p.x) + (o.y - p.y) * (o.y - p.y) < reach * reach:
-                    clear = False
+            clear = room > ZERO and not obstacle_within(obstacles, k, o.x, o.y, o.radius + c.obstacle_gap)
             if clear:
                 break
     if not clear:
@@ -83,18 +71,13 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
     for k in range(_TRIES):
         w.x = between(-c.target_extent, c.target_extent, w.key, 0, START, 3 * k)
         w.y = between(-c.target_extent, c.target_extent, w.key, 0, START, 3 * k + 1)
-        heading = _TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
+        heading = TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
         w.heading_cos = np.float32(math.cos(heading))
         w.heading_sin = np.float32(math.sin(heading))
-        clear = True
-        for j in range(c.num_obstacles):
-            o = obstacles[j]
-            reach = o.radius + c.radius + _CLEARANCE
-            if (o.x - w.x) * (o.x - w.x) + (o.y - w.y) * (o.y - w.y) < reach * reach:
-                clear = False
+        clear = not obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.radius + _CLEARANCE)
         if clear and c.walled and c.target_agent == 0:
-            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE) or has_free_circle(
-                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
+            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, ONE) or has_free_circle(
+                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -ONE
             )
         if clear:
             return
@@ -109,14 +92,14 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
         t = trackers[i]
         for _ in range(_TRIES if clear else 0):
             distance = between(c.start_distance_least, c.start_distance_most, w.key, 0, START, index)
-            bearing = _TWO_PI * uniform(w.key, 0, START, index + 1)
+            bearing = TWO_PI * uniform(w.key, 0, START, index + 1)
             index += 2
             t.x = w.x + distance * np.float32(math.cos(bearing))
             t.y = w.y + distance * np.float32(math.sin(bearing))
             clear = is_clear(c, w, trackers, i, obstacles, t.x, t.y)
             if clear:
                 break
-        heading = _TWO_PI * uniform(w.key, 0, START, index)
+        heading = TWO_PI * uniform(w.key, 0, START, index)
         index += 1
         t.heading_cos = np.float32(math.cos(heading))
         t.heading_sin = np.float32(math.sin(heading))
@@ -128,27 +111,26 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
 def rest(c: Record, w: Record, trackers: Records) -> None:
     """Reset the robots and the world to the start of an episode, but for poses, faults and sums of metrics."""
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
-    w.speed = c.target_speed if c.target_agent == 0 else _ZERO
-    w.turn_rate = _ZERO
+    w.speed = c.target_speed if c.target_agent == 0 else ZERO
+    w.turn_rate = ZERO
     w.frame_cos, w.frame_sin = w.heading_cos, w.heading_sin
     w.goal_cos, w.goal_sin = w.heading_cos, w.heading_sin
     w.touching = np.uint64(0)
     w.working = c.num_trackers
-    w.score = _ZERO
+    w.score = ZERO
     w.settled_at, w.detected_at, w.lost_at, w.recovered_at = -1, -1, -1, -1
     w.contacts_tracker, w.contacts_obstacle, w.contacts_target = 0, 0, 0
     w.least_gap = np.float32(1e6)
     for i in range(c.num_trackers):
         t = trackers[i]
-        t.speed, t.turn_rate = _ZERO, _ZERO
+        t.speed, t.turn_rate = ZERO, ZERO
         t.sees, t.touching, t.onsets = 0, 0, 0
         t.touching_trackers, t.touching_obstacles = np.uint64(0), np.uint64(0)
         t.fix_step = -1
-        t.fix_x, t.fix_y, t.fix_vx, t.fix_vy = _ZERO, _ZERO, _ZERO, _ZERO
-        t.fix_cos, t.fix_sin = _ONE, _ZERO
-        t.fix_frame_cos, t.fix_frame_sin = _ONE, _ZERO
+        t.fix.x, t.fix.y, t.fix_vx, t.fix_vy = ZERO, ZERO, ZERO, ZERO
+        t.fix.cos, t.fix.sin, t.fix.frame_cos, t.fix.frame_sin = ONE, ZERO, ONE, ZERO
         t.slot, t.could_arrive = -1, 0
-        t.slot_distance, t.slot_progress = _ZERO, _ZERO
+        t.slot_distance, t.slot_progress = ZERO, ZERO
         t.start_x, t.start_y = t.x, t.y
 
 

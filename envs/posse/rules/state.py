@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -22,11 +22,13 @@ from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import FAR, SAFE_MARGIN
 
 SPLITS: Final = ("train", "validation", "test")
+BIT: Final = np.uint64(1)
+NO_BITS: Final = np.uint64(0)
 NEVER: Final = np.int32(2**30)
 """A control step later than any."""
 
 
-def _record(*fields: tuple[str, type], size: int | None = None) -> np.dtype[Any]:
+def _record(*fields: tuple[str, Any], size: int | None = None) -> np.dtype[Any]:
     """Return a record of fields, at least ``size`` bytes long."""
     layout = np.dtype(list(fields), align=True)
     if size is not None:
@@ -194,17 +196,16 @@ def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
     )
 
 
-FIX_STEP: Final = ("fix_step", _I)  # when it was taken; -1: none yet
-FIX_FIELDS: Final = (
-    ("fix_x", _F),
-    ("fix_y", _F),  # where the target was, m; a bearing: a unit vector
-    ("fix_cos", _F),
-    ("fix_sin", _F),  # its heading; a bearing: 0
-    ("fix_frame_cos", _F),
-    ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
+FIX_RECORD: Final = _record(
+    ("x", _F),
+    ("y", _F),  # where the target was, m; a bearing: a unit vector
+    ("cos", _F),
+    ("sin", _F),  # its heading; a bearing: 0
+    ("frame_cos", _F),
+    ("frame_sin", _F),  # the slot frame ψ; a bearing: 0
 )
 """A fix of the target, in the common frame: a position or a bearing, depending on the sensor
-(:mod:`posse.rules.senses.declaring`). Of a certain control step (``FIX_STEP``)."""
+(:mod:`posse.rules.senses.declaring`). Its control step stands beside it (``fix_step``)."""
 
 TRACKER: Final = _record(
     ("x", _F),
@@ -225,13 +226,13 @@ TRACKER: Final = _record(
     ("near", _I),  # 1: something may touch it in the next step
     ("touching", _I),  # 1: it touches anything
     ("onsets", _I),  # contacts that began in this step
-    FIX_STEP,  # of its best fix
+    ("fix_step", _I),  # when its best fix was taken; -1: none yet
     ("slot", _S),  # number of the slot that it occupies; -1: none
     ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
     ("touching_trackers", _U),
     ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
     # its best fix of the target, from its sensor or by radio
-    *FIX_FIELDS,
+    ("fix", FIX_RECORD),
     ("fix_vx", _F),
     ("fix_vy", _F),  # m/s, from successive fixes
     # inputs of score and rewards, with slot and could_arrive
@@ -243,9 +244,9 @@ TRACKER: Final = _record(
 """One tracker."""
 
 # Kernels read and write these fields of a tracker in blocks of eight; unchanged fields are written
-# as they were read. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
+# as they were read. From x on: pose, speed, turn rate, their limits. From fix on: the fix.
 POSE: Final = _offset(TRACKER, "x")
-FIX: Final = _offset(TRACKER, "fix_x")
+FIX: Final = _offset(TRACKER, "fix")
 CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
@@ -273,8 +274,8 @@ BROADCAST: Final = _record(
     ("heading_sin", _F),
     ("speed", _F),
     ("turn_rate", _F),
-    FIX_STEP,
-    *FIX_FIELDS,
+    ("fix_step", _I),
+    ("fix", FIX_RECORD),
 )
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 
@@ -339,14 +340,16 @@ class WorldArrays(NamedTuple):
 
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
-        names: dict[str, npt.NDArray[Any]] = {}
-        for name, array in zip(self._fields, self, strict=True):
-            if array.dtype.names is None:
-                names[name] = array.view()
-            else:
-                for part in array.dtype.names:
-                    names[f"{name}_{part}"] = array[part]
-        return names
+        return {
+            name: part for name, array in zip(self._fields, self, strict=True) for name, part in _parts(name, array)
+        }
+
+
+def _parts(name: str, array: npt.NDArray[Any]) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    if array.dtype.names is None:
+        yield name, array.view()
+    for part in array.dtype.names or ():
+        yield from _parts(f"{name}_{part}", array[part])
 
 
 def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:

@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from posse.numeric import compiled
+from posse.numeric import HALF, ZERO, compiled
 
 if TYPE_CHECKING:
     from posse.scenarios.scenario import Scenario
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
-_HALF: Final = np.float32(0.5)
 _THREE_HALVES: Final = np.float32(1.5)
-_ZERO: Final = np.float32(0.0)
 _DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
@@ -70,8 +68,8 @@ def follow_heading(
     along = psi_c * heading_c + psi_s * heading_s
     if along >= most_c:
         return heading_c, heading_s
-    side = most_s if psi_c * heading_s - psi_s * heading_c >= _ZERO else -most_s
+    side = most_s if psi_c * heading_s - psi_s * heading_c >= ZERO else -most_s
     c = psi_c * most_c - psi_s * side
     s = psi_s * most_c + psi_c * side
-    scale = _THREE_HALVES - _HALF * (c * c + s * s)
+    scale = _THREE_HALVES - HALF * (c * c + s * s)
     return c * scale, s * scale

@@ -261,7 +261,7 @@ class Scenario:
     @property
     def target_is_agent(self) -> bool:
         """Whether a policy controls the target."""
-        return bool(TARGET_MOTIONS[self.target_motion].agent)
+        return self.target_motion == "agent"
 
     @property
     def target_clearance(self) -> float:

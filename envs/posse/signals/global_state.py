@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray
+from posse.numeric import FloatArray, Records
 from posse.registry import TARGET_MOTIONS
 from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario
@@ -82,7 +82,7 @@ def _table(s: Scenario) -> list[tuple[str, str, str, _Read]]:
     """Return name, unit, meaning and transform of every entry, in order."""
 
     def of(array: str, field: str) -> _Read:
-        return lambda arrays: np.asarray(getattr(arrays, array)[field])
+        return lambda arrays: _field(getattr(arrays, array), field)
 
     def when(array: str, field: str) -> _Read:
         """Read a control step as a time in s, -1 for never."""
@@ -133,6 +133,10 @@ def _table(s: Scenario) -> list[tuple[str, str, str, _Read]]:
             for k, unit in {**_POSE, **_FIX}.items()
         ),
     ]
+
+
+def _field(records: Records, name: str) -> _Values:
+    return np.asarray(records["fix"][name.removeprefix("fix_")] if name in _FIX else records[name])
 
 
 def _newest_first(arrays: WorldArrays, ring: _Values) -> _Values:

@@ -7,6 +7,9 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import (
+    ONE,
+    TINY,
+    ZERO,
     FloatArray,
     Lanes,
     Record,
@@ -25,9 +28,6 @@ from posse.rules.discs import BLOCK, FAR, blocks, natural, num_discs
 
 _WORD: Final = 8  # blocks of eight discs in a bit set of 64
 
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_TINY: Final = np.float32(1e-9)
 _A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
 
 Pose = tuple[np.float32, np.float32, np.float32, np.float32]
@@ -50,22 +50,22 @@ def echo(c: Record, robot: Pose, j: int, s: Record) -> _Echo:
     ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
     distance = root(ahead * ahead + left * left)
     reached = distance - radius < c.sonar_range + c.radius
-    nearest = greater(distance - radius - c.radius, _ZERO)
+    nearest = greater(distance - radius - c.radius, ZERO)
     radius2 = radius * radius
-    narrow = radius2 < (_ONE - c.beam_cosine * c.beam_cosine) * distance * distance
+    narrow = radius2 < (ONE - c.beam_cosine * c.beam_cosine) * distance * distance
     return (
         ahead,
         left,
         choose(reached, nearest, FAR),
         c.beam_cosine * distance,
-        choose(reached & (not narrow), radius2, -_ONE),
+        choose(reached & (not narrow), radius2, -ONE),
     )
 
 
 @compiled
 def listen(c: Record, one: _Echo, two: _Echo, three: _Echo, four: _Echo, s: Record) -> None:
     """Update the sonar readings with four discs."""
-    wide = max(max(one[4], two[4]), max(three[4], four[4])) >= _ZERO
+    wide = max(max(one[4], two[4]), max(three[4], four[4])) >= ZERO
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
         cosine, sine = load(s.beam_cos, k), load(s.beam_sin, k)
@@ -95,8 +95,8 @@ def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
     ahead, left, _, least, radius2 = disc
     along, across = ahead * cosine + left * sine, left * cosine - ahead * sine
     under_root = radius2 - across * across
-    axis = greater(along - root(greater(under_root, _ZERO)) - c.radius, _ZERO)
-    meets = (under_root > _ZERO) & (along > _ZERO) & (along < least)
+    axis = greater(along - root(greater(under_root, ZERO)) - c.radius, ZERO)
+    meets = (under_root > ZERO) & (along > ZERO) & (along < least)
     return choose(meets, axis, FAR)
 
 
@@ -104,10 +104,10 @@ def on_axis(c: Record, disc: _Echo, cosine: Lanes, sine: Lanes) -> Lanes:
 def listen_to_walls(c: Record, robot: Pose, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
     half, (x, y, _, _) = c.half_arena, robot
-    listen_to_wall(c, robot, _ONE, _ZERO, half - x, s)
-    listen_to_wall(c, robot, -_ONE, _ZERO, half + x, s)
-    listen_to_wall(c, robot, _ZERO, _ONE, half - y, s)
-    listen_to_wall(c, robot, _ZERO, -_ONE, half + y, s)
+    listen_to_wall(c, robot, ONE, ZERO, half - x, s)
+    listen_to_wall(c, robot, -ONE, ZERO, half + x, s)
+    listen_to_wall(c, robot, ZERO, ONE, half - y, s)
+    listen_to_wall(c, robot, ZERO, -ONE, half + y, s)
 
 
 @compiled
@@ -117,14 +117,14 @@ def listen_to_wall(
     """Update the sonar readings with a wall at a distance along its outward normal."""
     if distance >= c.sonar_range + c.radius:
         return
-    nearest = max(distance - c.radius, _ZERO)
+    nearest = max(distance - c.radius, ZERO)
     _, _, hc, hs = robot
     ahead, left = normal_x * hc + normal_y * hs, normal_y * hc - normal_x * hs
     for block in range(blocks(c.sonar_beams)):
         k = BLOCK * block
         towards = ahead * load(s.beam_cos, k) + left * load(s.beam_sin, k)
-        axis = greater(distance / greater(towards, _TINY) - c.radius, _ZERO)
-        found = choose(towards >= c.beam_cosine, nearest, choose(towards > _ZERO, axis, FAR))
+        axis = greater(distance / greater(towards, TINY) - c.radius, ZERO)
+        found = choose(towards >= c.beam_cosine, nearest, choose(towards > ZERO, axis, FAR))
         store(s.reading, k, lesser(load(s.reading, k), found))
 
 
