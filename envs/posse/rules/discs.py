@@ -77,7 +77,7 @@ def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
         s.index[k] = np.float32(k)
     for k in range(DISCS):
         s.radius[k] = c.radius
-        s.heard2[k] = heard_within2(c, c.radius)
+        s.sonar_reach2[k] = sonar_reach2(c, c.radius)
     count = beams.shape[1]
     for k in range(BLOCK * blocks(count)):
         s.beam_cos[k] = beams[0, k] if k < count else ZERO
@@ -85,7 +85,7 @@ def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
 
 
 @compiled
-def heard_within2(c: Record, radius: np.float32) -> np.float32:
+def sonar_reach2(c: Record, radius: np.float32) -> np.float32:
     """Return the squared distance of centres within which the sonar may detect a disc."""
     within = (c.sonar_range + c.radius + radius) * A_LITTLE_MORE
     return np.float32(within * within)
@@ -150,7 +150,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
             o = obstacles[k]
             j = n + 1 + k
             s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
-            s.heard2[j] = heard_within2(c, o.radius)
+            s.sonar_reach2[j] = sonar_reach2(c, o.radius)
         store(s.x, count, eight(FAR))
         store(s.y, count, eight(FAR))
 
