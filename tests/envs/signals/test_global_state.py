@@ -60,15 +60,10 @@ def disturb(scenario: posse.Scenario, arrays: WorldArrays, rng: np.random.Genera
         else:
             array[...] = before
     # Of messages never received or sent, the vector holds only that.
-    for name, record, absent in (
-        ("heard", arrays.heard, arrays.heard["step"] < 0),
-        ("broadcast", arrays.broadcast, arrays.broadcast["sent"] == 0),
-    ):
-        for field in record.dtype.names or ():
-            if field in ("step", "sent"):
-                continue
-            array = arrays.by_name()[f"{name}_{field}"]
-            array[absent] = junk(array, rng)[absent]
+    for name, absent in (("heard_", arrays.heard["step"] < 0), ("broadcast_", arrays.broadcast["sent"] == 0)):
+        for field, array in arrays.by_name().items():
+            if field.startswith(name) and field not in ("heard_step", "heard_message", "broadcast_sent"):
+                array[absent] = junk(array, rng)[absent]
     np.testing.assert_array_equal(layout.vector(arrays), vector)
     return disturbed
 
