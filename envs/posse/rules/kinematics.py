@@ -81,3 +81,26 @@ def turn_towards(
     else:
         error = np.float32(math.atan2(across, along))
     return min(max(error / time, -most), most)
+
+
+@compiled
+def follow_heading(
+    psi_c: np.float32,
+    psi_s: np.float32,
+    heading_c: np.float32,
+    heading_s: np.float32,
+    most_c: np.float32,
+    most_s: np.float32,
+) -> tuple[np.float32, np.float32]:
+    """Return (cos ψ, sin ψ) of the slot frame after one control step towards the heading.
+
+    ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the maximum turn.
+    """
+    along = psi_c * heading_c + psi_s * heading_s
+    if along >= most_c:
+        return heading_c, heading_s
+    side = most_s if psi_c * heading_s - psi_s * heading_c >= ZERO else -most_s
+    c = psi_c * most_c - psi_s * side
+    s = psi_s * most_c + psi_c * side
+    scale = _THREE_HALVES - HALF * (c * c + s * s)
+    return c * scale, s * scale

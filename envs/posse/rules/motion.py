@@ -27,10 +27,9 @@ from posse.numeric import (
 )
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
-from posse.rules.kinematics import approach, arc
+from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.state import NEVER, POSE
 from posse.rules.targets.steering import target_turn_rate
-from posse.scenarios.formation import follow_heading
 
 
 @compiled

@@ -68,6 +68,12 @@ def _physics_step(s: Scenario) -> np.float32:
     return np.float32(s.control_step / s.physics_steps)
 
 
+def _whole_arcs(s: Scenario) -> bool:
+    """Return whether a robot with nothing near moves on one arc for the whole control step."""
+    turn = max(*s.tracker_turn_rates, s.target_turn_rate) * s.control_step
+    return turn <= 1.0 and math.isinf(s.tracker_acceleration) and math.isinf(s.tracker_turn_acceleration)
+
+
 def _measured(s: Scenario) -> bool:
     return s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None
 
@@ -93,7 +99,7 @@ DERIVED: Final[dict[str, tuple[type, Callable[[Scenario], Any]]]] = {
     "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
     "perfect_radio": (_I, perfect_radio),
     "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
-    "whole_arcs": (_I, lambda s: s.whole_arcs),
+    "whole_arcs": (_I, _whole_arcs),
     "dt": (_F, lambda s: s.control_step),
     "physics_dt": (_F, _physics_step),
     "radius": (_F, lambda s: s.robot_radius),

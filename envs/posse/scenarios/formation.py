@@ -10,16 +10,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from posse.numeric import HALF, ZERO, compiled
-
 if TYPE_CHECKING:
     from posse.scenarios.scenario import Scenario
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
-_THREE_HALVES: Final = np.float32(1.5)
 _DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
@@ -50,26 +45,3 @@ def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
         ]
     wing = spacing * _DIAGONAL
     return [(-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1)) for i in range(n)]
-
-
-@compiled
-def follow_heading(
-    psi_c: np.float32,
-    psi_s: np.float32,
-    heading_c: np.float32,
-    heading_s: np.float32,
-    most_c: np.float32,
-    most_s: np.float32,
-) -> tuple[np.float32, np.float32]:
-    """Return (cos ψ, sin ψ) after one control step towards the heading.
-
-    ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the maximum turn.
-    """
-    along = psi_c * heading_c + psi_s * heading_s
-    if along >= most_c:
-        return heading_c, heading_s
-    side = most_s if psi_c * heading_s - psi_s * heading_c >= ZERO else -most_s
-    c = psi_c * most_c - psi_s * side
-    s = psi_s * most_c + psi_c * side
-    scale = _THREE_HALVES - HALF * (c * c + s * s)
-    return c * scale, s * scale

@@ -242,13 +242,6 @@ class Scenario:
         return round(self.control_step / self.physics_step)
 
     @property
-    def whole_arcs(self) -> bool:
-        """Whether a robot with nothing near moves on one arc for the whole control step."""
-        turn = max(*self.tracker_turn_rates, self.target_turn_rate) * self.control_step
-        limits = (self.tracker_acceleration, self.tracker_turn_acceleration)
-        return turn <= 1.0 and all(math.isinf(limit) for limit in limits)
-
-    @property
     def duration(self) -> float:
         """Length of an episode, s."""
         return self.horizon * self.control_step

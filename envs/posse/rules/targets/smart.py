@@ -12,10 +12,9 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import HALF, ONE, WIDTH, ZERO, Record, Records, choose, compiled, eight, lesser, load, root, store
-from posse.rules.kinematics import arc
+from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
 from posse.rules.targets.declaring import Memory, target_motion
-from posse.scenarios.formation import follow_heading
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""
