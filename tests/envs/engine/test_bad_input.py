@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import gymnasium
+import hypothesis
 import numpy as np
 import pettingzoo
 import pytest
@@ -111,6 +112,7 @@ BAD_ACTIONS: list[tuple[Any, str]] = [
 ]
 
 
+@hypothesis.settings(deadline=None)
 @given(
     number=st.integers(0, 37 * 5 * 2 - 1),
     value=st.sampled_from([math.nan, math.inf, -math.inf, 1.00001, -1.00001, 3.0]),
