@@ -201,7 +201,7 @@ class Batch(Stepping):
             world["episode"][chosen] += 1
         try:
             observations = self._start(chosen, START)
-            check_drawn(self.scenario, world[chosen], poses)
+            check_drawn(self.scenario, world, chosen, poses)
             for name, pose in poses.items():
                 write_poses(self._arrays.tracker if name == "tracker_pose" else world, pose, chosen)
             if poses:
@@ -344,7 +344,7 @@ class Batch(Stepping):
     def _check_started_worlds(self, started: BoolArray) -> None:
         """Raise ScenarioError if the start of a world could not be drawn; then only a reset helps."""
         try:
-            check_drawn(self.scenario, self._arrays.world[started])
+            check_drawn(self.scenario, self._arrays.world, started)
         except ScenarioError:
             self._started = False
             raise

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, Record, Records, compiled
+from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled
 from posse.rules.discs import obstacle_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
@@ -146,13 +146,15 @@ def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw
     draw_faults(c, w, trackers)
 
 
-def check_drawn(s: Scenario, world: Records, given: Container[str] = ()) -> None:
-    """Raise if the start of any of these worlds could not be drawn, but for poses that are given.
+def check_drawn(s: Scenario, world: Records, started: BoolArray, given: Container[str] = ()) -> None:
+    """Raise if the start of any ``started`` world could not be drawn, but for poses that are given.
 
     Raises:
         ScenarioError: Names the settings that are too tight.
     """
-    undrawn = np.bitwise_or.reduce(world["undrawn"]) if len(world) else 0
+    undrawn = int(np.bitwise_or.reduce(world["undrawn"][started]))
+    if undrawn == 0:
+        return
     walls = f" in arena={s.arena:g}" if math.isfinite(s.arena) else ""
     enlarge = ", or enlarge arena" if walls else ""
     if undrawn & _OBSTACLES:

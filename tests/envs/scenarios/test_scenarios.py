@@ -62,20 +62,6 @@ def test_it_plays_to_its_horizon(name: str) -> None:
     assert 0.6 < metrics["bound"].mean() < 0.99
 
 
-def test_only_the_first_three_differ_in_nothing_but_the_motion_of_a_free_target() -> None:
-    assert get_scenario("accelerating") == get_scenario("constant", name="accelerating", target_motion="accelerating")
-    for name in ("constant", "accelerating", "smart"):
-        s = get_scenario(name)
-        assert all(math.isinf(x) for x in (s.arena, s.sensing_range, s.radio_range))
-
-
-def test_the_smart_target_is_slower_and_nimbler_than_the_trackers() -> None:
-    s = get_scenario("smart")
-    assert s.target_motion == "smart"
-    assert s.target_speed < min(s.tracker_speeds)
-    assert s.target_turn_rate > 1.5 * max(s.tracker_turn_rates)
-
-
 def test_in_search_no_tracker_sees_the_target_at_the_start() -> None:
     assert get_scenario("search").start_distance[0] > get_scenario("search").sensing_range
     assert not started("search").state["tracker_sees"].any()
@@ -106,14 +92,6 @@ def test_in_leader_loss_the_leader_alone_sees_the_target_from_its_slot() -> None
     # At the start everyone does, so that nothing but the loss is tested.
     assert s.start_distance[1] < s.sensing_range
     assert started("leader-loss").state["tracker_sees"].all()
-
-
-def test_field_has_something_of_every_other_scenario() -> None:
-    s = get_scenario("field")
-    assert s.target_motion == "smart"
-    assert all(math.isfinite(x) for x in (s.arena, s.sensing_range, s.radio_range))
-    assert min(s.num_obstacles, s.range_noise, s.bearing_noise, s.radio_delay, s.radio_loss, s.breaks) > 0
-    assert min(s.sensor_outages, s.radio_outages) > 0
 
 
 def test_the_paper_is_one_set_up_under_two_names() -> None:
