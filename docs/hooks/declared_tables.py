@@ -50,13 +50,19 @@ def training_defaults() -> str:
     return table(("scenario", *(f"--{name.replace('_', '-')}" for name in names)), rows)
 
 
+def scenarios() -> str:
+    """Return every named scenario with its version and meaning."""
+    named = map(posse.get_scenario, posse.scenario_names())
+    return table(("scenario", "version", "meaning"), ((code(s.name), s.version, s.meaning) for s in named))
+
+
 def settings(scenario: str) -> str:
     """Return the settings of a named scenario that differ from the defaults."""
     own, plain = posse.get_scenario(scenario), posse.Scenario(name="plain")
     rows = []
     for field in dataclasses.fields(own):
         given, default = getattr(own, field.name), getattr(plain, field.name)
-        if field.name == "name" or given == default:
+        if field.name in ("name", "meaning") or given == default:
             continue
         setting = own.settings()[field.name]
         rows.append((code(field.name), code(value(given)), code(value(default)), setting.unit, setting.meaning))

@@ -23,6 +23,7 @@ import standings
 from equations import typeset
 
 PARTS: Final[dict[str, Callable[..., str]]] = {
+    "scenarios": declared_tables.scenarios,
     "settings": declared_tables.settings,
     "all_settings": declared_tables.all_settings,
     "observation_fields": declared_tables.observation_fields,

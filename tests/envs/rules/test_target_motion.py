@@ -74,24 +74,6 @@ def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     assert (turns.min(axis=0) < 0).all()
 
 
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        {"target_turn_rate": 20.0, "control_step": 1.0},
-        {"target_turn_rate": 5.0, "control_step": 0.5, "physics_step": 0.1},
-    ],
-    ids=str,
-)
-def test_a_long_control_step_keeps_the_goal_a_unit_vector(overrides: dict[str, Any]) -> None:
-    batch = posse.batch("accelerating", 50, horizon=100, **FAR_AWAY, **overrides)
-    batch.reset(seed=3)
-    _, courses, turns = follow(batch, 60)
-    state = snapshot(batch)
-    np.testing.assert_allclose(np.hypot(state["world_goal_cos"], state["world_goal_sin"]), 1, rtol=1e-5)
-    np.testing.assert_allclose(np.abs(courses), 1.0, rtol=1e-5)
-    assert np.abs(turns).max() <= overrides["target_turn_rate"]
-
-
 def room(batch: posse.Batch, places: Complexes) -> float:
     """Return the least free width that a target ever had to a wall or an obstacle."""
     s, state = batch.scenario, snapshot(batch)
@@ -119,31 +101,6 @@ def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, mot
     away = np.abs(places.T[:, None] - tracker).min(axis=1).T  # the trackers rest
     np.testing.assert_allclose(moved[away[1:] > 0.5], step, atol=1e-3 * limit)
     assert np.abs(np.angle(courses[1:] / courses[:-1])).max() <= 0.1 * limit + 1e-5
-
-
-@pytest.mark.parametrize("turn", [0.3, 4.0])
-def test_the_safeguard_holds_for_wide_and_narrow_turners(turn: float) -> None:
-    batch = posse.batch(
-        "obstacles",
-        200,
-        target_turn_rate=turn,
-        arena=24.0,
-        num_obstacles=8,
-        num_trackers=2,
-        target_motion="accelerating",
-    )
-    batch.reset(seed=5)
-    places, _, _ = follow(batch, 500)
-    assert room(batch, places) > 0.09
-
-
-@pytest.mark.parametrize("motion", ["accelerating", "smart"])
-def test_a_target_that_is_blocked_by_trackers_does_not_end_in_a_wall(motion: str) -> None:
-    batch = posse.batch("obstacles", 100, target_motion=motion, num_trackers=8)
-    batch.reset(seed=6)
-    places, _, _ = follow(batch, 400, "chase")
-    assert room(batch, places) > 0.05
-    assert (batch.state["world_contacts_target"] > 0).any()
 
 
 def test_a_target_in_an_arena_still_gets_about() -> None:

@@ -31,14 +31,6 @@ def test_slots_are_where_their_definition_says_and_apart(formation: str, number:
         ) else None
 
 
-def test_the_paper_s_wedge_has_one_leader_ahead_and_two_wings() -> None:
-    places = slots(posse.get_scenario("constant"))
-    assert places[0] == pytest.approx(-1.2)
-    assert np.abs(np.diff(places[[2, 0, 1]])) == pytest.approx([1.2, 1.2])
-    assert np.abs(np.diff(places[[4, 2]])) == pytest.approx([1.2])
-    assert places.real.argmax() == 0, "the leader is ahead of its followers"
-
-
 @pytest.mark.parametrize("formation", FORMATIONS)
 @pytest.mark.parametrize("motion", ["accelerating", "smart", "agent"])
 def test_every_slot_can_be_followed_without_reversing(formation: str, motion: str) -> None:

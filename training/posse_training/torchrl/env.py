@@ -111,8 +111,7 @@ class PosseEnv(EnvBase):
             reward[group] = Composite(reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count))
         observation["score"] = Bounded(0.0, 1.0, (worlds, 1), dtype=torch.float32)
         if self._state_layout is not None:
-            least, greatest = (torch.from_numpy(bound).expand(worlds, -1) for bound in self._state_layout.bounds())
-            observation["state"] = Bounded(least, greatest, dtype=torch.float32)
+            observation["state"] = Unbounded((worlds, self._state_layout.size), dtype=torch.float32)
         flag = Binary(1, (worlds, 1), dtype=torch.bool)
         self.observation_spec = observation.to(self.device)
         self.action_spec = action.to(self.device)
