@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 INSTALL := install --no-compile --constraint
 # pip compiles modules on one core; this does on all. Left out is what the tests hardly import: others' tests,
 # torch's compiler, and tools. One module of torch is for another Python.
-COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|sqlalchemy|debugpy|mypy|mypyc|pip|setuptools)/'
+COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|debugpy|mypy|mypyc|pip|setuptools)/'
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone.
@@ -22,7 +22,7 @@ RECIPES := .venv-recipes
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes fuzz mutants lint format docs bench bench-costs bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,18 +42,11 @@ test-long: $(FULL) ## Run the long tests: kills, full trainings, kernels compile
 
 recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
 
-fuzz: $(FULL) ## Run randomised tests in parallel, MINUTES=1 per campaign
-	$(BIN)/python -m tests.fuzz $(ONLY) --minutes $(or $(MINUTES),1) --seed $(or $(SEED),0) $(if $(JOBS),--jobs $(JOBS))
-
-mutants: $(FULL) ## Try mutants of the laws and the DDCS (one to two hours for all), SAMPLE=400 SEED=1; resumes
-	$(BIN)/python -m tests.mutation $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(SEED),--seed $(SEED)) --jobs $(or $(JOBS),2)
-	$(BIN)/python -m tests.mutation.page
-
 lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py
+	MYPYPATH=benchmarks $(BIN)/mypy benchmarks/*.py scripts/*.py
 
 format: $(FULL) ## Format the sources
 	$(BIN)/ruff check --fix
@@ -65,13 +58,10 @@ docs: $(FULL) ## Build the manual into site/
 bench: $(FULL) ## Measure throughput on this machine
 	$(BIN)/python benchmarks/speed.py
 
-bench-costs: $(FULL) ## Measure the time of each part of a step, and how it scales
-	$(BIN)/python benchmarks/costs.py
-
-bench-training: $(FULL) ## Measure throughput and time shares of PPO training
+bench-training: $(FULL) ## Measure throughput of PPO training, and the time to beat the script
 	$(BIN)/python benchmarks/training.py
 
-algorithms: $(FULL) $(RECIPES)/recipes.stamp ## Train the field's algorithms and write docs/algorithms.md (hours); resumes
+algorithms: $(FULL) ## Train the field's algorithms from nothing (hours); resumes
 	$(BIN)/python benchmarks/algorithms.py
 
 bench-peers: $(FULL) ## Compare throughput with other simulators
@@ -79,19 +69,16 @@ bench-peers: $(FULL) ## Compare throughput with other simulators
 
 results: $(FULL) ## Evaluate every shipped policy on every scenario (takes long)
 	$(BIN)/python benchmarks/results.py
-	$(BIN)/python benchmarks/leaderboard.py
 	$(BIN)/python docs/drawing/readme_table.py
-	$(BIN)/python benchmarks/comparison.py $(if $(SEEDS),--groups $(SEEDS))
-	$(BIN)/python benchmarks/behaviour.py
 
 reproduce: $(FULL) ## Reproduce the paper's experiments
 	$(BIN)/posse reproduce
 
 tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted, it resumes
-	$(BIN)/python -m posse_training.tuning.again
+	$(BIN)/python scripts/tune_shipped.py
 
 train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
-	$(BIN)/python -m posse_training.shipping.train_all $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
+	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,22 +1,19 @@
-"""What the field's algorithms reach: each trained from nothing, with the same budget and inputs.
+"""``make algorithms``: what algorithms reach from nothing, with the same budget and inputs.
 
-Finished runs are skipped and interrupted ones resume, so that it can be stopped at any time; each
-result is kept in benchmarks/algorithms. Writes the table and the figure of docs/algorithms.md.
+Writes a row of benchmarks/algorithms.csv for each run. Runs with a row are skipped and interrupted ones resume.
 
-    make algorithms
     python benchmarks/algorithms.py --algorithms ppo sac --scenarios smart --seeds 1
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
+import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import tyro
-from algorithms_page import RESULTS, write_page
 from rich.console import Console
 
 from posse_baselines import load
@@ -24,24 +21,24 @@ from posse_training.provenance import commit
 from posse_training.reports.evaluation import evaluate
 from posse_training.reports.statistics import mean
 from posse_training.runs.defaults import default_settings
-from posse_training.runs.saved.curve import POINT
 from posse_training.runs.saved.folder import LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import resume, train
 
-OFF_POLICY: Final = ("sac", "td3")
-BENCHMARL: Final = ("qmix",)
-"""Learned by BenchMARL in an environment of its own, off policy as well."""
-BENCHMARL_PYTHON: Final = Path(".venv-recipes/bin/python")
+TABLE: Final = Path(__file__).parent / "algorithms.csv"
+COLUMNS: Final = (
+    *("algorithm", "scenario", "version", "training_seed", "steps", "worlds", "seed"),
+    *("safe_score", "low", "high", "score", "contact_free", "area", "steps_per_second", "commit"),
+)
 CHANGES: Final[dict[str, dict[str, Any]]] = {
     "ppo": {},
     "mappo": {"algorithm": "mappo"},
-    "recurrent-ppo": {"algorithm": "recurrent-ppo"},
     "sac": {"algorithm": "sac"},
     "td3": {"algorithm": "td3"},
     "ppo-imitation": {"imitate": "ddcs-tuned"},
 }
 """Settings of each algorithm beyond the defaults of its class."""
+OFF_POLICY: Final = ("sac", "td3")
 TEST_SEED: Final = 7
 
 
@@ -49,18 +46,16 @@ TEST_SEED: Final = 7
 class Settings:
     """Command-line arguments."""
 
-    algorithms: tuple[str, ...] = (*CHANGES, *BENCHMARL)
+    algorithms: tuple[str, ...] = tuple(CHANGES)
     scenarios: tuple[str, ...] = ("smart", "radio", "field")
     seeds: tuple[int, ...] = (1, 2, 3)
     steps: int = 10_000_000
     """Steps of training; a step is one control step of one tracker."""
     off_policy_steps: int = 1_000_000
-    """The same for sac, td3 and qmix, whose steps take longer."""
+    """The same for sac and td3, whose steps take longer."""
     worlds: int = 500
     """Worlds of the split ``test`` that the last policy plays."""
     folder: Path = Path("runs/algorithms")
-    page_only: bool = False
-    """Write the page from the results that there are."""
 
 
 def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainSettings:
@@ -68,96 +63,44 @@ def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainS
     changes = dict(CHANGES[algorithm])
     base = default_settings(scenario, changes.pop("algorithm", "ppo"), own=False)
     steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
-    return replace(
-        base,
-        **changes,
-        seed=seed,
-        steps=steps,
-        evaluate_every=steps // 20,
-        tensorboard=False,
-        beside=None,
-        folder=s.folder / f"{algorithm}-{scenario}-{seed}",
-    )
+    folder = s.folder / f"{algorithm}-{scenario}-{seed}"
+    run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
+    return replace(base, **changes, **run, tensorboard=False, beside=None)
 
 
-def result_of(run: TrainSettings, algorithm: str, worlds: int) -> dict[str, Any]:
-    """Return what is kept of a finished run: its curve, and its last policy on test worlds."""
+def row_of(run: TrainSettings, algorithm: str, worlds: int) -> dict[str, Any]:
+    """Return the row of a finished run: its last policy on test worlds, and the area under its curve."""
     policy = load(str(run.run_folder / LAST))
     card: dict[str, Any] = policy.card  # type: ignore[attr-defined]
     results = evaluate(policy, run.scenario, worlds, TEST_SEED, split="test", progress=False)
-    return {
-        "algorithm": algorithm,
-        "scenario": run.scenario,
-        "version": results.scenario.version,
-        "seed": run.seed,
-        "steps": card["steps"],
-        "commit": commit(),
-        "curve": [{name: point[name] for name in POINT} for point in card["curve"]],
-        "test": {
-            "seed": TEST_SEED,
-            "worlds": worlds,
-            "safe_score": mean(results["safe_score"]).to_dict(),
-            "score": float(results["score"].mean()),
-            "contact_free": float(results["contact_free"].mean()),
-        },
-    }
-
-
-def train_here(s: Settings, algorithm: str, scenario: str, seed: int, console: Console) -> str:
-    """Train with the package's own trainer, or go on with that; return the result as JSON."""
-    run = settings_of(s, algorithm, scenario, seed)
-    if (run.run_folder / SETTINGS).is_file():
-        resume(run.run_folder, console=console)
-    else:
-        train(run, console=console)
-    return json.dumps(result_of(run, algorithm, s.worlds), indent=1) + "\n"
-
-
-def train_in_benchmarl(s: Settings, algorithm: str, scenario: str, seed: int) -> str:
-    """Train with BenchMARL, from the start; return the result as JSON."""
-    out = s.folder / f"{algorithm}-{scenario}-{seed}" / "result.json"
-    out.parent.mkdir(parents=True, exist_ok=True)
-    subprocess.run(
-        [
-            str(BENCHMARL_PYTHON),
-            str(Path(__file__).with_name("algorithms_benchmarl.py")),
-            algorithm,
-            scenario,
-            "--seed",
-            str(seed),
-            "--steps",
-            str(s.off_policy_steps),
-            "--worlds",
-            str(s.worlds),
-            "--out",
-            str(out),
-        ],
-        check=True,
+    safe, last = mean(results["safe_score"]), card["curve"][-1]
+    steps = [0.0, *(point["steps"] for point in card["curve"])]
+    scores = [0.0, *(point["safe_score"] for point in card["curve"])]
+    area = float(np.trapezoid(scores, steps) / steps[-1])
+    numbers = (safe.value, safe.low, safe.high, results["score"].mean(), results["contact_free"].mean(), area)
+    values = (
+        *(algorithm, run.scenario, results.scenario.version, run.seed, card["steps"], worlds, TEST_SEED),
+        *(f"{number:.6f}" for number in numbers),
+        *(round(last["steps"] / last["seconds"]), commit()),
     )
-    return out.read_text(encoding="utf-8")
+    return dict(zip(COLUMNS, values, strict=True))
 
 
 def main() -> None:
-    """Train what is left, and write the page."""
+    """Train what has no row yet."""
     s = tyro.cli(Settings, description=__doc__)
+    with TABLE.open(newline="", encoding="utf-8") as file:
+        done = {(row["algorithm"], row["scenario"], int(row["training_seed"])) for row in csv.DictReader(file)}
     console = Console()
-    RESULTS.mkdir(exist_ok=True)
-    for seed in s.seeds:
-        for scenario in s.scenarios:
-            for algorithm in s.algorithms if not s.page_only else ():
-                kept = RESULTS / f"{algorithm}-{scenario}-{seed}.json"
-                if kept.is_file():
-                    continue
-                console.print(kept.stem, style="bold")
-                if algorithm not in BENCHMARL:
-                    text = train_here(s, algorithm, scenario, seed, console)
-                elif BENCHMARL_PYTHON.is_file():
-                    text = train_in_benchmarl(s, algorithm, scenario, seed)
-                else:
-                    console.print(f"left out: no {BENCHMARL_PYTHON} (make recipes)")
-                    continue
-                kept.write_text(text, encoding="utf-8")
-    write_page(console)
+    todo = [(a, c, n) for n in s.seeds for c in s.scenarios for a in s.algorithms if (a, c, n) not in done]
+    for algorithm, scenario, seed in todo:
+        run = settings_of(s, algorithm, scenario, seed)
+        if (run.run_folder / SETTINGS).is_file():
+            resume(run.run_folder, console=console)
+        else:
+            train(run, console=console)
+        with TABLE.open("a", newline="", encoding="utf-8") as file:
+            csv.DictWriter(file, COLUMNS, lineterminator="\n").writerow(row_of(run, algorithm, s.worlds))
 
 
 if __name__ == "__main__":

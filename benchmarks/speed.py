@@ -1,13 +1,11 @@
 """``make bench``: throughput on this machine.
 
-Agent-steps/s of batches, compared with a plain copy of the observations; steps/s of single-world
-environments, alone and with other busy processes; time of the first step of a new process. With
-``--device cuda``: batches on the GPU, and their share of its memory bandwidth.
+Agent-steps/s of batches, steps/s of single-world environments, and the time of the first step of a new process
+without and with cached kernels. Median, least and greatest of five runs each.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import statistics
@@ -19,15 +17,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 import machine
-import numba
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.table import Table
 
 import posse
 
@@ -36,8 +31,6 @@ FIRST_STEP = (
     "env = gymnasium.make('posse/Team-v0', scenario='smart'); "
     "env.reset(seed=0); env.step(env.action_space.sample())"
 )
-# Ends with its parent process, so that it does not disturb later measurements.
-BUSY = "import os; parent = os.getppid()\nwhile os.getppid() == parent: sum(range(1000))"
 
 
 @dataclass(frozen=True)
@@ -47,9 +40,7 @@ class Settings:
     scenario: str = "smart"
     overrides: dict[str, int] = field(default_factory=dict)
     """Integer settings that override those of the scenario."""
-    device: Literal["cpu", "cuda"] = "cpu"
-    worlds: tuple[int, ...] | None = None
-    """Default: 1 to 16,384 on the CPU, 1,024 to 4 million on a GPU."""
+    worlds: tuple[int, ...] = (1, 32, 1024, 4096, 16384)
     seconds: float = 1.0
     """Total time of the five runs of each figure, s."""
     cold: bool = True
@@ -76,280 +67,74 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
 
 
 def batches(settings: Settings) -> list[dict[str, Any]]:
-    """Measure batches with one thread and with all, and a plain copy of their observations.
-
-    With the general kernel, then with one compiled for this scenario.
-    """
+    """Measure batches with one thread and with all."""
     rows = []
-    kinds = itertools.product(
-        (False, True), settings.worlds or (1, 32, 1024, 4096, 16384), sorted({1, os.cpu_count() or 1})
-    )
-    for own_kernel, count, threads in kinds:
-        batch = posse.batch(
-            settings.scenario, count, num_threads=threads, own_kernel=own_kernel, **dict[str, Any](settings.overrides)
-        )
-        observations = batch.reset(seed=0)
-        rng = np.random.default_rng(0)
-        actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
-        copy = np.empty_like(observations)
-        agents = observations.shape[0] * observations.shape[1]
-        rate = per_second(partial(batch.step, actions), settings.seconds)
-        plain = per_second(partial(np.copyto, copy, observations), settings.seconds)
-        rows.append(
-            {
-                "kernel": "own" if own_kernel else "general",
-                "worlds": count,
-                "threads": threads,
-                "agent_steps": [r * agents for r in rate],
-                "copies": [r * agents for r in plain],
-                "times_a_copy": plain[0] / rate[0],
-                "observation_length": observations.shape[2],
-                "bytes_a_world": batch.bytes_per_world,
-            }
-        )
+    for count in settings.worlds:
+        for threads in sorted({1, os.cpu_count() or 1}):
+            batch = posse.batch(settings.scenario, count, num_threads=threads, **dict[str, Any](settings.overrides))
+            batch.reset(seed=0)
+            actions = np.random.default_rng(0).uniform(-1, 1, batch.action_shape).astype(np.float32)
+            agents = actions.shape[0] * actions.shape[1]
+            rate = [calls * agents for calls in per_second(partial(batch.step, actions), settings.seconds)]
+            rows.append({"worlds": count, "threads": threads, "agent_steps": rate})
+            print(f"{count:6,} worlds, {threads} threads: {_shown(rate)} agent-steps/s", flush=True)
     return rows
 
 
-def finished(step: Callable[[], object], times: int) -> None:
-    """Call a GPU function several times and synchronise."""
-    for _ in range(times):
-        step()
-    numba.cuda.synchronize()  # type: ignore[no-untyped-call]
-
-
-def bandwidth(seconds: float) -> float:
-    """Return bytes per second, read and written, of a plain copy in GPU memory."""
-    source, target = (numba.cuda.device_array(1 << 28, np.float32) for _ in range(2))
-    copies = per_second(lambda: finished(lambda: target.copy_to_device(source), 10), seconds)
-    return float(copies[0] * 10 * 2 * source.nbytes)
-
-
-def gpu_batches(settings: Settings) -> list[dict[str, Any]]:
-    """Measure batches on the GPU, compared with a plain copy in its memory."""
-    limit = bandwidth(settings.seconds)
-    rows = []
-    for count in settings.worlds or tuple(1 << k for k in range(10, 23, 2)):
-        batch: Any = posse.batch(settings.scenario, count, device="cuda", **dict[str, Any](settings.overrides))
-        batch.reset(seed=0)
-        rng = np.random.default_rng(0)
-        actions = numba.cuda.to_device(rng.uniform(-1, 1, batch.action_shape).astype(np.float32))
-        once = partial(batch.step, actions, check=False)
-        rate = [10 * r for r in per_second(partial(finished, once, 10), settings.seconds)]
-        checked = per_second(partial(batch.step, actions), settings.seconds)
-        agents = count * batch.observation_shape[1]
-        # State read and written, actions read, results written.
-        outputs = agents * (batch.observation_shape[2] + 1 + len(posse.REWARD_TERMS)) * 4
-        moved = 2 * count * batch.bytes_per_world + actions.nbytes + outputs
-        rows.append(
-            {
-                "worlds": count,
-                "agent_steps": [r * agents for r in rate],
-                "agent_steps_checked": [r * agents for r in checked],
-                "share_of_bandwidth": rate[0] * moved / limit,
-                "observation_length": batch.observation_shape[2],
-                "bytes_a_world": batch.bytes_per_world,
-            }
-        )
-    return rows
-
-
-def report_gpu(settings: Settings) -> None:
-    """Measure a GPU, print, and write the figures."""
-    from posse.engine.cuda import check_device  # imports numba.cuda
-
-    check_device()
-    rows = gpu_batches(settings)
-    name = numba.cuda.get_current_device().name  # type: ignore[no-untyped-call]
-    figures = {
-        "device": name.decode() if isinstance(name, bytes) else str(name),
-        "machine": machine.describe(),
-        "scenario": settings.scenario,
-        "overrides": settings.overrides,
-        "batches": rows,
-    }
-    table = Table(title=f"{settings.scenario} on {figures['device']}")
-    for column in ("worlds", "million agent-steps/s [range]", "waiting for each", "share of bandwidth"):
-        table.add_column(column, justify="right")
-    for row in rows:
-        median, low, high = (x / 1e6 for x in row["agent_steps"])
-        table.add_row(
-            f"{row['worlds']:,}",
-            f"{median:.1f} [{low:.1f}, {high:.1f}]",
-            f"{row['agent_steps_checked'][0] / 1e6:.1f}",
-            f"{row['share_of_bandwidth']:.1%}",
-        )
-    console = Console()
-    console.print(table)
-    settings.out.parent.mkdir(parents=True, exist_ok=True)
-    settings.out.write_text(json.dumps(figures, indent=2) + "\n")
-    console.print(f"figures: {settings.out}")
-
-
-def interfaces(settings: Settings) -> dict[str, list[float]]:
-    """Measure steps per second of single-world environments, including dictionaries and checks."""
-    parallel = posse.parallel_env(settings.scenario, horizon=15_000)
+def one_world(settings: Settings) -> dict[str, list[float]]:
+    """Measure steps/s of the environments of one world, resets included."""
+    parallel = posse.parallel_env(settings.scenario)
     parallel.reset(seed=0)
-    rng = np.random.default_rng(0)
-    actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in parallel.possible_agents}
+    actions = {agent: parallel.action_space(agent).sample() for agent in parallel.possible_agents}
+    team = gym.make("posse/Team-v0", scenario=settings.scenario)
+    team.reset(seed=0)
+    action = team.action_space.sample()
 
-    def step() -> None:
+    def step_parallel() -> None:
         parallel.step(actions)
         if not parallel.agents:
             parallel.reset()
 
-    team = team_step(settings.scenario, np.stack(list(actions.values())))
-    return {
-        "PettingZoo parallel": per_second(step, settings.seconds),
-        "Gymnasium Team": per_second(team, settings.seconds),
-    }
-
-
-def team_step(scenario: str, action: Any) -> Callable[[], None]:
-    """Return a function that steps one world through Gymnasium."""
-    env: Any = gym.make("posse/Team-v0", scenario=scenario, horizon=15_000).unwrapped
-    env.reset(seed=0)
-
-    def step() -> None:
-        _, _, terminated, truncated, _ = env.step(action)
+    def step_team() -> None:
+        *_, terminated, truncated, _ = team.step(action)
         if terminated or truncated:
-            env.reset()
+            team.reset()
 
-    return step
-
-
-@dataclass
-class Pace:
-    """Count and time of a repeated function."""
-
-    calls: int = 0
-    seconds: float = 0.0
-    processor: float = 0.0
-    """Processor time of the thread, s."""
-
-    def work(self, step: Callable[[], object], seconds: float) -> None:
-        """Repeat for a time."""
-        started, had = time.perf_counter(), time.thread_time()
-        while time.perf_counter() - started < seconds:
-            for _ in range(10):
-                step()
-            self.calls += 10
-        self.seconds += time.perf_counter() - started
-        self.processor += time.thread_time() - had
-
-    def beside(self, alone: Pace) -> dict[str, float]:
-        """Return its speed relative to running alone, by wall time and by processor time."""
-        return {
-            "share": self.calls / self.seconds / (alone.calls / alone.seconds),
-            "of_the_processor": self.calls / self.processor / (alone.calls / alone.processor),
-        }
+    found = {}
+    for name, step in (("PettingZoo", step_parallel), ("Gymnasium Team", step_team)):
+        found[name] = per_second(step, settings.seconds)
+        print(f"{name}, one world: {_shown(found[name])} steps/s", flush=True)
+    return found
 
 
-def beside_others(settings: Settings) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the speed of a single world with other busy processes, relative to running alone.
-
-    Alternating every 10 ms with a plain loop as a reference, since clock rate and scheduling
-    depend on the load.
-    """
-    still = np.zeros((posse.get_scenario(settings.scenario).num_trackers, 2), np.float32)
-    work: dict[str, Callable[[], object]] = {
-        "one world": team_step(settings.scenario, still),
-        "a plain loop": lambda: sum(range(1000)),
-    }
-
-    def paces() -> dict[str, Pace]:
-        found = {name: Pace() for name in work}
-        for name, step in list(work.items()) * max(1, round(50 * settings.seconds)):
-            found[name].work(step, 0.01)
-        return found
-
-    shares = {}
-    for count in sorted({1, os.cpu_count() or 1}):
-        rounds = []
-        for _ in range(5):
-            alone = paces()
-            busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(count)]
-            time.sleep(0.2)  # until they are busy
-            try:
-                beside = paces()
-            finally:
-                for process in busy:
-                    process.kill()
-                    process.wait()
-            rounds.append({name: beside[name].beside(alone[name]) for name in work})
-        shares[str(count)] = {
-            name: {kind: statistics.median(r[name][kind] for r in rounds) for kind in ("share", "of_the_processor")}
-            for name in work
-        }
-    return shares
-
-
-def first_steps() -> dict[str, float]:
-    """Return seconds from the start of a process to its first step, without and with cache."""
-    seconds = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for name in ("cold", "warm"):
+def first_step() -> dict[str, float]:
+    """Time the first step of a new process, s, without and with cached kernels."""
+    found = {}
+    with tempfile.TemporaryDirectory() as cache:
+        for name in ("without cached kernels", "with cached kernels"):
             started = time.perf_counter()
-            subprocess.run(
-                [sys.executable, "-c", FIRST_STEP], check=True, env={**os.environ, "POSSE_CACHE_DIR": folder}
-            )
-            seconds[name] = time.perf_counter() - started
-    return seconds
+            subprocess.run([sys.executable, "-c", FIRST_STEP], check=True, env={**os.environ, "POSSE_CACHE_DIR": cache})
+            found[name] = time.perf_counter() - started
+            print(f"first step of a new process, {name}: {found[name]:.1f} s", flush=True)
+    return found
+
+
+def _shown(rate: list[float]) -> str:
+    return "{:,.0f} [{:,.0f}, {:,.0f}]".format(*rate)
 
 
 def main() -> None:
-    """Measure, print, and write the figures."""
-    settings = tyro.cli(Settings)
-    if settings.device == "cuda":
-        report_gpu(settings)
-        return
-    others = machine.OtherWork()
-    own = time.process_time()
-    rows, single = batches(settings), interfaces(settings)
-    disturbed = others.cores(time.process_time() - own)
-    figures: dict[str, Any] = {
-        "machine": machine.describe(),
-        "scenario": settings.scenario,
-        "overrides": settings.overrides,
-        "batches": rows,
-        "one_world": single,
-        "cores_busy_with_other_work": disturbed,
-    }
-    figures["beside_busy_processes"] = beside_others(settings)
+    """Measure, print and write the figures."""
+    settings = tyro.cli(Settings, description=__doc__)
+    others, own = machine.OtherWork(), time.process_time()
+    figures: dict[str, Any] = {"machine": machine.describe()}
+    figures["batches"], figures["one_world"] = batches(settings), one_world(settings)
+    busy = others.cores(time.process_time() - own)
+    print(f"cores used by other processes meanwhile: {busy:.2f}")
     if settings.cold:
-        figures["first_step_seconds"] = first_steps()
-    console = Console()
-    length, size = rows[0]["observation_length"], rows[0]["bytes_a_world"]
-    table = Table(title=f"{settings.scenario}: {length} floats an observation, {size} bytes a world")
-    for column in ("kernel", "worlds", "threads", "million agent-steps/s [range]", "times a plain copy"):
-        table.add_column(column, justify="right")
-    for row in rows:
-        median, low, high = (x / 1e6 for x in row["agent_steps"])
-        table.add_row(
-            row["kernel"],
-            f"{row['worlds']:,}",
-            str(row["threads"]),
-            f"{median:.2f} [{low:.2f}, {high:.2f}]",
-            f"{row['times_a_copy']:.1f}",
-        )
-    console.print(table)
-    for name, (median, low, high) in single.items():
-        console.print(f"{name}: {median:,.0f} steps/s [{low:,.0f}, {high:,.0f}], one world")
-    for count, shares in figures["beside_busy_processes"].items():
-        fair = min(1.0, (os.cpu_count() or 1) / (int(count) + 1))
-        console.print(
-            f"with other busy processes, {count}, relative to the speed alone: "
-            + ", ".join(
-                f"{name} {s['share']:.2f} ({s['of_the_processor']:.2f} per second of processor)"
-                for name, s in shares.items()
-            )
-            + f"; share of the cores: {fair:.2f}"
-        )
-    for name, seconds in figures.get("first_step_seconds", {}).items():
-        console.print(f"first step of a new process, {name}: {seconds:.1f} s")
-    console.print(f"cores used by other processes meanwhile: {disturbed:.2f}")
+        figures["first_step_seconds"] = first_step()
     settings.out.parent.mkdir(parents=True, exist_ok=True)
-    settings.out.write_text(json.dumps(figures, indent=2) + "\n")
-    console.print(f"figures: {settings.out}")
+    settings.out.write_text(json.dumps({**figures, "other_work": busy}, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

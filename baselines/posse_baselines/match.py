@@ -44,6 +44,7 @@ class Match(BasePolicy):
         splits = (*getattr(policy, "trained_splits", ()), *target.trained_splits)
         self.trained_splits = tuple(dict.fromkeys(splits))
         self.policy, self.target = policy, target.policy
+        self.reads_state = isinstance(self.target, StateReader) and self.target.reads_state  # of the team: False
         self._target_name = target.name
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:

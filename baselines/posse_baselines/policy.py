@@ -152,11 +152,11 @@ def check_observations(
 
 
 def begin(policy: Policy, batch: Batch) -> Memory:
-    """Return the memory of a policy for a batch; one that reads the state is given the batch.
+    """Return the memory of a policy for a batch; one with ``reads_state = True`` is given the batch.
 
     Raises:
         PolicyError: The policy does not fit the batch.
     """
-    if isinstance(policy, StateReader):
+    if policy.reads_state and isinstance(policy, StateReader):
         policy.watch(batch)
     return policy.begin(batch.layout, batch.num_worlds)

@@ -53,6 +53,34 @@ def choice(default: str, choices: tuple[str, ...]) -> Any:
     return dataclasses.field(default=default, metadata={"choices": choices})
 
 
+def _text(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:g}"
+
+
+def check(settings: Any) -> None:
+    """Check the fields of a settings object against what they declare.
+
+    Raises:
+        ValueError: An unknown choice, a number of another kind or out of its range, or one that does not exceed the
+            field that it must exceed.
+    """
+    for field in dataclasses.fields(settings):
+        name, value, meta = field.name, getattr(settings, field.name), field.metadata
+        if "choices" in meta and value not in meta["choices"]:
+            raise ValueError(f"{name}={value!r} is unknown; known: {', '.join(meta['choices'])}")
+        if "low" not in meta:
+            continue
+        whole = isinstance(field.default, int)
+        if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
+            raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
+        if not meta["low"] <= value <= meta["high"]:
+            unit = f" {meta['unit']}" if meta["unit"] else ""
+            raise ValueError(f"{name}={value!r} must lie in [{_text(meta['low'])}, {_text(meta['high'])}]{unit}")
+        if meta["above"] and not getattr(settings, meta["above"]) < value:
+            low = getattr(settings, meta["above"])
+            raise ValueError(f"{meta['above']}={low!r} must be below {name}={value!r}: a hysteresis")
+
+
 def tunables(settings: Any) -> tuple[Tunable, ...]:
     """Return the tunable fields of a settings object, with its values as defaults."""
     return tuple(

@@ -1,7 +1,4 @@
-"""posse: a batch of worlds of 5 trackers.
-
-The variant is the scenario, followed by ", own kernel" for a kernel compiled for it.
-"""
+"""posse: a batch of worlds of 5 trackers; the variant is the scenario."""
 
 from __future__ import annotations
 
@@ -15,9 +12,7 @@ import posse
 
 def build(worlds: int, variant: str) -> Built:
     """Return a batch with one thread per available core."""
-    scenario, _, own_kernel = variant.partition(", ")
-    threads = len(os.sched_getaffinity(0))
-    batch = posse.batch(scenario, worlds, seed=0, num_threads=threads, own_kernel=own_kernel == "own kernel")
+    batch = posse.batch(variant, worlds, seed=0, num_threads=len(os.sched_getaffinity(0)))
     draws = np.random.default_rng(0).uniform(-1, 1, (ACTION_SETS, *batch.action_shape))
     actions = draws.astype(np.float32)
     batch.reset()

@@ -22,8 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import posse
-from posse_training.reports.pictures.parts import note
-from posse_training.reports.pictures.style import RC
+from posse_training.reports.pictures.style import RC, note
 from posse_training.reports.reproduce.motion import TARGET, draw_robots, look_of
 from posse_training.reports.reproduce.recording import Recording, played, record
 

@@ -1,4 +1,4 @@
-"""Writes the table of results into README.md, from the result files of the leaderboard.
+"""Writes the table of results into README.md, from benchmarks/standings.csv.
 
 python docs/drawing/readme_table.py
 """
@@ -12,7 +12,7 @@ from typing import Final
 sys.path.insert(0, str(Path(__file__).parents[1] / "hooks"))
 
 import standings
-from posse_training.leaderboard import ResultFile
+from posse_training.leaderboard import Standing
 
 README: Final = Path(__file__).parents[2] / "README.md"
 BEGIN: Final = "<!-- made by docs/drawing/readme_table.py -->\n"
@@ -40,10 +40,10 @@ def table() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cell(found: dict[str, ResultFile], policy: str, *, named: bool) -> str:
+def _cell(found: dict[str, Standing], policy: str, *, named: bool) -> str:
     if policy not in found:
         return ""
-    score = f"{found[policy].column('safe_score').mean():.3f}"
+    score = f"{found[policy].safe_score:.3f}"
     return f"{score} `{policy}`" if named else score
 
 

@@ -13,22 +13,17 @@ from matplotlib import pyplot as plt
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
-PLACES: Final = {
-    "searching": (0.0, 0.0),
-    "converging": (4.6, 1.8),
-    "flocking": (4.6, -1.8),
-    "leader exchange": (9.2, 0.0),
-}
+PLACES: Final = {"searching": (0.0, 0.0), "converging": (4.6, 1.8), "flocking": (4.6, -1.8), "exchange": (9.2, 0.0)}
 STAGES: Final = ("converging", "flocking")
 ARROWS: Final = (  # from, to, bend, why, where that is written
     ("searching", "converging", -0.12, "target seen\nor reported", (1.75, 1.75)),
     ("searching", "flocking", 0.12, "the same,\nalready in place", (1.65, -1.75)),
     ("converging", "flocking", 0.22, "distance to place\nbelow near", (3.1, 0.0)),
     ("flocking", "converging", 0.22, "distance\nabove far", (5.95, 0.0)),
-    ("converging", "leader exchange", -0.25, "leader changed", (8.0, 2.0)),
-    ("flocking", "leader exchange", 0.25, "leader changed", (8.0, -2.0)),
-    ("leader exchange", "converging", -0.12, "new leader heard:\nplace far, or near", (7.2, 0.0)),
-    ("leader exchange", "flocking", 0.12, "", (0.0, 0.0)),
+    ("converging", "exchange", -0.25, "leader changed", (8.0, 2.0)),
+    ("flocking", "exchange", 0.25, "leader changed", (8.0, -2.0)),
+    ("exchange", "converging", -0.12, "new leader heard:\nplace far, or near", (7.2, 0.0)),
+    ("exchange", "flocking", 0.12, "", (0.0, 0.0)),
 )
 
 

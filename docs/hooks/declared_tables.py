@@ -1,4 +1,4 @@
-"""Tables of what the code declares: settings, observation fields, metrics, reward terms."""
+"""Tables of what the code declares: settings, observation fields, metrics, reward terms, defaults of a training."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 import posse
+from posse_training.runs.defaults import default_settings
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -36,13 +37,32 @@ def all_settings() -> str:
     return table(("setting", "default", "unit", "range", "meaning"), rows)
 
 
+def training_defaults() -> str:
+    """Return the settings of a training by ``ppo`` that differ most between scenarios."""
+    names = ("steps", "encoding", "advise", "correction", "contact_bound")
+    rows = []
+    for scenario in posse.scenario_names():
+        chosen = default_settings(scenario).to_dict()
+        shown = {name: "" if chosen[name] is None else code(chosen[name]) for name in names}
+        if chosen["advise"] is None:
+            shown["correction"] = ""
+        rows.append((code(scenario), f"{chosen['steps']:,}", *(shown[name] for name in names[1:])))
+    return table(("scenario", *(f"--{name.replace('_', '-')}" for name in names)), rows)
+
+
+def scenarios() -> str:
+    """Return every named scenario with its version and meaning."""
+    named = map(posse.get_scenario, posse.scenario_names())
+    return table(("scenario", "version", "meaning"), ((code(s.name), s.version, s.meaning) for s in named))
+
+
 def settings(scenario: str) -> str:
     """Return the settings of a named scenario that differ from the defaults."""
     own, plain = posse.get_scenario(scenario), posse.Scenario(name="plain")
     rows = []
     for field in dataclasses.fields(own):
         given, default = getattr(own, field.name), getattr(plain, field.name)
-        if field.name == "name" or given == default:
+        if field.name in ("name", "meaning") or given == default:
             continue
         setting = own.settings()[field.name]
         rows.append((code(field.name), code(value(given)), code(value(default)), setting.unit, setting.meaning))

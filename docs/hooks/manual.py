@@ -8,27 +8,36 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
+from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
 
 import declared_tables
 import notebook_page
+import replays
 import standings
 from equations import typeset
 
 PARTS: Final[dict[str, Callable[..., str]]] = {
+    "scenarios": declared_tables.scenarios,
     "settings": declared_tables.settings,
     "all_settings": declared_tables.all_settings,
     "observation_fields": declared_tables.observation_fields,
     "metrics": declared_tables.metrics,
+    "training_defaults": declared_tables.training_defaults,
     "reward_terms": declared_tables.reward_terms,
-    "replay": standings.replay,
+    "replay": replays.replay,
     "gallery": standings.gallery,
     "scores": standings.scores,
     "leaderboard": standings.leaderboard,
+    "results": standings.results,
+    "training_seeds": standings.training_seeds,
+    "algorithms": standings.algorithms,
+    "peers": standings.peers,
     "notebook": notebook_page.notebook,
 }
 _PART: Final = re.compile(r"^\{\{ (\w+)(.*?) \}\}$", re.MULTILINE)
@@ -43,6 +52,11 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 def on_page_content(html: str, **_: Any) -> str:
     """Typeset the equations of a page."""
     return typeset(html)
+
+
+def on_post_build(config: MkDocsConfig, **_: Any) -> None:
+    """Write the replays that pages show."""
+    replays.write_replays(Path(config.site_dir))
 
 
 def _made(found: re.Match[str]) -> str:

@@ -1,9 +1,10 @@
-"""Who scores what, from the result files in the repository, and the replays that show it."""
+"""Who scores what: tables from ``benchmarks/*.csv`` and from the cards of the shipped policies."""
 
 from __future__ import annotations
 
+import csv
 import functools
-import html
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -11,15 +12,12 @@ from mkdocs.exceptions import PluginError
 
 import posse
 from declared_tables import code, table
+from posse_baselines import load, policy_names
 from posse_training.errors import ResultFileError
-from posse_training.leaderboard import ResultFile, read_result
-from posse_training.leaderboard.submit import SEED, WORLDS
-from posse_training.replay import read_replay
-from posse_training.reports.statistics import Estimate, mean, share
+from posse_training.leaderboard import WORLDS, Standing, read_standings
 
-ROOT: Final = Path(__file__).parents[2]
-FOLDER: Final = ROOT / "benchmarks" / "leaderboard"
-MEDIA: Final = ROOT / "docs" / "media"
+RESULTS: Final = Path(__file__).parents[2] / "benchmarks"
+STANDINGS: Final = RESULTS / "standings.csv"
 SCENARIOS: Final = tuple(n for n in posse.scenario_names() if not n.startswith("paper"))
 SUMMARY: Final = {
     "constant": "a target that runs straight on",
@@ -35,43 +33,22 @@ SUMMARY: Final = {
 
 
 @functools.cache
-def results() -> tuple[ResultFile, ...]:
-    """Return the results in the repository of the present scenarios, the best first."""
-    found = []
-    for path in sorted(FOLDER.glob("*.json")):
-        try:
-            result = read_result(path)
-        except ResultFileError as error:
-            raise PluginError(str(error)) from error
-        known = result.scenario in SCENARIOS and result.split == "test" and result.seed == SEED
-        if known and result.scenario_version == posse.get_scenario(result.scenario).version:
-            found.append(result)
-    return tuple(sorted(found, key=lambda r: -r.column("safe_score").mean()))
+def standings(path: Path) -> tuple[Standing, ...]:
+    """Return the rows of test worlds of the present scenarios, the best first."""
+    try:
+        rows = read_standings(path)
+    except ResultFileError as error:
+        raise PluginError(str(error)) from error
+    versions = {name: posse.get_scenario(name).version for name in SCENARIOS}
+    known = [row for row in rows if row.split == "test" and versions.get(row.scenario) == row.version]
+    return tuple(sorted(known, key=lambda row: -row.safe_score))
 
 
-def of_scenario(scenario: str) -> list[ResultFile]:
-    """Return the results on a scenario: references first, then teams, the best first."""
-    mine = [r for r in results() if r.scenario == scenario]
-    ranked = [r for r in mine if not r.reads_state and r.worlds >= WORLDS]
-    return [r for r in mine if r.reads_state] + ranked
-
-
-@functools.cache
-def players(file: str) -> tuple[str, ...]:
-    """Return who plays in a replay of the manual; nobody where there is none."""
-    path = MEDIA / "replays" / f"{file}.html"
-    return tuple(player.name for player in read_replay(path).players) if path.is_file() else ()
-
-
-def replay(scenario: str) -> str:
-    """Return a replay of a scenario in a frame, with a link to it alone."""
-    address = f"site:media/replays/{scenario}.html"
-    teams = " and ".join(code(name) for name in players(scenario))
-    return (
-        f'<iframe class="replay" src="{address}" loading="lazy" title="Replay of {scenario}">'
-        f'</iframe>\n\n{teams} in the same world. <a href="{address}">Open the replay alone</a>; '
-        "<kbd>?</kbd> in it lists its keys.\n"
-    )
+def of_scenario(scenario: str) -> list[Standing]:
+    """Return the rows of a scenario: references first, then teams with enough worlds, the best first."""
+    mine = [row for row in standings(STANDINGS) if row.scenario == scenario]
+    ranked = [row for row in mine if not row.reads_state and row.worlds >= WORLDS]
+    return [row for row in mine if row.reads_state] + ranked
 
 
 def gallery() -> str:
@@ -90,14 +67,12 @@ def scores(scenario: str) -> str:
     mine = of_scenario(scenario)
     if not mine:
         return "No results of this version yet: `make results` makes them.\n"
-    best = max((r.column("safe_score").mean() for r in mine if r.reads_state), default=None)
+    best = max((row.safe_score for row in mine if row.reads_state), default=None)
     rows = []
-    for result in mine:
-        value = mean(result.column("safe_score"))
-        of_planner = "" if best is None or result.reads_state else f"{value.value / best:.2f}"
-        rows.append((_name(result), _whole(value), of_planner, _contact_free(result)))
-    header = ("team", "safe score [95 %]", "of the planner's", "contact-free")
-    return table(header, rows) + "\n" + _made_of(mine)
+    for row in mine:
+        of_planner = "" if best is None or row.reads_state else f"{row.safe_score / best:.2f}"
+        rows.append((_name(row), _score(row), of_planner, f"{row.contact_free:.1%}"))
+    return table(("team", "safe score [95 %]", "of the planner's", "contact-free"), rows)
 
 
 def leaderboard() -> str:
@@ -105,55 +80,84 @@ def leaderboard() -> str:
     parts = []
     for scenario in SCENARIOS:
         rows, rank = [], 0
-        for result in of_scenario(scenario):
-            rank += not result.reads_state
-            rows.append(
-                (
-                    "" if result.reads_state else rank,
-                    _name(result),
-                    _whole(mean(result.column("safe_score"))),
-                    _contact_free(result),
-                    f"{result.worlds:,}",
-                    result.seed,
-                    code((result.commit or "")[:7]),
-                    replay_link(result),
-                )
-            )
-        header = ("", "team", "safe score [95 %]", "contact-free", "worlds", "seed", "commit", "replay")
+        for row in of_scenario(scenario):
+            rank += not row.reads_state
+            place = "" if row.reads_state else rank
+            worlds = (f"{row.worlds:,}", row.seed, code(row.commit[:7]))
+            rows.append((place, _name(row), _score(row), f"{row.contact_free:.1%}", *worlds))
+        header = ("", "team", "safe score [95 %]", "contact-free", "worlds", "seed", "commit")
         parts.append(f"### {scenario}\n\n" + (table(header, rows) if rows else "No results yet.\n"))
     return "\n".join(parts)
 
 
-def _name(result: ResultFile) -> str:
-    name = html.escape(result.label).replace("|", "&#124;").replace("`", "&#96;")
-    shown = f'<code class="team">{name}</code>' if result.label == result.policy else f"<span>{name}</span>"
-    return shown + (" (reference)" if result.reads_state else "")
+def results() -> str:
+    """Return the safe scores of all ranked teams and references, teams by scenarios."""
+    found = {(row.label, name): row for name in SCENARIOS for row in of_scenario(name)}
+    labels = list(dict.fromkeys(label for label, _ in found))
+    rows = [
+        (code(label), *(f"{found[label, n].safe_score:.3f}" if (label, n) in found else "" for n in SCENARIOS))
+        for label in labels
+    ]
+    return table(("team", *SCENARIOS), rows)
 
 
-def _whole(value: Estimate) -> str:
-    """Return an estimate whose interval is not broken across lines."""
-    return str(value).replace(", ", ",&nbsp;")
+def training_seeds() -> str:
+    """Return the safe score of every training seed of the shipped teams, from their cards."""
+    rows = []
+    for name in policy_names():
+        card = getattr(load(name), "card", None) or {}
+        seeds = [run["safe_score"] for run in card.get("training_seeds", ()) if "safe_score" in run]
+        if seeds:
+            shown = ", ".join(f"{s['value']:.3f}&nbsp;[{s['low']:.3f},&nbsp;{s['high']:.3f}]" for s in seeds)
+            rows.append((code(name), seeds[0]["count"], shown))
+    return table(("team", "worlds", "safe score of each training seed [95 % over worlds]"), rows)
 
 
-def _contact_free(result: ResultFile) -> str:
-    return f"{100 * share(result.column('contact_free') == 1).value:.1f} %"
+def algorithms() -> str:
+    """Return what algorithms reach from nothing: the mean of their training seeds, and their range."""
+    runs = _rows("algorithms.csv")
+    rows = []
+    for scenario, name in sorted({(run["scenario"], run["algorithm"]) for run in runs}):
+        mine = [run for run in runs if (run["scenario"], run["algorithm"]) == (scenario, name)]
+        safe = [float(run["safe_score"]) for run in mine]
+        spread = f" [{min(safe):.3f}, {max(safe):.3f}]" if len(safe) > 1 else ""
+        contact = 1 - _mean(float(run["contact_free"]) for run in mine)
+        steps = f"{float(mine[0]['steps']) / 1e6:.0f} M"
+        area = f"{_mean(float(run['area']) for run in mine):.3f}"
+        rows.append((code(scenario), name, steps, len(mine), f"{_mean(safe):.3f}{spread}", f"{contact:.1%}", area))
+    header = ("scenario", "algorithm", "steps", "seeds", "safe score [least, greatest]", "worlds with contact", "area")
+    return table(header, rows)
 
 
-def replay_link(result: ResultFile) -> str:
-    """Return a link to a replay of the team, or the command that writes one."""
-    if result.replay:
-        return f'<a href="{html.escape(result.replay)}">replay</a>'
-    further = sorted(path.stem for path in (MEDIA / "replays").glob(f"{result.scenario}-others*"))
-    for file in (result.scenario, *further):
-        if result.policy_kind == "shipped" and result.policy in players(file):
-            return f'<a href="site:media/replays/{file}.html">replay</a>'
-    return code(f"posse replay {result.policy} --scenario {result.scenario}")
+def peers() -> str:
+    """Return the throughput of simulators by number of worlds, million agent-steps/s."""
+    runs = _rows("peers.csv")
+    batches = sorted({int(run["worlds"]) for run in runs})
+    found = {(run["simulator"], run["threads"], int(run["worlds"])): run for run in runs}
+    rows = []
+    for name, threads in dict.fromkeys((run["simulator"], run["threads"]) for run in runs):
+        cells = [found.get((name, threads, batch)) for batch in batches]
+        rows.append((name, threads, *("" if c is None else f"{float(c['agent_steps']) / 1e6:.3g}" for c in cells)))
+    made = f"{runs[0]['machine']}, commit {code(runs[0]['commit'])}.\n\n"
+    return made + table(("simulator", "threads", *(f"{batch:,}" for batch in batches)), rows)
 
 
-def _made_of(shown: list[ResultFile]) -> str:
-    commits = sorted({r.commit or "unknown" for r in shown})
-    return (
-        f"{WORLDS:,} worlds of the `test` split, seed {SEED} (references: as many as stated on the "
-        f"[leaderboard](../leaderboard.md)), commit {', '.join(map(code, commits))}. Rows come "
-        "from `benchmarks/leaderboard`.\n"
-    )
+def _rows(name: str) -> Sequence[dict[str, str]]:
+    with (RESULTS / name).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _mean(values: Iterable[float]) -> float:
+    found = list(values)
+    return sum(found) / len(found)
+
+
+def _name(row: Standing) -> str:
+    """Return a label, whose letters ``Standing`` has checked."""
+    shown = code(row.label) if row.label == row.policy else row.label
+    return shown + (" (reference)" if row.reads_state else "")
+
+
+def _score(row: Standing) -> str:
+    """Return a safe score whose interval is not broken across lines."""
+    return f"{row.safe_score:.3f}&nbsp;[{row.low:.3f},&nbsp;{row.high:.3f}]"

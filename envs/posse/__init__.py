@@ -12,7 +12,6 @@ from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
-from posse.shown import shown
 from posse.signals.measuring import Metric, metric
 from posse.signals.metrics import METRICS
 from posse.signals.observation.fields import Field, field
@@ -33,23 +32,17 @@ def batch(
     first_world: int = 0,
     autoreset: str = "next_step",
     num_threads: int | None = None,
-    own_kernel: bool = False,
-    device: str = "cpu",
     target_policy: TargetPolicy | None = None,
     team_policy: TargetPolicy | None = None,
     **overrides: Any,
 ) -> Batch:
     """Return a batch of worlds, on which all environments are built; see :class:`Batch`.
 
-    With ``device="cuda"`` the worlds are simulated on an NVIDIA GPU: see
-    :class:`posse.engine.cuda.CudaBatch`, which requires the extra ``cuda``.
-
     With ``target_policy`` that policy moves the target of every world; observations, actions and
     rewards are those of the trackers. With ``team_policy`` a policy moves the trackers, and they
-    are those of the target, one row and actions of two numbers. Both are on the CPU only; see
+    are those of the target, one row and actions of two numbers. See
     :class:`posse.engine.paired_batch.PairedBatch`.
     """
-    made = _batch_class(device)
     inside = team_policy if target_policy is None else target_policy
     if team_policy is not None and target_policy is not None:
         raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
@@ -61,26 +54,11 @@ def batch(
         "first_world": first_world,
         "autoreset": autoreset,
         "num_threads": num_threads,
-        "own_kernel": own_kernel,
     }
-    if inside is not None and device == "cpu":
+    if inside is not None:
         moves_target = team_policy is None
         return PairedBatch(settings, num_worlds, inside, moves_target=moves_target, **arguments)
-    if inside is not None:
-        raise ValueError(f"{side}_policy= needs device='cpu', not {shown(device)}")
-    return made(settings, num_worlds, **arguments)
-
-
-def _batch_class(device: str) -> type[Batch]:
-    """Return the batch class of a device, or raise if the device cannot be used."""
-    if device == "cpu":
-        return Batch
-    if device == "cuda":
-        from posse.engine.cuda import CudaBatch, check_device
-
-        check_device()
-        return CudaBatch
-    raise ValueError(f"unknown device {shown(device)}; devices are: cpu, cuda")
+    return Batch(settings, num_worlds, **arguments)
 
 
 def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:

@@ -1,4 +1,4 @@
-"""Pages of the manual in a browser: search, two colour schemes, a phone's width, no other host."""
+"""Pages of the manual in a browser: they fit a phone and ask no other host."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.docs.test_manual import pages, site
-from tests.support.browser import chromium, until
+from tests.support.browser import chromium
 
 __all__ = ["site"]
 PHONE = 390
@@ -50,23 +50,3 @@ def test_pages_fit_a_phone_and_ask_no_other_host(site: Path, address: str) -> No
         assert [url for url in asked if not url.startswith(own)] == []
         assert failed == []
         assert wide == []
-
-
-@pytest.mark.parametrize("name", ["sonar_range", "ScenarioError"])
-def test_search_finds(address: str, name: str) -> None:
-    with chromium() as browser:
-        page = browser.new_page()
-        page.goto(f"{address}?q={name}")  # as soon as the search is ready
-        until(page, "document.querySelectorAll('.md-search-result__link').length > 0")
-        found = page.inner_text(".md-search-result__list")
-        assert name in found
-
-
-def test_light_and_dark(address: str) -> None:
-    with chromium() as browser:
-        for wanted, scheme in (("light", "default"), ("dark", "slate")):
-            context = browser.new_context(color_scheme="dark" if wanted == "dark" else "light")
-            page = context.new_page()
-            page.goto(address)
-            until(page, f"document.body.getAttribute('data-md-color-scheme') === '{scheme}'")
-            context.close()

@@ -35,7 +35,7 @@ def test_the_loop_is_in_the_readme_the_notebook_and_ten_lines_long() -> None:
 
 @pytest.mark.long
 def test_the_notebook_runs(tmp_path: Path) -> None:
-    pytest.importorskip("nbclient", reason="no nbclient: pip install posse[docs]")
+    pytest.importorskip("nbclient", reason="no nbclient: pip install '.[docs]'")
     out = tmp_path / "out.ipynb"
     short = {"POSSE_NOTEBOOK_STEPS": "1000", "POSSE_NOTEBOOK_EPISODES": "2"}
     done = subprocess.run(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +53,25 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
 
 
 def test_more_episodes_than_fit_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posse_training.datasets.record.AT_ONCE", 2)
+    monkeypatch.setattr("posse_training.datasets.AT_ONCE", 2)
     data = record_dataset("random", "constant", 5, out=tmp_path, terminate_on_contact=True, **SHORT)
     assert [episode.id for episode in data] == list(range(5))
+
+
+def test_a_recording_that_is_killed_leaves_no_data_set(tmp_path: Path) -> None:
+    def killed(episodes: int) -> None:
+        os._exit(9)
+
+    process = get_context("fork").Process(
+        target=record_dataset, args=("idle", "constant", 30), kwargs={"out": tmp_path, "progress": killed, **SHORT}
+    )
+    process.start()
+    process.join(60)
+    assert process.exitcode == 9
+    assert [path for path in tmp_path.rglob("*.hdf5") if ".recording-" not in str(path)] == []
+    with pytest.raises(FileNotFoundError):
+        load_dataset(tmp_path, "posse/constant/idle-v0")
+    assert record_dataset("idle", "constant", 2, out=tmp_path, **SHORT).total_episodes == 2
 
 
 def test_minaris_own_collector_records_every_kind_of_info() -> None:

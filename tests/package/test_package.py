@@ -89,7 +89,7 @@ def test_the_tests_of_the_sdist_run_from_its_own_tree(built: Path, tmp_path: Pat
     with tarfile.open(next(built.glob("*.tar.gz"))) as sdist:
         sdist.extractall(tmp_path, filter="data")
     tree = next(tmp_path.iterdir())
-    roots = ("envs", "baselines", "training", "tests", "docs", "benchmarks")
+    roots = ("envs", "baselines", "training", "tests", "docs", "benchmarks", "scripts")
     inside = {str(p.relative_to(tree)) for p in tree.rglob("*") if p.is_file()}
     assert tracked(*roots) <= inside
     path = os.pathsep.join(str(tree / root) for root in ("envs", "baselines", "training"))

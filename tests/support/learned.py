@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 import posse
-from posse_baselines.learned import LSTM, Encoding, LearnedPolicy, Network
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 
 
-def network_for(inputs: int, outputs: int = 2, seed: int = 0, *, cells: int = 0, **changes: Any) -> Network:
-    """A network of arbitrary weights; with a recurrent layer of so many cells, if there are any."""
+def network_for(inputs: int, outputs: int = 2, seed: int = 0, **changes: Any) -> Network:
+    """A network of arbitrary weights."""
     generator = np.random.default_rng(seed)
-    sizes = (cells or inputs, 24, 16, outputs)
+    sizes = (inputs, 24, 16, outputs)
 
     def draw(*shape: int) -> Any:
         return generator.normal(size=shape).astype(np.float32)
@@ -29,9 +29,6 @@ def network_for(inputs: int, outputs: int = 2, seed: int = 0, *, cells: int = 0,
         activation="tanh",
         output="clip",
     )
-    if cells:
-        read = draw(4 * cells, inputs) / np.float32(inputs**0.5)
-        changes = {"lstm": LSTM(read, draw(4 * cells, cells), draw(4 * cells)), **changes}
     return replace(network, **changes)
 
 
@@ -54,8 +51,8 @@ def observations_of(scenario: str, worlds: int = 6, steps: int = 5, **overrides:
     return batch, observations
 
 
-def target_for(scenario: posse.Scenario, name: str = "evading", seed: int = 0, cells: int = 0) -> LearnedPolicy:
+def target_for(scenario: posse.Scenario, name: str = "evading", seed: int = 0) -> LearnedPolicy:
     """A policy of arbitrary weights that moves the target."""
     encoding = Encoding.of(posse.ObservationLayout(scenario.replace(message_size=0)), "plain")
     card = {"name": name, "side": "target"}
-    return LearnedPolicy(network_for(encoding.size, seed=seed, cells=cells), encoding, card)
+    return LearnedPolicy(network_for(encoding.size, seed=seed), encoding, card)

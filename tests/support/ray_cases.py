@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import filecmp
-import os
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +16,13 @@ import pytest
 import ray
 from ray.cluster_utils import Cluster as Nodes
 from safetensors.numpy import load_file
-from tests.support.ray_policies import FOLDER, Watched
-from tests.support.runs import quiet
+from tests.support.ray_policies import Watched
 
 from posse_baselines import load
 from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.cluster import Cluster
-from posse_training.cluster.ray_backend import RayBackend
-from posse_training.league.cross_play import Cell, CrossPlay
-from posse_training.league.members import TARGET, TEAM, founders
-from posse_training.league.on_cluster import ClusterWork
-from posse_training.league.settings import LeagueSettings
-from posse_training.league.work import Work
-from posse_training.reports.comparing.players import PlayError
+from posse_training.reports.failures import PlayError
 from posse_training.runs.saved.folder import LAST
 
 SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}
@@ -40,14 +31,8 @@ WORLDS = 5  # nine shards
 
 
 @pytest.fixture(scope="module")
-def league_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("league")
-
-
-@pytest.fixture(scope="module")
-def nodes(league_folder: Path) -> Iterator[Nodes]:
+def nodes() -> Iterator[Nodes]:
     """Three nodes: one for the driver, two with a worker each."""
-    os.environ[FOLDER] = str(league_folder)
     head = {
         "num_cpus": 0,
         "include_dashboard": False,
@@ -132,21 +117,14 @@ def test_an_error_of_a_policy_says_where(nodes: Nodes, tmp_path: Path) -> None:
 def test_commands_give_the_same_files(nodes: Nodes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     commands = {
-        "compare idle pursuit --scenarios smart constant --episodes 3 --sweep-episodes 0 "
+        "compare idle pursuit --scenarios smart constant --episodes 3 "
         "--planner-episodes 0 --no-figures --out {}/compare": ("smart-idle.csv", "summary.json"),
-        "compare idle --target evader --scenarios duel --episodes 3 --sweep-episodes 0 "
-        "--planner-episodes 1 --no-figures --out {}/duel": ("duel-idle.csv", "summary.json"),
-        "record idle pursuit --scenario constant --episodes 2 --out {}/record": (
-            "posse/constant/idle-and-pursuit-v0/data/main_data.hdf5",
+        "compare idle --target evader --scenarios duel --episodes 3 --planner-episodes 1 --no-figures --out {}/duel": (
+            "duel-idle.csv",
+            "summary.json",
         ),
-        "tune ddcs-distributed --generations 1 --population 4 --worlds 2 --validation-worlds 4 "
-        "--only gain --out {}/tune": ("tuned.json",),
         "train --seeds 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None "
         "--advise None --imitate None --encoding plain --no-tensorboard --folder {}/train": ("seed-1/settings.json",),
-        "league --scenario smart --generations 1 --teams idle pursuit --target-steps 16 "
-        "--team-steps 16 --response-steps 16 --episodes 2 --overrides horizon 20 settle_time 0.5 "
-        "num_trackers 2 --training num_worlds 2 rollout 8 evaluate_worlds 1 imitate_rounds 1 "
-        "--folder {}/league": ("matrix.csv", "summary.json"),
     }
     for command, files in commands.items():
         name = command.split("{}/")[1]
@@ -157,7 +135,7 @@ def test_commands_give_the_same_files(nodes: Nodes, tmp_path: Path, monkeypatch:
             one, other = (tmp_path / place / name / file for place in ("here", "there"))
             assert filecmp.cmp(one, other, shallow=False), file
         assert not list((tmp_path / "there").glob(".*.work"))
-    for run in ("train/seed-1", "league/generation-01/target", "league/responses/target-to-trackers-1"):
+    for run in ("train/seed-1",):
         here, there = (load_file(tmp_path / p / run / LAST) for p in ("here", "there"))
         assert here.keys() == there.keys()
         assert all(np.array_equal(array, there[name]) for name, array in here.items()), run
@@ -178,41 +156,6 @@ def removing(nodes: Nodes, folder: Path) -> threading.Thread:
     thread = threading.Thread(target=remove)
     thread.start()
     return thread
-
-
-def cells(folder: Path, team: str, ray: bool) -> list[Cell]:
-    """What two teams, one of them given, score against a target: three shards each."""
-    settings = LeagueSettings(
-        scenario="smart",
-        teams=("idle", team),
-        targets=("smart",),
-        episodes=3 * WORLDS,
-        overrides={"horizon": 20, "settle_time": 0.5},
-        folder=folder / "league",
-    )
-    settings.path.mkdir(parents=True)
-    pairs = [(a, b) for a in founders(settings, TEAM) for b in founders(settings, TARGET)]
-    if not ray:
-        return CrossPlay(settings, Work(settings, quiet())).cells(pairs)
-    cluster = Cluster(work=folder / "work", worlds=WORLDS)
-    with RayBackend(cluster) as backend:
-        return CrossPlay(settings, ClusterWork(settings, quiet(), cluster, backend)).cells(pairs)
-
-
-def test_a_league_goes_on_when_a_worker_or_a_node_dies(nodes: Nodes, league_folder: Path, tmp_path: Path) -> None:
-    """Of three nodes two are left."""
-    expected = cells(tmp_path / "here", "pursuit", ray=False)
-    for deed in ("die", "wait"):
-        for old in league_folder.iterdir():
-            old.unlink()
-        (league_folder / "deed").write_text(deed)
-        thread = removing(nodes, league_folder) if deed == "wait" else None
-        found = cells(tmp_path / deed, "tests.support.ray_policies:InLeague", ray=True)
-        if thread:
-            thread.join()
-        assert begun(league_folder) >= 3 + 1
-        for one, other in zip(found, expected, strict=True):
-            assert replace(one, team="") == replace(other, team="")
 
 
 def test_a_worker_of_two_nodes_and_a_node_of_three_die(nodes: Nodes, local: Results, tmp_path: Path) -> None:

@@ -11,8 +11,6 @@ from typing import Any
 from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 
-FOLDER = "POSSE_TEST_FOLDER"
-
 
 class Watched(BasePolicy):
     """``pursuit``, which in one shard of a folder's choice does what the folder says.
@@ -50,17 +48,6 @@ class Watched(BasePolicy):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         return self._pursuit.act(observations, memory)
-
-
-class InLeague(Watched):
-    """The same for a league, which loads its teams by name.
-
-    The environment of the cluster's nodes names its folder, whose file ``deed`` says what to do.
-    """
-
-    def __init__(self) -> None:
-        folder = Path(os.environ[FOLDER])
-        super().__init__(folder, 2, (folder / "deed").read_text())
 
 
 def _claim(path: Path, content: str) -> bool:

@@ -15,7 +15,7 @@ from posse_training.runs import TrainSettings
 from posse_training.runs.saved.checkpoint import read_checkpoint
 
 HORIZON = 40
-ALGORITHMS = ("ppo", "mappo", "recurrent-ppo", "sac", "td3")
+ALGORITHMS = ("ppo", "mappo", "sac", "td3")
 ALGORITHM_CASES = [
     pytest.param(name, marks=() if name in ("ppo", "mappo") else pytest.mark.long) for name in ALGORITHMS
 ]
@@ -34,7 +34,6 @@ def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings
         team_sizes=(2,),
         overrides={"horizon": HORIZON, "settle_time": 1.0},
         hidden=(16, 16),
-        lstm_size=12,
         minibatch=64,
         rollout=20,
         epochs=2,

@@ -15,7 +15,7 @@ from posse.numeric import FloatArray
 from posse_baselines import Memory
 from posse_baselines.ddcs import DDCS
 from posse_baselines.tuning import tuned
-from posse_training.tuning import TuneSettings
+from posse_training.tune import TuneSettings
 
 BEST = 0.35
 

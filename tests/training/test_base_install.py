@@ -8,7 +8,17 @@ from pathlib import Path
 
 import pytest
 
-EXTRA = ("torch", "stable_baselines3", "sb3_contrib", "tensordict", "torchrl", "tensorboard", "moviepy", "wandb")
+EXTRA = (
+    "torch",
+    "stable_baselines3",
+    "sb3_contrib",
+    "tensordict",
+    "torchrl",
+    "tensorboard",
+    "moviepy",
+    "wandb",
+    "minari",
+)
 BLOCKED = f"""
 import sys
 
@@ -35,7 +45,7 @@ MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"
 def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> None:
     done = run(MAIN, *arguments, cwd=tmp_path)
     assert done.returncode == 2
-    assert "pip install 'posse[training]'" in done.stderr
+    assert "pip install '.[training]'" in done.stderr
     assert "torch cannot be imported" in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
@@ -45,10 +55,10 @@ def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> 
 def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     done = run(f"import {package}", cwd=tmp_path)
     assert done.returncode == 1
-    assert "pip install 'posse[training]'" in done.stderr.splitlines()[-1]
+    assert "pip install '.[training]'" in done.stderr.splitlines()[-1]
 
 
-COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--sweep-episodes", "0"]
+COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +66,6 @@ COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2", "--s
     [
         ["scenarios"],
         ["train", "--help"],
-        ["ship", "--help"],
         pytest.param(COMPARE, marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
@@ -73,7 +82,9 @@ def test_all_else_works_without_extras(tmp_path: Path, arguments: list[str]) -> 
     assert "Traceback" not in done.stderr
 
 
-def test_shipping_needs_no_torch(tmp_path: Path) -> None:
-    done = run(MAIN, "ship", "nowhere", "--name", "learned-x", cwd=tmp_path)
+def test_recording_says_what_to_install(tmp_path: Path) -> None:
+    assert run(MAIN, "record", "--help", cwd=tmp_path).returncode == 0
+    done = run(MAIN, "record", "idle", "--scenario", "constant", "--out", "here", cwd=tmp_path)
     assert done.returncode == 2
-    assert "nowhere is not a run folder" in done.stderr
+    assert "pip install 'posse[datasets]'" in done.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""The command line: ``posse train | tune | compare | watch | replay | ship | ...``.
+"""The command line: ``posse train | tune | compare | watch | replay | ...``.
 
 Each command is imported when it is called: listing the scenarios does not import torch.
 """
@@ -17,7 +17,7 @@ from posse_training.errors import OWN
 
 @dataclass(frozen=True)
 class _Command:
-    """A command: a one-line summary, and the module whose ``main`` takes its arguments."""
+    """A command: a one-line summary, and the module whose ``main``, or ``:function``, takes its arguments."""
 
     summary: str
     module: str
@@ -26,16 +26,15 @@ class _Command:
 COMMANDS: Final[dict[str, _Command]] = {
     "demo": _Command("a table of scores, films and a replay page", "commands.demo"),
     "train": _Command("train a team", "commands.train"),
-    "tune": _Command("tune the settings of a scripted team", "tuning.command"),
-    "league": _Command("train teams and targets in turns against each other", "league.command"),
-    "compare": _Command("score policies on the same worlds", "reports.comparing.compare"),
+    "tune": _Command("tune the settings of a scripted team", "tune"),
+    "league": _Command("train teams and targets in turns against each other", "league"),
+    "compare": _Command("score policies on the same worlds", "compare.compare"),
     "watch": _Command("show policies in a window, as a page or a film", "commands.watch"),
     "play": _Command("drive the target, or a tracker, in a window", "play"),
     "replay": _Command("write a replay of teams as a web page", "replay.command"),
-    "ship": _Command("make the best of several runs a policy of the package", "shipping.ship"),
-    "submit": _Command("write a result file for the leaderboard", "leaderboard.submit"),
-    "verify": _Command("play a result file again and check it", "leaderboard.verify"),
-    "record": _Command("record episodes as a data set for offline learning", "datasets.command"),
+    "submit": _Command("play for the leaderboard and write the claim", "leaderboard:submit_command"),
+    "verify": _Command("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
+    "record": _Command("record episodes as a data set for offline learning", "datasets"),
     "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
     "completion": _Command("print what a shell needs to complete commands", "commands.completion"),
@@ -62,8 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"posse: unknown command {name!r:.80}{hint}\n\n{_usage()}", file=sys.stderr)
         return 2
     try:
-        module = importlib.import_module(f"posse_training.{COMMANDS[name].module}")
-        run: Callable[[list[str]], Any] = module.main
+        module, _, function = COMMANDS[name].module.partition(":")
+        run: Callable[[list[str]], Any] = getattr(
+            importlib.import_module(f"posse_training.{module}"), function or "main"
+        )
         return run(rest) or 0
     except KeyboardInterrupt:
         print(f"\nposse {name}: interrupted", file=sys.stderr)

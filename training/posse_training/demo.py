@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from pathlib import Path
 from typing import Final
 
@@ -45,6 +45,7 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
         episodes: Worlds for each policy and scenario.
         seconds: Simulated time of a film, s.
     """
+    _refuse_unguarded()
     console = Console()
     started = time.perf_counter()
     plays = [(scenario, policy) for scenario in SCENARIOS for policy in POLICIES]
@@ -87,6 +88,15 @@ def main(episodes: int = EPISODES, seconds: float = 25.0) -> None:
         f"{' beside '.join(names)} on {SCENARIOS[-1]}, to open in a browser: {page}", markup=False, soft_wrap=True
     )
     console.print(f"total time: {time.perf_counter() - started:.0f} s")
+
+
+def _refuse_unguarded() -> None:
+    """End the second process if it is running a script without a main guard again, from its top."""
+    if getattr(current_process(), "_inheriting", False):
+        raise SystemExit(
+            "the demo starts a second process, which runs this script again from its top: put what the script does "
+            'below a line `if __name__ == "__main__":`'
+        )
 
 
 def _mute() -> None:

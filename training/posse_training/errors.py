@@ -35,7 +35,7 @@ class TimeLimitError(RuntimeError):
 
 
 class ResultFileError(ValueError):
-    """A result file of the leaderboard that is damaged, forged, or cannot be checked."""
+    """A claim for the leaderboard that is invalid or cannot be checked."""
 
 
 class ClusterError(RuntimeError):
@@ -72,5 +72,6 @@ def require(extra: str, *packages: str) -> None:
             importlib.import_module(package)
         except ImportError as error:
             raise MissingExtraError(
-                f"{package} cannot be imported ({error}). Install what this needs: pip install 'posse[{extra}]'"
+                f"{package} cannot be imported ({error}). Install the extra {extra!r} of posse-rl; from a clone: "
+                f"pip install '.[{extra}]'"
             ) from error

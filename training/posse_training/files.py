@@ -8,13 +8,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Final
 
+from posse_baselines.files import read_json, refuse_link, remove_unfinished
+
 try:
     import fcntl
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
+__all__ = ["LOCK", "InUseError", "locked", "read_json"]
+
 LOCK: Final = "lock"
 """Name of the lock file in a folder."""
+_LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 
 
 class InUseError(RuntimeError):
@@ -33,21 +38,27 @@ class InUseError(RuntimeError):
 def locked(folder: Path) -> Iterator[None]:
     """Hold a folder, made if missing: no other process can hold it meanwhile.
 
-    The operating system releases the lock when the process ends, however it ends.
+    The operating system releases the lock when the process ends, however it ends. Unfinished files
+    of a process that was killed are removed. A folder that contains a symbolic link is refused,
+    since what is written to it would land elsewhere.
 
     Raises:
         InUseError: Another process holds it.
-        OSError: The folder cannot be written to; it names the file.
+        OSError: The folder cannot be written to, or contains a symbolic link; it names the file.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / LOCK).open("a+", encoding="utf-8") as file:
+    for inside in folder.iterdir():
+        refuse_link(inside)
+    path = folder / LOCK
+    with os.fdopen(os.open(path, _LOCK_FLAGS, 0o666), "r+", encoding="utf-8") as file:
         _hold(file, folder)
         try:
             # Unbuffered, so that closing the file does not fail again on a full disk.
             os.truncate(file.fileno(), 0)
             os.write(file.fileno(), f"{os.getpid()}\n".encode())
         except OSError as error:
-            raise OSError(error.errno, error.strerror, str(folder / LOCK)) from error
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        remove_unfinished(folder)
         yield
 
 

@@ -17,7 +17,7 @@ from posse import Batch, Scenario, get_scenario
 from posse.rendering import style
 from posse.rendering.renderer import LEAST_SIZE, Renderer
 from posse_baselines.ddcs import TASKS
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_baselines.playing import check_moves_all
 from posse_baselines.policy import Annotations, Policy, begin
 from posse_training.errors import SettingsError, require

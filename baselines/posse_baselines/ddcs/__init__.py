@@ -1,9 +1,24 @@
-"""The paper's Distributed Decision Control System: monitoring, tracking, actuation."""
+"""The paper's Distributed Decision Control System (DDCS): three layers, four tasks.
+
+====================  =====================================================================================
+layer                 where it is
+====================  =====================================================================================
+monitoring            :mod:`~posse_baselines.ddcs.monitoring`: an estimate of the target, a table of team-mates
+target tracking       :mod:`~posse_baselines.ddcs.tasks`, :mod:`~posse_baselines.ddcs.leadership`,
+                      :mod:`~posse_baselines.ddcs.slots`, and the motion of each task:
+                      :mod:`~posse_baselines.ddcs.searching`, :mod:`~posse_baselines.ddcs.motion` (guided by the
+                      target), :mod:`~posse_baselines.ddcs.following` (on a leader)
+motor actuation       :mod:`~posse_baselines.ddcs.surroundings`, :mod:`~posse_baselines.ddcs.detour`, then
+                      :mod:`posse_baselines.laws.safeguard`
+====================  =====================================================================================
+
+:mod:`~posse_baselines.ddcs.baseline` says what the baseline PNGL + l-φ is; :mod:`~posse_baselines.ddcs.step` is one
+control step of one tracker, in order.
+"""
 
 from __future__ import annotations
 
-from posse_baselines.ddcs.memory import CONVERGING, EXCHANGING, FLOCKING, SEARCHING, TASKS
 from posse_baselines.ddcs.policy import DDCS
-from posse_baselines.ddcs.settings import Settings
+from posse_baselines.ddcs.settings import CONVERGING, EXCHANGING, FLOCKING, SEARCHING, TASKS, Settings
 
 __all__ = ["CONVERGING", "DDCS", "EXCHANGING", "FLOCKING", "SEARCHING", "TASKS", "Settings"]

@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
-from posse_baselines.ddcs.memory import GRID, SEARCHING
+from posse_baselines.ddcs.memory import GRID, Team
 from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.ddcs.tracking.searching import age_of
-from posse_baselines.ddcs.tracking.slots import slot_place
+from posse_baselines.ddcs.searching import age_of
+from posse_baselines.ddcs.settings import SEARCHING
+from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.laws.geometry import length
 
 MATES: Final = 3
@@ -47,114 +48,88 @@ _ZERO: Final = np.float32(0.0)
 
 
 @compiled
-def soft(x: float, y: float, heading_c: float, heading_s: float, scale: float, out: FloatArray) -> None:
+def soft(me: Record, x: float, y: float, scale: float, out: FloatArray) -> None:
     """Write a vector of the common frame (m) relative to the tracker, its length scaled."""
     by = 1.0 / (length(x, y) + scale)
-    out[0] = by * (x * heading_c + y * heading_s)
-    out[1] = by * (y * heading_c - x * heading_s)
+    out[0] = by * (x * me.heading_cos + y * me.heading_sin)
+    out[1] = by * (y * me.heading_cos - x * me.heading_sin)
 
 
 @compiled
-def write_belief(
-    f: Record,
-    s: Record,
-    slots: Records,
-    d: Record,
-    mates: Records,
-    seen: npt.NDArray[np.uint16],
-    o: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Write the belief (BELIEF_SIZE,) of one tracker after it planned for its observation (F,)."""
+def write_belief(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16], out: FloatArray) -> None:
+    """Write the belief (BELIEF_SIZE,) of one tracker after it planned."""
     for k in range(BELIEF_SIZE):
         out[k] = _ZERO
-    x, y = float(o[f.position]), float(o[f.position + 1])
-    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
-    if d.known != 0:
+    x, y, cosine, sine = me.x, me.y, me.heading_cos, me.heading_sin
+    if me.known != 0:
         b = out[TARGET_AT:]
         b[0] = 1.0
-        soft(d.now_x - x, d.now_y - y, hc, hs, _FAR, b[1:3])
-        b[3] = d.speed_x * hc + d.speed_y * hs
-        b[4] = d.speed_y * hc - d.speed_x * hs
-        b[5] = d.frame_cos * hc + d.frame_sin * hs
-        b[6] = d.frame_sin * hc - d.frame_cos * hs
-        b[7] = d.psi_rate
-        b[8] = d.age / (d.age + 1.0)
-    out[TASK_AT + d.task] = 1.0
-    if d.slot >= 0:
+        soft(me, me.target_x - x, me.target_y - y, _FAR, b[1:3])
+        b[3] = me.target_vx * cosine + me.target_vy * sine
+        b[4] = me.target_vy * cosine - me.target_vx * sine
+        b[5] = me.frame_cos * cosine + me.frame_sin * sine
+        b[6] = me.frame_sin * cosine - me.frame_cos * sine
+        b[7] = me.psi_rate
+        b[8] = me.fix_age / (me.fix_age + 1.0)
+    out[TASK_AT + me.task] = 1.0
+    if me.slot >= 0:
         b = out[SLOT_AT:]
-        place_x, place_y, arm_x, arm_y = slot_place(d, slots[d.slot])
-        vx, vy = d.speed_x - d.psi_rate * arm_y, d.speed_y + d.psi_rate * arm_x
+        place_x, place_y, arm_x, arm_y = slot_place(me, team.slots[me.slot])
+        vx, vy = me.target_vx - me.psi_rate * arm_y, me.target_vy + me.psi_rate * arm_x
         b[0] = 1.0
-        soft(place_x - x, place_y - y, hc, hs, _NEAR, b[1:3])
-        soft(place_x - x, place_y - y, hc, hs, _FAR, b[3:5])
-        b[5] = vx * hc + vy * hs
-        b[6] = vy * hc - vx * hs
-    if d.task == SEARCHING:
+        soft(me, place_x - x, place_y - y, _NEAR, b[1:3])
+        soft(me, place_x - x, place_y - y, _FAR, b[3:5])
+        b[5] = vx * cosine + vy * sine
+        b[6] = vy * cosine - vx * sine
+    if me.task == SEARCHING:
         b = out[SEARCH_AT:]
-        lost = float(d.step - max(0, d.lost_step)) * f.dt
+        lost = float(me.step - max(0, me.lost_step)) * team.world.dt
         b[0] = lost / (lost + _LOST)
-        if d.goal_step >= 0:
-            soft(d.goal_x - x, d.goal_y - y, hc, hs, _FAR, b[1:3])
-    _write_mates(f, s, d, mates, int(o[f.number]), x, y, hc, hs, out[MATES_AT:])
+        if me.goal_step >= 0:
+            soft(me, me.goal_x - x, me.goal_y - y, _FAR, b[1:3])
+    _write_mates(team, me, mates, out[MATES_AT:])
     if len(seen) > 0:
-        _write_looks(f, s, d, seen, x, y, hc, hs, out[LOOKS_AT:])
+        _write_looks(team, me, seen, out[LOOKS_AT:])
 
 
 @compiled
-def _write_mates(
-    f: Record,
-    s: Record,
-    d: Record,
-    mates: Records,
-    own: int,
-    x: float,
-    y: float,
-    heading_c: float,
-    heading_s: float,
-    out: FloatArray,
-) -> None:
+def _write_mates(team: Team, me: Record, mates: Records, out: FloatArray) -> None:
     """Write the share of team-mates that are there, and the nearest ones in order."""
     there, last, last_j = 0, -1.0, -1
     for j in range(len(mates)):
-        if j != own and is_there(f, s, d, mates[j], len(mates)):
+        if j != me.number and is_there(team, me, mates[j]):
             there += 1
     out[0] = there / max(1.0, len(mates) - 1.0)
     for k in range(min(there, MATES)):
         least, best = 1e9, -1
         for j in range(len(mates)):
-            if j == own or not is_there(f, s, d, mates[j], len(mates)):
+            if j == me.number or not is_there(team, me, mates[j]):
                 continue
-            at_x, at_y = mate_now(f, s, d, mates[j])
-            way = length(at_x - x, at_y - y)
+            at_x, at_y = mate_now(team, me, mates[j])
+            way = length(at_x - me.x, at_y - me.y)
             after = way > last or (way == last and j > last_j)
             if after and way < least:
                 least, best = way, j
         if best < 0:
             break
-        at_x, at_y = mate_now(f, s, d, mates[best])
-        soft(at_x - x, at_y - y, heading_c, heading_s, _BESIDE, out[1 + 2 * k : 3 + 2 * k])
+        at_x, at_y = mate_now(team, me, mates[best])
+        soft(me, at_x - me.x, at_y - me.y, _BESIDE, out[1 + 2 * k : 3 + 2 * k])
         last, last_j = least, best
 
 
 @compiled
-def _write_looks(
-    f: Record,
-    s: Record,
-    d: Record,
-    seen: npt.NDArray[np.uint16],
-    x: float,
-    y: float,
-    heading_c: float,
-    heading_s: float,
-    out: FloatArray,
-) -> None:
+def _write_looks(team: Team, me: Record, seen: npt.NDArray[np.uint16], out: FloatArray) -> None:
     """Write how long ago the team covered the places around; 0 beyond the area."""
-    scale = GRID / (2.0 * f.area)
+    world, settings = team.world, team.settings
+    scale = GRID / (2.0 * world.area)
     for k in range(LOOKS):
         angle = 2.0 * math.pi * k / LOOKS
         c, n = math.cos(angle), math.sin(angle)
-        i = math.floor((x + f.sight * (c * heading_c - n * heading_s) - d.area_x + f.area) * scale)
-        j = math.floor((y + f.sight * (c * heading_s + n * heading_c) - d.area_y + f.area) * scale)
+        i = math.floor(
+            (me.x + world.sight * (c * me.heading_cos - n * me.heading_sin) - me.area_x + world.area) * scale
+        )
+        j = math.floor(
+            (me.y + world.sight * (c * me.heading_sin + n * me.heading_cos) - me.area_y + world.area) * scale
+        )
         if 0 <= i < GRID and 0 <= j < GRID:
-            out[k] = age_of(f, s, d, seen, i, j, False) / s.stale_after
+            out[k] = age_of(team, me, seen, i, j, False) / settings.stale_after

@@ -1,102 +1,186 @@
-"""Memory of the trackers, as structured arrays with leading axes (E, N)."""
+"""What a team knows in common, and the memory of its trackers, as records that compiled code reads by name.
+
+Functions of the DDCS take ``team`` (:class:`Team`), ``me`` (:data:`MIND`, the tracker that decides), ``mates``
+((N,) :data:`MATE`, by number) and, where they read the observation, its ``row`` (F,).
+"""
 
 from __future__ import annotations
 
-from typing import Any, Final
+import math
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+
+from posse import ObservationLayout
+from posse.numeric import MOST_THREADS, FloatArray, Record, Records, compiled
+from posse.rules import beam_directions, slot_records
+from posse.scenarios.formation import slot_offsets
+from posse_baselines.ddcs.settings import Settings, settings_record
+from posse_baselines.laws.assignment import WORK_ROWS
+from posse_baselines.laws.heading import BODY
+from posse_baselines.laws.offsets import constants_of, offsets_of
+from posse_baselines.laws.safeguard import DISC, PLAYS
 
 _F, _I = np.float32, np.int32
+_MOST_DISCS: Final = 32
+_UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
-def _record(*fields: tuple[str, type]) -> np.dtype[Any]:
-    return np.dtype((np.record, np.dtype(list(fields), align=True)))
+class Team(NamedTuple):
+    """What the trackers of a team have in common."""
+
+    at: Record
+    """:data:`~posse_baselines.laws.offsets.OFFSETS`: where each field is in an observation."""
+    world: Record
+    """:data:`~posse_baselines.laws.offsets.CONSTANTS`: robots and arena."""
+    settings: Record
+    """:data:`~posse_baselines.ddcs.settings.SETTINGS`."""
+    slots: Records
+    """(N,) position of each slot in the slot frame, m."""
+    outermost: float
+    """Distance of the outermost slot from the target, m."""
+    beams: FloatArray
+    """(2, S) cosine and sine of each sonar beam's direction."""
 
 
-SEARCHING: Final = 0
-CONVERGING: Final = 1
-FLOCKING: Final = 2
-EXCHANGING: Final = 3
-TASKS: Final = ("searching", "converging", "flocking", "leader exchange")
+def team_of(layout: ObservationLayout, settings: Settings) -> Team:
+    """Return what a team has in common; ``at``, ``world`` and ``settings`` are arrays of one record."""
+    scenario = layout.scenario
+    outermost = max(math.hypot(x, y) for x, y in slot_offsets(scenario))
+    at, world, played = offsets_of(layout), constants_of(scenario), settings_record(settings)
+    return Team(at, world, played, slot_records(scenario), outermost, beam_directions(scenario))
 
-MIND: Final = _record(
-    ("step", _I),  # control steps since it began
+
+class Work(NamedTuple):
+    """Arrays that a step works in, one of each for a thread."""
+
+    cost: npt.NDArray[np.float64]
+    """(N, N) cost of each slot for each tracker, s."""
+    assigning: npt.NDArray[np.float64]
+    """(WORK_ROWS, N + 1) for the assignment."""
+    discs: Records
+    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
+    plays: Record
+    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
+
+
+def work_for(num_trackers: int) -> Work:
+    """Return the arrays of all threads."""
+    n, threads = num_trackers, MOST_THREADS
+    cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
+    return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC), np.empty(threads, PLAYS))
+
+
+def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:
+    """Return a record type, and a record with the value that each field has at the start of an episode."""
+    dtype = np.dtype((np.record, np.dtype([(name, kind) for name, kind, _ in fields], align=True)))
+    start = np.zeros((), dtype)
+    for name, _, value in fields:
+        start[name] = value
+    return dtype, start
+
+
+MIND, MIND_AT_START = _fields(
+    ("step", _I, 0),  # control steps since the episode began
+    # this robot, from the observation of this step; heading, motion and limits are those of BODY
+    ("number", _I, 0),
+    ("x", np.float64, 0),
+    ("y", np.float64, 0),
+    *((name, np.float64, 0) for name in BODY.names or ()),
     # the target, as it was at the newest fix; common frame
-    ("fix_step", _I),  # own step of that fix; -1: none yet
-    ("x", _F),
-    ("y", _F),
-    ("theta", _F),
-    ("psi", _F),
-    ("speed", _F),
-    ("turn", _F),  # estimated speed, turn rate
-    ("speed_known", _I),  # 1: the speed has been measured
-    ("raw_x", _F),
-    ("raw_y", _F),  # the fix itself, before it was blended
-    ("mean_x", _F),
-    ("mean_y", _F),  # mean velocity
+    ("fix_step", _I, -1),  # own step of that fix; -1: none yet
+    ("fix_x", _F, 0),
+    ("fix_y", _F, 0),
+    ("fix_theta", _F, 0),
+    ("fix_psi", _F, 0),
+    ("target_speed", _F, 0),  # estimated speed, m/s
+    ("target_turn", _F, 0),  # estimated turn rate, rad/s
+    ("speed_known", _I, 0),  # 1: the speed has been measured
+    ("raw_x", _F, 0),  # the fix itself, before it was blended
+    ("raw_y", _F, 0),
+    ("mean_vx", _F, 0),  # mean velocity, m/s
+    ("mean_vy", _F, 0),
     # the target, as it is taken to be now
-    ("now_x", _F),
-    ("now_y", _F),
-    ("now_theta", _F),
-    ("psi_rate", _F),
-    ("speed_x", _F),
-    ("speed_y", _F),  # its velocity, m/s
-    ("frame_cos", _F),
-    ("frame_sin", _F),  # of the slot frame's heading
-    ("age", _F),  # of the fix, s
-    ("known", _I),  # 1: there is an estimate that is not too old
-    ("sees", _I),  # 1: its own sensor has the target
-    ("horizon", _F),  # distance within which every team-mate that is heard is listed, m
-    ("usual_gap", _F),  # about the longest silence of a team-mate lately, s
-    ("usual_age", _F),  # about the usual age of the fix, s
+    ("target_x", _F, 0),
+    ("target_y", _F, 0),
+    ("target_theta", _F, 0),
+    ("target_vx", _F, 0),  # velocity, m/s
+    ("target_vy", _F, 0),
+    ("psi_rate", _F, 0),  # turn rate of the slot frame, rad/s
+    ("frame_cos", _F, 0),  # heading of the slot frame
+    ("frame_sin", _F, 0),
+    ("fix_age", _F, 0),  # s
+    ("known", _I, 0),  # 1: there is an estimate that is not too old
+    ("sees", _I, 0),  # 1: its own sensor has the target
+    ("horizon", _F, 0),  # distance within which every team-mate that is heard is listed, m
+    ("usual_gap", _F, 0),  # about the longest silence of a team-mate lately, s
+    ("usual_age", _F, 0),  # about the usual age of the fix, s
     # tracking
-    ("task", _I),
-    ("slot", _I),  # -1: none
-    ("taken", np.uint64),  # bit set of slots in which the sonar detected a robot not heard
-    ("error", _F),  # distance from its place (PNGL: excess of the range), m; -1: it has none
-    ("pursues", _I),  # 1: under PNGL
-    ("closing", _I),  # 1: the law itself, not the safeguard, keeps the range to the target
-    ("side", _I),
-    ("side_step", _I),  # of the last detour: 1 left, -1 right; when
+    ("task", _I, 0),
+    ("slot", _I, -1),  # -1: none
+    ("taken", np.uint64, 0),  # bit set of slots in which the sonar detected a robot not heard
+    ("error", _F, -1),  # distance from its place (PNGL: excess of the range), m; -1: it has none
+    ("pursues", _I, 0),  # 1: under PNGL
+    ("closing", _I, 0),  # 1: the law itself, not the safeguard, keeps the range to the target
+    ("side", _I, 0),  # of the last detour: 1 left, -1 right
+    ("side_step", _I, 0),  # own step of that detour
     # the tracking layer's result; float64, so that storing it changes no action
-    ("wish_x", np.float64),
-    ("wish_y", np.float64),  # wanted velocity, common frame, m/s
-    ("wish_speed", np.float64),
-    ("wish_omega", np.float64),  # its command: m/s, rad/s
+    ("wish_x", np.float64, 0),  # wanted velocity, common frame, m/s
+    ("wish_y", np.float64, 0),
+    ("wish_speed", np.float64, 0),  # its command: m/s, rad/s
+    ("wish_omega", np.float64, 0),
     # leadership
-    ("leader", _I),  # -1: none yet
-    ("term", _I),  # how often the lead has passed, modulo 256; the higher claim wins
-    ("pulse", _I),  # the leader counts its steps, modulo 256; team-mates pass the count on
-    ("pulse_step", _I),  # own step at which the count last went up
-    ("confirmed", _I),  # 0: the leader has not been heard of since it was appointed
-    ("exchanges", _I),  # times that the lead passed to another, as far as this one knows
+    ("leader", _I, -1),  # -1: none yet
+    ("term", _I, 0),  # how often the lead has passed, modulo 256; the higher claim wins
+    ("pulse", _I, 0),  # the leader counts its steps, modulo 256; team-mates pass the count on
+    ("pulse_step", _I, 0),  # own step at which the count last went up
+    ("confirmed", _I, 0),  # 0: the leader has not been heard of since it was appointed
+    ("exchanges", _I, 0),  # times that the lead passed to another, as far as this one knows
     # searching
-    ("goal_x", _F),
-    ("goal_y", _F),
-    ("goal_step", _I),  # where to, chosen when; -1: nowhere
-    ("lost_step", _I),  # when the target was lost; -1: never seen yet
-    ("area_x", _F),
-    ("area_y", _F),  # middle of the area that is searched
+    ("goal_x", _F, 0),
+    ("goal_y", _F, 0),
+    ("goal_step", _I, -1),  # own step at which the goal was chosen; -1: there is none
+    ("lost_step", _I, -1),  # when the target was lost; -1: never seen yet
+    ("area_x", _F, 0),  # middle of the area that is searched
+    ("area_y", _F, 0),
 )
-"""Memory of one tracker."""
+"""Memory of one tracker, and its value at the start of an episode."""
 
-MATE: Final = _record(
-    ("step", _I),  # own step at which it sent what follows; -1: never heard
-    ("x", _F),
-    ("y", _F),
-    ("speed_x", _F),
-    ("speed_y", _F),
-    ("heading_cos", _F),
-    ("heading_sin", _F),
-    ("turn", _F),  # turn rate, rad/s
-    ("fresh", _I),  # 1: heard in this step
-    ("task", _I),
-    ("leader", _I),
-    ("term", _I),
-    ("pulse", _I),
-    ("slot", _I),  # -1: not said
+MATE, MATE_AT_START = _fields(
+    ("step", _I, -1),  # own step at which it sent what follows; -1: never heard
+    ("x", _F, 0),
+    ("y", _F, 0),
+    ("speed_x", _F, 0),
+    ("speed_y", _F, 0),
+    ("heading_cos", _F, 0),
+    ("heading_sin", _F, 0),
+    ("turn", _F, 0),  # turn rate, rad/s
+    ("fresh", _I, 0),  # 1: heard in this step
+    ("task", _I, -1),
+    ("leader", _I, -1),
+    ("term", _I, -1),
+    ("pulse", _I, -1),
+    ("slot", _I, -1),  # -1: not said
 )
-"""Knowledge of a tracker about a team-mate: (E, N, N), the second N by the mate's number."""
+"""Knowledge of a tracker about a team-mate, and its value at the start of an episode."""
 
 GRID: Final = 16
 """Cells of a tracker's map of covered areas, along each axis."""
+
+
+@compiled
+def read_body(team: Team, me: Record, row: FloatArray) -> None:
+    """Read the robot's number, pose, motion and limits from its observation (F,), once a step."""
+    at = team.at
+    me.number = int(row[at.number])
+    me.x, me.y = row[at.position], row[at.position + 1]
+    me.heading_cos, me.heading_sin = row[at.heading], row[at.heading + 1]
+    me.speed, me.omega = row[at.speed], row[at.turn_rate]
+    me.max_speed, me.max_omega = row[at.max_speed], row[at.max_turn_rate]
+    me.acceleration, me.turn_acceleration = _UNLIMITED, _UNLIMITED
+    if row[at.acceleration_time] > 0.0:
+        me.acceleration = row[at.max_speed] / row[at.acceleration_time]
+    if row[at.turn_acceleration_time] > 0.0:
+        me.turn_acceleration = row[at.max_turn_rate] / row[at.turn_acceleration_time]
+    me.dt = team.world.dt

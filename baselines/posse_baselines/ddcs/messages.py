@@ -34,10 +34,10 @@ def is_newer(value: int, old: int) -> bool:
 
 
 @compiled
-def write_message(d: Record, action: FloatArray) -> None:
+def write_message(me: Record, action: FloatArray) -> None:
     """Write the message of a tracker into an action (2 + m,)."""
-    action[2] = encode(d.task)
-    action[3] = encode(d.leader)
-    action[4] = encode(d.term)
-    action[5] = encode(d.pulse)
-    action[6] = encode(d.slot)
+    action[2] = encode(me.task)
+    action[3] = encode(me.leader)
+    action[4] = encode(me.term)
+    action[5] = encode(me.pulse)
+    action[6] = encode(me.slot)

@@ -10,24 +10,26 @@ from __future__ import annotations
 import math
 
 from posse.numeric import FloatArray, Record, Records, compiled
+from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.messages import decode
 from posse_baselines.laws.geometry import clip, length, wrap
 
 
 @compiled
-def carry_on(
-    s: Record, x: float, y: float, theta: float, speed: float, turn: float, time: float
+def extrapolate(
+    team: Team, x: float, y: float, theta: float, speed: float, turn: float, time: float
 ) -> tuple[float, float, float]:
     """Return the most likely (x, y, θ) after a time (s), with a decaying turn rate.
 
     After a second the speed decays, too: the direction gets uncertain, and the mean of the possible
     positions lags behind a target that keeps its heading.
     """
+    settings = team.settings
     if time <= 0.0:
         return x, y, theta
     if time > 1.0:
-        time = 1.0 + s.way_memory * (1.0 - math.exp((1.0 - time) / s.way_memory))
-    turned = turn * s.turn_memory * (1.0 - math.exp(-time / s.turn_memory))
+        time = 1.0 + settings.way_memory * (1.0 - math.exp((1.0 - time) / settings.way_memory))
+    turned = turn * settings.turn_memory * (1.0 - math.exp(-time / settings.turn_memory))
     middle = theta + 0.5 * turned
     return (x + speed * time * math.cos(middle), y + speed * time * math.sin(middle), wrap(theta + turned))
 
@@ -39,137 +41,143 @@ def frame_limit(speed: float, max_speed: float, outermost: float) -> float:
 
 
 @compiled
-def watch_target(f: Record, s: Record, d: Record, o: FloatArray, outermost: float) -> None:
+def watch_target(team: Team, me: Record, row: FloatArray) -> None:
     """Update the estimate of the target with an observation (F,)."""
-    dt = float(f.dt)
-    d.sees = 1 if o[f.target_seen] > 0.0 else 0
-    if o[f.target_known] > 0.0 and (s.radio or d.sees):
-        fix_step = d.step - round(o[f.target_age] / dt)
-        if fix_step > d.fix_step:
-            take_fix(f, s, d, o, fix_step, dt)
-    d.known = 0
-    if d.fix_step < 0:
+    at, world, settings = team.at, team.world, team.settings
+    dt = float(world.dt)
+    me.sees = 1 if row[at.target_seen] > 0.0 else 0
+    if row[at.target_known] > 0.0 and (settings.radio or me.sees):
+        fix_step = me.step - round(row[at.target_age] / dt)
+        if fix_step > me.fix_step:
+            take_fix(team, me, row, fix_step)
+    me.known = 0
+    if me.fix_step < 0:
         return
-    d.age = (d.step - d.fix_step) * dt
-    if d.age <= s.late_fix:
+    me.fix_age = (me.step - me.fix_step) * dt
+    if me.fix_age <= settings.late_fix:
         # The usual age of fixes, to detect unusual delays.
-        d.usual_age += (dt / s.gap_memory) * (d.age - d.usual_age)
-    if d.age <= s.target_lost_after:
-        d.known = 1
-    x, y, theta = carry_on(s, d.x, d.y, d.theta, d.speed, d.turn, d.age)
-    d.now_x, d.now_y, d.now_theta = x, y, theta
-    limit = frame_limit(d.speed, float(o[f.max_speed]), outermost)
-    psi = wrap(d.psi + clip(wrap(theta - d.psi), -limit * d.age, limit * d.age))
-    turn = s.turn_share * d.turn * math.exp(-d.age / s.turn_memory)
-    d.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
+        me.usual_age += (dt / settings.gap_memory) * (me.fix_age - me.usual_age)
+    if me.fix_age <= settings.target_lost_after:
+        me.known = 1
+    x, y, theta = extrapolate(team, me.fix_x, me.fix_y, me.fix_theta, me.target_speed, me.target_turn, me.fix_age)
+    me.target_x, me.target_y, me.target_theta = x, y, theta
+    limit = frame_limit(me.target_speed, me.max_speed, team.outermost)
+    psi = wrap(me.fix_psi + clip(wrap(theta - me.fix_psi), -limit * me.fix_age, limit * me.fix_age))
+    turn = settings.turn_share * me.target_turn * math.exp(-me.fix_age / settings.turn_memory)
+    me.psi_rate = clip(wrap(theta - psi) / dt + turn, -limit, limit)
     # Computed once for all slots and discs of this step.
-    d.speed_x, d.speed_y = d.speed * math.cos(theta), d.speed * math.sin(theta)
-    d.frame_cos, d.frame_sin = math.cos(psi), math.sin(psi)
+    me.target_vx, me.target_vy = me.target_speed * math.cos(theta), me.target_speed * math.sin(theta)
+    me.frame_cos, me.frame_sin = math.cos(psi), math.sin(psi)
 
 
 @compiled
-def take_fix(f: Record, s: Record, d: Record, o: FloatArray, fix_step: int, dt: float) -> None:
+def take_fix(team: Team, me: Record, row: FloatArray, fix_step: int) -> None:
     """Blend a newer fix into the estimate."""
-    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
-    r = float(o[f.target_range])
-    bc, bs = float(o[f.target_bearing]), float(o[f.target_bearing + 1])
-    x = o[f.position] + r * (bc * hc - bs * hs)
-    y = o[f.position + 1] + r * (bc * hs + bs * hc)
-    tc, ts = float(o[f.target_heading]), float(o[f.target_heading + 1])
+    at, settings = team.at, team.settings
+    hc, hs = me.heading_cos, me.heading_sin
+    r = float(row[at.target_range])
+    bc, bs = float(row[at.target_bearing]), float(row[at.target_bearing + 1])
+    x = me.x + r * (bc * hc - bs * hs)
+    y = me.y + r * (bc * hs + bs * hc)
+    tc, ts = float(row[at.target_heading]), float(row[at.target_heading + 1])
     heading_c, heading_s = tc * hc - ts * hs, tc * hs + ts * hc
     theta = math.atan2(heading_s, heading_c)
-    fc, fs = float(o[f.target_frame]), float(o[f.target_frame + 1])
+    fc, fs = float(row[at.target_frame]), float(row[at.target_frame + 1])
     psi = math.atan2(fc * hs + fs * hc, fc * hc - fs * hs)
-    time = (fix_step - d.fix_step) * dt
-    if d.fix_step < 0 or time > s.target_lost_after:
-        d.x, d.y, d.turn = x, y, 0.0
-        if d.speed_known == 0:
-            d.speed = s.unknown_speed * o[f.max_speed]
-        d.mean_x, d.mean_y = d.speed * heading_c, d.speed * heading_s
+    time = (fix_step - me.fix_step) * team.world.dt
+    if me.fix_step < 0 or time > settings.target_lost_after:
+        me.fix_x, me.fix_y, me.target_turn = x, y, 0.0
+        if me.speed_known == 0:
+            me.target_speed = settings.unknown_speed * me.max_speed
+        me.mean_vx, me.mean_vy = me.target_speed * heading_c, me.target_speed * heading_s
     else:
-        guess_x, guess_y, _ = carry_on(s, d.x, d.y, d.theta, d.speed, d.turn, time)
-        turned = wrap(theta - d.theta)
-        if time <= s.turn_memory:
-            d.turn = turned / time
-            middle = d.theta + 0.5 * turned
-            along = ((x - d.raw_x) * math.cos(middle) + (y - d.raw_y) * math.sin(middle)) / time
-            share = 1.0 - math.exp(-time / s.speed_memory) if d.speed_known else 1.0
-            d.speed = clip(d.speed + share * (along - d.speed), 0.0, float(o[f.max_speed]))
-            d.speed_known = 1
+        guess_x, guess_y, _ = extrapolate(team, me.fix_x, me.fix_y, me.fix_theta, me.target_speed, me.target_turn, time)
+        turned = wrap(theta - me.fix_theta)
+        if time <= settings.turn_memory:
+            me.target_turn = turned / time
+            middle = me.fix_theta + 0.5 * turned
+            along = ((x - me.raw_x) * math.cos(middle) + (y - me.raw_y) * math.sin(middle)) / time
+            share = 1.0 - math.exp(-time / settings.speed_memory) if me.speed_known else 1.0
+            me.target_speed = clip(me.target_speed + share * (along - me.target_speed), 0.0, me.max_speed)
+            me.speed_known = 1
         else:
-            d.turn = 0.0
-        trust = s.fix_trust
-        if length(x - guess_x, y - guess_y) > s.fix_jump:
+            me.target_turn = 0.0
+        trust = settings.fix_trust
+        if length(x - guess_x, y - guess_y) > settings.fix_jump:
             trust = 1.0
-        d.x = guess_x + trust * (x - guess_x)
-        d.y = guess_y + trust * (y - guess_y)
-        share = 1.0 - math.exp(-time / s.mean_memory)
-        d.mean_x += share * (d.speed * heading_c - d.mean_x)
-        d.mean_y += share * (d.speed * heading_s - d.mean_y)
-    d.raw_x, d.raw_y, d.theta, d.psi, d.fix_step = x, y, theta, psi, fix_step
+        me.fix_x = guess_x + trust * (x - guess_x)
+        me.fix_y = guess_y + trust * (y - guess_y)
+        share = 1.0 - math.exp(-time / settings.mean_memory)
+        me.mean_vx += share * (me.target_speed * heading_c - me.mean_vx)
+        me.mean_vy += share * (me.target_speed * heading_s - me.mean_vy)
+    me.raw_x, me.raw_y, me.fix_theta, me.fix_psi, me.fix_step = x, y, theta, psi, fix_step
 
 
 @compiled
-def hear_mates(f: Record, s: Record, d: Record, mates: Records, o: FloatArray) -> None:
+def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> None:
     """Update the table of team-mates (N,) with an observation (F,)."""
+    at, world, settings = team.at, team.world, team.settings
     for j in range(len(mates)):
         mates[j].fresh = 0
-    d.usual_gap -= d.usual_gap * min(1.0, f.dt / s.gap_memory)
-    if not s.radio:
+    me.usual_gap -= me.usual_gap * min(1.0, world.dt / settings.gap_memory)
+    if not settings.radio:
         return
-    hc, hs = float(o[f.heading]), float(o[f.heading + 1])
-    d.horizon = 0.0
-    for p in range(f.neighbours):
-        k = p * f.stride
-        number = int(o[f.neighbour_number + k])
+    hc, hs = me.heading_cos, me.heading_sin
+    me.horizon = 0.0
+    for p in range(at.neighbours):
+        k = p * at.stride
+        number = int(row[at.neighbour_number + k])
         if number < 0:
             continue
         # Nearest first: others are farther away than the last of the list, or not heard.
-        if o[f.neighbour_age + k] < s.lost_after:
-            d.horizon = float(o[f.neighbour_range + k])
+        if row[at.neighbour_age + k] < settings.lost_after:
+            me.horizon = float(row[at.neighbour_range + k])
         mate = mates[number]
-        sent = d.step - round(o[f.neighbour_age + k] / f.dt)
+        sent = me.step - round(row[at.neighbour_age + k] / world.dt)
         if sent <= mate.step:
             continue
         if mate.step >= 0:
-            gap = float((sent - mate.step) * f.dt + o[f.neighbour_age + k])
-            if gap < s.lost_after:
-                d.usual_gap = max(d.usual_gap, gap)
+            gap = float((sent - mate.step) * world.dt + row[at.neighbour_age + k])
+            if gap < settings.lost_after:
+                me.usual_gap = max(me.usual_gap, gap)
         mate.step, mate.fresh = sent, 1
-        r = float(o[f.neighbour_range + k])
-        bc, bs = float(o[f.neighbour_bearing + k]), float(o[f.neighbour_bearing + k + 1])
-        mate.x = o[f.position] + r * (bc * hc - bs * hs)
-        mate.y = o[f.position + 1] + r * (bc * hs + bs * hc)
-        c, t = float(o[f.neighbour_heading + k]), float(o[f.neighbour_heading + k + 1])
+        r = float(row[at.neighbour_range + k])
+        bc, bs = float(row[at.neighbour_bearing + k]), float(row[at.neighbour_bearing + k + 1])
+        mate.x = me.x + r * (bc * hc - bs * hs)
+        mate.y = me.y + r * (bc * hs + bs * hc)
+        c, t = float(row[at.neighbour_heading + k]), float(row[at.neighbour_heading + k + 1])
         cosine, sine = c * hc - t * hs, c * hs + t * hc
-        speed = float(o[f.neighbour_speed + k])
+        speed = float(row[at.neighbour_speed + k])
         mate.heading_cos, mate.heading_sin = cosine, sine
         mate.speed_x, mate.speed_y = speed * cosine, speed * sine
-        mate.turn = o[f.neighbour_turn_rate + k]
-        m = f.neighbour_message + k
-        mate.task, mate.leader, mate.term = decode(o[m]), decode(o[m + 1]), decode(o[m + 2])
-        mate.pulse, mate.slot = decode(o[m + 3]), decode(o[m + 4])
+        mate.turn = row[at.neighbour_turn_rate + k]
+        m = at.neighbour_message + k
+        mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
+        mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
 
 
 @compiled
-def patience(s: Record, d: Record) -> float:
+def patience(team: Team, me: Record) -> float:
     """Return the timeout (s) of a silence: over twice the usual."""
-    return float(min(s.lost_after, s.least_patience + 2.0 * d.usual_gap))
+    settings = team.settings
+    return float(min(settings.lost_after, settings.least_patience + 2.0 * me.usual_gap))
 
 
 @compiled
-def is_there(f: Record, s: Record, d: Record, mate: Record, size: int) -> bool:
+def is_there(team: Team, me: Record, mate: Record) -> bool:
     """Return whether a team-mate counts as working and in range."""
+    at, world, settings = team.at, team.world, team.settings
     if mate.step < 0:
         return False
-    time = patience(s, d) if f.neighbours >= size - 1 else s.unseen_memory
-    return bool((d.step - mate.step) * f.dt <= time)
+    time = patience(team, me) if at.neighbours >= len(team.slots) - 1 else settings.unseen_memory
+    return bool((me.step - mate.step) * world.dt <= time)
 
 
 @compiled
-def mate_now(f: Record, s: Record, d: Record, mate: Record) -> tuple[float, float]:
+def mate_now(team: Team, me: Record, mate: Record) -> tuple[float, float]:
     """Return the predicted position of a team-mate; after a long silence it counts as stopped."""
-    age = (d.step - mate.step) * f.dt
-    if age > patience(s, d):
+    world = team.world
+    age = (me.step - mate.step) * world.dt
+    if age > patience(team, me):
         return mate.x, mate.y
     return mate.x + age * mate.speed_x, mate.y + age * mate.speed_y

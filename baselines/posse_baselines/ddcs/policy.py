@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, Records, over_worlds
-from posse.rules import beam_directions, slot_records
-from posse.scenarios.formation import slot_offsets
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
 from posse_baselines.ddcs.belief import BELIEF_SIZE
-from posse_baselines.ddcs.controller import decide_all
-from posse_baselines.ddcs.correction import correct_all, propose_all, write_beliefs
-from posse_baselines.ddcs.memory import GRID, MATE, MIND
+from posse_baselines.ddcs.memory import GRID, MATE, MATE_AT_START, MIND, MIND_AT_START, Team, team_of, work_for
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
-from posse_baselines.ddcs.settings import Settings, settings_record
-from posse_baselines.laws.assignment import WORK_ROWS
-from posse_baselines.laws.heading import BODY
-from posse_baselines.laws.offsets import offsets_of
-from posse_baselines.laws.safeguard import DISC, PLAYS
+from posse_baselines.ddcs.settings import Settings
+from posse_baselines.ddcs.step import carry_out_all, propose_all, write_beliefs
 from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of
-
-_MOST_DISCS: Final = 32
 
 
 @dataclass
@@ -33,16 +24,11 @@ class _Minds(OwnArrays):
     """The memory of a team in each of E worlds."""
 
     layout: ObservationLayout
-    settings: Records
-    offsets: Records
-    slots: Records
-    beams: FloatArray
-    """(2, S), cosine and sine of each sonar beam's direction."""
-    outermost: float
+    team: Team
     minds: Records
     """(E, N) :data:`~posse_baselines.ddcs.memory.MIND`."""
     mates: Records
-    """(E, N, N) :data:`~posse_baselines.ddcs.memory.MATE`."""
+    """(E, N, N) :data:`~posse_baselines.ddcs.memory.MATE`, the second N by the mate's number."""
     seen: npt.NDArray[np.uint16]
     """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
 
@@ -82,54 +68,26 @@ class DDCS(OwnArrays, BasePolicy):
         check_fits(self, layout)
         scenario = layout.scenario
         n = scenario.num_trackers
-        limited = math.isfinite(scenario.sensing_range)
+        cells = GRID * GRID if math.isfinite(scenario.sensing_range) else 0
         memory = _Minds(
             layout,
-            settings_record(self.settings_for(scenario)),
-            offsets_of(layout),
-            slot_records(scenario),
-            beam_directions(scenario),
-            max(math.hypot(x, y) for x, y in slot_offsets(scenario)),
-            np.zeros((num_worlds, n), MIND),
-            np.zeros((num_worlds, n, n), MATE),
-            np.zeros((num_worlds, n, GRID * GRID if limited else 0), np.uint16),
+            team_of(layout, self.settings_for(scenario)),
+            np.empty((num_worlds, n), MIND),
+            np.empty((num_worlds, n, n), MATE),
+            np.empty((num_worlds, n, cells), np.uint16),
         )
         return self.restart(memory, np.ones(num_worlds, np.bool_))
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
         m: _Minds = memory
-        for records in (m.minds, m.mates):
-            records[mask] = np.zeros((), records.dtype)
-        m.seen[mask] = 0
-        for name in ("fix_step", "slot", "leader", "goal_step", "lost_step", "error"):
-            m.minds[name][mask] = -1
-        for name in ("step", "task", "leader", "term", "pulse", "slot"):
-            m.mates[name][mask] = -1
+        m.minds[mask], m.mates[mask], m.seen[mask] = MIND_AT_START, MATE_AT_START, 0
         return m
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return the actions (E, N, 2 + m) of every team."""
-        m: _Minds = memory
-        num_worlds, n = m.minds.shape
-        observations = check_observations(self, observations, num_worlds, m.layout)
-        actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
-        parts = MOST_THREADS
-        work = (
-            np.empty((parts, n, n)),
-            np.empty((parts, WORK_ROWS, n + 1)),
-            m.beams,
-            np.empty((parts, _MOST_DISCS), DISC),
-            np.empty(parts, BODY),
-            np.empty(parts, PLAYS),
-        )
-        over_worlds(
-            decide_all,
-            (m.offsets, m.settings, m.slots, m.outermost, m.minds, m.mates, m.seen, observations, *work, actions),
-            num_worlds,
-            n,
-        )
-        return actions, m
+        """Return the actions (E, N, 2 + m) of every team: :meth:`propose`, then :meth:`carry_out`."""
+        proposals, m = self.propose(observations, memory)
+        return self.carry_out(observations, m, np.zeros_like(proposals))
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
@@ -141,25 +99,8 @@ class DDCS(OwnArrays, BasePolicy):
         num_worlds, n = m.minds.shape
         observations = check_observations(self, observations, num_worlds, m.layout)
         proposals = np.zeros((num_worlds, n, 2), np.float32)
-        parts = MOST_THREADS
         over_worlds(
-            propose_all,
-            (
-                m.offsets,
-                m.settings,
-                m.slots,
-                m.outermost,
-                m.minds,
-                m.mates,
-                m.seen,
-                observations,
-                np.empty((parts, n, n)),
-                np.empty((parts, WORK_ROWS, n + 1)),
-                np.empty(parts, BODY),
-                proposals,
-            ),
-            num_worlds,
-            n,
+            propose_all, (m.team, m.minds, m.mates, m.seen, observations, work_for(n), proposals), num_worlds, n
         )
         return proposals, m
 
@@ -172,26 +113,10 @@ class DDCS(OwnArrays, BasePolicy):
         m: _Minds = memory
         num_worlds, n = m.minds.shape
         observations = check_observations(self, observations, num_worlds, m.layout)
+        corrections = np.ascontiguousarray(corrections, np.float32)
         actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
-        parts = MOST_THREADS
         over_worlds(
-            correct_all,
-            (
-                m.offsets,
-                m.settings,
-                m.slots,
-                m.minds,
-                m.mates,
-                observations,
-                m.beams,
-                np.empty((parts, _MOST_DISCS), DISC),
-                np.empty(parts, BODY),
-                np.empty(parts, PLAYS),
-                np.ascontiguousarray(corrections, np.float32),
-                actions,
-            ),
-            num_worlds,
-            n,
+            carry_out_all, (m.team, m.minds, m.mates, observations, work_for(n), corrections, actions), num_worlds, n
         )
         return actions, m
 
@@ -207,14 +132,8 @@ class DDCS(OwnArrays, BasePolicy):
         """
         m: _Minds = memory
         num_worlds, n = m.minds.shape
-        observations = check_observations(self, observations, num_worlds, m.layout)
         beliefs = np.empty((num_worlds, n, BELIEF_SIZE), np.float32)
-        over_worlds(
-            write_beliefs,
-            (m.offsets, m.settings, m.slots, m.minds, m.mates, m.seen, observations, beliefs),
-            num_worlds,
-            n,
-        )
+        over_worlds(write_beliefs, (m.team, m.minds, m.mates, m.seen, beliefs), num_worlds, n)
         return beliefs
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -226,14 +145,14 @@ class DDCS(OwnArrays, BasePolicy):
         """
         minds = memory.minds
         estimate = np.empty((*minds.shape, 3), np.float32)
-        for k, name in enumerate(("now_x", "now_y", "now_theta")):
+        for k, name in enumerate(("target_x", "target_y", "target_theta")):
             estimate[..., k] = minds[name]
         names = ["task", "slot"]
         if self.settings.model == "centralized":
             names += ["leader", "term", "exchanges"]
         notes: Annotations = {name: minds[name].copy() for name in names}
         notes["estimate"] = estimate
-        notes["estimate_age"] = np.where(minds["known"] != 0, minds["age"], np.float32(-1.0))
+        notes["estimate_age"] = np.where(minds["known"] != 0, minds["fix_age"], np.float32(-1.0))
         return notes
 
     def leaders(self, memory: Memory) -> npt.NDArray[Any]:

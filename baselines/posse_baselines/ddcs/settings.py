@@ -9,14 +9,26 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import Records
-from posse_baselines.tuning import choice, number, tuned
+from posse_baselines.tuning import check, choice, number, tuned
 
 MODELS: Final = ("distributed", "centralized")
 GUIDANCE_LAWS: Final = ("slot", "pngl")
 DEVIATIONS: Final = ("none", "slot", "occupant")
 FOLLOWER_LAWS: Final = ("l-phi", "l-l")
 FOLLOWER_FRAMES: Final = ("leader", "slot-frame")
-TASK_NAMES: Final = ("searching", "converging", "flocking", "exchange")
+# A choice as the kernels read it is its position.
+CENTRALIZED: Final = MODELS.index("centralized")
+PNGL: Final = GUIDANCE_LAWS.index("pngl")
+NO_DEVIATION: Final = DEVIATIONS.index("none")
+OF_OCCUPANT: Final = DEVIATIONS.index("occupant")
+L_L: Final = FOLLOWER_LAWS.index("l-l")
+BY_SLOT_FRAME: Final = FOLLOWER_FRAMES.index("slot-frame")
+SEARCHING: Final = 0
+CONVERGING: Final = 1
+FLOCKING: Final = 2
+EXCHANGING: Final = 3
+TASKS: Final = ("searching", "converging", "flocking", "exchange")
+"""The four tasks of section 3.1 (:mod:`posse_baselines.ddcs.tasks`); a tracker's memory holds the position."""
 TRANSITIONS: Final = (
     "searching>converging",
     "searching>flocking",
@@ -206,24 +218,10 @@ class Settings:
     """Silence after which a team-mate is no longer assumed at its last position."""
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value, meta = getattr(self, field.name), field.metadata
-            allowed = meta.get("choices")
-            if allowed is not None:
-                if value not in allowed:
-                    known = ", ".join(allowed)
-                    raise ValueError(f"{field.name}={value!r} is unknown; known: {known}")
-            elif "low" in meta and not meta["low"] <= value <= meta["high"]:
-                unit = f" {meta['unit']}" if meta["unit"] else ""
-                raise ValueError(f"{field.name}={value!r} must lie in [{meta['low']:g}, {meta['high']:g}]{unit}")
+        check(self)
         for transition in self.forbidden:
             if transition not in TRANSITIONS:
                 raise ValueError(f"forbidden={transition!r} is unknown; known: {', '.join(TRANSITIONS)}")
-        for field in dataclasses.fields(self):
-            if near := field.metadata.get("above"):
-                low, high = getattr(self, near), getattr(self, field.name)
-                if not low < high:
-                    raise ValueError(f"{near}={low!r} must be below {field.name}={high!r}: a hysteresis")
 
     def replace(self, **overrides: Any) -> Settings:
         """Return a copy with some settings changed."""
@@ -260,4 +258,4 @@ def settings_record(settings: Settings) -> Records:
 
 def _bit(transition: str) -> int:
     before, after = transition.split(">")
-    return 4 * TASK_NAMES.index(before) + TASK_NAMES.index(after)
+    return 4 * TASKS.index(before) + TASKS.index(after)

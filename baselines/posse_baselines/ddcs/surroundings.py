@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
+from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.monitoring import mate_now, patience
-from posse_baselines.ddcs.tracking.slots import slot_place
+from posse_baselines.ddcs.slots import slot_place
 from posse_baselines.laws.geometry import length
-from posse_baselines.laws.safeguard import put_disc, put_wall
+from posse_baselines.laws.safeguard import put_disc, put_walls, wall_normal
 
 _BIT = np.uint64(1)
 _NO_BITS = np.uint64(0)
@@ -20,30 +21,32 @@ _EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other exp
 
 
 @compiled
-def wall_explains(f: Record, x: float, y: float, beam_x: float, beam_y: float, reading: float) -> bool:
+def wall_explains(team: Team, me: Record, beam_x: float, beam_y: float, reading: float) -> bool:
     """Return whether a wall explains a sonar reading (m)."""
+    world = team.world
     for k in range(4):
         nx, ny = wall_normal(k)
-        away = f.extent - nx * x - ny * y
+        away = world.extent - nx * me.x - ny * me.y
         towards = nx * beam_x + ny * beam_y
         if away >= _NEAR or towards <= 0.0:
             continue
-        if towards < f.wide_beam:
+        if towards < world.wide_beam:
             away /= towards
-        if reading >= away - f.radius - _EXPLAINED:
+        if reading >= away - world.radius - _EXPLAINED:
             return True
     return False
 
 
 @compiled
 def is_explained(
-    f: Record, discs: Records, robots: int, x: float, y: float, beam_x: float, beam_y: float, reading: float
+    team: Team, me: Record, discs: Records, robots: int, beam_x: float, beam_y: float, reading: float
 ) -> bool:
     """Return whether a known object explains a sonar reading (m).
 
     One of the ``robots`` that head the list, or a wall. (beam_x, beam_y) is the beam's direction.
     """
-    radius, wide_beam = float(f.radius), float(f.wide_beam)
+    world = team.world
+    radius, wide_beam = float(world.radius), float(world.wide_beam)
     reach = reading + 2.0 * radius + _EXPLAINED
     for j in range(robots):
         dx, dy = discs[j].x, discs[j].y
@@ -54,103 +57,79 @@ def is_explained(
         along, across = dx * beam_x + dy * beam_y, dy * beam_x - dx * beam_y
         if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(across) < radius + 0.1):
             return True
-    return bool(f.walled) and wall_explains(f, x, y, beam_x, beam_y, reading)
+    return bool(world.walled) and wall_explains(team, me, beam_x, beam_y, reading)
 
 
 @compiled
-def wall_normal(k: int) -> tuple[float, float]:
-    """Return the outward normal of one of the four walls."""
-    return (1.0 if k == 0 else (-1.0 if k == 1 else 0.0), 1.0 if k == 2 else (-1.0 if k == 3 else 0.0))
-
-
-@compiled
-def slot_in_beam(
-    f: Record, d: Record, slots: Records, x: float, y: float, beam_x: float, beam_y: float, reading: float
-) -> int:
+def slot_in_beam(team: Team, me: Record, beam_x: float, beam_y: float, reading: float) -> int:
     """Return the slot whose occupant would give this echo, or -1.
 
     Where not all team-mates have a place in the observation, an echo from a slot is attributed to
     one of them, moving with the formation.
     """
-    for k in range(len(slots)):
-        place_x, place_y, _, _ = slot_place(d, slots[k])
-        dx, dy = place_x - x, place_y - y
+    world = team.world
+    for k in range(len(team.slots)):
+        place_x, place_y, _, _ = slot_place(me, team.slots[k])
+        dx, dy = place_x - me.x, place_y - me.y
         distance = length(dx, dy)
-        fits = abs(distance - 2.0 * f.radius - reading) < _SLOT_ECHO
-        if fits and dx * beam_x + dy * beam_y >= f.wide_beam * distance:
+        fits = abs(distance - 2.0 * world.radius - reading) < _SLOT_ECHO
+        if fits and dx * beam_x + dy * beam_y >= world.wide_beam * distance:
             return k
     return -1
 
 
 @compiled
-def surround(
-    f: Record,
-    s: Record,
-    d: Record,
-    mates: Records,
-    slots: Records,
-    own: int,
-    x: float,
-    y: float,
-    heading_c: float,
-    heading_s: float,
-    o: FloatArray,
-    beams: FloatArray,
-    discs: Records,
-) -> int:
+def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
     """List the nearby discs; return their number."""
-    count, two, radius = 0, 2.0 * f.radius, float(f.radius)
-    if d.known:
-        dx, dy = d.now_x - x, d.now_y - y
+    at, world, settings = team.at, team.world, team.settings
+    count, two, radius = 0, 2.0 * world.radius, float(world.radius)
+    if me.known:
+        dx, dy = me.target_x - me.x, me.target_y - me.y
         if dx * dx + dy * dy < _NEAR * _NEAR:
             # In a chase the target is not avoided: the law ends the chase in time.
-            reach, margin = (0.0, 0.0) if d.closing else (two, float(s.target_margin))
-            count = put_disc(discs, count, dx, dy, d.speed_x, d.speed_y, reach, margin)
-    few = f.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
+            reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
+            count = put_disc(discs, count, dx, dy, me.target_vx, me.target_vy, reach, margin)
+    few = at.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
-        if j == own or mate.step < 0 or (d.step - mate.step) * f.dt > s.forgotten:
+        if j == me.number or mate.step < 0 or (me.step - mate.step) * world.dt > settings.forgotten:
             continue
-        mx, my = mate_now(f, s, d, mate)
-        dx, dy = mx - x, my - y
+        mx, my = mate_now(team, me, mate)
+        dx, dy = mx - me.x, my - me.y
         if dx * dx + dy * dy < _NEAR * _NEAR:
             vx, vy = float(mate.speed_x), float(mate.speed_y)
-            age = (d.step - mate.step) * f.dt
-            if age > patience(s, d):
-                if few and length(dx, dy) < d.horizon:
+            age = (me.step - mate.step) * world.dt
+            if age > patience(team, me):
+                if few and length(dx, dy) < me.horizon:
                     continue  # there still, it would have a place in the observation
                 vx, vy = 0.0, 0.0
-            margin = s.margin + s.age_margin * min(age, s.most_age)
+            margin = settings.margin + settings.age_margin * min(age, settings.most_age)
             count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
     robots = count
-    if f.walled:
-        for k in range(4):
-            nx, ny = wall_normal(k)
-            away = f.extent - nx * x - ny * y
-            if away < _NEAR:
-                count = put_wall(discs, count, away, nx, ny, f.radius, s.margin)
-    strangers = d.known != 0 and few
-    if not strangers or d.step % max(1, round(s.taken_memory / f.dt)) == 0:
-        d.taken = _NO_BITS
-    farthest = f.sonar_range - _EXPLAINED
-    for k in range(f.sonar_beams):
-        reading = float(o[f.sonar + k])
+    if world.walled:
+        count = put_walls(discs, count, me.x, me.y, world.extent, _NEAR, world.radius, settings.margin)
+    strangers = me.known != 0 and few
+    if not strangers or me.step % max(1, round(settings.taken_memory / world.dt)) == 0:
+        me.taken = _NO_BITS
+    farthest = world.sonar_range - _EXPLAINED
+    for k in range(at.sonar_beams):
+        reading = float(row[at.sonar + k])
         if reading >= farthest:
             continue
-        beam_x = beams[0, k] * heading_c - beams[1, k] * heading_s
-        beam_y = beams[1, k] * heading_c + beams[0, k] * heading_s
-        if is_explained(f, discs, robots, x, y, beam_x, beam_y, reading):
+        beam_x = team.beams[0, k] * me.heading_cos - team.beams[1, k] * me.heading_sin
+        beam_y = team.beams[1, k] * me.heading_cos + team.beams[0, k] * me.heading_sin
+        if is_explained(team, me, discs, robots, beam_x, beam_y, reading):
             continue
         if strangers:
-            k_slot = slot_in_beam(f, d, slots, x, y, beam_x, beam_y, reading)
+            k_slot = slot_in_beam(team, me, beam_x, beam_y, reading)
             if k_slot >= 0:
-                d.taken |= _BIT << np.uint64(k_slot)
-                place_x, place_y, arm_x, arm_y = slot_place(d, slots[k_slot])
-                vx, vy = d.speed_x - d.psi_rate * arm_y, d.speed_y + d.psi_rate * arm_x
-                count = put_disc(discs, count, place_x - x, place_y - y, vx, vy, two, s.margin)
+                me.taken |= _BIT << np.uint64(k_slot)
+                place_x, place_y, arm_x, arm_y = slot_place(me, team.slots[k_slot])
+                vx, vy = me.target_vx - me.psi_rate * arm_y, me.target_vy + me.psi_rate * arm_x
+                count = put_disc(discs, count, place_x - me.x, place_y - me.y, vx, vy, two, settings.margin)
                 continue
         # Its position within the beam is unknown: a disc that fills most of the beam.
         wide = min(0.5, 0.4 * (reading + radius))
         away = reading + radius + wide
-        count = put_disc(discs, count, away * beam_x, away * beam_y, 0.0, 0.0, wide + radius, s.echo_margin)
+        count = put_disc(discs, count, away * beam_x, away * beam_y, 0.0, 0.0, wide + radius, settings.echo_margin)
     return count

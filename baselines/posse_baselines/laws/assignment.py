@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
-from posse.numeric import FloatArray, compiled
+import numpy.typing as npt
+
+from posse.numeric import compiled
 
 WORK_ROWS: Final = 7
 """Rows of the work array of :func:`assign`."""
@@ -13,7 +15,7 @@ _LARGE: Final = 1e30
 
 
 @compiled
-def assign(cost: FloatArray, rows: int, columns: int, work: FloatArray) -> None:
+def assign(cost: npt.NDArray[Any], rows: int, columns: int, work: npt.NDArray[Any]) -> None:
     """Assign every row to a column of its own so that the sum of the costs is least.
 
     The Hungarian method in the form of Jonker and Volgenant (1987): one row after the other is

@@ -1,4 +1,4 @@
-"""Offsets of observation fields for kernels."""
+"""Offsets of observation fields, and constants of a scenario, for kernels."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse import ObservationLayout
+from posse import ObservationLayout, Scenario
 from posse.numeric import Records
 from posse.scenarios.limits import OPEN_PLANE_EXTENT
 
@@ -61,6 +61,21 @@ OFFSETS: Final[np.dtype[Any]] = np.dtype(
                 ("stride", np.int32),  # length of one team-mate's part
                 ("sonar_beams", np.int32),
                 ("message_size", np.int32),
+            ],
+            align=True,
+        ),
+    )
+)
+"""Offsets of the fields of a layout.
+
+A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
+"""
+
+CONSTANTS: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
                 ("dt", np.float32),  # control step, s
                 ("sonar_range", np.float32),  # reading that means "nothing near", m
                 ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
@@ -74,10 +89,7 @@ OFFSETS: Final[np.dtype[Any]] = np.dtype(
         ),
     )
 )
-"""Of a layout: offsets of the fields, and constants of robot and arena.
-
-A team-mate's fields are those of the first place; the next ones follow ``stride`` apart.
-"""
+"""Of a scenario: constants of robots and arena."""
 
 
 def offsets_of(layout: ObservationLayout) -> Records:
@@ -89,6 +101,12 @@ def offsets_of(layout: ObservationLayout) -> Records:
     record["neighbours"], record["stride"] = layout.neighbours, layout.stride
     record["sonar_beams"] = scenario.sonar_beams
     record["message_size"] = scenario.message_size
+    return record
+
+
+def constants_of(scenario: Scenario) -> Records:
+    """Return an array of one :data:`CONSTANTS`."""
+    record = np.zeros(1, CONSTANTS)
     record["dt"] = scenario.control_step
     record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
     record["sonar_range"] = scenario.sonar_range

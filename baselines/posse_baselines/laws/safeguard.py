@@ -100,6 +100,25 @@ def put_wall(
 
 
 @compiled
+def wall_normal(k: int) -> tuple[float, float]:
+    """Return the outward normal of one of the four walls."""
+    return (1.0 if k == 0 else (-1.0 if k == 1 else 0.0), 1.0 if k == 2 else (-1.0 if k == 3 else 0.0))
+
+
+@compiled
+def put_walls(
+    discs: Records, count: int, x: float, y: float, extent: float, near: float, radius: float, margin: float
+) -> int:
+    """Add the walls of an arena, up to ``extent`` (m) from its middle, that are nearer than ``near`` to (x, y)."""
+    for k in range(4):
+        nx, ny = wall_normal(k)
+        away = extent - nx * x - ny * y
+        if away < near:
+            count = put_wall(discs, count, away, nx, ny, radius, margin)
+    return count
+
+
+@compiled
 def turned(body: Record, error: float) -> tuple[float, float]:
     """Return the direction (x, y) of a robot that has turned by an angle (rad)."""
     c, s = math.cos(error), math.sin(error)

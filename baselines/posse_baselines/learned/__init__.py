@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from posse_baselines.learned.encoder import Encoder
 from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.lstm import LSTM
 from posse_baselines.learned.network import Network
 from posse_baselines.learned.policy import LearnedPolicy
 
-__all__ = ["LSTM", "Encoder", "Encoding", "LearnedPolicy", "Network"]
+__all__ = ["Encoder", "Encoding", "LearnedPolicy", "Network"]

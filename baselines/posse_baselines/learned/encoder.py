@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import MOST_THREADS, Blocks, FloatArray, OwnArrays, compiled, kernel, over_worlds, worlds_of
+from posse.numeric import MOST_THREADS, Blocks, FloatArray, OwnArrays, Records, compiled, kernel, over_worlds, worlds_of
 from posse_baselines.learned.encoding import Columns, Encoding
 from posse_baselines.learned.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
 
@@ -16,7 +15,7 @@ def encode_row(
     row: FloatArray,
     columns: Columns,
     unknown: FloatArray,
-    offsets: npt.NDArray[np.int64],
+    fields: Records,
     slots: FloatArray,
     with_features: int,
     scratch: FloatArray,
@@ -26,7 +25,7 @@ def encode_row(
     start = 0
     if with_features:
         start = NUM_FEATURES
-        write_features(row, offsets, slots, scratch, out[:start])
+        write_features(row, fields[0], slots, scratch, out[:start])
     for k in range(len(columns)):
         c = columns[k]
         out[start + k] = row[c] if c >= 0 else unknown[k]
@@ -37,7 +36,7 @@ def _encode_rows(
     rows: FloatArray,
     columns: Columns,
     unknown: FloatArray,
-    offsets: npt.NDArray[np.int64],
+    fields: Records,
     slots: FloatArray,
     with_features: int,
     scratch: FloatArray,
@@ -47,7 +46,7 @@ def _encode_rows(
 ) -> None:
     s = scratch[thread]
     for r in worlds_of(thread, blocks):
-        encode_row(rows[r], columns, unknown, offsets, slots, with_features, s, out[r])
+        encode_row(rows[r], columns, unknown, fields, slots, with_features, s, out[r])
 
 
 class Encoder(OwnArrays):
@@ -60,9 +59,9 @@ class Encoder(OwnArrays):
     def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
         self.encoding = encoding
         columns, unknown = encoding.columns(layout)
-        offsets, slots = feature_tables(layout)
+        fields, slots = feature_tables(layout)
         self._scratch = np.empty((MOST_THREADS, SCRATCH), np.float32)
-        self.tables = (columns, unknown, offsets, slots, int(encoding.with_features))
+        self.tables = (columns, unknown, fields, slots, int(encoding.with_features))
         """The arguments of :func:`encode_row` between the observation and the scratch memory."""
 
     def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:

@@ -11,14 +11,14 @@ d / (d + scale), which resolves both centimetres near the slot and tens of metre
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from posse import ObservationLayout
-from posse.numeric import FloatArray, compiled
+from posse.numeric import FloatArray, Records, compiled
 from posse.scenarios.formation import slot_offsets
+from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.learned.team import MOST, OLDEST, gather_team, match_slots, sort_by_number
 from posse_baselines.policy import PolicyError
 
@@ -35,7 +35,7 @@ NUM_FEATURES: Final = 25 + 4 * _MATES
 SCRATCH: Final = MOST * (4 + 64)
 """Scratch memory of :func:`write_features`, in float32 numbers."""
 
-_NAMES: Final = (
+_NEEDED: Final = (
     "speed",
     "turn_rate",
     "max_speed",
@@ -51,42 +51,20 @@ _NAMES: Final = (
     "neighbour_number",
     "number",
 )
-(
-    _SPEED,
-    _TURN,
-    _MAX_SPEED,
-    _MAX_TURN,
-    _KNOWN,
-    _SEEN,
-    _AGE,
-    _RANGE,
-    _BEARING,
-    _HEADING,
-    _FRAME,
-    _VELOCITY,
-    _MATE,
-    _NUMBER,
-    _STRIDE,
-    _PLACES,
-) = range(16)
-
-Offsets = npt.NDArray[np.int64]
 
 
-def feature_tables(layout: ObservationLayout) -> tuple[Offsets, FloatArray]:
-    """Return the offsets of the fields that features are computed from, and the slots (N, 2).
+def feature_tables(layout: ObservationLayout) -> tuple[Records, FloatArray]:
+    """Return the offsets of a layout's fields, an array of one record, and the slots (N, 2).
 
     Raises:
-        PolicyError: The layout lacks such a field.
+        PolicyError: The layout lacks a field that features are computed from.
     """
-    missing = [name for name in _NAMES if name not in layout.offsets]
+    missing = [name for name in _NEEDED if name not in layout.offsets]
     if missing:
         raise PolicyError(
             f"the observations of scenario {layout.scenario.name!r} lack {missing[0]!r}, which the policy needs"
         )
-    offsets = [layout.offsets[name] for name in _NAMES] + [layout.stride, layout.neighbours]
-    slots = np.array(slot_offsets(layout.scenario), np.float32)
-    return np.array(offsets, np.int64), slots
+    return offsets_of(layout), np.array(slot_offsets(layout.scenario), np.float32)
 
 
 @compiled
@@ -108,37 +86,34 @@ def _slot_y(slots: FloatArray, s: int, y: np.float32, c: np.float32, n: np.float
 
 
 @compiled
-def write_features(row: FloatArray, at: Offsets, slots: FloatArray, scratch: FloatArray, out: FloatArray) -> None:
+def write_features(row: FloatArray, f: Any, slots: FloatArray, scratch: FloatArray, out: FloatArray) -> None:
     """Write the features of one observation (F,) to ``out`` (NUM_FEATURES,).
 
-    ``at`` and ``slots`` come from :func:`feature_tables`; ``scratch`` is (SCRATCH,).
+    The record ``f`` and ``slots`` come from :func:`feature_tables`; ``scratch`` is (SCRATCH,).
     """
     for k in range(NUM_FEATURES):
         out[k] = _ZERO
     xs, ys, numbers = scratch[:MOST], scratch[MOST : 2 * MOST], scratch[2 * MOST : 3 * MOST]
     chosen, ways = scratch[3 * MOST : 4 * MOST], scratch[4 * MOST :]
-    mates_at, stride, places = at[_MATE], at[_STRIDE], at[_PLACES]
-    count = gather_team(row, row[at[_NUMBER]], mates_at, stride, places, xs, ys, numbers)
-    top, speed = row[at[_MAX_SPEED]], row[at[_SPEED]]
+    count = gather_team(row, f, xs, ys, numbers)
+    top, speed = row[f.max_speed], row[f.speed]
     out[0] = speed / top
-    out[1] = row[at[_TURN]] / row[at[_MAX_TURN]]
+    out[1] = row[f.turn_rate] / row[f.max_turn_rate]
     for m in range(min(count - 1, _MATES)):
-        k = at[_MATE] + m * at[_STRIDE]
+        place = m * f.stride
+        heading, mate_speed = f.neighbour_heading + place, row[f.neighbour_speed + place]
         _soft(xs[m + 1], ys[m + 1], _ONE, out[2 + 4 * m : 4 + 4 * m])
-        out[4 + 4 * m] = row[k + 7] * row[k + 5] - speed
-        out[5 + 4 * m] = row[k + 7] * row[k + 6]
-    if row[at[_KNOWN]] == _ZERO:
+        out[4 + 4 * m] = mate_speed * row[heading] - speed
+        out[5 + 4 * m] = mate_speed * row[heading + 1]
+    if row[f.target_known] == _ZERO:
         return
     o = out[2 + 4 * _MATES :]
-    k = at[_VELOCITY]
-    vx, vy = row[k], row[k + 1]
-    age = min(row[at[_AGE]], OLDEST)
-    k = at[_BEARING]
-    x = row[at[_RANGE]] * row[k] + vx * age
-    y = row[at[_RANGE]] * row[k + 1] + vy * age
-    k = at[_FRAME]
-    c, n = row[k], row[k + 1]
-    k = at[_HEADING]
+    vx, vy = row[f.target_velocity], row[f.target_velocity + 1]
+    age = min(row[f.target_age], OLDEST)
+    x = row[f.target_range] * row[f.target_bearing] + vx * age
+    y = row[f.target_range] * row[f.target_bearing + 1] + vy * age
+    c, n = row[f.target_frame], row[f.target_frame + 1]
+    hx, hy = row[f.target_heading], row[f.target_heading + 1]
     me = sort_by_number(count, xs, ys, numbers)
     num_slots = len(slots)
     for s in range(num_slots):
@@ -156,8 +131,8 @@ def write_features(row: FloatArray, at: Offsets, slots: FloatArray, scratch: Flo
     _soft(dx, dy, _FAR, o[2:4])
     o[4] = d / (d + _ONE)
     _soft(x, y, _ONE, o[5:7])
-    o[7] = row[k] * c + row[k + 1] * n  # its heading in the slot frame
-    o[8] = row[k + 1] * c - row[k] * n
+    o[7] = hx * c + hy * n  # its heading in the slot frame
+    o[8] = hy * c - hx * n
     o[9], o[10] = vx, vy
     o[11], o[12] = c, n
     _soft(slots[mine, 0], slots[mine, 1], _FAR, o[13:15])
@@ -168,13 +143,13 @@ def write_features(row: FloatArray, at: Offsets, slots: FloatArray, scratch: Flo
     o[15] = min(wanted / top, _ONE)
     o[16] = wx / (wanted + _SMALL)
     o[17] = wy / (wanted + _SMALL)
-    o[18] = max(-_ONE, min(_ONE, _TURN_GAIN * error / row[at[_MAX_TURN]]))
+    o[18] = max(-_ONE, min(_ONE, _TURN_GAIN * error / row[f.max_turn_rate]))
     held = 0
     for j in range(count):
         s = int(chosen[j])
         if s >= 0 and j != me:
             held += ways[j * num_slots + s] < _NEAR
     o[19] = np.float32(held) / np.float32(max(count - 1, 1))
-    o[20] = row[at[_SEEN]]
-    o[21] = row[at[_AGE]] / (row[at[_AGE]] + _ONE)
+    o[20] = row[f.target_seen]
+    o[21] = row[f.target_age] / (row[f.target_age] + _ONE)
     o[22] = _ONE

@@ -1,4 +1,4 @@
-"""A network as plain arrays: layers, with a recurrent one before them or without."""
+"""A network as plain arrays."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, OwnArrays
-from posse_baselines.learned.lstm import GATES, LSTM, STATES
 from posse_baselines.policy import PolicyError
 
 ACTIVATIONS: Final = ("tanh", "relu")
@@ -17,8 +16,6 @@ OUTPUTS: Final = ("clip", "tanh")
 """Functions that bring the output into [-1, 1]."""
 LARGEST: Final = 1e30
 """Largest absolute value of an input statistic or of ``limit``: differences stay finite."""
-LSTM_TENSORS: Final = ("input_weights", "memory_weights", "biases")
-"""A policy file's names for the arrays of an LSTM, behind ``lstm.``."""
 
 _FLOAT_MAX: Final = float(np.finfo(np.float32).max)
 
@@ -27,9 +24,8 @@ _FLOAT_MAX: Final = float(np.finfo(np.float32).max)
 class Network(OwnArrays):
     """A network with its input normalisation, all float32.
 
-    x = clip((input - mean) * scale, ±limit), then the recurrent layer, if there is one, then layers
-    of weight (out, in) and bias (out,) with the activation between them; ``output`` brings the
-    result into [-1, 1].
+    x = clip((input - mean) * scale, ±limit), then layers of weight (out, in) and bias (out,) with
+    the activation between them; ``output`` brings the result into [-1, 1].
     """
 
     mean: FloatArray
@@ -39,7 +35,6 @@ class Network(OwnArrays):
     biases: tuple[FloatArray, ...]
     activation: str
     output: str
-    lstm: LSTM | None = None
 
     @property
     def inputs(self) -> int:
@@ -52,23 +47,14 @@ class Network(OwnArrays):
         return len(self.weights[-1])
 
     @property
-    def cells(self) -> int:
-        """Cells of the recurrent layer; 0: there is none."""
-        return 0 if self.lstm is None else self.lstm.cells
-
-    @property
     def sizes(self) -> tuple[int, ...]:
-        """Length of what the layers after the recurrent one read, and of each one's output."""
-        return (self.weights[0].shape[1], *(weight.shape[0] for weight in self.weights))
+        """Numbers that the first layer reads, and that each layer computes."""
+        return (self.inputs, *(weight.shape[0] for weight in self.weights))
 
     @property
     def widest(self) -> int:
         """Most numbers that any layer reads or computes."""
-        return max(self.inputs, GATES * self.cells, *self.sizes)
-
-    def fresh(self, *shape: int) -> FloatArray:
-        """Return the states (..., 2, cells) at the start of an episode: zeros."""
-        return np.zeros((*shape, STATES, self.cells), np.float32)
+        return max(self.sizes)
 
     def check(self) -> None:
         """Raise unless the network returns finite actions for every observation.
@@ -100,9 +86,6 @@ class Network(OwnArrays):
                 f"input statistics of shapes {self.mean.shape} and {self.scale.shape}: both must be (inputs,)"
             )
         size = self.inputs
-        if self.lstm is not None:
-            self.lstm.check_shapes(size)
-            size = self.lstm.cells
         for weight, bias in zip(self.weights, self.biases, strict=True):
             if weight.ndim != 2 or weight.shape[1] != size or bias.shape != weight.shape[:1]:
                 raise PolicyError(
@@ -114,16 +97,6 @@ class Network(OwnArrays):
     def _check_reach(self) -> None:
         """Raise if a sum of the largest possible terms exceeds float32 in some layer."""
         reach: npt.NDArray[Any] = np.full(self.inputs, float(self.limit))
-        if self.lstm is not None:
-            # Its output lies in [-1, 1]; its cells grow by 1 a step at most.
-            terms = np.abs(self.lstm.input_weights.astype(np.float64)) @ reach
-            terms += np.abs(self.lstm.memory_weights.astype(np.float64)).sum(axis=1)
-            if (terms + np.abs(self.lstm.biases.astype(np.float64)) > _FLOAT_MAX).any():
-                raise PolicyError(
-                    "the weights of the LSTM are so large that its sums can overflow float32: "
-                    "train with smaller weights"
-                )
-            reach = np.ones(self.cells)
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             terms = np.abs(weight.astype(np.float64)) @ reach
             reach = terms + np.abs(bias.astype(np.float64))
@@ -135,34 +108,12 @@ class Network(OwnArrays):
             if self.activation == "tanh":
                 reach = np.ones(len(reach))
 
-    def forward(self, inputs: FloatArray) -> FloatArray:
-        """Return the actions (..., out) for inputs (..., in) that start episodes, in numpy."""
-        return self.step(inputs, self.fresh(*inputs.shape[:-1]))[0]
-
-    def step(self, inputs: FloatArray, states: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return actions (..., out) and new states for inputs (..., in) and states, in numpy.
-
-        States are (..., 2, cells), those of :meth:`fresh` when an episode starts.
-        """
-        x = np.clip((inputs - self.mean) * self.scale, -self.limit, self.limit)
-        if self.lstm is not None:
-            states = self.lstm.step(x, states)
-            x = states[..., 0, :]
-        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            x = x @ weight.T + bias
-            if k < len(self.weights) - 1:
-                x = np.tanh(x) if self.activation == "tanh" else np.maximum(x, np.float32(0))
-        y = np.tanh(x) if self.output == "tanh" else np.clip(x, -1, 1)
-        return np.asarray(y, np.float32), states
-
     def tensors(self) -> dict[str, FloatArray]:
         """Return the arrays by their names in a policy file."""
         named = {"normaliser.mean": self.mean, "normaliser.scale": self.scale}
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             named[f"layers.{k}.weight"] = weight
             named[f"layers.{k}.bias"] = bias
-        if self.lstm is not None:
-            named |= {f"lstm.{name}": getattr(self.lstm, name) for name in LSTM_TENSORS}
         return {name: np.ascontiguousarray(array) for name, array in named.items()}
 
     def flat(self) -> tuple[Any, ...]:
@@ -171,17 +122,13 @@ class Network(OwnArrays):
         Weights lie input by input, so that the kernel's inner loop vectorises.
         """
         weights = [np.ascontiguousarray(weight.T).reshape(-1) for weight in self.weights]
-        biases = list(self.biases)
-        if self.lstm is not None:
-            first, bias = self.lstm.flat()
-            weights, biases = [first, *weights], [bias, *biases]
         return (
             np.ascontiguousarray(self.mean),
             np.ascontiguousarray(self.scale),
             np.float32(self.limit),
             np.array(self.sizes, np.int64),
             np.concatenate(weights),
-            np.concatenate(biases),
+            np.concatenate(self.biases),
             int(self.activation == "tanh"),
             int(self.output == "tanh"),
         )

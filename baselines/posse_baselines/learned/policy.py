@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,17 +19,13 @@ from posse_baselines.learned.encoder import Encoder
 from posse_baselines.learned.encoding import Encoding
 from posse_baselines.learned.features import SCRATCH
 from posse_baselines.learned.forward import act
-from posse_baselines.learned.lstm import LSTM
-from posse_baselines.learned.network import LSTM_TENSORS, Network
-from posse_baselines.learned.policy_file import read_policy_file, write_atomically, write_policy_file
+from posse_baselines.learned.network import Network
+from posse_baselines.learned.policy_file import read_policy_file, write_policy_file
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations, message_size_of
 
-FORMATS: Final = (1, 2, 3)
-"""Formats of policy files. 2: with a correction, or a belief, that format 1 does not know. 3: with
-a recurrent layer."""
-MEMORIES: Final = (None, "lstm")
-"""Recurrent layers of a policy file; ``None``: there is none."""
+FORMAT: Final = 1
+"""Version of the policy file's format."""
 
 
 @dataclass
@@ -39,8 +34,8 @@ class _Memory(OwnArrays):
 
     layout: ObservationLayout
     num_worlds: int
+    robots: int
     encoder: Encoder
-    states: FloatArray  # of the network's recurrent layer, (E, robots, 2, cells)
     adviser: Memory
 
 
@@ -110,7 +105,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         return other
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` worlds: the network's states, and the adviser's.
+        """Return the memory of ``num_worlds`` worlds: the adviser's.
 
         Raises:
             PolicyError: The layout lacks a field that the network reads, or has another size of it.
@@ -118,9 +113,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         super().begin(layout, num_worlds)
         encoder = Encoder(self.encoding, layout)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
-        states = self.network.fresh(num_worlds, robots)
         adviser_memory = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        return _Memory(layout, num_worlds, encoder, states, adviser_memory)
+        return _Memory(layout, num_worlds, robots, encoder, adviser_memory)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -128,71 +122,56 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         One that moves the target takes (E, 1, F).
         """
         m: _Memory = memory
-        robots = m.states.shape[1]
-        observations = check_observations(self, observations, m.num_worlds, m.layout, robots)
+        observations = check_observations(self, observations, m.num_worlds, m.layout, m.robots)
         length = MOTION + message_size_of(m.layout)
-        actions = np.empty((m.num_worlds, robots, length), np.float32)
+        actions = np.empty((m.num_worlds, m.robots, length), np.float32)
         scratch = np.empty((MOST_THREADS, SCRATCH + 2 * self.network.widest), np.float32)
         proposals = inputs = actions[..., :0]
         if self._advising is not None:
             proposals, inputs, m.adviser = self._advising.ask(observations, m.adviser)
         over_worlds(
             act,
-            (observations, *m.encoder.tables, np.ascontiguousarray(inputs), *self._numbers, scratch, m.states, actions),
+            (observations, *m.encoder.tables, np.ascontiguousarray(inputs), *self._numbers, scratch, actions),
             m.num_worlds,
-            robots,
+            m.robots,
         )
         if self._advising is not None:
             actions, m.adviser = self._advising.answer(observations, proposals, actions[..., :MOTION], m.adviser)
         return actions, m
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with network and adviser restarted in the worlds of a mask (E,)."""
+        """Return the memory with the adviser restarted in the worlds of a mask (E,)."""
         m: _Memory = memory
-        m.states[mask] = 0
         if self.adviser is not None:
             m.adviser = self.adviser.restart(m.adviser, mask)
         return m
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory of network and adviser as arrays by name; views, not copies."""
-        m: _Memory = memory
-        own = {"lstm": m.states} if self.network.cells else {}
-        return own if self.adviser is None else {**self.adviser.arrays(m.adviser), **own}
+        """Return the adviser's memory as arrays by name; views, not copies."""
+        return {} if self.adviser is None else self.adviser.arrays(memory.adviser)
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
         return {} if self.adviser is None else self.adviser.annotations(memory.adviser)
 
     def save(self, path: Path) -> None:
-        """Write the policy as one file, and its card beside it as readable JSON.
-
-        Each file replaces an old one atomically.
+        """Write the policy and its card as one file, which replaces an old one atomically.
 
         Raises:
-            OSError: A file could not be written; an old one of that name is unchanged.
+            OSError: It could not be written; an old file of that name is unchanged.
         """
-        correction = "motion" if self._advising is None else self._advising.correction
-        needed = 2 if correction != "motion" or self.encoding.believes else 1
-        if self.network.cells:
-            needed = 3
         description = {
-            "format": needed,
+            "format": FORMAT,
             "limit": self.network.limit,
             "activation": self.network.activation,
             "output": self.network.output,
             "encoding": self.encoding.to_dict(),
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
+            "correction": "motion" if self._advising is None else self._advising.correction,
         }
-        if needed > 1:
-            description["correction"] = correction
-        if self.network.cells:
-            description["memory"] = "lstm"
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), description)
-        card = json.dumps(self.card, indent=2, sort_keys=True) + "\n"
-        write_atomically(path.with_suffix(".json"), card.encode())
 
     @classmethod
     def from_file(cls, path: str | Path) -> LearnedPolicy:
@@ -212,10 +191,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     @classmethod
     def _from_parts(cls, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]) -> LearnedPolicy:
-        if description["format"] not in FORMATS:
+        if description["format"] != FORMAT:
             raise PolicyError(
-                f"its format is {description['format']!r:.80}, this version reads "
-                f"{', '.join(map(str, FORMATS))}: install the version that wrote it"
+                f"its format is {description['format']!r:.80}, this version reads {FORMAT}: "
+                "install the version that wrote it"
             )
         count = sum(name.endswith(".weight") for name in tensors)
         network = Network(
@@ -226,25 +205,11 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             biases=tuple(tensors[f"layers.{k}.bias"] for k in range(count)),
             activation=str(description["activation"]),
             output=str(description["output"]),
-            lstm=_lstm(description.get("memory"), tensors),
         )
         encoding = Encoding.from_dict(description["encoding"])
         return cls(
-            network,
-            encoding,
-            description["card"],
-            _adviser(description.get("adviser")),
-            str(description.get("correction", "motion")),
+            network, encoding, description["card"], _adviser(description["adviser"]), str(description["correction"])
         )
-
-
-def _lstm(memory: Any, tensors: Mapping[str, FloatArray]) -> LSTM | None:
-    """Return the recurrent layer of a file, if it has one."""
-    if memory not in MEMORIES:
-        raise PolicyError(f"its memory {memory!r:.80} is unknown: install the version that wrote it")
-    if memory is None:
-        return None
-    return LSTM(**{name: tensors[f"lstm.{name}"] for name in LSTM_TENSORS})
 
 
 def _adviser(name: str | None) -> Adviser | None:

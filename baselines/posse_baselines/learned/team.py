@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,31 +21,25 @@ _BIT: Final = np.uint64(1)
 
 
 @compiled
-def gather_team(
-    row: FloatArray,
-    own_number: np.float32,
-    mates_at: int,
-    stride: int,
-    places: int,
-    xs: FloatArray,
-    ys: FloatArray,
-    numbers: FloatArray,
-) -> int:
+def gather_team(row: FloatArray, f: Any, xs: FloatArray, ys: FloatArray, numbers: FloatArray) -> int:
     """Write the present positions of the known team, own robot first; return their number.
 
-    The fields of team-mate p begin at ``mates_at + p * stride`` of the observation ``row``. All
-    positions are relative to the own robot: x ahead, y to the left, m.
+    ``f`` has the offsets of the fields of the observation ``row``. All positions are relative to
+    the own robot: x ahead, y to the left, m.
     """
-    xs[0], ys[0], numbers[0] = _ZERO, _ZERO, own_number
+    xs[0], ys[0], numbers[0] = _ZERO, _ZERO, row[f.number]
     count = 1
-    for p in range(places):
-        k = mates_at + p * stride
-        if row[k] < _ZERO or count >= MOST:
+    for p in range(f.neighbours):
+        place = p * f.stride
+        number = row[f.neighbour_number + place]
+        if number < _ZERO or count >= MOST:
             continue
-        reach = row[k + 7] * min(row[k + 1], OLDEST)
-        xs[count] = row[k + 2] * row[k + 3] + row[k + 5] * reach
-        ys[count] = row[k + 2] * row[k + 4] + row[k + 6] * reach
-        numbers[count] = row[k]
+        length, bearing = row[f.neighbour_range + place], f.neighbour_bearing + place
+        heading = f.neighbour_heading + place
+        reach = row[f.neighbour_speed + place] * min(row[f.neighbour_age + place], OLDEST)
+        xs[count] = length * row[bearing] + row[heading] * reach
+        ys[count] = length * row[bearing + 1] + row[heading + 1] * reach
+        numbers[count] = number
         count += 1
     return count
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.numeric import Blocks, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, worlds_of
-from posse_baselines.laws.offsets import offsets_of
+from posse_baselines.laws.offsets import constants_of, offsets_of
 from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
 
 _KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
@@ -22,6 +22,7 @@ class _PursuitMemory(OwnArrays):
     layout: ObservationLayout
     num_worlds: int
     offsets: Records
+    constants: Records
 
 
 class Pursuit(BasePolicy):
@@ -32,7 +33,7 @@ class Pursuit(BasePolicy):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
         """Return the memory: the layout, the number of worlds, where the fields are."""
         check_fits(self, layout)
-        return _PursuitMemory(layout, num_worlds, offsets_of(layout))
+        return _PursuitMemory(layout, num_worlds, offsets_of(layout), constants_of(layout.scenario))
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions straight at the last fix of the target; in a circle without one."""
@@ -40,26 +41,26 @@ class Pursuit(BasePolicy):
         observations = check_observations(self, observations, m.num_worlds, m.layout)
         num_worlds, num_trackers = observations.shape[:2]
         actions = np.zeros((num_worlds, num_trackers, 2 + message_size_of(m.layout)), np.float32)
-        over_worlds(pursue_all, (m.offsets, observations, actions), num_worlds, num_trackers)
+        over_worlds(pursue_all, (m.offsets, m.constants, observations, actions), num_worlds, num_trackers)
         return actions, memory
 
 
 @compiled
-def pursue(f: Record, o: FloatArray, action: FloatArray) -> None:
+def pursue(at: Record, dt: float, row: FloatArray, action: FloatArray) -> None:
     """Write one tracker's action (2 + m,) for what it is given, (F,)."""
     speed, turn = 1.0, 0.2
-    if o[f.target_known] > 0.0:
-        age = max(0.0, o[f.target_age])
-        x = o[f.target_range] * o[f.target_bearing] + age * o[f.target_velocity]
-        y = o[f.target_range] * o[f.target_bearing + 1] + age * o[f.target_velocity + 1]
+    if row[at.target_known] > 0.0:
+        age = max(0.0, row[at.target_age])
+        x = row[at.target_range] * row[at.target_bearing] + age * row[at.target_velocity]
+        y = row[at.target_range] * row[at.target_bearing + 1] + age * row[at.target_velocity + 1]
         bearing = math.atan2(y, x)
-        turn = bearing / (2.0 * f.dt * o[f.max_turn_rate])
+        turn = bearing / (2.0 * dt * row[at.max_turn_rate])
         speed = max(0.0, math.cos(bearing)) if math.hypot(x, y) > _STOP else 0.0
     # The nearest thing within the keep-away width turns it aside, and slows it if it is ahead.
-    for k in range(f.sonar_beams):
-        gap = o[f.sonar + k]
+    for k in range(at.sonar_beams):
+        gap = row[at.sonar + k]
         if gap < _KEEP_AWAY:
-            angle = 2.0 * math.pi * k / f.sonar_beams
+            angle = 2.0 * math.pi * k / at.sonar_beams
             angle = angle - 2.0 * math.pi if angle > math.pi else angle
             closeness = 1.0 - gap / _KEEP_AWAY
             if math.cos(angle) > 0.3:
@@ -70,9 +71,11 @@ def pursue(f: Record, o: FloatArray, action: FloatArray) -> None:
 
 
 @kernel
-def pursue_all(offsets: Records, observations: FloatArray, actions: FloatArray, thread: int, blocks: Blocks) -> None:
+def pursue_all(
+    offsets: Records, constants: Records, observations: FloatArray, actions: FloatArray, thread: int, blocks: Blocks
+) -> None:
     """Write the actions of a thread's worlds."""
-    f = offsets[0]
+    at, dt = offsets[0], constants[0].dt
     for e in worlds_of(thread, blocks):
         for i in range(observations.shape[1]):
-            pursue(f, observations[e, i], actions[e, i])
+            pursue(at, dt, observations[e, i], actions[e, i])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from posse_baselines.ddcs import DDCS, Settings
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.policies.planner import Planner
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 from posse_baselines.ddcs import Settings
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.files import read_json
 from posse_baselines.policy import PolicyError
 from posse_baselines.tuning import tunables
 
@@ -48,9 +48,7 @@ def read_tuned(path: Path) -> TunedFile:
             tunable or out of its range.
     """
     try:
-        card = json.loads(path.read_text(encoding="utf-8"))
-    except RecursionError:
-        raise PolicyError(f"{path} is damaged: its values are nested too deeply") from None
+        card = read_json(path)
     except FileNotFoundError:
         raise PolicyError(f"there is no policy file {path}") from None
     except (OSError, ValueError) as error:

@@ -7,7 +7,7 @@ from typing import Final
 
 from posse import Scenario
 from posse_baselines.ddcs import DDCS, Settings
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.tuned.files import read_tuned, tuned_files
 
 TUNED: Final = {"ddcs-tuned": "ddcs-distributed", "pngl-l-phi-tuned": "pngl-l-phi"}

@@ -125,7 +125,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     def state_space(self) -> spaces.Box:
         """Space of :meth:`state`."""
         if self._state_space is None:
-            self._state_space = box(self.state_layout.bounds())
+            self._state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
         return self._state_space
 
     def reset(

@@ -18,7 +18,7 @@ from posse.engine.paired_batch import TargetPolicy, batch_for
 from posse.numeric import FloatArray
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario, get_scenario
-from posse.scenarios.setting import is_number, is_one_of
+from posse.scenarios.setting import is_one_of
 from posse.shown import shown
 from posse.signals.global_state import StateLayout
 from posse.signals.reward import namer
@@ -227,14 +227,7 @@ def frames_per_second(scenario: Scenario) -> int:
 def shortened(scenario: str | Scenario, horizon: int | None, overrides: Mapping[str, Any]) -> Scenario:
     """Return a scenario with overrides, and ``horizon`` steps per episode unless that is None.
 
-    For ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium). ``settle_time`` is
-    reduced to the episode's length where necessary.
+    For ``max_cycles`` (PettingZoo) and ``max_episode_steps`` (Gymnasium).
     """
-    changed = dict(overrides)
-    if horizon is None:
-        return get_scenario(scenario, **changed)
-    full = get_scenario(scenario, **changed)
-    changed["horizon"] = horizon
-    if is_number(horizon) and horizon > 0:
-        changed["settle_time"] = min(full.settle_time, horizon * full.control_step)
+    changed = overrides if horizon is None else {**overrides, "horizon": horizon}
     return get_scenario(scenario, **changed)

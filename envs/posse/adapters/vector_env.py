@@ -57,8 +57,6 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the first world.
         num_threads: Threads that step the worlds; never changes a result.
-        own_kernel: Whether to compile a kernel for this scenario, about a third faster; never
-            changes a result.
         target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
         flat_infos: Whether infos are without nested dictionaries: ``info["metrics/score"]`` for
             ``info["metrics"]["score"]``.
@@ -90,7 +88,6 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         split: str = "train",
         first_world: int = 0,
         num_threads: int | None = None,
-        own_kernel: bool = False,
         target_policy: TargetPolicy | None = None,
         flat_infos: bool = False,
         **overrides: Any,
@@ -108,7 +105,6 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             first_world=first_world,
             autoreset=_MODES[self.autoreset_mode],
             num_threads=num_threads,
-            own_kernel=own_kernel,
         )
         self._seeded = seed is not None
         self.num_envs = num_envs

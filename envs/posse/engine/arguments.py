@@ -121,9 +121,7 @@ def check_array(name: str, array: object, shape: tuple[int, ...]) -> None:
         )
 
 
-def check_settings(
-    num_worlds: int, first_world: int, split: str, autoreset: str, num_threads: int | None, own_kernel: bool
-) -> None:
+def check_settings(num_worlds: int, first_world: int, split: str, autoreset: str, num_threads: int | None) -> None:
     """Raise ScenarioError if these settings of a batch are invalid."""
     num_worlds = check_count("num_worlds", num_worlds, 1)
     first_world = check_count("first_world", first_world, 0)
@@ -133,8 +131,6 @@ def check_settings(
         )
     if num_threads is not None:
         check_count("num_threads", num_threads, 1)
-    if not isinstance(own_kernel, bool):
-        raise ScenarioError(f"own_kernel={shown(own_kernel)} is not possible: it is True or False")
     if not is_one_of(SPLITS, split):
         raise ScenarioError(f"unknown split {shown(split)}; splits are: {', '.join(SPLITS)}")
     if not is_one_of(AUTORESET_MODES, autoreset):

@@ -20,6 +20,7 @@ from posse.engine.kernels import LOOK, START, START_FROM_POSES, Results, first_o
 from posse.engine.start_poses import check_overlap, check_room_to_turn, poses_of, write_poses
 from posse.engine.stepping import Stepping
 from posse.numeric import BoolArray, FloatArray, divide
+from posse.rules.start import check_drawn
 from posse.rules.state import SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
 from posse.shown import shown
@@ -54,9 +55,6 @@ class Batch(Stepping):
             once and the last observation is ``infos["final_obs"]``; ``"disabled"``: the caller
             resets, with ``options={"reset_mask": mask}``.
         num_threads: Threads that step the worlds; default: one per core. Never changes a result.
-        own_kernel: Whether to use a kernel compiled for this scenario: about a third faster, with
-            the same results. It takes as long to compile as the kernel for all scenarios, once per
-            scenario, and is cached on disk.
 
     Attributes:
         layout: Position of each field in an observation.
@@ -65,8 +63,7 @@ class Batch(Stepping):
         action_shape: (E, rows, 2 + message_size).
 
     Raises:
-        ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode,
-            an ``own_kernel`` that is not a boolean.
+        ScenarioError: ``num_worlds`` below 1, a negative seed, an unknown split or autoreset mode.
     """
 
     def __init__(
@@ -79,9 +76,8 @@ class Batch(Stepping):
         first_world: int = 0,
         autoreset: str = "next_step",
         num_threads: int | None = None,
-        own_kernel: bool = False,
     ) -> None:
-        check_settings(num_worlds, first_world, split, autoreset, num_threads, own_kernel)
+        check_settings(num_worlds, first_world, split, autoreset, num_threads)
         self.scenario = scenario
         self.num_worlds = int(num_worlds)
         self.seed = check_seed(seed)
@@ -89,7 +85,6 @@ class Batch(Stepping):
         self.first_world = int(first_world)
         self.autoreset = autoreset
         self.num_threads = num_threads or os.cpu_count() or 1
-        self.own_kernel = own_kernel
         self.layout = ObservationLayout(scenario)
         rows = scenario.num_agents
         self.observation_shape = (num_worlds, rows, self.layout.size)
@@ -102,6 +97,7 @@ class Batch(Stepping):
                 f"num_worlds={num_worlds} of {each} bytes each are more than there is memory for: lower it"
             ) from None
         self._started = False
+        self._restarts = True  # whether the next step may start episodes
         self._prepare()
 
     def save(self) -> Snapshot:
@@ -129,7 +125,7 @@ class Batch(Stepping):
                 f"{self.scenario.name!r}: scenario and number of worlds must be equal"
             )
         self._arrays.write(snapshot.arrays)
-        self._started = True
+        self._started = self._restarts = True
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
 
     def observe(self) -> FloatArray:
@@ -169,7 +165,7 @@ class Batch(Stepping):
                 self.scenario, self.num_worlds * count, seed=self.seed, split=self.split, num_threads=self.num_threads
             )
         elif type(into) is not Batch or into is self:
-            raise ValueError(f"copies go into another Batch on the CPU, got {shown(into)}")
+            raise ValueError(f"copies go into another Batch, got {shown(into)}")
         else:
             check_fit(self.scenario, self.num_worlds, count, into.scenario, into.num_worlds)
         write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
@@ -189,12 +185,12 @@ class Batch(Stepping):
             ValueError: An unknown option, or one of a wrong shape or not finite; start poses in
                 which robots overlap each other, an obstacle or a wall, or a scripted target has no
                 room to turn. Nothing is changed.
+            ScenarioError: The scenario is too tight for a start to be drawn. Nothing is changed.
         """
         options = options_of(options)
         chosen = self.check_reset(seed, options)
         poses = poses_of(options, self.scenario, self.num_worlds)
-        before = self._arrays.copy() if poses else None
-        world = self._arrays.world
+        before, world = self._arrays.copy(), self._arrays.world
         new_seed = self.seed if seed is None else int(seed)
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
@@ -203,19 +199,19 @@ class Batch(Stepping):
             world["episode"][chosen] = 0
         else:
             world["episode"][chosen] += 1
-        observations = self._start(chosen, START)
-        if poses:
+        try:
+            observations = self._start(chosen, START)
+            check_drawn(self.scenario, world, chosen, poses)
             for name, pose in poses.items():
                 write_poses(self._arrays.tracker if name == "tracker_pose" else world, pose, chosen)
-            try:
+            if poses:
                 check_overlap(self.scenario, self._arrays, chosen)
                 if "target_pose" in poses:
                     check_room_to_turn(self.scenario, self._arrays, chosen)
                 observations = self._start(chosen, START_FROM_POSES)
-            except BaseException:
-                if before is not None:
-                    self._arrays.write(before)
-                raise
+        except BaseException:
+            self._arrays.write(before)
+            raise
         self.seed, self._started = new_seed, True
         return observations
 
@@ -260,6 +256,9 @@ class Batch(Stepping):
         """Advance every world by the actions of all agents (E, num_agents, 2 + m)."""
         results = self._new_results()
         over = self._run(self._orders, checked, results)
+        if self._restarts:
+            self._check_started_worlds(self._arrays.world["step"] == 0)
+        self._restarts = over > 0 and self.autoreset == "next_step"
         observations, rewards, terms, (terminated, truncated) = results
         infos: dict[str, Any] = {"score": self._score.copy(), "reward_terms": TermsByName(self.term_names, terms)}
         if over:
@@ -338,4 +337,14 @@ class Batch(Stepping):
         infos["final_info"] = {k: infos[k] for k in ("score", "metrics", "_metrics")}
         infos["_final_info"] = ended
         self._arrays.world["episode"][ended] += 1
-        return self._start(ended, START)
+        observations = self._start(ended, START)
+        self._check_started_worlds(ended)
+        return observations
+
+    def _check_started_worlds(self, started: BoolArray) -> None:
+        """Raise ScenarioError if the start of a world could not be drawn; then only a reset helps."""
+        try:
+            check_drawn(self.scenario, self._arrays.world, started)
+        except ScenarioError:
+            self._started = False
+            raise

@@ -46,7 +46,7 @@ from posse.rules.start import draw_start, rest
 from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.observation.observing import TOGETHER, lay_out_fixed, observe_sonar, observe_target, observe_together
-from posse.signals.parts import Parts, Sums, Writers, parts_for, rules_for, sums_for, writers_for
+from posse.signals.parts import Parts, Sums, Writers, rules_for, sums_for, writers_for
 from posse.signals.reward import target_weights_for, weights_for
 from posse.signals.scratch import MOST_IN_TEAM
 
@@ -265,15 +265,16 @@ def tables_of(scenario: Scenario) -> Tables:
     )
 
 
-def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario, or of one whose tables are given.
+@functools.cache
+def kernel_of(parts: Parts) -> Callable[..., int]:
+    """Return the kernel that steps worlds of any scenario with these parts.
 
-    Configuration, slots and beams of a given scenario become constants in the code.
+    It executes the orders of the worlds that a thread claims (:func:`advance_worlds`), and returns
+    the number of those whose episodes are over.
     """
     own_fields, fixed, mate, terms, target_terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
-    own_config, own_slots, own_beams, *_ = own or (None, None, None)
 
     @kernel
     def advance(
@@ -286,48 +287,21 @@ def _stepping(parts: Parts, own: Tables | None) -> Callable[..., int]:
         thread: int,
         blocks: Blocks,
     ) -> int:
-        used = Tables(
-            tables.config if own_config is None else own_config,
-            tables.slots if own_slots is None else own_slots,
-            tables.beams if own_beams is None else own_beams,
-            tables.weights,
-            tables.target_weights,
-        )
         s = scratch[0]
         writers = Writers(own_fields, fixed, mate, terms, target_terms, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
         sums = Sums(clear_sums, add_to_sums)
         if s.prepared[0] == _ZERO:
-            prepare(used, worlds, writers, s)
+            prepare(tables, worlds, writers, s)
             s.prepared[0] = _ONE
         over = 0
         for first, end in blocks_of(thread, blocks):
             for e in range(natural(first), end, TOGETHER):
                 count = min(TOGETHER, end - e)
-                over += advance_worlds(e, count, used, worlds, actions, results, orders, rules, sums, writers, s)
+                over += advance_worlds(e, count, tables, worlds, actions, results, orders, rules, sums, writers, s)
         return over
 
     return advance
-
-
-@functools.cache
-def kernel_of(parts: Parts) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario with these parts.
-
-    It executes the orders of the worlds that a thread claims (:func:`advance_worlds`), and returns
-    the number of those whose episodes are over.
-    """
-    return _stepping(parts, None)
-
-
-@functools.lru_cache(maxsize=64)
-def own_kernel(scenario: Scenario) -> Callable[..., int]:
-    """Return :data:`advance` for one scenario alone.
-
-    The scenario is constant in the code: loops over trackers, slots and beams have known lengths,
-    and unused parts are removed. Results are bit-identical. The kernel is cached on disk.
-    """
-    return _stepping(parts_for(scenario), tables_of(scenario))
 
 
 @kernel

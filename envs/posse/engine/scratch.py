@@ -14,5 +14,3 @@ _KEPT: Final = (
 )
 
 SCRATCH: Final = scratch_record(_KEPT, MOVING, SENSING, observing(worlds=8))
-SCRATCH_FOR_ONE: Final = scratch_record(_KEPT, MOVING, SENSING, observing(worlds=1))
-"""For worlds stepped one by one with little memory, as on a GPU."""

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.engine.arguments import action_error, as_array, real_numbers, to_float32
-from posse.engine.kernels import LOOK, STEP, TO_CLIP, Results, bad_action, kernel_of, own_kernel, tables_of
+from posse.engine.kernels import LOOK, STEP, TO_CLIP, Results, bad_action, kernel_of, tables_of
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
 from posse.engine.user_parts import check_fields, check_functions
@@ -24,7 +24,6 @@ class Stepping(WorldViews):
 
     num_worlds: int
     num_threads: int
-    own_kernel: bool
     observation_shape: tuple[int, int, int]
     action_shape: tuple[int, int, int]
 
@@ -39,7 +38,7 @@ class Stepping(WorldViews):
         self._rewards = Recycler((num_worlds, rows))
         self.term_names = parts.term_names
         self._terms = Recycler((num_worlds, rows, len(self.term_names)))
-        self._untyped: Callable[..., int] = own_kernel(scenario) if self.own_kernel else kernel_of(parts)
+        self._untyped: Callable[..., int] = kernel_of(parts)
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
         self._orders = np.full(num_worlds, STEP, np.uint8)

@@ -4,7 +4,7 @@ Arrays and records, lanes (blocks of eight numbers), the decorators that compile
 distribution of work over threads. It depends on no other room, and every room may import it.
 """
 
-from posse.numeric.arrays import BoolArray, FloatArray, OwnArrays, Record, Records
+from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records
 from posse.numeric.blocks import Blocks, blocks_of, divide, worlds_of
 from posse.numeric.compiling import UNCOMPILED, checked_before_compiling, compiled, direct, kernel
 from posse.numeric.simd.lanes import (
@@ -33,9 +33,13 @@ from posse.numeric.threads import MOST_THREADS, over_worlds, run_threads, thread
 from posse.numeric.written import written
 
 __all__ = [
+    "HALF",
     "MOST_THREADS",
+    "ONE",
+    "TINY",
     "UNCOMPILED",
     "WIDTH",
+    "ZERO",
     "Blocks",
     "BoolArray",
     "FloatArray",

@@ -11,20 +11,31 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Lanes, Record, Records, bits, choose, compiled, greater, least, lesser, load, root
-from posse.rules.discs import BLOCK, FAR, TOUCHING_GAP, blocks, natural
+from posse.numeric import (
+    ONE,
+    ZERO,
+    FloatArray,
+    Lanes,
+    Record,
+    Records,
+    bits,
+    choose,
+    compiled,
+    greater,
+    least,
+    lesser,
+    load,
+    root,
+)
+from posse.rules.discs import A_LITTLE_MORE, BLOCK, FAR, TOUCHING_GAP, blocks, natural, obstacle_within
+from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
 
 _SURELY_APART: Final = np.float32(0.01)  # m; far more than a touch and all rounding
 
-_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 _TINY: Final = np.float32(1e-30)  # m²; a move so short meets nothing
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_BIT: Final = np.uint64(1)
-_NO_BITS: Final = np.uint64(0)
 _FIRST_WALL: Final = 60
 
 
@@ -41,19 +52,19 @@ def free_share(
     gap = rx * rx + ry * ry - reach * reach
     length = dx * dx + dy * dy
     under_root = closing * closing - length * gap
-    until = (_ZERO - closing - root(greater(under_root, _ZERO))) / greater(length, _TINY)
-    share = choose(gap <= _ZERO, _ZERO, choose(under_root <= _ZERO, _ONE, lesser(_ONE, until)))
-    return choose(closing >= _ZERO, _ONE, share)
+    until = (ZERO - closing - root(greater(under_root, ZERO))) / greater(length, _TINY)
+    share = choose(gap <= ZERO, ZERO, choose(under_root <= ZERO, ONE, lesser(ONE, until)))
+    return choose(closing >= ZERO, ONE, share)
 
 
 @compiled
 def free_share_wall(x: np.float32, dx: np.float32, bound: np.float32) -> np.float32:
     """Return the share of a move along one axis that stays within ±bound."""
-    if dx > _ZERO and x + dx > bound:
-        return max(_ZERO, (bound - x) / dx)
-    if dx < _ZERO and x + dx < -bound:
-        return max(_ZERO, (-bound - x) / dx)
-    return _ONE
+    if dx > ZERO and x + dx > bound:
+        return max(ZERO, (bound - x) / dx)
+    if dx < ZERO and x + dx < -bound:
+        return max(ZERO, (-bound - x) / dx)
+    return ONE
 
 
 @compiled
@@ -65,12 +76,12 @@ def free_of_robots(
     The positions of ``count`` robots are in ``xs`` and ``ys``; the robot itself may be among them.
     """
     reach = c.radius + c.radius + BLOCKING_GAP
-    within = (reach + abs(dx) + abs(dy)) * _A_LITTLE_MORE
-    share = _ONE
+    within = (reach + abs(dx) + abs(dy)) * A_LITTLE_MORE
+    share = ONE
     for block in range(blocks(count)):
         other_x, other_y = load(xs, BLOCK * block), load(ys, BLOCK * block)
         rx, ry = x - other_x, y - other_y
-        if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < _ZERO)) != 0:
+        if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < ZERO)) != 0:
             share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
     return np.float32(share)
 
@@ -80,7 +91,7 @@ def free_of_surroundings(
     c: Record, obstacles: Records, x: np.float32, y: np.float32, dx: np.float32, dy: np.float32
 ) -> np.float32:
     """Return the share of a robot's move that neither obstacles nor walls block."""
-    share = _ONE
+    share = ONE
     for k in range(c.num_obstacles):
         o = obstacles[k]
         share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.radius + o.radius + BLOCKING_GAP))
@@ -96,12 +107,7 @@ def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
     inner = c.half_arena - c.radius - TOUCHING_GAP
     if c.walled and max(abs(robot.x), abs(robot.y)) >= inner:
         return True
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
-        dx, dy, reach = o.x - robot.x, o.y - robot.y, c.radius + o.radius + TOUCHING_GAP
-        if dx * dx + dy * dy <= reach * reach:
-            return True
-    return False
+    return obstacle_within(obstacles, c.num_obstacles, robot.x, robot.y, c.radius + TOUCHING_GAP)
 
 
 @compiled
@@ -113,7 +119,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     """
     inner = c.half_arena - c.radius
     smallest, before = w.least_gap, w.contacts_target
-    target_touching, target_near = _NO_BITS, False
+    target_touching, target_near = NO_BITS, False
     for i in range(c.num_trackers):
         t = trackers[i]
         wall = FAR
@@ -121,18 +127,18 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
             wall = inner - max(abs(t.x), abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= t.max_speed * c.dt + TOUCHING_GAP
-        near = s.excess[i] <= _ZERO or wall_near
+        near = s.excess[i] <= ZERO or wall_near
         if not near:
             if t.near:
-                t.touching_trackers, t.touching_obstacles = _NO_BITS, _NO_BITS
+                t.touching_trackers, t.touching_obstacles = NO_BITS, NO_BITS
                 t.near, t.touching, t.onsets = 0, 0, 0
             continue
         t.near, t.onsets = 1, 0
         target_near = target_near or near_target(c, w, t)
         if min(s.gap[i], wall) > _SURELY_APART:
-            t.touching_trackers, t.touching_obstacles, t.touching = _NO_BITS, _NO_BITS, 0
+            t.touching_trackers, t.touching_obstacles, t.touching = NO_BITS, NO_BITS, 0
         elif meet_closely(c, w, t, obstacles, i, s):
-            target_touching |= _BIT << np.uint64(i)
+            target_touching |= BIT << np.uint64(i)
     w.touching = target_touching
     w.onsets = w.contacts_target - before
     w.near = target_near
@@ -147,7 +153,7 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
     touches_target = meet_target(c, w, t, i)
     meet_trackers(c, w, t, i, s)
     meet_surroundings(c, w, t, obstacles)
-    t.touching = touches_target or (t.touching_trackers | t.touching_obstacles) != _NO_BITS
+    t.touching = touches_target or (t.touching_trackers | t.touching_obstacles) != NO_BITS
     return bool(touches_target)
 
 
@@ -187,7 +193,7 @@ def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
     dx, dy = w.x - t.x, w.y - t.y
     if dx * dx + dy * dy > touch * touch:
         return False
-    if w.touching & (_BIT << np.uint64(i)) == _NO_BITS:
+    if w.touching & (BIT << np.uint64(i)) == NO_BITS:
         t.onsets += 1
         w.contacts_target += 1
     return True
@@ -203,13 +209,13 @@ def meet_trackers(c: Record, w: Record, t: Record, i: int, s: Record) -> None:
         dx, dy = load(s.x, j) - t.x, load(s.y, j) - t.y
         other = load(s.index, j) < np.float32(c.num_trackers)
         touching |= bits((dx * dx + dy * dy <= touch * touch) & other) << j
-    now = np.uint64(touching) & ~(_BIT << np.uint64(i))
+    now = np.uint64(touching) & ~(BIT << np.uint64(i))
     begun = now & ~t.touching_trackers
-    while begun != _NO_BITS:
-        first = begun & (~begun + _BIT)
+    while begun != NO_BITS:
+        first = begun & (~begun + BIT)
         begun ^= first
         t.onsets += 1
-        if first > _BIT << np.uint64(i):
+        if first > BIT << np.uint64(i):
             w.contacts_tracker += 1
     t.touching_trackers = now
 
@@ -217,25 +223,25 @@ def meet_trackers(c: Record, w: Record, t: Record, i: int, s: Record) -> None:
 @compiled
 def meet_surroundings(c: Record, w: Record, t: Record, obstacles: Records) -> None:
     """Note which obstacles and walls a tracker touches, and count the contacts that begin."""
-    touching = _NO_BITS
+    touching = NO_BITS
     for k in range(c.num_obstacles):
         o = obstacles[k]
         dx, dy, reach = o.x - t.x, o.y - t.y, c.radius + o.radius + TOUCHING_GAP
         if dx * dx + dy * dy <= reach * reach:
-            touching |= _BIT << np.uint64(k)
+            touching |= BIT << np.uint64(k)
     if c.walled:
         inner = c.half_arena - c.radius - TOUCHING_GAP
         if t.x >= inner:
-            touching |= _BIT << np.uint64(_FIRST_WALL)
+            touching |= BIT << np.uint64(_FIRST_WALL)
         if t.x <= -inner:
-            touching |= _BIT << np.uint64(_FIRST_WALL + 1)
+            touching |= BIT << np.uint64(_FIRST_WALL + 1)
         if t.y >= inner:
-            touching |= _BIT << np.uint64(_FIRST_WALL + 2)
+            touching |= BIT << np.uint64(_FIRST_WALL + 2)
         if t.y <= -inner:
-            touching |= _BIT << np.uint64(_FIRST_WALL + 3)
+            touching |= BIT << np.uint64(_FIRST_WALL + 3)
     begun = touching & ~t.touching_obstacles
-    while begun != _NO_BITS:
-        begun &= begun - _BIT
+    while begun != NO_BITS:
+        begun &= begun - BIT
         t.onsets += 1
         w.contacts_obstacle += 1
     t.touching_obstacles = touching

@@ -12,7 +12,9 @@ from typing import Final
 import numpy as np
 
 from posse.numeric import (
+    ONE,
     WIDTH,
+    ZERO,
     FloatArray,
     Lanes,
     Record,
@@ -29,7 +31,7 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.scratch import DISCS, ROBOTS
-from posse.rules.state import POSE
+from posse.rules.state import BIT, NO_BITS, POSE
 
 BLOCK: Final = WIDTH
 
@@ -37,12 +39,8 @@ TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
 
 FAR: Final = np.float32(1e9)
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 _MINUS_ONE: Final = np.float32(-1.0)
-_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
-_BIT: Final = np.uint64(1)
-_NO_BITS: Final = np.uint64(0)
+A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
@@ -58,6 +56,17 @@ def blocks(count: int) -> int:
 
 
 @compiled
+def obstacle_within(obstacles: Records, count: int, x: np.float32, y: np.float32, reach: np.float32) -> bool:
+    """Return whether the rim of one of the first ``count`` obstacles is nearer than ``reach`` to a point."""
+    for k in range(count):
+        o = obstacles[k]
+        dx, dy, within = o.x - x, o.y - y, o.radius + reach
+        if dx * dx + dy * dy < within * within:
+            return True
+    return False
+
+
+@compiled
 def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
     """Write the constants of all worlds.
 
@@ -68,17 +77,17 @@ def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
         s.index[k] = np.float32(k)
     for k in range(DISCS):
         s.radius[k] = c.radius
-        s.heard2[k] = heard_within2(c, c.radius)
+        s.sonar_reach2[k] = sonar_reach2(c, c.radius)
     count = beams.shape[1]
     for k in range(BLOCK * blocks(count)):
-        s.beam_cos[k] = beams[0, k] if k < count else _ZERO
-        s.beam_sin[k] = beams[1, k] if k < count else _ZERO
+        s.beam_cos[k] = beams[0, k] if k < count else ZERO
+        s.beam_sin[k] = beams[1, k] if k < count else ZERO
 
 
 @compiled
-def heard_within2(c: Record, radius: np.float32) -> np.float32:
+def sonar_reach2(c: Record, radius: np.float32) -> np.float32:
     """Return the squared distance of centres within which the sonar may detect a disc."""
-    within = (c.sonar_range + c.radius + radius) * _A_LITTLE_MORE
+    within = (c.sonar_range + c.radius + radius) * A_LITTLE_MORE
     return np.float32(within * within)
 
 
@@ -141,7 +150,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
             o = obstacles[k]
             j = n + 1 + k
             s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
-            s.heard2[j] = heard_within2(c, o.radius)
+            s.sonar_reach2[j] = sonar_reach2(c, o.radius)
         store(s.x, count, eight(FAR))
         store(s.y, count, eight(FAR))
 
@@ -155,7 +164,7 @@ def num_discs(c: Record) -> int:
 @compiled
 def within_one(value: Lanes) -> Lanes:
     """Return a cosine or sine, clipped to [-1, 1] against rounding."""
-    return lesser(greater(value, _MINUS_ONE), _ONE)
+    return lesser(greater(value, _MINUS_ONE), ONE)
 
 
 @compiled
@@ -201,7 +210,7 @@ def find_slots(c: Record, w: Record, first: int, slots: Records, taken: np.uint6
     ahead, left = dx * w.frame_cos + dy * w.frame_sin, dy * w.frame_cos - dx * w.frame_sin
     nearest, nearest2 = eight(_MINUS_ONE), eight(FAR)
     for slot in range(natural(c.num_trackers)):
-        if taken & (_BIT << np.uint64(slot)) == _NO_BITS:
+        if taken & (BIT << np.uint64(slot)) == NO_BITS:
             dx, dy = ahead - slots[slot].x, left - slots[slot].y
             d2 = dx * dx + dy * dy
             nearest = choose(d2 < nearest2, s.index[slot], nearest)

@@ -6,13 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import ONE, Record, Records, compiled
 from posse.rules.randomness import FAULTS, bits, uniform
 from posse.rules.state import NEVER
 
 _PER_TRACKER: Final = 4  # draws for each tracker
 _BREAKS: Final = 1000  # first index of the draws for breaks
-_ONE: Final = np.float32(1.0)
 
 
 @compiled
@@ -27,7 +26,7 @@ def _drawn_outage(c: Record, w: Record, chance: np.float32, looked: int, index: 
     """Return the start of an outage, given none in the first ``looked`` steps, or NEVER."""
     left = np.float32(c.horizon - looked)
     share = left / np.float32(c.horizon)
-    if uniform(w.key, 0, FAULTS, index) >= chance * share / (_ONE - chance * (_ONE - share)):
+    if uniform(w.key, 0, FAULTS, index) >= chance * share / (ONE - chance * (ONE - share)):
         return NEVER
     return np.int32(looked) + np.int32(uniform(w.key, 0, FAULTS, index + 1) * left)
 
@@ -65,7 +64,7 @@ def draw_coming_faults(c: Record, w: Record, trackers: Records, looked: int, mov
     if c.break_nearest:
         w.break_step = _drawn_step(c, w, earliest, _BREAKS)
         return
-    if c.break_number >= 0:
+    if c.break_given:
         trackers[c.break_number].breaks_at = _drawn_step(c, w, earliest, _BREAKS)
         return
     for k in range(w.breaks_left):

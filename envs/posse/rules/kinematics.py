@@ -12,11 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import Lanes, compiled, greater, lesser
+from posse.numeric import HALF, ONE, ZERO, Lanes, compiled, greater, lesser
 
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_HALF: Final = np.float32(0.5)
 _THREE_HALVES: Final = np.float32(1.5)
 _C6: Final = np.float32(1 / 6)
 _C20: Final = np.float32(1 / 20)
@@ -31,10 +28,10 @@ _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 @compiled
 def half_turn(turn_rate: np.float32, time: np.float32) -> tuple[np.float32, np.float32, np.float32]:
     """Return (cos h, sin h, sin h / h) of half the turn, h = ω dt / 2, for |h| ≤ 0.5."""
-    h = _HALF * turn_rate * time
+    h = HALF * turn_rate * time
     h2 = h * h
-    sinc = _ONE - h2 * _C6 * (_ONE - h2 * _C20 * (_ONE - h2 * _C42))
-    cosine = _ONE - h2 * _HALF * (_ONE - h2 * _C12 * (_ONE - h2 * _C30 * (_ONE - h2 * _C56)))
+    sinc = ONE - h2 * _C6 * (ONE - h2 * _C20 * (ONE - h2 * _C42))
+    cosine = ONE - h2 * HALF * (ONE - h2 * _C12 * (ONE - h2 * _C30 * (ONE - h2 * _C56)))
     return cosine, h * sinc, sinc
 
 
@@ -53,7 +50,7 @@ def arc(
     new_c = middle_c * ch - middle_s * sh
     new_s = middle_s * ch + middle_c * sh
     # One Newton step keeps the heading a unit vector over any number of steps.
-    scale = _THREE_HALVES - _HALF * (new_c * new_c + new_s * new_s)
+    scale = _THREE_HALVES - HALF * (new_c * new_c + new_s * new_s)
     return chord * middle_c, chord * middle_s, new_c * scale, new_s * scale
 
 
@@ -76,11 +73,34 @@ def turn_towards(
     # Usually the heading is out of reach or reached, and no inverse tangent is needed. The tangent
     # of the greatest turn is at most limit / near_one.
     limit = most * time
-    near_one = _ONE - _HALF * limit * limit
-    if near_one > _ZERO and abs(across) * near_one > _A_LITTLE_MORE * limit * along:
+    near_one = ONE - HALF * limit * limit
+    if near_one > ZERO and abs(across) * near_one > _A_LITTLE_MORE * limit * along:
         return np.float32(math.copysign(most, across))
     if abs(across) < _SMALL * along:
         error = np.float32(across / along)
     else:
         error = np.float32(math.atan2(across, along))
     return min(max(error / time, -most), most)
+
+
+@compiled
+def follow_heading(
+    psi_c: np.float32,
+    psi_s: np.float32,
+    heading_c: np.float32,
+    heading_s: np.float32,
+    most_c: np.float32,
+    most_s: np.float32,
+) -> tuple[np.float32, np.float32]:
+    """Return (cos ψ, sin ψ) of the slot frame after one control step towards the heading.
+
+    ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the maximum turn.
+    """
+    along = psi_c * heading_c + psi_s * heading_s
+    if along >= most_c:
+        return heading_c, heading_s
+    side = most_s if psi_c * heading_s - psi_s * heading_c >= ZERO else -most_s
+    c = psi_c * most_c - psi_s * side
+    s = psi_s * most_c + psi_c * side
+    scale = _THREE_HALVES - HALF * (c * c + s * s)
+    return c * scale, s * scale

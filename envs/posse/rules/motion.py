@@ -6,21 +6,30 @@ steps, target first, then trackers by number, with swept collision checks.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from posse.numeric import FloatArray, Lanes, Record, Records, compiled, eight, lesser, load, store, store_fields
+from posse.numeric import (
+    HALF,
+    ONE,
+    ZERO,
+    FloatArray,
+    Lanes,
+    Record,
+    Records,
+    compiled,
+    eight,
+    lesser,
+    load,
+    store,
+    store_fields,
+)
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
-from posse.rules.kinematics import approach, arc
+from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.state import NEVER, POSE
 from posse.rules.targets.steering import target_turn_rate
-from posse.scenarios.formation import follow_heading
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_HALF: Final = np.float32(0.5)
 
 
 @compiled
@@ -47,9 +56,9 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
     share = lesser(
         free_of_robots(c, x, y, dx, dy, s.near_x, s.near_y, count), free_of_surroundings(c, obstacles, x, y, dx, dy)
     )
-    if share < _ONE:
+    if share < ONE:
         dx, dy = dx * share, dy * share
-        robot.speed = _ZERO
+        robot.speed = ZERO
     robot.x += dx
     robot.y += dy
     s.near_x[place], s.near_y[place] = robot.x, robot.y
@@ -94,7 +103,7 @@ def command(
 ) -> tuple[Lanes, Lanes]:
     """Return speed and turn rate after an action, within the limits."""
     return (
-        approach(speed, _HALF * (wanted_speed + _ONE) * max_speed, c.speed_change),
+        approach(speed, HALF * (wanted_speed + ONE) * max_speed, c.speed_change),
         approach(turn_rate, wanted_turn * max_turn_rate, c.turn_change),
     )
 
@@ -138,7 +147,7 @@ def command_target(
     """Set the target's speed and turn rate for the control step."""
     if c.target_agent != 0:
         action = actions[c.num_trackers]
-        share, least = _HALF * (action[0] + _ONE), c.target_least_speed
+        share, least = HALF * (action[0] + ONE), c.target_least_speed
         w.speed = least + share * (c.target_speed - least)
         w.turn_rate = action[1] * c.target_turn_rate
     else:

@@ -30,7 +30,7 @@ _S30: Final = np.uint64(30)
 _S31: Final = np.uint64(31)
 _S40: Final = np.uint64(40)
 _TO_UNIT: Final = np.float32(2.0**-24)
-_TWO_PI: Final = np.float32(2.0 * math.pi)
+TWO_PI: Final = np.float32(2.0 * math.pi)
 _CUT: Final = np.float32(math.exp(-4.5))  # exp(-3²/2): radius 3 of the normal plane
 _KEPT: Final = np.float32(1.0 - math.exp(-4.5))
 _MINUS_TWO: Final = np.float32(-2.0)
@@ -79,6 +79,6 @@ def normal_pair(key: np.uint64, step: int, stream: np.uint64, index: int) -> tup
     Box-Muller with the radius truncated at 3, so that neither number exceeds 3 in absolute value.
     """
     u = uniform(key, step, stream, 2 * index)
-    angle = _TWO_PI * uniform(key, step, stream, 2 * index + 1)
+    angle = TWO_PI * uniform(key, step, stream, 2 * index + 1)
     radius = np.float32(math.sqrt(_MINUS_TWO * np.float32(math.log(_CUT + _KEPT * u))))
     return (radius * np.float32(math.cos(angle)), radius * np.float32(math.sin(angle)))

@@ -7,18 +7,11 @@ For the safe score, steps count only until the first contact of any tracker.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import ONE, ZERO, Record, Records, compiled
 from posse.rules.discs import BLOCK, blocks, find_slots, natural
-from posse.rules.state import NEVER
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_BIT: Final = np.uint64(1)
-_NO_BITS: Final = np.uint64(0)
+from posse.rules.state import BIT, NEVER, NO_BITS
 
 
 @compiled
@@ -36,8 +29,8 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
     """
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
-        find_slots(c, w, BLOCK * block, slots, _NO_BITS, s)
-    taken = _NO_BITS
+        find_slots(c, w, BLOCK * block, slots, NO_BITS, s)
+    taken = NO_BITS
     occupied = 0
     near2 = c.tolerance * c.tolerance
     for i in range(c.num_trackers):
@@ -48,29 +41,29 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
         t.slot_distance = s.slot_distance[i]
         if s.slot_distance2[i] <= near2 and t.broken_at == NEVER and t.touching == 0:
             best = int(s.slot[i])
-            bit = _BIT << np.uint64(best)
-            if taken & bit == _NO_BITS:
+            bit = BIT << np.uint64(best)
+            if taken & bit == NO_BITS:
                 taken |= bit
                 occupied += 1
                 t.slot = best
-    for first in range(0, n if taken != _NO_BITS else 0, BLOCK):
+    for first in range(0, n if taken != NO_BITS else 0, BLOCK):
         last = min(first + BLOCK, n)
         looking = False  # whether the nearest slot of any is occupied by another
         for i in range(first, last):
-            if trackers[i].slot < 0 and s.slot[i] >= _ZERO:
-                looking |= taken & (_BIT << np.uint64(s.slot[i])) != _NO_BITS
+            if trackers[i].slot < 0 and s.slot[i] >= ZERO:
+                looking |= taken & (BIT << np.uint64(s.slot[i])) != NO_BITS
         if looking:
             find_slots(c, w, first, slots, taken, s)
             for i in range(first, last):
                 t = trackers[i]
-                if t.slot < 0 and s.slot[i] >= _ZERO:
+                if t.slot < 0 and s.slot[i] >= ZERO:
                     t.slot_distance = s.slot_distance[i]
     for i in range(c.num_trackers):
         t = trackers[i]
         t.slot_progress -= t.slot_distance
-    w.score = _ZERO
+    w.score = ZERO
     if w.working > 0:
-        w.score = min(_ONE, np.float32(occupied) / np.float32(w.working))
+        w.score = min(ONE, np.float32(occupied) / np.float32(w.working))
     w.held = w.held + 1 if w.working > 0 and occupied >= w.working else 0
 
 

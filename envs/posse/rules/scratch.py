@@ -29,7 +29,7 @@ WORLD_FIELDS: Final[Fields] = (
     ("x", DISCS),  # common frame, m
     ("y", DISCS),
     ("radius", DISCS),  # m
-    ("heard2", DISCS),  # squared distance, with a margin, within which the sonar detects it, m²
+    ("sonar_reach2", DISCS),  # squared distance, with a margin, within which the sonar detects it, m²
     ("index", ROBOTS),  # 0, 1, 2, …
     # The sonar's beams.
     ("beam_cos", BEAMS),

@@ -1,27 +1,31 @@
 """How an episode starts: obstacles, the target, the trackers, each drawn clear of the others.
 
-Places are drawn until one is clear. The scenario's checks leave room enough that the number of
-tries below is never used up.
+Places are drawn until one is clear. What finds none in so many tries is noted in the world
+(``undrawn``), and :func:`check_drawn` raises.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled
+from posse.rules.discs import obstacle_within
 from posse.rules.faults import draw_faults
-from posse.rules.randomness import OBSTACLES, START, between, episode_key, uniform
-from posse.rules.targets.walls import has_free_circle
+from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
+from posse.rules.targets.steering import has_free_circle
+from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import START_CLEARANCE
 
 _TRIES: Final = 2000
-_TWO_PI: Final = np.float32(2 * math.pi)
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 _CLEARANCE: Final = np.float32(START_CLEARANCE)
+_OBSTACLES: Final = 1
+_TARGET: Final = 2
+_TRACKERS: Final = 4
+"""Bits of ``undrawn``."""
 _TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come first
 
 
@@ -30,15 +34,10 @@ def is_clear(
     c: Record, w: Record, trackers: Records, placed: int, obstacles: Records, x: np.float32, y: np.float32
 ) -> bool:
     """Return whether a tracker at (x, y) is clear of walls, obstacles and ``placed`` trackers."""
-    if c.walled:
-        inner = c.half_arena - c.radius - _CLEARANCE
-        if abs(x) > inner or abs(y) > inner:
-            return False
-    for k in range(c.num_obstacles):
-        o = obstacles[k]
-        reach = o.radius + c.radius + _CLEARANCE
-        if (o.x - x) * (o.x - x) + (o.y - y) * (o.y - y) < reach * reach:
-            return False
+    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.radius - _CLEARANCE:
+        return False
+    if obstacle_within(obstacles, c.num_obstacles, x, y, c.radius + _CLEARANCE):
+        return False
     reach = c.radius + c.radius + _CLEARANCE
     for j in range(placed):
         t = trackers[j]
@@ -50,23 +49,20 @@ def is_clear(
 @compiled
 def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
     """Draw the obstacles, ``obstacle_gap`` apart and clear of the walls."""
-    index = 0
+    index, clear = 0, True
     for k in range(c.num_obstacles):
         o = obstacles[k]
-        o.radius = between(c.obstacle_least, c.obstacle_most, w.key, 0, OBSTACLES, index)
+        o.radius = between(c.obstacle_radius_least, c.obstacle_radius_most, w.key, 0, OBSTACLES, index)
         room = c.half_arena - o.radius - c.obstacle_gap
-        for _ in range(_TRIES):
+        for _ in range(_TRIES if clear else 0):
             o.x = between(-room, room, w.key, 0, OBSTACLES, index + 1)
             o.y = between(-room, room, w.key, 0, OBSTACLES, index + 2)
             index += 3
-            clear = True
-            for j in range(k):
-                p = obstacles[j]
-                reach = o.radius + p.radius + c.obstacle_gap
-                if (o.x - p.x) * (o.x - p.x) + (o.y - p.y) * (o.y - p.y) < reach * reach:
-                    clear = False
+            clear = room > ZERO and not obstacle_within(obstacles, k, o.x, o.y, o.radius + c.obstacle_gap)
             if clear:
                 break
+    if not clear:
+        w.undrawn |= _OBSTACLES
 
 
 @compiled
@@ -75,71 +71,66 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
     for k in range(_TRIES):
         w.x = between(-c.target_extent, c.target_extent, w.key, 0, START, 3 * k)
         w.y = between(-c.target_extent, c.target_extent, w.key, 0, START, 3 * k + 1)
-        heading = _TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
+        heading = TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
         w.heading_cos = np.float32(math.cos(heading))
         w.heading_sin = np.float32(math.sin(heading))
-        clear = True
-        for j in range(c.num_obstacles):
-            o = obstacles[j]
-            reach = o.radius + c.radius + _CLEARANCE
-            if (o.x - w.x) * (o.x - w.x) + (o.y - w.y) * (o.y - w.y) < reach * reach:
-                clear = False
+        clear = not obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.radius + _CLEARANCE)
         if clear and c.walled and c.target_agent == 0:
-            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE) or has_free_circle(
-                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
+            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, ONE) or has_free_circle(
+                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -ONE
             )
         if clear:
-            break
+            return
+    w.undrawn |= _TARGET
 
 
 @compiled
 def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Draw the trackers' poses round the target, uniform in distance, bearing and heading."""
-    index = _TRACKER_DRAWS
+    index, clear = _TRACKER_DRAWS, True
     for i in range(c.num_trackers):
         t = trackers[i]
-        for _ in range(_TRIES):
-            distance = between(c.start_least, c.start_most, w.key, 0, START, index)
-            bearing = _TWO_PI * uniform(w.key, 0, START, index + 1)
+        for _ in range(_TRIES if clear else 0):
+            distance = between(c.start_distance_least, c.start_distance_most, w.key, 0, START, index)
+            bearing = TWO_PI * uniform(w.key, 0, START, index + 1)
             index += 2
             t.x = w.x + distance * np.float32(math.cos(bearing))
             t.y = w.y + distance * np.float32(math.sin(bearing))
-            if is_clear(c, w, trackers, i, obstacles, t.x, t.y):
+            clear = is_clear(c, w, trackers, i, obstacles, t.x, t.y)
+            if clear:
                 break
-        heading = _TWO_PI * uniform(w.key, 0, START, index)
+        heading = TWO_PI * uniform(w.key, 0, START, index)
         index += 1
         t.heading_cos = np.float32(math.cos(heading))
         t.heading_sin = np.float32(math.sin(heading))
+    if not clear:
+        w.undrawn |= _TRACKERS
 
 
 @compiled
 def rest(c: Record, w: Record, trackers: Records) -> None:
-    """Set everything that does not depend on a draw to what it is when an episode starts.
-
-    But for the sums behind the metrics.
-    """
+    """Reset the robots and the world to the start of an episode, but for poses, faults and sums of metrics."""
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
-    w.speed = c.target_speed if c.target_agent == 0 else _ZERO
-    w.turn_rate = _ZERO
+    w.speed = c.target_speed if c.target_agent == 0 else ZERO
+    w.turn_rate = ZERO
     w.frame_cos, w.frame_sin = w.heading_cos, w.heading_sin
     w.goal_cos, w.goal_sin = w.heading_cos, w.heading_sin
     w.touching = np.uint64(0)
     w.working = c.num_trackers
-    w.score = _ZERO
+    w.score = ZERO
     w.settled_at, w.detected_at, w.lost_at, w.recovered_at = -1, -1, -1, -1
     w.contacts_tracker, w.contacts_obstacle, w.contacts_target = 0, 0, 0
     w.least_gap = np.float32(1e6)
     for i in range(c.num_trackers):
         t = trackers[i]
-        t.speed, t.turn_rate = _ZERO, _ZERO
+        t.speed, t.turn_rate = ZERO, ZERO
         t.sees, t.touching, t.onsets = 0, 0, 0
         t.touching_trackers, t.touching_obstacles = np.uint64(0), np.uint64(0)
         t.fix_step = -1
-        t.fix_x, t.fix_y, t.fix_vx, t.fix_vy = _ZERO, _ZERO, _ZERO, _ZERO
-        t.fix_cos, t.fix_sin = _ONE, _ZERO
-        t.fix_frame_cos, t.fix_frame_sin = _ONE, _ZERO
+        t.fix.x, t.fix.y, t.fix_vx, t.fix_vy = ZERO, ZERO, ZERO, ZERO
+        t.fix.cos, t.fix.sin, t.fix.frame_cos, t.fix.frame_sin = ONE, ZERO, ONE, ZERO
         t.slot, t.could_arrive = -1, 0
-        t.slot_distance, t.slot_progress = _ZERO, _ZERO
+        t.slot_distance, t.slot_progress = ZERO, ZERO
         t.start_x, t.start_y = t.x, t.y
 
 
@@ -147,8 +138,37 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
 def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)
+    w.undrawn = 0
     draw_obstacles(c, w, obstacles)
     draw_target(c, w, obstacles)
     draw_trackers(c, w, trackers, obstacles)
     draw_motion(c, w)
     draw_faults(c, w, trackers)
+
+
+def check_drawn(s: Scenario, world: Records, started: BoolArray, given: Container[str] = ()) -> None:
+    """Raise if the start of any ``started`` world could not be drawn, but for poses that are given.
+
+    Raises:
+        ScenarioError: Names the settings that are too tight.
+    """
+    undrawn = int(np.bitwise_or.reduce(world["undrawn"][started]))
+    if undrawn == 0:
+        return
+    walls = f" in arena={s.arena:g}" if math.isfinite(s.arena) else ""
+    enlarge = ", or enlarge arena" if walls else ""
+    if undrawn & _OBSTACLES:
+        raise ScenarioError(
+            f"could not place num_obstacles={s.num_obstacles} of obstacle_radius={s.obstacle_radius} with "
+            f"obstacle_gap={s.obstacle_gap:g}{walls}: lower their number, radius or gap{enlarge}"
+        )
+    if undrawn & _TARGET and "target_pose" not in given:
+        raise ScenarioError(
+            f"could not place the target{walls} with room to turn between num_obstacles={s.num_obstacles}: lower "
+            f"num_obstacles or target_speed={s.target_speed:g}, raise target_turn_rate={s.target_turn_rate:g}{enlarge}"
+        )
+    if undrawn & _TRACKERS and "tracker_pose" not in given:
+        raise ScenarioError(
+            f"could not place num_trackers={s.num_trackers} at start_distance={s.start_distance} of the "
+            f"target{walls}: widen start_distance, lower num_trackers or robot_radius={s.robot_radius:g}{enlarge}"
+        )

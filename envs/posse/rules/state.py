@@ -9,23 +9,26 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Record, Records
+from posse.numeric import FloatArray, Records
 from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
-from posse.scenarios.limits import BREAK_CHOICES, FAR, SAFE_MARGIN
+from posse.scenarios.limits import FAR, SAFE_MARGIN
 
 SPLITS: Final = ("train", "validation", "test")
+BIT: Final = np.uint64(1)
+NO_BITS: Final = np.uint64(0)
 NEVER: Final = np.int32(2**30)
 """A control step later than any."""
 
 
-def _record(*fields: tuple[str, type], size: int | None = None) -> np.dtype[Any]:
+def _record(*fields: tuple[str, Any], size: int | None = None) -> np.dtype[Any]:
     """Return a record of fields, at least ``size`` bytes long."""
     layout = np.dtype(list(fields), align=True)
     if size is not None:
@@ -43,76 +46,97 @@ def _offset(record: np.dtype[Any], name: str) -> int:
 
 _F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
 
-CONFIG: Final = _record(
-    ("num_trackers", _I),
-    ("num_agents", _I),
-    ("num_obstacles", _I),
-    ("neighbours", _I),
-    ("message_size", _I),
-    ("physics_steps", _I),
-    ("horizon", _I),
-    ("settle_steps", _I),
-    ("outage_steps", _I),
-    ("break_from", _I),
-    ("break_until", _I),
-    ("forget_steps", _I),
-    ("radio_delay", _I),
-    ("breaks", _I),
-    ("break_nearest", _I),
-    ("break_number", _I),
-    ("motion", _I),
-    ("mirrored", _I),
-    ("target_agent", _I),
-    ("sensor", _I),
-    ("fix_bearing", _I),  # 1: a fix is a bearing, else a position
-    ("measured", _I),  # 0: sensors return the target's true position
-    ("terminate_on_contact", _I),
-    ("walled", _I),
-    ("sonar_beams", _I),
-    ("all_round", _I),
-    ("perfect_radio", _I),
-    ("formation", _I),
-    ("whole_arcs", _I),
-    ("dt", _F),
-    ("physics_dt", _F),
-    ("fastest", _F),  # greatest speed of any tracker
-    ("speed_change", _F),
-    ("turn_change", _F),
-    ("target_speed", _F),
-    ("target_turn_rate", _F),
-    ("target_least_speed", _F),
-    ("radius", _F),
-    ("tolerance", _F),
-    ("frame_c", _F),
-    ("frame_s", _F),
-    ("slots_reach", _F),
-    ("half_arena", _F),
-    ("obstacle_least", _F),
-    ("obstacle_most", _F),
-    ("obstacle_gap", _F),
-    ("start_least", _F),
-    ("start_most", _F),
-    ("target_extent", _F),
-    ("safe_distance", _F),
-    ("sensing_range", _F),
-    ("view_cosine", _F),
-    ("range_noise", _F),
-    ("bearing_noise", _F),
-    ("smoothing", _F),
-    ("sonar_range", _F),
-    ("beam_cosine", _F),
-    ("radio_range", _F),
-    ("radio_loss", _F),
-    ("sensor_outages", _F),
-    ("radio_outages", _F),
-    ("formation_distance", _F),
-    ("formation_spacing", _F),
-    ("per_acceleration", _F),
-    ("per_turn_acceleration", _F),  # 1 / limit; 0: no limit
-    ("told_sensing_range", _F),
-    ("told_arena", _F),  # as observed; -1: unlimited
-)
-"""The scenario, for kernels."""
+_NUMERIC: Final = {"int": _I, "bool": _I, "float": _F}
+
+
+def perfect_radio(s: Scenario) -> bool:
+    """Return whether working trackers always receive each other's messages without delay."""
+    reliable = s.radio_delay == 0 and s.radio_loss == 0 and s.radio_outages == 0 and s.breaks == 0
+    return reliable and math.isinf(s.radio_range)
+
+
+def _slots_reach(s: Scenario) -> float:
+    return max(math.hypot(x, y) for x, y in slot_offsets(s))
+
+
+def _frame_turn(s: Scenario) -> float:
+    """Return the greatest turn of the slot frame in a control step, rad."""
+    return min(s.slot_turn_rate * s.control_step, math.pi / 2)
+
+
+def _physics_step(s: Scenario) -> np.float32:
+    return np.float32(s.control_step / s.physics_steps)
+
+
+def _whole_arcs(s: Scenario) -> bool:
+    """Return whether a robot with nothing near moves on one arc for the whole control step."""
+    turn = max(*s.tracker_turn_rates, s.target_turn_rate) * s.control_step
+    return turn <= 1.0 and math.isinf(s.tracker_acceleration) and math.isinf(s.tracker_turn_acceleration)
+
+
+def _measured(s: Scenario) -> bool:
+    return s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None
+
+
+DERIVED: Final[dict[str, tuple[type, Callable[[Scenario], Any]]]] = {
+    "num_agents": (_I, lambda s: s.num_agents),
+    "neighbours": (_I, lambda s: s.neighbours),
+    "physics_steps": (_I, lambda s: s.physics_steps),
+    "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
+    "outage_steps": (_I, lambda s: max(1, round(s.outage_time / s.control_step))),
+    "forget_steps": (_I, lambda s: int(s.forget_after / s.control_step + 1e-6)),
+    "break_from": (_I, lambda s: round(s.break_window[0] * s.horizon)),
+    "break_until": (_I, lambda s: round(s.break_window[1] * s.horizon)),
+    "break_nearest": (_I, lambda s: s.break_choice == "nearest"),
+    "break_given": (_I, lambda s: s.break_choice == "given"),
+    "motion": (_I, lambda s: TARGET_MOTIONS.with_added(s.target_motion).index(TARGET_MOTIONS[s.target_motion])),
+    "mirrored": (_I, lambda s: TARGET_MOTIONS[s.target_motion].mirrored and math.isfinite(s.arena)),
+    "target_agent": (_I, lambda s: s.target_is_agent),
+    "sensor": (_I, lambda s: SENSORS.with_added(s.sensor).index(SENSORS[s.sensor])),
+    "fix_bearing": (_I, lambda s: SENSORS[s.sensor].fix == "bearing"),  # 1: a fix is a bearing, else a position
+    "measured": (_I, _measured),  # 0: sensors return the target's true position
+    "walled": (_I, lambda s: math.isfinite(s.arena)),
+    "all_round": (_I, lambda s: s.field_of_view >= 2 * math.pi - 1e-9),
+    "perfect_radio": (_I, perfect_radio),
+    "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
+    "whole_arcs": (_I, _whole_arcs),
+    "dt": (_F, lambda s: s.control_step),
+    "physics_dt": (_F, _physics_step),
+    "radius": (_F, lambda s: s.robot_radius),
+    "fastest": (_F, lambda s: max(s.tracker_speeds)),
+    "speed_change": (_F, lambda s: min(s.tracker_acceleration * _physics_step(s), FAR)),
+    "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * _physics_step(s), FAR)),
+    "per_acceleration": (_F, lambda s: 1 / s.tracker_acceleration),  # 0: no limit
+    "per_turn_acceleration": (_F, lambda s: 1 / s.tracker_turn_acceleration),
+    "frame_c": (_F, lambda s: math.cos(_frame_turn(s))),
+    "frame_s": (_F, lambda s: math.sin(_frame_turn(s))),
+    "slots_reach": (_F, _slots_reach),
+    "half_arena": (_F, lambda s: min(s.arena / 2, FAR)),
+    "target_extent": (_F, lambda s: s.target_extent),
+    "safe_distance": (_F, lambda s: s.robot_radius + SAFE_MARGIN),
+    "view_cosine": (_F, lambda s: math.cos(s.field_of_view / 2)),
+    "beam_cosine": (_F, lambda s: math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0),
+    "smoothing": (
+        _F,
+        lambda s: 1 - math.exp(-s.control_step / s.velocity_smoothing) if s.velocity_smoothing > 0 else 1.0,
+    ),
+}
+"""What kernels read of a scenario beside its numbers: type and value."""
+
+
+def _config() -> np.dtype[Any]:
+    fields: list[tuple[str, type]] = []
+    for name, setting in Scenario.settings().items():
+        if setting.kind in _NUMERIC:
+            fields.append((name, _NUMERIC[setting.kind]))
+        elif setting.kind == "tuple[float, float]":
+            fields += [(f"{name}_least", _F), (f"{name}_most", _F)]
+    return _record(*fields, *((name, kind) for name, (kind, _) in DERIVED.items()))
+
+
+CONFIG: Final = _config()
+"""The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
+``_most``), then :data:`DERIVED`."""
 
 _WORLD: Final = (
     ("seed", _U),  # as given by the user
@@ -137,6 +161,7 @@ _WORLD: Final = (
     ("touching", _U),  # bit mask of the trackers that touch the target
     ("onsets", _I),  # contacts of the target with trackers that began in the current step
     ("near", _I),  # 1: something may touch the target in the next step
+    ("undrawn", _I),  # bits of what found no place at the start (posse.rules.start)
     ("break_step", _I),  # when the next tracker breaks (break_choice "nearest")
     ("breaks_left", _I),
     # inputs of the metrics
@@ -177,17 +202,16 @@ def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
     )
 
 
-FIX_STEP: Final = ("fix_step", _I)  # when it was taken; -1: none yet
-FIX_FIELDS: Final = (
-    ("fix_x", _F),
-    ("fix_y", _F),  # where the target was, m; a bearing: a unit vector
-    ("fix_cos", _F),
-    ("fix_sin", _F),  # its heading; a bearing: 0
-    ("fix_frame_cos", _F),
-    ("fix_frame_sin", _F),  # the slot frame ψ; a bearing: 0
+FIX_RECORD: Final = _record(
+    ("x", _F),
+    ("y", _F),  # where the target was, m; a bearing: a unit vector
+    ("cos", _F),
+    ("sin", _F),  # its heading; a bearing: 0
+    ("frame_cos", _F),
+    ("frame_sin", _F),  # the slot frame ψ; a bearing: 0
 )
 """A fix of the target, in the common frame: a position or a bearing, depending on the sensor
-(:mod:`posse.rules.senses.declaring`). Of a certain control step (``FIX_STEP``)."""
+(:mod:`posse.rules.senses.declaring`). Its control step stands beside it (``fix_step``)."""
 
 TRACKER: Final = _record(
     ("x", _F),
@@ -208,13 +232,13 @@ TRACKER: Final = _record(
     ("near", _I),  # 1: something may touch it in the next step
     ("touching", _I),  # 1: it touches anything
     ("onsets", _I),  # contacts that began in this step
-    FIX_STEP,  # of its best fix
+    ("fix_step", _I),  # when its best fix was taken; -1: none yet
     ("slot", _S),  # number of the slot that it occupies; -1: none
     ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
     ("touching_trackers", _U),
     ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
     # its best fix of the target, from its sensor or by radio
-    *FIX_FIELDS,
+    ("fix", FIX_RECORD),
     ("fix_vx", _F),
     ("fix_vy", _F),  # m/s, from successive fixes
     # inputs of score and rewards, with slot and could_arrive
@@ -226,9 +250,9 @@ TRACKER: Final = _record(
 """One tracker."""
 
 # Kernels read and write these fields of a tracker in blocks of eight; unchanged fields are written
-# as they were read. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
+# as they were read. From x on: pose, speed, turn rate, their limits. From fix on: the fix.
 POSE: Final = _offset(TRACKER, "x")
-FIX: Final = _offset(TRACKER, "fix_x")
+FIX: Final = _offset(TRACKER, "fix")
 CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
@@ -256,8 +280,8 @@ BROADCAST: Final = _record(
     ("heading_sin", _F),
     ("speed", _F),
     ("turn_rate", _F),
-    FIX_STEP,
-    *FIX_FIELDS,
+    ("fix_step", _I),
+    ("fix", FIX_RECORD),
 )
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 
@@ -322,29 +346,20 @@ class WorldArrays(NamedTuple):
 
     def by_name(self) -> dict[str, npt.NDArray[Any]]:
         """Return every field of every array by name, e.g. ``"tracker_x"`` (E, N), as views."""
-        names: dict[str, npt.NDArray[Any]] = {}
-        for name, array in zip(self._fields, self, strict=True):
-            if array.dtype.names is None:
-                names[name] = array.view()
-            else:
-                for part in array.dtype.names:
-                    names[f"{name}_{part}"] = array[part]
-        return names
+        return {
+            name: part for name, array in zip(self._fields, self, strict=True) for name, part in _parts(name, array)
+        }
+
+
+def _parts(name: str, array: npt.NDArray[Any]) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    if array.dtype.names is None:
+        yield name, array.view()
+    for part in array.dtype.names or ():
+        yield from _parts(f"{name}_{part}", array[part])
 
 
 def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
     return WorldArrays(*arrays).copy()
-
-
-def perfect_radio(scenario: Scenario) -> bool:
-    """Return whether working trackers always receive each other's messages without delay."""
-    return (
-        math.isinf(scenario.radio_range)
-        and scenario.radio_delay == 0
-        and scenario.radio_loss == 0
-        and scenario.radio_outages == 0
-        and scenario.breaks == 0
-    )
 
 
 def slot_records(scenario: Scenario) -> Records:
@@ -360,63 +375,13 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
-    s = scenario
     config = np.zeros(1, CONFIG)
-    c: Record = config[0]
-    c.num_trackers, c.num_agents, c.num_obstacles = s.num_trackers, s.num_agents, s.num_obstacles
-    c.neighbours, c.message_size = s.neighbours, s.message_size
-    c.physics_steps, c.horizon = s.physics_steps, s.horizon
-    c.settle_steps = max(1, round(s.settle_time / s.control_step))
-    c.outage_steps = max(1, round(s.outage_time / s.control_step))
-    c.break_from, c.break_until = (round(share * s.horizon) for share in s.break_window)
-    c.forget_steps = int(s.forget_after / s.control_step + 1e-6)
-    c.radio_delay, c.breaks = s.radio_delay, s.breaks
-    c.break_nearest = s.break_choice == BREAK_CHOICES[0]
-    c.break_number = s.break_number if s.break_choice == BREAK_CHOICES[2] else -1
-    motions = TARGET_MOTIONS.with_added(s.target_motion)
-    motion = TARGET_MOTIONS[s.target_motion]
-    c.motion, c.target_agent = motions.index(motion), motion.agent
-    c.mirrored = motion.mirrored and math.isfinite(s.arena)
-    sensor = SENSORS[s.sensor]
-    c.sensor = SENSORS.with_added(s.sensor).index(sensor)
-    c.fix_bearing = sensor.fix == "bearing"
-    c.measured = s.range_noise > 0 or s.bearing_noise > 0 or sensor.measure is not None
-    c.terminate_on_contact, c.walled = s.terminate_on_contact, math.isfinite(s.arena)
-    c.sonar_beams = s.sonar_beams
-    c.whole_arcs = s.whole_arcs
-    c.all_round = s.field_of_view >= 2 * math.pi - 1e-9
-    c.perfect_radio = perfect_radio(s)
-    c.dt, c.physics_dt = s.control_step, s.control_step / s.physics_steps
-    c.fastest = max(s.tracker_speeds)
-    c.speed_change = min(s.tracker_acceleration * c.physics_dt, FAR)
-    c.turn_change = min(s.tracker_turn_acceleration * c.physics_dt, FAR)
-    c.target_speed, c.target_turn_rate = s.target_speed, s.target_turn_rate
-    c.target_least_speed = s.target_least_speed
-    c.radius = s.robot_radius
-    c.tolerance = s.tolerance
-    most = min(s.slot_turn_rate * s.control_step, math.pi / 2)
-    c.frame_c, c.frame_s = math.cos(most), math.sin(most)
-    c.slots_reach = max(math.hypot(x, y) for x, y in slot_offsets(s))
-    c.half_arena = min(s.arena / 2, FAR)
-    c.obstacle_least, c.obstacle_most = s.obstacle_radius
-    c.obstacle_gap = s.obstacle_gap
-    c.start_least, c.start_most = s.start_distance
-    c.safe_distance = s.robot_radius + SAFE_MARGIN
-    c.target_extent = s.target_extent
-    c.sensing_range = min(s.sensing_range, FAR)
-    c.view_cosine = math.cos(s.field_of_view / 2)
-    c.range_noise, c.bearing_noise = s.range_noise, s.bearing_noise
-    c.smoothing = 1.0
-    if s.velocity_smoothing > 0:
-        c.smoothing = 1 - math.exp(-s.control_step / s.velocity_smoothing)
-    c.sonar_range = s.sonar_range
-    c.beam_cosine = math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0
-    c.radio_range, c.radio_loss = min(s.radio_range, FAR), s.radio_loss
-    c.sensor_outages, c.radio_outages = s.sensor_outages, s.radio_outages
-    c.formation = FORMATIONS.index(s.formation)
-    c.formation_distance, c.formation_spacing = s.formation_distance, s.formation_spacing
-    c.per_acceleration = 1 / s.tracker_acceleration
-    c.per_turn_acceleration = 1 / s.tracker_turn_acceleration
-    c.told_sensing_range = s.sensing_range if math.isfinite(s.sensing_range) else -1.0
-    c.told_arena = s.arena if math.isfinite(s.arena) else -1.0
+    for name, setting in Scenario.settings().items():
+        given = getattr(scenario, name)
+        if setting.kind in _NUMERIC:
+            config[name] = min(given, FAR) if setting.infinite else given
+        elif setting.kind == "tuple[float, float]":
+            config[f"{name}_least"], config[f"{name}_most"] = given
+    for name, (_, value) in DERIVED.items():
+        config[name] = value(scenario)
     return config

@@ -1,6 +1,5 @@
 """The scenario: settings, validation, formation slots, named scenarios."""
 
-import posse.scenarios.checks  # noqa: F401 (declares the checks)
 from posse.scenarios.named import get_scenario, scenario_names
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError, Setting

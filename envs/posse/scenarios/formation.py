@@ -8,34 +8,17 @@ follow every slot (:attr:`posse.scenarios.scenario.Scenario.slot_turn_rate`).
 from __future__ import annotations
 
 import math
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from posse.numeric import compiled
+if TYPE_CHECKING:
+    from posse.scenarios.scenario import Scenario
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
-_HALF: Final = np.float32(0.5)
-_THREE_HALVES: Final = np.float32(1.5)
-_ZERO: Final = np.float32(0.0)
 _DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
-class FormationSettings(Protocol):
-    """The settings of a scenario that its slots follow from."""
-
-    @property
-    def num_trackers(self) -> int: ...  # noqa: D102
-    @property
-    def formation(self) -> str: ...  # noqa: D102
-    @property
-    def formation_distance(self) -> float: ...  # noqa: D102
-    @property
-    def formation_spacing(self) -> float: ...  # noqa: D102
-
-
-def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
+def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
     """Return the (x, y) of each slot in the slot frame, m; x points ahead.
 
     ========== ====================================================================================
@@ -47,12 +30,9 @@ def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
     rows       a block behind the target, as wide as deep, ``formation_spacing`` apart
     ========== ====================================================================================
     """
-    n, distance = scenario.num_trackers, scenario.formation_distance
-    spacing = scenario.formation_spacing
+    n, distance, spacing = scenario.num_trackers, scenario.formation_distance, scenario.formation_spacing
     if scenario.formation == "ring":
-        radius = distance
-        if n > 1:
-            radius = max(radius, spacing / (2 * math.sin(math.pi / n)))
+        radius = max(distance, spacing / (2 * math.sin(math.pi / n))) if n > 1 else distance
         bearings = [math.pi + 2 * math.pi * i / n for i in range(n)]
         return [(radius * math.cos(b), radius * math.sin(b)) for b in bearings]
     if scenario.formation == "rows":
@@ -65,26 +45,3 @@ def slot_offsets(scenario: FormationSettings) -> list[tuple[float, float]]:
         ]
     wing = spacing * _DIAGONAL
     return [(-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1)) for i in range(n)]
-
-
-@compiled
-def follow_heading(
-    psi_c: np.float32,
-    psi_s: np.float32,
-    heading_c: np.float32,
-    heading_s: np.float32,
-    most_c: np.float32,
-    most_s: np.float32,
-) -> tuple[np.float32, np.float32]:
-    """Return (cos ψ, sin ψ) after one control step towards the heading.
-
-    ``most_c``, ``most_s`` are the cosine and sine of ω_s dt, the maximum turn.
-    """
-    along = psi_c * heading_c + psi_s * heading_s
-    if along >= most_c:
-        return heading_c, heading_s
-    side = most_s if psi_c * heading_s - psi_s * heading_c >= _ZERO else -most_s
-    c = psi_c * most_c - psi_s * side
-    s = psi_s * most_c + psi_c * side
-    scale = _THREE_HALVES - _HALF * (c * c + s * s)
-    return c * scale, s * scale

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 from typing import Any
 
 from posse.scenarios.scenario import Scenario
 from posse.scenarios.setting import ScenarioError, is_one_of
-from posse.shown import shown
+from posse.shown import shown, unknown
 
 
 @functools.cache  # lazily, after all declarations that scenarios may name
@@ -16,6 +15,7 @@ def _named() -> dict[str, Scenario]:
     # The reasons for these settings are in docs/scenarios.md.
     paper = Scenario(
         name="paper",
+        meaning="Section 4 of the paper: 8 s from near starts, fast trackers, a slow target that runs straight.",
         horizon=80,
         start_distance=(0.6, 1.8),
         tracker_speed=1.5,
@@ -26,11 +26,25 @@ def _named() -> dict[str, Scenario]:
         tolerance=0.2,
     )
     scenarios = (
-        Scenario(name="constant"),
-        Scenario(name="accelerating", target_motion="accelerating"),
-        Scenario(name="smart", target_motion="smart", tracker_turn_rate=1.2, target_turn_rate=2.0),
+        Scenario(
+            name="constant",
+            meaning="The target runs straight on; everybody sees it and hears everybody: a sanity check.",
+        ),
+        Scenario(
+            name="accelerating",
+            meaning="The target weaves: its turn rate is a sine, drawn for each world.",
+            target_motion="accelerating",
+        ),
+        Scenario(
+            name="smart",
+            meaning="The target turns faster than the trackers, flees through the widest gap, and darts.",
+            target_motion="smart",
+            tracker_turn_rate=1.2,
+            target_turn_rate=2.0,
+        ),
         Scenario(
             name="search",
+            meaning="Sight is short: the team has to spread out in an arena, find the target, and tell the others.",
             version=2,
             target_motion="accelerating",
             tracker_turn_rate=1.2,
@@ -41,6 +55,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="obstacles",
+            meaning="Discs block paths and the view in a walled arena, and the target is smart.",
             version=2,
             target_motion="smart",
             tracker_turn_rate=1.8,
@@ -50,6 +65,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="radio",
+            meaning="Sight is too short without communication; messages are late, three in ten are lost.",
             target_motion="smart",
             tracker_turn_rate=1.5,
             target_turn_rate=2.0,
@@ -61,6 +77,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="leader-loss",
+            meaning="Only the first tracker sees the target from its slot; it breaks, and another must lead.",
             target_motion="accelerating",
             tracker_turn_rate=1.1,
             target_turn_rate=0.2,
@@ -73,6 +90,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="field",
+            meaning="Search, obstacles, noise, a lossy radio, a broken robot, outages, and a smart target.",
             version=2,
             target_motion="smart",
             tracker_turn_rate=1.5,
@@ -94,6 +112,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="duel",
+            meaning="Two sides that both can learn; by itself the target is smart, and nearly as fast as the trackers.",
             version=2,
             target_speed=0.8,
             target_motion="smart",
@@ -115,6 +134,9 @@ def scenario_names() -> tuple[str, ...]:
 def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden.
 
+    A ``horizon`` that is given without ``settle_time``, and makes the episode shorter than that of
+    the scenario, shortens it to the episode.
+
     Args:
         scenario: Its name, or a scenario.
         target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
@@ -124,27 +146,34 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
         ScenarioError: An unknown name (the message suggests similar ones), an unknown or invalid
             setting.
     """
-    overrides = _with_target(target, overrides)
     if isinstance(scenario, Scenario):
         found = scenario
     elif is_one_of(_named(), scenario):
         found = _named()[scenario]
     else:
-        near = difflib.get_close_matches(shown(scenario), _named(), n=3)
-        hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-        raise ScenarioError(f"unknown scenario {shown(scenario)}{hint}; scenarios are: {', '.join(_named())}")
-    return found.replace(**overrides) if overrides else found
+        raise ScenarioError(unknown("scenario", scenario, _named()))
+    overrides = _with_target(target, overrides)
+    if not overrides:
+        return found
+    if "horizon" in overrides and "settle_time" not in overrides:
+        settings, step = Scenario.settings(), overrides.get("control_step", found.control_step)
+        length = settings["horizon"].accept("horizon", overrides["horizon"]) * (
+            settings["control_step"].accept("control_step", step)
+        )
+        overrides["settle_time"] = min(found.settle_time, length)
+    return found.replace(**overrides)
 
 
 def _with_target(target: Any, overrides: dict[str, Any]) -> dict[str, Any]:
     """Return the overrides with ``target="agent"`` resolved."""
     if target is None:
         return overrides
-    if target != "agent":
+    if not isinstance(target, str) or target != "agent":
         raise ScenarioError(
-            f"target={shown(target)} is not possible: the one choice is 'agent'; "
+            f"target={shown(target)} is refused: the one choice is 'agent'; "
             "target_motion= chooses among the scripted ones"
         )
-    if overrides.get("target_motion", "agent") != "agent":
-        raise ScenarioError(f"target='agent' and target_motion={shown(overrides['target_motion'])} exclude each other")
+    motion = overrides.get("target_motion", "agent")
+    if motion != "agent":
+        raise ScenarioError(f"target='agent' and target_motion={shown(motion)} exclude each other")
     return {**overrides, "target_motion": "agent"}

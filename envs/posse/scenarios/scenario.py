@@ -7,12 +7,14 @@ Scenarios with equal fields define the same benchmark. Named ones are in
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from posse.registry import SENSORS, TARGET_MOTIONS
+from posse.scenarios.checks import check_together
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
     BREAK_CHOICES,
@@ -20,27 +22,14 @@ from posse.scenarios.limits import (
     FARTHEST,
     MAX_OBSTACLES,
     MAX_TRACKERS,
+    MOST_WEIGHT,
     OPEN_PLANE_EXTENT,
     SAFE_MARGIN,
     SMALL,
     WIDE,
 )
-from posse.scenarios.setting import (
-    ScenarioError,
-    Setting,
-    UnknownSettingError,
-    check,
-    declare,
-    fail,
-    flag,
-    near,
-    number,
-    pair,
-    setting_of,
-    text,
-    whole,
-)
-from posse.shown import shown
+from posse.scenarios.setting import Setting, UnknownSettingError, setting
+from posse.shown import shown, unknown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,169 +44,177 @@ class Scenario:
         ScenarioError: An invalid field or combination of fields.
     """
 
-    name: str = text(dataclasses.MISSING, "name in results and policy cards")
-    version: int = whole(1, 1, math.inf, "incremented when the behaviour of the named scenario changes")
+    name: str = setting(dataclasses.MISSING, "name in results and policy cards")
+    meaning: str = dataclasses.field(
+        default="", compare=False, metadata={"setting": Setting("what the scenario asks of a team, in one sentence")}
+    )
+    version: int = setting(1, "incremented when the behaviour of the named scenario changes", "1", 1, 1e6)
 
     # The team
-    num_trackers: int = whole(5, 1, MAX_TRACKERS, "robots in the team", source="section 4: five trackers")
-    tracker_speed: float | tuple[float, ...] = number(
+    num_trackers: int = setting(5, "robots in the team", "1", 1, MAX_TRACKERS, source="section 4: five trackers")
+    tracker_speed: float | tuple[float, ...] = setting(
         1.0,
+        "greatest speed of a tracker, or of each; above target_speed",
         "m/s",
         SMALL,
         1000,
-        "greatest speed of a tracker, or of each; above target_speed",
-        per_tracker=True,
         source="section 2, assumption ii",
     )
-    tracker_turn_rate: float | tuple[float, ...] = number(
-        2.0, "rad/s", SMALL, WIDE, "greatest turn rate of a tracker, or of each", per_tracker=True
+    tracker_turn_rate: float | tuple[float, ...] = setting(
+        2.0, "greatest turn rate of a tracker, or of each", "rad/s", SMALL, WIDE
     )
-    tracker_acceleration: float = number(
-        math.inf, "m/s²", SMALL, FAR, "greatest change of a tracker's speed; inf: no limit", infinite=True
+    tracker_acceleration: float = setting(
+        math.inf, "greatest change of a tracker's speed; inf: no limit", "m/s²", SMALL, FAR, infinite=True
     )
-    tracker_turn_acceleration: float = number(
-        math.inf, "rad/s²", SMALL, FAR, "greatest change of a tracker's turn rate; inf: no limit", infinite=True
+    tracker_turn_acceleration: float = setting(
+        math.inf, "greatest change of a tracker's turn rate; inf: no limit", "rad/s²", SMALL, FAR, infinite=True
     )
-    robot_radius: float = number(0.15, "m", SMALL, WIDE, "radius of every robot's disc, trackers and target")
+    robot_radius: float = setting(0.15, "radius of every robot's disc, trackers and target", "m", SMALL, WIDE)
 
     # The target
-    target_motion: str = text(
-        "constant", "how the target moves; agent: a policy controls it", lambda: TARGET_MOTIONS, source="section 2"
+    target_motion: str = setting(
+        "constant",
+        "how the target moves; agent: a policy controls it",
+        choices=lambda: TARGET_MOTIONS,
+        source="section 2",
     )
-    target_speed: float = number(0.6, "m/s", 0, 1000, "speed of the target; an agent's greatest")
-    target_turn_rate: float = number(1.0, "rad/s", SMALL, WIDE, "greatest turn rate of the target")
-    target_least_speed: float = number(
-        0.0, "m/s", 0, 1000, "least speed of a target that is an agent, at most target_speed"
+    target_speed: float = setting(0.6, "speed of the target; an agent's greatest", "m/s", 0, 1000)
+    target_turn_rate: float = setting(1.0, "greatest turn rate of the target", "rad/s", SMALL, WIDE)
+    target_least_speed: float = setting(
+        0.0, "least speed of a target that is an agent, at most target_speed", "m/s", 0, 1000
     )
 
     # The formation
-    formation: str = text(
+    formation: str = setting(
         "wedge",
         "wedge: behind the target; ring: around it; rows: compact, behind",
-        lambda: FORMATIONS,
+        choices=lambda: FORMATIONS,
         source="section 3.3, figure 6",
     )
-    formation_distance: float = number(
-        1.2, "m", 0, WIDE, "from the target to the nearest slot (ring: the least radius of the ring)", above=True
+    formation_distance: float = setting(
+        1.2, "from the target to the nearest slot (ring: the least radius of the ring)", "m", 0, WIDE, above=True
     )
-    formation_spacing: float = number(
-        1.2, "m", 0, WIDE, "between neighbouring slots; more than twice the tolerance", above=True
+    formation_spacing: float = setting(
+        1.2, "between neighbouring slots; more than twice the tolerance", "m", 0, WIDE, above=True
     )
-    tolerance: float = number(0.3, "m", SMALL, WIDE, "a slot is occupied when a tracker is within this distance")
-    settle_time: float = number(
+    tolerance: float = setting(0.3, "a slot is occupied when a tracker is within this distance", "m", SMALL, WIDE)
+    settle_time: float = setting(
         3.0,
+        "the team has settled when every slot has been held continuously for this long; by name"
+        " (get_scenario) at most the length of an episode whose horizon is given without it",
         "s",
         0,
-        math.inf,
-        "the team has settled when every slot has been held continuously for this long",
         above=True,
     )
 
     # Time
-    control_step: float = number(0.1, "s", 1e-4, 100, "between two actions; a whole multiple of physics_step")
-    physics_step: float = number(0.05, "s", 1e-4, 100, "between two contact checks")
-    horizon: int = whole(600, 1, 1_000_000, "control steps in an episode", unit="steps")
-    terminate_on_contact: bool = flag(False, "whether the episode ends when any tracker touches anything")
+    control_step: float = setting(0.1, "between two actions; a whole multiple of physics_step", "s", 1e-4, 100)
+    physics_step: float = setting(0.05, "between two contact checks", "s", 1e-4, 100)
+    horizon: int = setting(600, "control steps in an episode", "steps", 1, 1_000_000)
+    terminate_on_contact: bool = setting(False, "whether the episode ends when any tracker touches anything")
 
     # The arena
-    arena: float = number(
-        math.inf, "m", 0, 2 * FARTHEST, "side of the walled square; inf: the open plane", above=True, infinite=True
+    arena: float = setting(
+        math.inf, "side of the walled square; inf: the open plane", "m", 0, 2 * FARTHEST, above=True, infinite=True
     )
-    num_obstacles: int = whole(0, 0, MAX_OBSTACLES, "discs in the arena; require an arena")
-    obstacle_radius: tuple[float, float] = pair((0.4, 0.8), "m", WIDE, "least and greatest radius of an obstacle")
-    obstacle_gap: float = number(
-        1.2, "m", 0, WIDE, "least clearance between two obstacles, and between an obstacle and a wall"
+    num_obstacles: int = setting(0, "discs in the arena; require an arena", "1", 0, MAX_OBSTACLES)
+    obstacle_radius: tuple[float, float] = setting(
+        (0.4, 0.8), "least and greatest radius of an obstacle", "m", 0, 2 * FARTHEST
     )
-    start_distance: tuple[float, float] = pair(
-        (4.0, 10.0), "m", FARTHEST, "least and greatest distance of a tracker from the target at the start"
+    obstacle_gap: float = setting(
+        1.2, "least clearance between two obstacles, and between an obstacle and a wall", "m", 0, WIDE
+    )
+    start_distance: tuple[float, float] = setting(
+        (4.0, 10.0), "least and greatest distance of a tracker from the target at the start", "m", 0, 2 * FARTHEST
     )
 
     # Sensing
-    sensor: str = text("range-bearing", "kind of the target sensor", lambda: SENSORS)
-    sensing_range: float = number(
-        math.inf, "m", 0, FAR, "a tracker sees the target up to this distance; inf: at any", above=True, infinite=True
+    sensor: str = setting("range-bearing", "kind of the target sensor", choices=lambda: SENSORS)
+    sensing_range: float = setting(
+        math.inf, "a tracker sees the target up to this distance; inf: at any", "m", 0, WIDE, above=True, infinite=True
     )
-    field_of_view: float = number(
-        2.0 * math.pi, "rad", 0, 2 * math.pi + 1e-9, "full angle of the target sensor about the heading", above=True
+    field_of_view: float = setting(
+        2.0 * math.pi, "full angle of the target sensor about the heading", "rad", 0, 2 * math.pi + 1e-9, above=True
     )
-    range_noise: float = number(
-        0.0, "1", 0, 0.3, "standard deviation of a measured range, as a share of the range; truncated at three"
+    range_noise: float = setting(
+        0.0, "standard deviation of a measured range, as a share of the range; truncated at three", "1", 0, 0.3
     )
-    bearing_noise: float = number(0.0, "rad", 0, 0.5, "standard deviation of a measured bearing; truncated at three")
-    velocity_smoothing: float = number(
-        0.0, "s", 0, WIDE, "time constant of the velocity estimated from successive fixes; 0: none"
+    bearing_noise: float = setting(0.0, "standard deviation of a measured bearing; truncated at three", "rad", 0, 0.5)
+    velocity_smoothing: float = setting(
+        0.0, "time constant of the velocity estimated from successive fixes; 0: none", "s", 0, WIDE
     )
-    sonar_beams: int = whole(8, 0, 64, "beams of the sonar ring, evenly spaced from straight ahead")
-    sonar_range: float = number(2.0, "m", SMALL, WIDE, "range of the sonar, from the robot's rim")
+    sonar_beams: int = setting(8, "beams of the sonar ring, evenly spaced from straight ahead", "1", 0, 64)
+    sonar_range: float = setting(2.0, "range of the sonar, from the robot's rim", "m", SMALL, WIDE)
 
     # Radio
-    radio_range: float = number(
-        math.inf, "m", 0, FAR, "trackers hear each other up to this distance; inf: at any", above=True, infinite=True
+    radio_range: float = setting(
+        math.inf, "trackers hear each other up to this distance; inf: at any", "m", 0, WIDE, above=True, infinite=True
     )
-    radio_delay: int = whole(
-        0, 0, 100, "delay of messages; 0: received in the observation after the step", unit="steps"
+    radio_delay: int = setting(0, "delay of messages; 0: received in the observation after the step", "steps", 0, 100)
+    radio_loss: float = setting(0.0, "probability that a message is lost, for each pair and step", "1", 0, 0.999)
+    message_size: int = setting(0, "numbers that a policy can add to each broadcast", "1", 0, 64)
+    forget_after: float = setting(
+        5.0, "time after which a silent team-mate is dropped from the observation", "s", 0, WIDE, above=True
     )
-    radio_loss: float = number(0.0, "1", 0, 0.999, "probability that a message is lost, for each pair and step")
-    message_size: int = whole(0, 0, 64, "numbers that a policy can add to each broadcast")
-    forget_after: float = number(
-        5.0, "s", 0, WIDE, "time after which a silent team-mate is dropped from the observation", above=True
-    )
-    num_neighbours: int | None = whole(
-        None, 0, MAX_TRACKERS - 1, "places for team-mates in an observation; None: min(num_trackers - 1, 8)", none=True
+    num_neighbours: int | None = setting(
+        None, "places for team-mates in an observation; None: min(num_trackers - 1, 8)", "1", 0, MAX_TRACKERS - 1
     )
 
     # Faults
-    breaks: int = whole(0, 0, MAX_TRACKERS - 1, "trackers that break during an episode, below num_trackers")
-    break_choice: str = text(
+    breaks: int = setting(0, "trackers that break during an episode, below num_trackers", "1", 0, MAX_TRACKERS - 1)
+    break_choice: str = setting(
         "nearest",
         "which one breaks: the nearest to the target at that time (usually the leader), a random"
         " one, or the one given by number",
-        lambda: BREAK_CHOICES,
+        choices=lambda: BREAK_CHOICES,
     )
-    break_number: int = whole(0, 0, MAX_TRACKERS - 1, "number of the tracker that breaks with break_choice given")
-    break_window: tuple[float, float] = pair(
-        (0.4, 0.6), "1", 1.0, "interval of the time of a break, as shares of the horizon"
+    break_number: int = setting(
+        0, "number of the tracker that breaks with break_choice given", "1", 0, MAX_TRACKERS - 1
     )
-    sensor_outages: float = number(
-        0.0, "1", 0, 1, "probability that a tracker's target sensor fails once for outage_time"
+    break_window: tuple[float, float] = setting(
+        (0.4, 0.6), "interval of the time of a break, as shares of the horizon", "1", 0, 1
     )
-    radio_outages: float = number(0.0, "1", 0, 1, "probability that a tracker's radio fails once for outage_time")
-    outage_time: float = number(
-        5.0, "s", 0, WIDE, "length of an outage; its start is drawn over the episode", above=True
+    sensor_outages: float = setting(
+        0.0, "probability that a tracker's target sensor fails once for outage_time", "1", 0, 1
+    )
+    radio_outages: float = setting(0.0, "probability that a tracker's radio fails once for outage_time", "1", 0, 1)
+    outage_time: float = setting(
+        5.0, "length of an outage; its start is drawn over the episode", "s", 0, WIDE, above=True
     )
 
     # Declarations of the user's own
-    extra_fields: tuple[str, ...] = declare(
-        (), Setting("other", "1", "observation fields of your own, by name: docs/extend.md")
-    )
-    metrics: tuple[str, ...] = declare((), Setting("other", "1", "metrics of your own, by name: docs/extend.md"))
+    extra_fields: tuple[str, ...] = setting((), "observation fields of your own, by name: docs/extend.md", "1")
+    metrics: tuple[str, ...] = setting((), "metrics of your own, by name: docs/extend.md", "1")
 
     # Reward
-    reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
+    reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = setting(
         (("slot", 1.0), ("progress", 0.5), ("contact", -0.2)),
-        Setting("other", "1", "weight of each reward term by name (posse.REWARD_TERMS); others: 0"),
+        "weight of each reward term by name (posse.REWARD_TERMS); others: 0",
+        "1",
+        -MOST_WEIGHT,
+        MOST_WEIGHT,
     )
-    target_reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = declare(
-        (("team", -1.0),), Setting("other", "1", "the same for a target that is an agent: contact, effort, team")
+    target_reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = setting(
+        (("team", -1.0),),
+        "the same for a target that is an agent: contact, effort, team",
+        "1",
+        -MOST_WEIGHT,
+        MOST_WEIGHT,
     )
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "extra_fields", _names("extra_fields", self.extra_fields))
-        for name in ("reward_weights", "target_reward_weights"):
-            object.__setattr__(self, name, _weights(name, getattr(self, name)))
-        further = tuple(dict.fromkeys(_names("metrics", self.metrics)))
-        object.__setattr__(self, "metrics", further)
-        for name, setting in self.settings().items():
-            if setting.per_tracker and isinstance(getattr(self, name), list):
-                object.__setattr__(self, name, tuple(getattr(self, name)))
-            check(name, getattr(self, name), setting)
-        for check_together in _CHECKS:
-            check_together(self)
+        for name, declared in self.settings().items():
+            object.__setattr__(self, name, declared.accept(name, getattr(self, name)))
+        check_together(self)
 
-    @classmethod
-    def settings(cls) -> dict[str, Setting]:
+    @staticmethod
+    @functools.cache
+    def settings() -> Mapping[str, Setting]:
         """Return the declaration of every field by name: unit, range, meaning, source."""
-        return {field.name: setting_of(field) for field in dataclasses.fields(cls)}
+        return {
+            field.name: dataclasses.replace(field.metadata["setting"], kind=field.type)
+            for field in dataclasses.fields(Scenario)
+        }
 
     @property
     def tracker_speeds(self) -> tuple[float, ...]:
@@ -245,13 +242,6 @@ class Scenario:
         return round(self.control_step / self.physics_step)
 
     @property
-    def whole_arcs(self) -> bool:
-        """Whether a robot with nothing near moves on one arc for the whole control step."""
-        turn = max(*self.tracker_turn_rates, self.target_turn_rate) * self.control_step
-        limits = (self.tracker_acceleration, self.tracker_turn_acceleration)
-        return turn <= 1.0 and all(math.isinf(limit) for limit in limits)
-
-    @property
     def duration(self) -> float:
         """Length of an episode, s."""
         return self.horizon * self.control_step
@@ -259,7 +249,12 @@ class Scenario:
     @property
     def num_agents(self) -> int:
         """Rows of an action: the trackers, and the target where it is an agent."""
-        return self.num_trackers + (self.target_motion == "agent")
+        return self.num_trackers + self.target_is_agent
+
+    @property
+    def target_is_agent(self) -> bool:
+        """Whether a policy controls the target."""
+        return self.target_motion == "agent"
 
     @property
     def target_clearance(self) -> float:
@@ -278,7 +273,7 @@ class Scenario:
         """Greatest absolute coordinate of the target at the start, m."""
         if not math.isfinite(self.arena):
             return OPEN_PLANE_EXTENT
-        if self.target_motion == "agent":
+        if self.target_is_agent:
             return self.arena / 2 - self.robot_radius
         return self.arena / 2 - self.target_clearance
 
@@ -311,13 +306,11 @@ class Scenario:
         Raises:
             ScenarioError: An unknown field (the message suggests similar ones) or an invalid value.
         """
-        names = [field.name for field in dataclasses.fields(self)]
         for key in overrides:
-            if key not in names:
-                raise UnknownSettingError(
-                    f"unknown setting {shown(key)}{near(key, names)}: unexpected keyword argument "
-                    f"{shown(key)}; settings are: {', '.join(names)}"
-                )
+            if key not in self.settings():
+                # Libraries that try a keyword of their own look for the words of Python's TypeError.
+                message = unknown("setting", key, self.settings())
+                raise UnknownSettingError(f"unexpected keyword argument {shown(key)}: {message}")
         return dataclasses.replace(self, **overrides)
 
     def to_dict(self) -> dict[str, Any]:
@@ -326,29 +319,3 @@ class Scenario:
         values["reward_weights"] = dict(self.reward_weights)
         values["target_reward_weights"] = dict(self.target_reward_weights)
         return values
-
-
-_CHECKS: list[Callable[[Scenario], None]] = []
-
-
-def checked_by(function: Callable[[Scenario], None]) -> Callable[[Scenario], None]:
-    """Declare a function that raises ScenarioError where settings do not go together."""
-    _CHECKS.append(function)
-    return function
-
-
-def _names(setting: str, given: object) -> tuple[str, ...]:
-    """Return names in a tuple, whatever they were given in; a name alone is one of them."""
-    names = tuple(given) if isinstance(given, (list, tuple)) else (given,)
-    if not all(isinstance(name, str) for name in names):
-        fail(setting, given, "it must be a tuple of names")
-    return names
-
-
-def _weights(name: str, given: object) -> tuple[tuple[str, float], ...]:
-    """Return reward weights sorted by name, so that equal scenarios compare equal."""
-    try:
-        weights = dict(given)  # type: ignore[call-overload]
-        return tuple(sorted(weights.items()))
-    except (TypeError, ValueError):
-        raise ScenarioError(f"{name}={shown(given)} is not possible: it must map names of terms to numbers") from None

@@ -1,21 +1,17 @@
-"""Declaration of a scenario's settings: unit, range, meaning and source.
-
-A field of :class:`~posse.scenarios.scenario.Scenario` is declared by one of the functions below.
-Its :class:`Setting` is in the field's metadata; checks, tables and messages are derived from it.
-"""
+"""A setting of a scenario, written once: unit, range, meaning and source on the field, its kind by the annotation."""
 
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NoReturn
+from numbers import Integral, Real
+from typing import Any, NoReturn
 
-from posse.shown import LONGEST, shown
+import numpy as np
 
-GREATEST_WHOLE: Final = 2**62
+from posse.shown import shown, unknown
 
 
 class ScenarioError(ValueError):
@@ -23,11 +19,7 @@ class ScenarioError(ValueError):
 
 
 class UnknownSettingError(ScenarioError, TypeError):
-    """A keyword that no scenario has.
-
-    Libraries that offer a keyword of their own to every environment, and then go on without it,
-    look for a TypeError about an unexpected keyword argument, which the message says.
-    """
+    """A keyword that no scenario has; a TypeError too, as any unexpected keyword argument is."""
 
 
 @dataclass(frozen=True)
@@ -35,176 +27,132 @@ class Setting:
     """Declaration of one field of a scenario.
 
     Attributes:
-        kind: ``"number"``, ``"whole"``, ``"pair"``, ``"flag"``, ``"text"`` or ``"other"``.
-        unit: SI unit; ``"1"`` for shares and counts, ``""`` for texts.
         meaning: Its meaning, in one sentence.
+        unit: SI unit; ``"1"`` for shares and counts, ``""`` for texts.
         low: Least value.
         high: Greatest value.
-        low_is_allowed: Whether the range includes ``low``.
-        may_be_infinite: Whether ``math.inf`` is allowed beyond ``high``: no limit.
-        may_be_none: Whether ``None`` is allowed.
-        per_tracker: Whether it may be a tuple, one value for each tracker.
+        above: Whether the range excludes ``low``.
+        infinite: Whether ``math.inf`` is allowed beyond ``high``: no limit.
         choices: Returns the valid values of a text.
         source: Section of the paper.
+        kind: The annotation of the field, such as ``"int"`` or ``"tuple[float, float]"``.
     """
 
-    kind: str
-    unit: str
     meaning: str
+    unit: str = ""
     low: float = -math.inf
     high: float = math.inf
-    low_is_allowed: bool = True
-    may_be_infinite: bool = False
-    may_be_none: bool = False
-    per_tracker: bool = False
+    above: bool = False
+    infinite: bool = False
     choices: Callable[[], Iterable[str]] | None = None
     source: str = ""
+    kind: str = ""
 
     @property
     def range(self) -> str:
         """The valid values, as text."""
         if self.choices is not None:
             return ", ".join(f'"{choice}"' for choice in self.choices())
-        if self.kind == "flag":
+        if self.kind == "bool":
             return "True or False"
-        if self.kind in ("text", "other"):
+        if math.isinf(self.low):
             return ""
-        opening = "[" if self.low_is_allowed else "("
-        closing = ")" if math.isinf(self.high) else "]"
-        infinite = ", or be inf" if self.may_be_infinite and math.isfinite(self.high) else ""
-        none = ", or be None" if self.may_be_none else ""
+        interval = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
+        infinite = ", or be inf" if self.infinite else ""
+        none = ", or be None" if "None" in self.kind else ""
         each = ", or one for each tracker" if self.per_tracker else ""
-        return f"{opening}{self.low:g}, {self.high:g}{closing}{infinite}{none}{each}"
+        return interval + infinite + none + each
+
+    @property
+    def per_tracker(self) -> bool:
+        """Whether it may be a tuple, one value for each tracker."""
+        return "tuple[float, ...]" in self.kind
+
+    def accept(self, name: str, value: object) -> Any:
+        """Return a value as the scenario keeps it: Python's numbers for numpy's, tuples for lists.
+
+        Raises:
+            ScenarioError: A wrong type, or out of range; names the setting and its range.
+        """
+        several = list(value) if isinstance(value, (tuple, list, np.ndarray)) else None
+        if value is None and "None" in self.kind:
+            return None
+        if self.kind.startswith("int"):
+            return self._whole(name, value)
+        if self.kind == "tuple[float, float]":
+            return self._pair(name, value)
+        if self.per_tracker and several is not None:
+            return tuple(self._number(f"{name}[{k}]", each) for k, each in enumerate(several))
+        if self.kind.startswith("float"):
+            return self._number(name, value)
+        if self.kind == "bool":
+            if not isinstance(value, (bool, np.bool_)):
+                fail(name, value, "it must be True or False")
+            return bool(value)
+        if self.kind == "tuple[str, ...]":
+            names = [value] if several is None else several
+            if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
+                fail(name, value, "it must be a tuple of names, each once")
+            return tuple(names)
+        if self.kind.startswith("Mapping"):
+            return self._weights(name, value)
+        if not isinstance(value, str):
+            fail(name, value, "it must be a string")
+        if self.choices is not None and value not in (known := tuple(self.choices())):
+            raise ScenarioError(unknown(name, value, known))
+        return value
+
+    def _whole(self, name: str, value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, Integral) or not self.low <= int(value) <= self.high:
+            fail(name, value, f"it must be a whole number in {self.range}")
+        return int(value)
+
+    def _number(self, name: str, value: object) -> float:
+        try:
+            number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+        except OverflowError:
+            number = math.inf
+        inside = self.low < number if self.above else self.low <= number
+        if not (inside and number <= self.high and math.isfinite(number)) and not (
+            self.infinite and number == math.inf
+        ):
+            fail(name, value, f"it must be a number in {self.range}")
+        return number
+
+    def _pair(self, name: str, value: object) -> tuple[float, float]:
+        if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
+            fail(name, value, f"it must be a tuple (least, greatest), both in {self.range}")
+        least, most = (self._number(f"{name}[{k}]", each) for k, each in enumerate(value))
+        if least > most:
+            fail(name, value, "the least must not be above the greatest")
+        return least, most
+
+    def _weights(self, name: str, value: object) -> tuple[tuple[str, float], ...]:
+        """Return weights sorted by name, so that equal scenarios compare equal."""
+        if not isinstance(value, (Mapping, tuple, list)):
+            fail(name, value, "it must map names of reward terms to numbers")
+        try:
+            weights = dict(value)
+        except (TypeError, ValueError):
+            weights = {None: 0.0}
+        if not all(isinstance(term, str) for term in weights):
+            fail(name, value, "it must map names of reward terms to numbers")
+        return tuple(sorted((term, self._number(f"{name}[{shown(term)}]", weights[term])) for term in weights))
 
 
-def declare(default: Any, setting: Setting) -> Any:
-    """Return a dataclass field with this default and declaration."""
-    return dataclasses.field(default=default, metadata={"setting": setting})
-
-
-def number(
-    default: float,
-    unit: str,
-    low: float,
-    high: float,
-    meaning: str,
-    *,
-    above: bool = False,
-    infinite: bool = False,
-    per_tracker: bool = False,
-    source: str = "",
+def setting(
+    default: Any, meaning: str, unit: str = "", low: float = -math.inf, high: float = math.inf, **more: Any
 ) -> Any:
-    """Declare a real number in [low, high], or in (low, high] with ``above``."""
-    setting = Setting("number", unit, meaning, low, high, not above, infinite, per_tracker=per_tracker, source=source)
-    return declare(default, setting)
+    """Return a dataclass field with this default and declaration; see :class:`Setting`."""
+    declaration = Setting(meaning, unit, low, high, **more)
+    return dataclasses.field(default=default, metadata={"setting": declaration})
 
 
-def whole(
-    default: int | None, low: int, high: float, meaning: str, *, unit: str = "1", none: bool = False, source: str = ""
-) -> Any:
-    """Declare a whole number in [low, high]."""
-    return declare(default, Setting("whole", unit, meaning, low, high, may_be_none=none, source=source))
-
-
-def pair(default: tuple[float, float], unit: str, high: float, meaning: str) -> Any:
-    """Declare two numbers (least, greatest), 0 <= least <= greatest <= high."""
-    return declare(default, Setting("pair", unit, meaning, 0, high))
-
-
-def flag(default: bool, meaning: str) -> Any:
-    """Declare a boolean."""
-    return declare(default, Setting("flag", "", meaning))
-
-
-def text(default: Any, meaning: str, choices: Callable[[], Iterable[str]] | None = None, source: str = "") -> Any:
-    """Declare a string, one of ``choices()`` where given."""
-    return declare(default, Setting("text", "", meaning, choices=choices, source=source))
-
-
-def setting_of(field: dataclasses.Field[Any]) -> Setting:
-    """Return the declaration of a scenario's field."""
-    setting: Setting = field.metadata["setting"]
-    return setting
-
-
-def check(name: str, value: object, setting: Setting) -> None:
-    """Raise if a value is invalid for its setting.
-
-    Raises:
-        ScenarioError: A wrong type, or out of range; names the setting and its range.
-    """
-    if value is None and setting.may_be_none:
-        return
-    if setting.kind == "whole":
-        if not isinstance(value, int) or isinstance(value, bool):
-            fail(name, value, "it must be a whole number")
-        _check_range(name, value, setting)
-    elif setting.kind == "number":
-        if setting.per_tracker and isinstance(value, tuple):
-            for number, each in enumerate(value):
-                check(f"{name}[{number}]", each, dataclasses.replace(setting, per_tracker=False))
-            return
-        if not is_number(value) or math.isnan(value):  # type: ignore[arg-type]
-            fail(name, value, "it must be a number")
-        _check_range(name, value, setting)  # type: ignore[arg-type]
-    elif setting.kind == "pair":
-        _check_pair(name, value, setting)
-    elif setting.kind == "flag":
-        if not isinstance(value, bool):
-            fail(name, value, "it must be True or False")
-    elif setting.kind == "text":
-        _check_text(name, value, setting)
-
-
-def _check_range(name: str, value: float, setting: Setting) -> None:
-    if value == math.inf:
-        if setting.may_be_infinite:
-            return
-        if setting.kind == "number":
-            fail(name, value, "it must be finite")
-    low_is_missed = value < setting.low or (value == setting.low and not setting.low_is_allowed)
-    if low_is_missed or value > setting.high:
-        fail(name, value, f"it must lie in {setting.range}")
-
-
-def _check_pair(name: str, value: object, setting: Setting) -> None:
-    if not (
-        isinstance(value, tuple)
-        and len(value) == 2
-        and all(is_number(v) and math.isfinite(v) for v in value)
-        and 0 <= value[0] <= value[1]
-    ):
-        fail(name, value, "it must be a tuple (least, greatest), 0 <= least <= greatest")
-    if value[1] > setting.high:
-        fail(name, value, f"both must lie in [0, {setting.high:g}]")
-
-
-def _check_text(name: str, value: object, setting: Setting) -> None:
-    if not isinstance(value, str):
-        fail(name, value, "it must be a string")
-    choices = None if setting.choices is None else tuple(setting.choices())
-    if choices is not None and value not in choices:
-        raise ScenarioError(f"unknown {name}={shown(value)}{near(value, choices)}; known: {', '.join(choices)}")
-
-
-def is_one_of(names: Container[str], value: object) -> bool:
+def is_one_of(names: Iterable[str], value: object) -> bool:
     """Return whether a value is a string and one of the names."""
     return isinstance(value, str) and value in names
 
 
-def is_number(value: object) -> bool:
-    """Return whether a value is a real number that a float can hold, and not a boolean."""
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        return False
-    return not isinstance(value, int) or abs(value) <= GREATEST_WHOLE
-
-
-def near(name: str, names: Iterable[str]) -> str:
-    """Return a hint with the names similar to an unknown one, or an empty string."""
-    found = difflib.get_close_matches(name[:LONGEST], tuple(names), n=3)
-    return f" (did you mean {' or '.join(map(repr, found))}?)" if found else ""
-
-
 def fail(name: str, value: object, allowed: str) -> NoReturn:
     """Raise the error for an invalid value, with what is allowed."""
-    raise ScenarioError(f"{name}={shown(value)} is not possible: {allowed}")
+    raise ScenarioError(f"{name}={shown(value)} is refused: {allowed}")

@@ -12,7 +12,7 @@ import pytest
 import posse
 from posse_baselines import PolicyError, play, settings_of, tunable, with_settings
 from posse_baselines.ddcs import Settings
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
 
 
 @pytest.mark.parametrize(

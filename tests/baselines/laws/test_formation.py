@@ -112,6 +112,18 @@ def test_l_l_in_line_or_on_the_wrong_side_is_l_phi_on_the_nearer(point: complex,
     assert asked(point, 0.4) == pytest.approx(SPEED + along * arm / abs(arm), abs=1e-9)
 
 
+@pytest.mark.parametrize("wanted", [1.2, -1.2])
+@pytest.mark.parametrize("crossing", [0.1, 0.2, 1.5, 2.9, -0.1, -0.2, -1.5, -2.9])
+def test_l_l_asks_for_both_rates_where_the_lines_cross_on_the_wanted_side(crossing: float, wanted: float) -> None:
+    gamma_i, gamma_k = 0.4, 0.4 + crossing
+    found = complex(*l_l.l_l_velocity(1.0, 0.3, 0.7, gamma_i, 2.0, -0.5, 0.2, gamma_k, wanted, 0.15))
+    rates = [(found * cmath.exp(-1j * gamma)).real for gamma in (gamma_i, gamma_k)]
+    if math.copysign(1.0, wanted) * math.sin(crossing) < 0.15:  # l-φ on the nearer leader
+        assert found == pytest.approx((0.3 + 0.7j) * cmath.exp(1j * gamma_i))
+    else:
+        assert rates == pytest.approx((0.3, -0.5))
+
+
 # --- slots ---------------------------------------------------------------------------------------
 
 

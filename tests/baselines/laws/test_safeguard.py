@@ -123,6 +123,32 @@ def test_a_wanted_velocity_that_is_safe_is_left_alone() -> None:
     assert safe_velocity(body_of(0.0, 1.0, LIMITS[1]), discs, count, 1.0, 0.0, WORK) == (1.0, 0.0, False)
 
 
+def choose(speed: float, wanted: complex, *discs: tuple[complex, complex, float, float]) -> tuple[complex, bool]:
+    """Choose for a robot that looks along x; a disc is (place, velocity, reach, margin)."""
+    found, count = np.zeros(8, DISC), 0
+    for at, velocity, reach, margin in discs:
+        count = put_disc(found, count, at.real, at.imag, velocity.real, velocity.imag, reach, margin)
+    body = body_of(0.0, speed, (1.5, 5.0))
+    x, y, changed = safe_velocity(body, found, count, wanted.real, wanted.imag, WORK)
+    return complex(x, y), changed
+
+
+@pytest.mark.parametrize("ahead", [0.7, 0.8, 0.9])
+def test_what_is_straight_ahead_is_passed_on_the_right(ahead: float) -> None:
+    velocity, changed = choose(0.6, 0.8 + 0j, (ahead + 0j, -0.3 + 0j, 0.3, 0.2))
+    assert changed
+    assert velocity.imag < -0.1
+
+
+def test_a_robot_that_can_only_stop_stops() -> None:
+    places = (0.53, 0.1 + 0.33j, 0.1 - 0.33j, -0.3 + 0.3j, -0.3 - 0.3j)
+    assert choose(0.6, 0.8 + 0j, *((complex(at), 0j, 0.3, 0.02) for at in places)) == (0j, True)
+
+
+def test_in_contact_no_velocity_is_better_than_the_wanted_one() -> None:
+    assert choose(0.6, 0.7 + 0.1j, (0.1 + 0j, 0j, 0.5, 0.2)) == (0.7 + 0.1j, True)
+
+
 def test_a_full_list_of_discs_stays_as_it_is() -> None:
     discs = np.zeros(1, DISC)
     count = put_disc(discs, 0, 1.0, 2.0, 0.0, 0.0, 0.3, 0.1)

@@ -7,16 +7,16 @@ import re
 from pathlib import Path
 
 import pytest
+from scripts.ship import LARGEST, make_target_check
 
 from posse import get_scenario
 from posse_baselines import load_target
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.targets import SHIPPED_TARGETS, shipped_targets
-from posse_training.shipping.ship import LARGEST
-from posse_training.shipping.ship_target import make_target_check
 
 FILES = sorted(SHIPPED_TARGETS.glob("*.safetensors"))
-TOLERANCE = 0.01
+TOLERANCE = 0.03
+"""About two standard errors of the mean of a check."""
 
 
 def test_every_file_is_known_by_its_name() -> None:
@@ -30,7 +30,6 @@ def test_a_shipped_target_is_what_its_card_says(path: Path) -> None:
     policy = LearnedPolicy.from_file(path)
     card = policy.card
     assert path.stat().st_size <= LARGEST
-    assert json.loads(path.with_suffix(".json").read_text(encoding="utf-8")) == card
     assert card["encoding_hash"] == policy.encoding.digest
     assert not re.search(r"(?<![\w.])/(tmp|home|root|work|Users)/", json.dumps(card))
     comparison = card["comparison"]

@@ -23,8 +23,6 @@ SHIPPED = {
     "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field", "duel"},
     "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss"},
 }
-TOLERANCE = 0.02
-"""How far the mean safe score of 32 worlds may move on a machine that rounds otherwise."""
 
 
 def scenario_of(path: Path, **overrides: Any) -> posse.Scenario:
@@ -64,7 +62,9 @@ def test_a_file_says_where_it_is_from(name: str, path: Path) -> None:
 def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None:
     check = read_tuned(path).card["check"]
     results = evaluate(name, path.stem, check["worlds"], check["seed"], split=check["split"], progress=False)
-    assert results["safe_score"].mean() == pytest.approx(check["safe_score"], abs=TOLERANCE)
+    scores = results["safe_score"]
+    sampled = max(0.01, 2.0 * float(scores.std()) / len(scores) ** 0.5)  # two standard errors
+    assert scores.mean() == pytest.approx(check["safe_score"], abs=sampled)
 
 
 @pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)

@@ -101,7 +101,7 @@ def test_a_team_is_the_first_world_of_a_batch() -> None:
         actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
         observation, reward, _, _, info = env.step(actions[0])
         batch_observations, rewards, _, _, infos = batch.step(actions)
-        assert reward == pytest.approx(rewards[0].mean(), abs=1e-6)
+        assert reward == pytest.approx(rewards[0].mean(), rel=1e-5, abs=1e-6)
         assert info["score"] == infos["score"][0]
         for term, values in infos["reward_terms"].items():
             assert np.array_equal(info["reward_terms"][term], values[0])
@@ -228,7 +228,7 @@ def test_episodes_are_counted_and_filmed(tmp_path: Path) -> None:
     steps = play(env, 8)
     episode = steps[-1][-1]["episode"]
     assert episode["l"] == 8
-    assert episode["r"] == pytest.approx(sum(step[1] for step in steps), abs=1e-5)
+    assert episode["r"] == pytest.approx(sum(step[1] for step in steps), rel=1e-5, abs=1e-5)
     env.close()
     assert [path.suffix for path in (tmp_path / "films").iterdir()] == [".mp4"]
 

@@ -61,6 +61,7 @@ def test_pettingzoo_finds_the_environment_in_turns_sound(settings: dict[str, Any
     seed_test(lambda: posse.env(**settings), num_cycles=20)
 
 
+@pytest.mark.filterwarnings("ignore:Environment's m:UserWarning")  # the space has no bounds
 @variants
 def test_the_state_lies_in_its_space(settings: dict[str, Any]) -> None:
     short = {"horizon": 40, **settings}

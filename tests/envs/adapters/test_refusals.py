@@ -137,8 +137,6 @@ def test_an_agent_whose_episode_is_over_acts_no_more() -> None:
         ({"seed": 10**5000}, r"seed=<int .*\[0, 2\*\*63\)"),
         ({"split": np.zeros(2)}, r"unknown split array.*splits are: train"),
         ({"autoreset": LONG_NAME}, r"unknown autoreset mode 'xxx.*\(5,002 characters\)"),
-        ({"own_kernel": LONG_NAME}, r"own_kernel='xxx.*True or False"),
-        ({"device": LONG_NAME}, r"unknown device 'xxx.*devices are: cpu, cuda"),
         ({"scenario": LONG_NAME}, r"unknown scenario 'xxx.*\(5,002 characters\)"),
         ({"scenario": "a\0b"}, r"unknown scenario 'a\\x00b'"),
         ({"scenario": ["constant"]}, r"unknown scenario \['constant'\]"),

@@ -153,18 +153,6 @@ def test_the_same_seed_gives_the_same_worlds_whatever_their_number() -> None:
     assert not np.array_equal(theirs[0], theirs[1])
 
 
-@pytest.mark.long
-def test_a_kernel_of_its_own_changes_nothing() -> None:
-    general, own = (vector(own_kernel=own_kernel, **BUSY) for own_kernel in (False, True))
-    assert own.batch.own_kernel
-    assert not general.batch.own_kernel
-    assert same(general.reset(seed=7), own.reset(seed=7))
-    own.action_space.seed(0)
-    for _ in range(60):
-        actions = own.action_space.sample()
-        assert same(general.step(actions)[:4], own.step(actions)[:4])
-
-
 def test_without_a_seed_environments_differ() -> None:
     first, second = vector(), vector()
     assert not np.array_equal(first.reset()[0], second.reset()[0])

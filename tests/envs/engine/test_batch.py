@@ -63,26 +63,6 @@ def test_the_number_of_threads_changes_nothing() -> None:
         assert_equal(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
 
 
-@pytest.mark.parametrize(
-    ("name", "more"),
-    [
-        ("field", {}),
-        pytest.param("smart", {}, marks=pytest.mark.long),
-        pytest.param("smart", {"num_trackers": 11, "num_neighbours": 3}, marks=pytest.mark.long),
-    ],
-)
-def test_a_kernel_of_its_own_changes_nothing(name: str, more: dict[str, Any]) -> None:
-    make: dict[str, Any] = {"seed": 3, "horizon": 60, "num_threads": 1, **more}
-    whole = play(posse.batch(name, 40, **make), 140)
-    batch = posse.batch(name, 40, **make, own_kernel=True)
-    assert_equal(play(batch, 140), whole)
-    again = pickle.loads(pickle.dumps(batch))  # noqa: S301
-    assert again.own_kernel
-    for step in range(3):
-        actions = actions_for(batch, step)
-        assert_equal([again.step(actions)[0]], [batch.step(actions)[0]])
-
-
 def test_two_batches_in_two_python_threads_do_not_disturb_each_other() -> None:
     expected = [play(posse.batch("field", 500, seed=seed), 25) for seed in (1, 2)]
     got: dict[int, list[npt.NDArray[Any]]] = {}
@@ -347,7 +327,6 @@ def test_a_refused_reset_leaves_the_seed() -> None:
         ({"first_world": -1}, "first_world"),
         ({"autoreset": "always"}, "autoreset"),
         ({"num_threads": 0}, "num_threads"),
-        ({"own_kernel": "yes"}, "own_kernel"),
     ],
     ids=str,
 )
@@ -419,4 +398,4 @@ def test_uncompiled_worlds_are_the_same_to_rounding(name: str, steps: int, tmp_p
     """For 30 steps, a new episode among them; and no index is out of bounds, which numpy sees."""
     plain = in_another_process(tmp_path, name, steps, NUMBA_DISABLE_JIT="1")
     for mine, theirs in zip(here(name, steps), plain, strict=True):
-        np.testing.assert_allclose(mine, theirs, atol=2e-4)
+        np.testing.assert_allclose(mine, theirs, rtol=1e-4, atol=1e-3)

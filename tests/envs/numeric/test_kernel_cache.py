@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from tests.fuzz.kernel_cache import campaign
 from tests.support.forks import forks_of
 
 import posse
@@ -389,14 +388,6 @@ def test_a_full_disk_costs_time_only(herd: Herd, tmp_path: Path) -> None:
     run = Herd(herd.root, limit + MAIN).run(cache)
     assert (run.answer, run.hits, run.misses) == (6.0, 0, 1)
     assert list(cache.iterdir()) == [], "nothing half written is left"
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_damaged_files_are_compiled_again(tmp_path: Path) -> None:
-    """The long form: ``python -m tests.fuzz.kernel_cache --minutes 30``."""
-    counts, failures = campaign(tmp_path, seed=0, cases=5)
-    assert failures == []
-    assert sum(counts.values()) == 5
 
 
 @pytest.mark.long

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.fuzz.interrupts import campaign
 
 import posse
 from posse.numeric import Blocks, divide, kernel, run_threads, threads, worlds_of
@@ -299,11 +298,3 @@ def test_memory_of_observations_is_used_again_with_threads_too() -> None:
     actions = np.zeros(batch.action_shape, np.float32)
     places = {batch.step(actions)[0].ctypes.data for _ in range(20)}
     assert len(places) == 1
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs signals of POSIX")
-def test_an_interrupted_step_is_done_or_not_begun_and_nothing_is_written_later() -> None:
-    """The long form: ``python -m tests.fuzz.interrupts --minutes 30``."""
-    counts, failures = campaign(seed=0, cases=150)
-    assert failures == []
-    assert counts["interrupted"] > 30

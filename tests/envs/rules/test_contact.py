@@ -31,34 +31,6 @@ def least_gap(batch: posse.Batch) -> float:
     return min(float(free_gaps(batch.scenario, world).min()) for world in worlds)
 
 
-@settings(derandomize=True, max_examples=25, deadline=None)
-@given(
-    speed=st.sampled_from([1.0, 5.0, 30.0, 100.0]),
-    acceleration=st.sampled_from([math.inf, 50.0]),
-    seed=st.integers(0, 1000),
-    motion=st.sampled_from(["constant", "smart", "agent"]),
-)
-def test_discs_never_overlap_however_fast(speed: float, acceleration: float, seed: int, motion: str) -> None:
-    batch = posse.batch(
-        num_worlds=4,
-        num_trackers=8,
-        arena=12.0,
-        num_obstacles=2,
-        start_distance=(1.0, 12.0),
-        tracker_speed=speed,
-        tracker_turn_rate=10.0,
-        target_speed=min(0.9 * speed, 0.9),
-        tracker_acceleration=acceleration,
-        target_motion=motion,
-        obstacle_gap=0.5,
-    )
-    batch.reset(seed=seed)
-    rng = np.random.default_rng(seed)
-    for _ in range(25):
-        batch.step(rng.uniform(-1, 1, batch.action_shape))
-        assert least_gap(batch) > 0
-
-
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(
     speed=st.floats(1.0, 100.0),
@@ -105,22 +77,6 @@ def test_walls_hold(speed: float) -> None:
     assert (reached < 4.85).all()
     assert state["world_contacts_obstacle"] == 4, "once each, though all kept pushing"
     assert (infos["reward_terms"]["contact"] == 0).all()
-
-
-def test_a_robot_that_is_blocked_stands_and_can_leave() -> None:
-    batch = posse.batch(num_trackers=2)
-    at(batch, [8.0, 8.0, 0.0], [0.0, 0.0, 0.0], [0.5, 0.0, 0.0])
-    for _ in range(5):
-        act(batch, [1.0, 0.0], [-1.0, 0.0])
-    state = one_world(snapshot(batch), 0)
-    assert state["tracker_speed"][0] == 0
-    assert state["tracker_x"][0] == pytest.approx(0.2 - 0.0005, abs=1e-5)
-    assert (state["tracker_touching"] == 1).all()
-    for _ in range(20):
-        act(batch, [1.0, 1.0], [-1.0, 0.0])  # turns on the spot until the way is free
-    state = one_world(snapshot(batch), 0)
-    assert (state["tracker_touching"] == 0).all()
-    assert state["world_contacts_tracker"] == 1
 
 
 def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
@@ -181,14 +137,4 @@ def test_the_least_gap_is_to_anything_however_slow_the_robots() -> None:
     state = snapshot(batch)
     for e in range(16):
         least = float(free_gaps(batch.scenario, one_world(state, e)).min())
-        assert batch.metrics()["least_gap"][e] == pytest.approx(least, abs=1e-4)
-
-
-def test_termination_on_contact_and_only_then() -> None:
-    batch = posse.batch(num_trackers=2, terminate_on_contact=True, autoreset="disabled")
-    at(batch, [8.0, 8.0, 0.0], [0.0, 0.0, 0.0], [0.45, 0.0, 0.0])
-    ends = []
-    for _ in range(2):
-        _, _, terminated, truncated, infos = batch.step([[[1.0, 0.0], [-1.0, 0.0]]])
-        ends.append((bool(terminated[0]), bool(truncated[0]), "metrics" in infos))
-    assert ends == [(False, False, False), (True, False, True)]
+        assert batch.metrics()["least_gap"][e] == pytest.approx(least, rel=1e-4, abs=1e-4)

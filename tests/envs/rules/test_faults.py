@@ -69,24 +69,6 @@ def test_several_leaders_break_one_after_the_other_within_the_window() -> None:
     assert np.ptp(times[:, 0]) > 25, "the first is drawn from all of the window"
 
 
-def test_a_given_tracker_breaks_at_a_given_time() -> None:
-    batch = posse.batch(
-        "leader-loss",
-        20,
-        break_choice="given",
-        break_number=3,
-        break_window=(0.3, 0.3),
-        autoreset="disabled",
-        horizon=100,
-    )
-    batch.reset(seed=3)
-    for _ in range(100):
-        batch.step(np.zeros(batch.action_shape))
-    expected = np.full((20, 5), NEVER)
-    expected[:, 3] = 30
-    np.testing.assert_array_equal(batch.state["tracker_broken_at"], expected)
-
-
 def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
     batch = posse.batch("leader-loss", 10, break_window=(0.1, 0.1), horizon=60, message_size=1, autoreset="disabled")
     batch.reset(seed=4)
@@ -120,14 +102,3 @@ def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
             assert views["neighbour_age"][0, mate][heard] == pytest.approx(0.1 * silent)
         else:
             assert not heard.any()
-
-
-def test_it_stays_in_the_team_and_in_the_way() -> None:
-    batch = posse.batch(num_trackers=2, breaks=1, break_window=(0.0, 0.0), autoreset="disabled")
-    batch.reset(options={"target_pose": [3.0, 0.0, math.pi / 2], "tracker_pose": [[1, 0, 0], [0, 0, 0]]})
-    for _ in range(20):
-        observations, *_ = batch.step([[[1.0, 0.0], [1.0, 0.0]]])
-    assert observations.shape[1] == 2
-    assert broken(batch).tolist() == [[True, False]]
-    assert batch.state["tracker_x"][0, 1] == pytest.approx(0.7, abs=0.001)
-    assert batch.state["world_contacts_tracker"][0] == 1

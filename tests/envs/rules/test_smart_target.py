@@ -13,13 +13,9 @@ import pytest
 
 import posse
 from posse.scenarios.formation import slot_offsets
-from posse.scenarios.limits import SAFE_MARGIN
 
 Floats = npt.NDArray[np.float64]
 Controller = Callable[[posse.Batch], npt.NDArray[np.float32]]
-
-
-# ------------------------------------------------------------------------------------ teams
 
 
 def resting(batch: posse.Batch) -> npt.NDArray[np.float32]:
@@ -53,26 +49,11 @@ def pursuing(batch: posse.Batch) -> npt.NDArray[np.float32]:
     return drive(batch, batch.scenario.tracker_speeds[0] * speed * to_target / distance)
 
 
-def keeping_slots(batch: posse.Batch) -> npt.NDArray[np.float32]:
-    """Every tracker to the slot of its own number: slot velocity and a gain on the offset."""
-    s, state = batch.scenario, batch.state
-    heading = state["world_heading_cos"] + 1j * state["world_heading_sin"]
-    frame = state["world_frame_cos"] + 1j * state["world_frame_sin"]
-    slots = np.array([x + 1j * y for x, y in slot_offsets(s)])
-    offset = offsets(batch) + frame[:, None] * slots
-    pull = np.minimum(2.0 * np.abs(offset), s.tracker_speeds[0] - s.target_speed)
-    pull = pull * offset / np.maximum(np.abs(offset), 1e-9)
-    return drive(batch, s.target_speed * heading[:, None] + pull)
-
-
 def flying_blind(batch: posse.Batch) -> npt.NDArray[np.float32]:
     """Every tracker straight on at the target's speed, whatever it does."""
     actions = np.zeros(batch.action_shape, np.float32)
     actions[..., 0] = 2 * batch.scenario.target_speed / batch.scenario.tracker_speeds[0] - 1
     return actions
-
-
-# ------------------------------------------------------------------------------------ playing
 
 
 class Play:
@@ -118,8 +99,8 @@ def start(
 
 @functools.cache
 def pursued(motion: str) -> Play:
-    """500 worlds of a pursuing team; the same starts, speeds and limits for every motion."""
-    return Play(start(500, target_motion=motion), pursuing, 600)
+    """200 worlds of a pursuing team; the same starts, speeds and limits for every motion."""
+    return Play(start(200, target_motion=motion), pursuing, 600)
 
 
 def in_slots(worlds: int) -> tuple[Floats, Floats]:
@@ -129,17 +110,6 @@ def in_slots(worlds: int) -> tuple[Floats, Floats]:
     places = slots * np.exp(1j * theta)[:, None]
     trackers = np.stack([places.real, places.imag, np.broadcast_to(theta[:, None], places.shape)], -1)
     return trackers, np.stack([0 * theta, 0 * theta, theta], -1)
-
-
-# ------------------------------------------------------------------------------------ far away
-
-
-def test_it_opens_its_distance_to_trackers_that_rest() -> None:
-    play = Play(start(200), resting, 300)
-    gained = play.nearest[-1] - play.nearest[0]
-    assert gained.min() > 0
-    # 30 s at 0.6 m/s are 18 m; some of it goes into turning and getting out between them.
-    assert gained.mean() > 0.6 * 18
 
 
 @pytest.mark.parametrize("team", [resting, pursuing])
@@ -156,22 +126,6 @@ def test_it_leaves_a_ring_by_the_widest_gap(team: Controller) -> None:
     assert np.abs(left).mean() < np.radians(20)
 
 
-def test_it_heeds_where_trackers_are_going() -> None:
-    # One on each side, equally near, both going the same way: only their motion tells them apart.
-    # It leaves ahead, between them, but on the side of the one that goes away.
-    for direction in (1.0, -1.0):
-        theta = 0.0 if direction > 0 else math.pi
-        batch = start(
-            1, num_trackers=2, tracker_pose=[[-2.0, 0.0, theta], [2.0, 0.0, theta]], target_pose=[0.0, 0.0, math.pi / 2]
-        )
-        batch.arrays.tracker["speed"] = batch.scenario.tracker_speeds[0]
-        batch.step(flying_blind(batch))
-        assert direction * batch.state["world_heading_cos"][0] > 0.1
-
-
-# ------------------------------------------------------------------------------------ close by
-
-
 def test_it_turns_on_a_team_that_keeps_station_and_not_before() -> None:
     trackers, target = in_slots(24)
     batch = start(24, tracker_pose=trackers, target_pose=target)
@@ -182,16 +136,6 @@ def test_it_turns_on_a_team_that_keeps_station_and_not_before() -> None:
     # ... and then round, by more than a right angle, within the time an about-turn takes.
     assert away.max(axis=0).min() > np.radians(90)
     assert np.argmax(away > np.radians(60), axis=0).max() < 50
-
-
-def test_a_dart_breaks_the_formation_and_touches_nobody() -> None:
-    trackers, target = in_slots(24)
-    batch = start(24, tracker_pose=trackers, target_pose=target)
-    before = offsets(batch).copy()
-    play = Play(batch, flying_blind, 55)
-    assert np.abs(offsets(batch) - before).mean() > 1.0
-    assert not play.touched.any()
-    assert (play.score[-1] == 0).mean() > 0.5
 
 
 def test_it_turns_away_from_a_tracker_that_comes_too_near() -> None:
@@ -211,27 +155,6 @@ def test_it_gets_away_from_trackers_that_hold_it_fast() -> None:
     assert batch.state["world_touching"][0] != 0
     play = Play(batch, resting, 40)
     assert play.nearest[-1, 0] > 1.0
-
-
-def test_it_breaks_a_formation_that_a_constant_target_leaves_whole() -> None:
-    trackers, target = in_slots(40)
-    scores = {
-        motion: Play(
-            start(40, tracker_pose=trackers, target_pose=target, target_motion=motion), keeping_slots, 600
-        ).score.mean()
-        for motion in ("constant", "smart")
-    }
-    assert scores["constant"] > 0.95
-    assert scores["smart"] < 0.75
-
-
-def test_a_team_that_is_quick_to_settle_can() -> None:
-    batch = start(200)
-    Play(batch, keeping_slots, 600)
-    assert np.isfinite(batch.metrics()["settling_time"]).mean() > 0.8
-
-
-# ------------------------------------------------------------------------------------ pursued
 
 
 @pytest.mark.parametrize("motion", ["constant", "accelerating"])
@@ -258,46 +181,6 @@ def test_it_obeys_its_turn_limit_and_keeps_its_speed() -> None:
     free = ~(play.touched[1:] | play.touched[:-1])
     # The chord of an arc is shorter than the arc, by h²/6 with h half the turn.
     assert steps[free].min() >= s.target_speed * s.control_step * (1 - most**2 / 24 - 1e-3)
-
-
-def test_it_does_not_chatter() -> None:
-    turns = pursued("smart").turns
-    flips = (turns[1:] * turns[:-1] < -1e-4).sum(axis=0)
-    assert flips.mean() < 30  # in 60 s: less than once in two seconds
-
-
-@pytest.mark.parametrize("scenario", ["obstacles", "field"])
-def test_it_keeps_off_obstacles_and_walls(scenario: str) -> None:
-    batch = start(150, scenario, breaks=0)
-    play = Play(batch, pursuing, 500)
-    s, state = batch.scenario, batch.state
-    # A tracker that blocks it can take the room that it counted on: look at what came before.
-    alone = ~np.maximum.accumulate(play.touched, axis=0)
-    places = state["obstacle_x"] + 1j * state["obstacle_y"]
-    gap = np.abs(play.target[..., None] - places) - state["obstacle_radius"]
-    room = s.arena / 2 - np.maximum(np.abs(play.target.real), np.abs(play.target.imag))
-    free = np.minimum(gap.min(axis=-1), room) - s.robot_radius
-    assert free[alone].min() > SAFE_MARGIN - 1e-3
-    assert free.min() > 0
-
-
-# ------------------------------------------------------------------------------------ determinism
-
-
-def test_it_follows_from_the_state_alone() -> None:
-    trackers, target = in_slots(6)
-    trackers[:, :, :2] *= 1.5
-    plays = [Play(start(6, tracker_pose=trackers, target_pose=target, seed=seed), pursuing, 200) for seed in (1, 2)]
-    np.testing.assert_array_equal(plays[0].target, plays[1].target)
-
-
-def test_it_goes_on_as_it_was_after_a_restore() -> None:
-    batch = start(20)
-    Play(batch, keeping_slots, 157)
-    snapshot = batch.save()
-    first = Play(batch, keeping_slots, 150)
-    batch.restore(snapshot)
-    np.testing.assert_array_equal(first.target, Play(batch, keeping_slots, 150).target)
 
 
 def test_it_flees_from_trackers_that_work_and_only_steers_clear_of_broken_ones() -> None:

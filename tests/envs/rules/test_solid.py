@@ -65,7 +65,7 @@ def scenarios(draw: st.DrawFn) -> posse.Scenario:
         raise
 
 
-@settings(derandomize=True, max_examples=50, deadline=None)
+@settings(derandomize=True, max_examples=25, deadline=None)
 @given(
     scenario=scenarios(),
     crowds=st.booleans(),
@@ -90,8 +90,11 @@ def scenarios(draw: st.DrawFn) -> posse.Scenario:
 def test_no_disc_is_ever_inside_another_or_a_wall(
     scenario: posse.Scenario, crowds: bool, stays: float, leaves: float, seed: int
 ) -> None:
-    batch = posse.Batch(scenario, 200, seed=seed)
-    batch.reset()
+    batch = posse.Batch(scenario, 100, seed=seed)
+    try:
+        batch.reset()
+    except ScenarioError:
+        assume(False)
     team = Team(batch, seed, crowds=crowds, stays=stays, leaves=leaves)
     for _ in range(200):
         team.play()

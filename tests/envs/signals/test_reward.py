@@ -37,10 +37,10 @@ def test_every_term_and_the_sum_equal_an_independent_working(case: Any) -> None:
         }
         terms = infos["reward_terms"]
         for name, value in expected.items():
-            np.testing.assert_allclose(terms[name][0], value, atol=2e-4, err_msg=name)
+            np.testing.assert_allclose(terms[name][0], value, rtol=1e-4, atol=2e-4, err_msg=name)
         weights = dict(s.reward_weights)
         total = sum(weights.get(name, 0.0) * terms[name][0].astype(float) for name in terms)
-        np.testing.assert_allclose(rewards, total, atol=1e-5)
+        np.testing.assert_allclose(rewards, total, rtol=1e-5, atol=1e-5)
 
 
 def test_terms_are_those_declared_and_weights_are_used() -> None:

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.support.replays import short
 
+from posse_training.errors import SettingsError
 from posse_training.replay import Column, Event, Player, Replay
 from posse_training.replay.format import decode, encode
-from posse_training.runs.settings import SettingsError
 
 VALUES = arrays.arrays(
     np.float64,

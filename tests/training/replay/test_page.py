@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
-import os
 import re
 import zlib
 from dataclasses import replace
@@ -15,14 +14,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.disk import largest_file
 from tests.support.replays import ATTACK, hostile, short
 
 from posse.rendering import style
 from posse_training.cli import main
+from posse_training.errors import SettingsError
 from posse_training.replay import colours as colours_of
 from posse_training.replay import read_replay, record, write_replay
 from posse_training.replay.page import MODULES, colours, page
-from posse_training.runs.settings import SettingsError
 
 WEB = resources.files("posse_training.replay") / "web"
 
@@ -187,15 +187,10 @@ def test_a_page_with_damaged_data_is_named(tmp_path: Path) -> None:
             read_replay(path)
 
 
-def test_a_full_disk_keeps_the_old_page_and_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_keeps_the_old_page_and_names_it(tmp_path: Path) -> None:
     path = write_replay(short("constant"), tmp_path / "a.html")
     before = path.read_bytes()
-
-    def full(file: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match=r"No space left on device.*a\.html"):
+    with largest_file(1000), pytest.raises(OSError, match=r"File too large.*a\.html"):
         write_replay(hostile(), path)
     assert path.read_bytes() == before
     assert [each.name for each in tmp_path.iterdir()] == ["a.html"]

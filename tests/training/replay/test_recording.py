@@ -10,9 +10,9 @@ from tests.support.replays import short
 
 import posse
 from posse_baselines import begin, load
+from posse_training.errors import SettingsError
 from posse_training.replay import Player, Recorder, join, record
 from posse_training.replay.format import decode, encode
-from posse_training.runs.settings import SettingsError
 
 
 def close(column: Any, frame: int, value: Any, angle: bool = False) -> None:

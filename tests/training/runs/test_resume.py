@@ -25,10 +25,9 @@ from posse_training.runs.train import resume, train
     ("algorithm", "changes"),
     [
         ("ppo", {}),
-        *(pytest.param(name, {}, marks=pytest.mark.long) for name in ("mappo", "recurrent-ppo", "sac", "td3")),
+        *(pytest.param(name, {}, marks=pytest.mark.long) for name in ("mappo", "sac", "td3")),
         ("mappo", ADVISED),
         ("ppo", BELIEVING),
-        pytest.param("recurrent-ppo", BELIEVING, marks=pytest.mark.long),
     ],
 )
 def test_a_training_that_was_cut_ends_where_it_would_have(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy.typing as npt
 import pytest
 import torch
 from tensordict import TensorDictBase
-from tests.support.cuda_cases import run_in_simulator
 from torchrl.envs.utils import check_env_specs
 
 import posse
@@ -242,8 +240,3 @@ def test_a_collector_gathers_whole_batches() -> None:
         observations, *_ = batch.step(np.ones(batch.action_shape, np.float32))
         np.testing.assert_array_equal(data["next", "agents", "observation"][:, step].numpy(), observations)
     assert data["next", "truncated"].squeeze(-1)[:, 11].all()
-
-
-@pytest.mark.long
-def test_over_the_gpu_engine_in_the_simulator() -> None:
-    run_in_simulator(Path(__file__).parents[2] / "support" / "torchrl_simulated.py")

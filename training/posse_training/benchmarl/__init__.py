@@ -9,7 +9,7 @@ try:
 except ImportError as error:
     raise MissingExtraError(
         f"benchmarl cannot be imported ({error}). It wants a virtual environment of its own: "
-        "pip install posse benchmarl"
+        "`make recipes`, from a clone, makes one"
     ) from error
 
 from posse_training.benchmarl.task import PosseTask, PosseTaskClass, register

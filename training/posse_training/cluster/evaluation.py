@@ -20,8 +20,8 @@ from posse_training.cluster.settings import Cluster
 from posse_training.cluster.shards import Arrays, Job, Shard, cut, joined
 from posse_training.cluster.store import Folder
 from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
-from posse_training.reports.comparing.players import PlayError, describe
-from posse_training.reports.evaluation import limited, play_shard, refuse_trained_split
+from posse_training.reports.episodes import limited, play_shard, refuse_trained_split
+from posse_training.reports.failures import PlayError, describe
 
 _GRACE: Final = 4.0  # s beyond the time limit, after which a hanging process is ended
 

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.cluster.shards import Arrays, Job, Shard
 from posse_training.errors import ClusterError
 from posse_training.files import InUseError, locked

@@ -29,17 +29,23 @@ def main(arguments: Sequence[str]) -> None:
     if which.name is not None:
         table.add_column("setting", style="bold", no_wrap=True)
         table.add_column("value", overflow="fold")
-        for name, value in get_scenario(which.name).to_dict().items():
-            table.add_row(name, Text(str(value)))
+        table.add_column("unit")
+        table.add_column("range", overflow="fold")
+        table.add_column("meaning", overflow="fold")
+        scenario = get_scenario(which.name)
+        for name, value in scenario.to_dict().items():
+            setting = scenario.settings()[name]
+            table.add_row(name, Text(str(value)), setting.unit, Text(setting.range), setting.meaning)
     else:
         plain = get_scenario("constant").to_dict()
         table.add_column("scenario", style="bold", no_wrap=True)
+        table.add_column("meaning", overflow="fold")
         table.add_column("settings that differ from those of constant", overflow="fold")
         for name in scenario_names():
             differs = [
                 f"{key}={value}"
                 for key, value in get_scenario(name).to_dict().items()
-                if value != plain[key] and key != "name"
+                if value != plain[key] and key not in ("name", "meaning")
             ]
-            table.add_row(name, Text(", ".join(differs) or "-"))
+            table.add_row(name, get_scenario(name).meaning, Text(", ".join(differs) or "-"))
     Console().print(table)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
@@ -14,10 +13,11 @@ import tyro
 
 from posse_training.cluster.settings import RayOption, how_to_resume, of_option
 from posse_training.errors import require
+from posse_training.files import read_json
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.settings import TrainSettings, opponents_of
 
-_NEEDED = ("training", "torch", "stable_baselines3", "sb3_contrib")
+_NEEDED = ("training", "torch", "stable_baselines3")
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str]) -> None:
 
 def _what_next(path: Path) -> str:
     """Return the file of the policy, and the commands that show what it does."""
-    run = json.loads((path.parent / "settings.json").read_text(encoding="utf-8"))
+    run = read_json(path.parent / "settings.json")
     scenario, _, _ = run["scenario"].partition(",")
     beside, policy = shlex.quote(run["beside"] or "ddcs-tuned"), shlex.quote(str(path))
     page = shlex.quote(str(path.with_name("replay.html")))

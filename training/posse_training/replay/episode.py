@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy.typing as npt
 
-from posse_training.runs.settings import SettingsError
+from posse_training.errors import SettingsError
 
 MOST_PLAYERS: Final = 4
 EVENT_KINDS: Final = ("detection", "dart", "contact", "break", "leader", "settled")

@@ -19,8 +19,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from posse_training.errors import SettingsError
 from posse_training.replay.episode import Column, Event, Player, Replay
-from posse_training.runs.settings import SettingsError
 
 FORMAT: Final = 1
 _GREATEST: Final = 2**30

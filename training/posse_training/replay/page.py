@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from posse.rendering import style
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
+from posse_training.errors import SettingsError
 from posse_training.replay.colours import DARK, DARK_PLAYERS, DARK_TASK_COLOURS, PLAYERS, TASK_COLOURS
 from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
-from posse_training.runs.settings import SettingsError
 
 MODULES: Final = (
     "data.js",

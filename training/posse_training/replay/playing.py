@@ -8,9 +8,9 @@ from typing import Any, Final
 from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, Target, against, begin, load, load_target
 from posse_baselines.playing import check_moves_all
+from posse_training.errors import SettingsError
 from posse_training.replay.episode import MOST_PLAYERS, Replay, join
 from posse_training.replay.recording import Recorder
-from posse_training.runs.settings import SettingsError
 
 _LONGEST_ENTRY: Final = 400  # characters, of a card
 

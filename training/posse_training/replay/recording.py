@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from posse import Batch
 from posse.numeric import BoolArray, FloatArray
+from posse_training.errors import SettingsError
 from posse_training.replay.columns import (
     STATES,
     action_columns,
@@ -22,7 +23,6 @@ from posse_training.replay.columns import (
 from posse_training.replay.episode import Player, Replay
 from posse_training.replay.events import find_events
 from posse_training.replay.world import describe_world
-from posse_training.runs.settings import SettingsError
 
 
 class Recorder:

@@ -5,25 +5,24 @@ Every policy plays the same worlds: world i depends on the seed, the split and i
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
+from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import posse
 from posse import Scenario, get_scenario
-from posse_baselines import Policy, Target, against, load, load_target, rollout
+from posse_baselines import Policy, Target, against, load, load_target
 from posse_training.cluster import Cluster
 from posse_training.cluster.settings import WORLDS, as_cluster
-from posse_training.cluster.shards import Shard, cut, joined
-from posse_training.errors import SettingsError, TimeLimitError, TrainedSplitError
-from posse_training.reports.exchanges import ExchangeCounter, leaders_of
+from posse_training.cluster.shards import cut, joined
+from posse_training.errors import SettingsError
+from posse_training.reports.episodes import limited, play_shard, refuse_trained_split
 from posse_training.reports.results import Column, Results
 
-__all__ = ["Results", "TrainedSplitError", "evaluate", "play_episode", "progress_bar"]
+__all__ = ["Results", "evaluate", "progress_bar"]
 
 
 def evaluate(
@@ -115,7 +114,7 @@ def evaluate(
     return Results(policy.name, settings, seed, split, columns, named)
 
 
-def progress_bar(*, disable: bool = False) -> Progress:
+def progress_bar(*, disable: bool = False, console: Console | None = None) -> Progress:
     """Return a progress bar, as all commands show it."""
     return Progress(
         TextColumn("{task.description}"),
@@ -124,32 +123,8 @@ def progress_bar(*, disable: bool = False) -> Progress:
         TimeRemainingColumn(),
         transient=True,
         disable=disable,
+        console=console,
     )
-
-
-def refuse_trained_split(policy: Policy | Target, split: str) -> None:
-    """Raise if a policy or a target was trained on this split, by its own account."""
-    trained = tuple(getattr(policy, "trained_splits", ()))
-    if split in trained:
-        raise TrainedSplitError(
-            f"{policy.name!r} was trained on the split {split!r}, so that its score there would be "
-            "biased: choose another of 'train', 'validation', 'test' than "
-            f"{', '.join(map(repr, trained))}"
-        )
-
-
-def limited(advance: Callable[[int], object], time_limit: float | None) -> Callable[[int], object]:
-    """Return a function that calls another one, and raises once a time limit is exceeded."""
-    if time_limit is None:
-        return advance
-    ends = time.monotonic() + time_limit
-
-    def check(steps: int) -> None:
-        if time.monotonic() > ends:
-            raise TimeLimitError(f"it exceeded the time limit of {time_limit:g} s")
-        advance(steps)
-
-    return check
 
 
 def _play_all(
@@ -164,43 +139,3 @@ def _play_all(
     return joined(
         [play_shard(policy, scenario, shard, seed, split, num_threads, advance) for shard in cut(episodes, WORLDS)]
     )
-
-
-def play_shard(
-    policy: Policy,
-    scenario: Scenario,
-    shard: Shard,
-    seed: int,
-    split: str,
-    num_threads: int | None,
-    advance: Callable[[int], object],
-) -> dict[str, Column]:
-    """Play one episode in every world of a shard; return every metric by name, (count,)."""
-    batch = posse.Batch(scenario, shard.count, seed=seed, split=split, first_world=shard.first, num_threads=num_threads)
-    return play_episode(batch, policy, advance)
-
-
-def play_episode(
-    batch: posse.Batch, policy: Policy, advance: Callable[[int], object] = lambda steps: None
-) -> dict[str, Column]:
-    """Play one episode in every world of a batch; return every metric by name, (E,).
-
-    They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority
-    changed, ``nan`` for policies without leaders.
-    """
-    columns: dict[str, Column] = {}
-    running = np.ones(batch.num_worlds, np.bool_)
-    exchanges = ExchangeCounter(batch.num_worlds)
-    for step in rollout(batch, policy):
-        exchanges.count(leaders_of(policy, step.memory), running)
-        ended = running & (step.terminated | step.truncated)
-        if ended.any():
-            for name, values in step.infos["metrics"].items():
-                column = columns.setdefault(name, np.full(batch.num_worlds, np.nan))
-                column[ended] = values[ended]
-            running &= ~ended
-        advance(1)
-        if not running.any():
-            break
-    columns["leader_exchanges"] = exchanges.total
-    return columns

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Scenario
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.reports.statistics import Estimate, mean
 
 Column = npt.NDArray[np.float64]

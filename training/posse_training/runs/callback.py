@@ -12,13 +12,13 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.policies import ActorCriticPolicy
 
+from posse_baselines.files import write_atomically
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.learned.policy_file import write_atomically
 from posse_training.errors import CheckpointError, DivergedError
 from posse_training.runs.display import Display
 from posse_training.runs.models import make_adviser
 from posse_training.runs.saved.checkpoint import Arrays, write_checkpoint
-from posse_training.runs.saved.curve import Point, as_csv, best_of, read_points
+from posse_training.runs.saved.curve import Point, as_csv, best_of
 from posse_training.runs.saved.export import export, make_card
 from posse_training.runs.saved.folder import BEST, CURVE, LAST
 from posse_training.runs.saved.model_state import model_state, random_state, restore_model, restore_random_state
@@ -238,7 +238,7 @@ class TrainingCallback(BaseCallback):
             self.statistics.restore(part("statistics"))
             restore_model(self.model, part("model"), state["model"])
             restore_random_state(part("random"), state["random"])
-            self.curve = read_points(state["curve"])
+            self.curve = list(state["curve"])
             self._seconds_before = float(state["seconds"])
             self._next_evaluation = int(state["next_evaluation"])
             self._next_checkpoint = int(state["next_checkpoint"])
@@ -247,7 +247,7 @@ class TrainingCallback(BaseCallback):
             if self.bound is not None:
                 self.bound.restore(state["contact_bound"])
                 self._price()
-        except Exception as error:  # whatever a state of other settings, or a forged one, raises
+        except Exception as error:  # whatever a state of other settings raises
             raise CheckpointError(
                 f"the checkpoint in {self.folder} does not fit its settings: {error!s:.300}. "
                 "Restore settings.json, or start the training again in another --folder"

@@ -7,7 +7,7 @@ from importlib import resources
 from typing import Any
 
 from posse_training.errors import SettingsError
-from posse_training.runs.ranges import ALGORITHMS
+from posse_training.runs.ranges import ALGORITHMS, ON_POLICY
 from posse_training.runs.settings import TrainSettings
 
 
@@ -17,7 +17,8 @@ def default_settings(
     """Return the default settings of a scenario.
 
     They are kept in ``posse_training/defaults``, one file for each scenario; ``all.toml`` holds
-    for every scenario. In each, the table ``all`` holds for every algorithm, the others for one.
+    for every scenario. In each, the table ``all`` holds for every algorithm, ``on-policy`` and
+    ``off-policy`` for those, and a table that is named after an algorithm for it alone.
 
     Args:
         scenario: A scenario's name, or several separated by commas.
@@ -44,6 +45,6 @@ def default_settings(
         files.append(folder / f"{scenario}.toml")
     for file in files:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
-        for table in ("all", algorithm):
+        for table in ("all", "on-policy" if algorithm in ON_POLICY else "off-policy", algorithm):
             values.update(tables.get(table, {}))
     return TrainSettings.from_dict(values)

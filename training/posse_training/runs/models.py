@@ -17,7 +17,6 @@ from posse_training.runs.settings import TrainSettings
 from posse_training.runs.sides import encoding_of, make_batches
 from posse_training.sb3.centralized_critic import CentralizedCriticPolicy
 from posse_training.sb3.normalisation import Normaliser
-from posse_training.sb3.recurrent import SequencePPO
 from posse_training.sb3.speedups import FlatRolloutBuffer, QuickTanh
 from posse_training.sb3.vec_env import TeamVecEnv
 
@@ -66,7 +65,7 @@ def make_model(settings: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
 
 
 def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> BaseAlgorithm:
-    """Return PPO, MAPPO or recurrent PPO."""
+    """Return PPO or MAPPO."""
     network["optimizer_kwargs"]["eps"] = _ADAM_EPSILON
     rows = even_minibatch(s.rollout * env.num_envs, s.minibatch)
     kind: Any = partial(PPO, "MlpPolicy", rollout_buffer_class=FlatRolloutBuffer)
@@ -75,11 +74,6 @@ def _on_policy(s: TrainSettings, env: TeamVecEnv, network: dict[str, Any]) -> Ba
         network |= {"private_size": env.private_size, "hidden": s.hidden}
     else:
         network |= {"net_arch": list(s.hidden)}
-    if s.recurrent:
-        kind = partial(SequencePPO, "MlpLstmPolicy")
-        network |= {"lstm_hidden_size": s.lstm_size}
-        # Whole rollouts of so many slots.
-        rows = s.rollout * even_minibatch(env.num_envs, max(1, s.minibatch // s.rollout))
     model: BaseAlgorithm = kind(
         env,
         learning_rate=_LearningRate(s),

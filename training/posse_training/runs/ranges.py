@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
 
 from posse_training.errors import SettingsError
 
-ALGORITHMS: Final = ("ppo", "mappo", "recurrent-ppo", "sac", "td3")
+ON_POLICY: Final = ("ppo", "mappo")
+ALGORITHMS: Final = (*ON_POLICY, "sac", "td3")
 _WIDEST: Final = 8192
 _CHOICES: Final = {
     "algorithm": ALGORITHMS,
@@ -25,7 +25,6 @@ _INTEGERS: Final = {
     "message_size": (0, 64),
     "minibatch": (2, 10**9),
     "rollout": (1, 10**6),
-    "lstm_size": (1, _WIDEST),
     "epochs": (1, 1000),
     "replay": (1, 10**9),
     "learning_starts": (0, 10**12),
@@ -111,9 +110,6 @@ def _check_integer(name: str, value: Any, low: int, high: int) -> None:
 
 
 def _fail(name: str, value: Any, why: str) -> None:
-    try:
-        shown = repr(value)
-    except ValueError:  # integers of more than 4,300 digits have no text
-        shown = f"{'-' if value < 0 else ''}10**{math.floor(value.bit_length() * math.log10(2))}"
+    shown = repr(value)
     short = shown if len(shown) <= 80 else f"{shown[:60]}... ({len(shown):,} characters)"
     raise SettingsError(f"{name}={short} is invalid: {why}")

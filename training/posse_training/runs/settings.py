@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,9 +13,8 @@ from posse import Scenario, ScenarioError, get_scenario
 from posse_baselines import PolicyError, load, target_names
 from posse_baselines.registry import ships_or_is_file
 from posse_training.errors import SettingsError
-from posse_training.runs.ranges import check_ranges
-
-__all__ = ["SettingsError", "TrainSettings", "read_settings"]
+from posse_training.files import read_json
+from posse_training.runs.ranges import ON_POLICY, check_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,9 +29,8 @@ class TrainSettings:
 
     scenario: str = "smart"
     """Scenario to train on, or several separated by commas."""
-    algorithm: Literal["ppo", "mappo", "recurrent-ppo", "sac", "td3"] = "ppo"
-    """mappo is ppo with a value function that reads the state of the world; recurrent-ppo, with
-    networks that remember the episode."""
+    algorithm: Literal["ppo", "mappo", "sac", "td3"] = "ppo"
+    """mappo is ppo with a value function that reads the state of the world."""
     steps: int = 20_000_000
     """Steps to train for, at least; rollouts are completed."""
     seed: int = 1
@@ -72,8 +69,6 @@ class TrainSettings:
     """Widths of the hidden layers of policy and value function."""
     activation: Literal["tanh", "relu"] = "tanh"
     """Activation between the layers."""
-    lstm_size: int = 64
-    """recurrent-ppo: cells of the recurrent layer (LSTM) before the hidden layers."""
 
     # All algorithms
     learning_rate: float = 3e-4
@@ -85,9 +80,9 @@ class TrainSettings:
     minibatch: int = 8192
     """Steps in one gradient, about: a rollout is divided evenly."""
 
-    # ppo, mappo and recurrent-ppo
+    # ppo and mappo
     rollout: int = 64
-    """Control steps between two updates; gradients of recurrent-ppo reach back so far."""
+    """Control steps between two updates."""
     epochs: int = 4
     """Passes over a rollout."""
     gae_lambda: float = 0.95
@@ -164,12 +159,7 @@ class TrainSettings:
     @property
     def on_policy(self) -> bool:
         """Whether the algorithm learns from its latest rollout only."""
-        return self.algorithm in ("ppo", "mappo", "recurrent-ppo")
-
-    @property
-    def recurrent(self) -> bool:
-        """Whether the networks have a recurrent layer."""
-        return self.algorithm == "recurrent-ppo"
+        return self.algorithm in ON_POLICY
 
     @property
     def run_folder(self) -> Path:
@@ -219,10 +209,10 @@ def _check_together(s: TrainSettings) -> None:
     """Raise if settings that are valid on their own exclude each other."""
     if s.contact_bound is not None and not s.on_policy:
         raise SettingsError(
-            f"contact_bound={s.contact_bound} needs algorithm ppo, mappo or recurrent-ppo, "
-            f"not {s.algorithm}: set a weight of the reward term contact instead"
+            f"contact_bound={s.contact_bound} needs algorithm ppo or mappo, not {s.algorithm}: "
+            "set a weight of the reward term contact instead"
         )
-    if s.imitate is not None and (s.recurrent or not s.on_policy):
+    if s.imitate is not None and not s.on_policy:
         raise SettingsError(f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out")
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
         raise SettingsError(
@@ -286,14 +276,12 @@ def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
         SettingsError: There is no such file, it is damaged, or it names code to import.
     """
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = read_json(path)
         if not trust_code:
             _refuse_code(path, values)
         return TrainSettings.from_dict(values)
     except FileNotFoundError:
         raise SettingsError(f"{path.parent} is not a run folder: it has no {path.name}") from None
-    except RecursionError:
-        raise SettingsError(f"{path} is damaged: its values are nested too deeply") from None
     except (SettingsError, ScenarioError, PolicyError):
         raise
     except (OSError, TypeError, ValueError) as error:

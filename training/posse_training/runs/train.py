@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from posse_baselines import PolicyError, load
 from posse_training.errors import DivergedError
 from posse_training.runs.callback import TrainingCallback
 from posse_training.runs.display import Display
+from posse_training.runs.imitation import imitate
 from posse_training.runs.logs import check_wandb, make_logger
-from posse_training.runs.memory import check_memory
 from posse_training.runs.models import make_adviser, make_env, make_model
 from posse_training.runs.saved.checkpoint import read_checkpoint
 from posse_training.runs.saved.folder import BEST, LAST, SETTINGS, locked_run, open_run
@@ -23,7 +23,6 @@ from posse_training.runs.settings import TrainSettings, read_settings
 from posse_training.runs.sides import check_opponents, load_own
 from posse_training.runs.start import start_from
 from posse_training.runs.validation import first_statistics, score_beside
-from posse_training.sb3.imitation import imitate
 from posse_training.sb3.normalisation import RunningStatistics
 
 _NOT_FINITE = (
@@ -47,7 +46,7 @@ def train(
         num_threads: Threads that step the worlds; default: one per core. Never changes the result.
 
     Raises:
-        SettingsError: More memory than there is, or a package that is not installed.
+        SettingsError: A package that is not installed.
         PolicyError: An unknown policy, or one that cannot be an adviser.
         RunFolderError: The folder is in use, or already holds a run.
         CheckpointError: A checkpoint cannot be written or read.
@@ -59,7 +58,7 @@ def train(
         saved = open_run(folder, settings, resume)
         env = make_env(settings, num_threads)
         model = make_model(settings, env)
-        model.set_logger(make_logger(folder, settings, display.note))
+        model.set_logger(make_logger(folder, settings))
         steps = steps_made(settings, env.num_envs)
         if steps != settings.steps:
             display.note(f"rollouts are completed: {steps:,} steps in all")
@@ -75,10 +74,9 @@ def train(
                 start_from(Path(settings.start), model, statistics, settings.log_deviation)
             statistics.apply(model.policy)
             if settings.imitate is not None:
-                display.copying(0)
                 expert = load(settings.imitate)
-                imitate(model, settings, env.encoding, expert, statistics, copy_report(display))
-        display.begin(model.num_timesteps, steps, callback.curve)
+                imitate(model, settings, env.encoding, expert, statistics, display.copied)
+        display.begin(model.num_timesteps, steps)
         with _divergence(callback):
             model.learn(settings.steps - model.num_timesteps, callback=callback, reset_num_timesteps=saved is None)
             callback.finish()
@@ -109,7 +107,6 @@ def resume(folder: Path, *, console: Console | None = None, steps: int | None = 
 def check_before(settings: TrainSettings) -> None:
     """Raise what can be known to be wrong before the run folder is made."""
     check_wandb(settings)
-    check_memory(settings)
     make_adviser(settings)
     check_opponents(settings)
     for policy in (settings.imitate, settings.beside):
@@ -145,8 +142,3 @@ def torch_threads(count: int) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
-
-
-def copy_report(display: Display) -> Callable[[int, int, float], None]:
-    """Return a function that shows a round of imitation."""
-    return lambda done, rounds, error: display.copying(done, error)

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
@@ -38,18 +37,16 @@ TARGET: Final = "target"
 class PosseEnv(EnvBase):
     """A batch of E worlds of one scenario, ``batch_size=[E]``.
 
-    TorchRL's rollouts and collectors reset the worlds whose episodes end. On the CPU the tensors
-    share the memory of the engine's arrays, which are not overwritten while a tensor refers to
-    them; on a GPU they are copies, since the engine there reuses its arrays.
+    TorchRL's rollouts and collectors reset the worlds whose episodes end. The worlds are on the CPU, where the
+    tensors share the memory of the engine's arrays, which are not overwritten while a tensor refers to them; tensors
+    on another device are copies.
 
     Args:
         scenario: A scenario, or the name of one.
         num_worlds: E, at least 1.
-        device: Device of the tensors. On ``"cuda"`` the worlds are stepped there as well, which
-            needs the extra ``cuda``. For other devices the worlds are stepped on the CPU, and
-            each step costs a copy each way.
+        device: Device of the tensors; any but the CPU costs a copy each way at each step.
         state: Whether the full state of each world comes with the observations, under ``"state"``,
-            for centralized critics; on the CPU only.
+            for centralized critics.
         discrete_actions: Whether actions are numbers of
             :data:`posse.adapters.actions.MOTIONS`, as in the other environments.
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
@@ -80,10 +77,7 @@ class PosseEnv(EnvBase):
                 f"autoreset={settings['autoreset']!r} cannot be set: TorchRL itself resets worlds "
                 "that are done; leave it out"
             )
-        engine = "cuda" if torch.device(device).type == "cuda" else "cpu"
-        self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", device=engine, **settings)
-        if state and engine == "cuda":
-            raise ValueError("state=True needs device='cpu': leave one of them out")
+        self.batch = posse.batch(scenario, num_worlds, autoreset="disabled", **settings)
         single_action_space(self.batch.scenario, discrete_actions)  # raises if impossible
         super().__init__(device=device, batch_size=(num_worlds,))
         self._state_layout = StateLayout(self.batch.scenario) if state else None
@@ -117,8 +111,7 @@ class PosseEnv(EnvBase):
             reward[group] = Composite(reward=Unbounded((worlds, count, 1), dtype=torch.float32), shape=(worlds, count))
         observation["score"] = Bounded(0.0, 1.0, (worlds, 1), dtype=torch.float32)
         if self._state_layout is not None:
-            least, greatest = (torch.from_numpy(bound).expand(worlds, -1) for bound in self._state_layout.bounds())
-            observation["state"] = Bounded(least, greatest, dtype=torch.float32)
+            observation["state"] = Unbounded((worlds, self._state_layout.size), dtype=torch.float32)
         flag = Binary(1, (worlds, 1), dtype=torch.bool)
         self.observation_spec = observation.to(self.device)
         self.action_spec = action.to(self.device)
@@ -187,11 +180,8 @@ class PosseEnv(EnvBase):
 
     def _tensor(self, array: Any) -> torch.Tensor:
         """Return an array of the engine as a tensor on the device."""
-        if isinstance(array, np.ndarray):
-            return torch.from_numpy(array).to(self.device)
-        # The engine overwrites it two steps later.
-        return torch.as_tensor(array, device=self.device).clone()
+        return torch.from_numpy(array).to(self.device)
 
     def _array(self, tensor: torch.Tensor) -> Any:
         """Return a tensor in the form that the engine takes."""
-        return tensor.contiguous() if tensor.device.type == "cuda" else tensor.cpu().numpy()
+        return tensor.cpu().numpy()

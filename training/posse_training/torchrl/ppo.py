@@ -116,7 +116,7 @@ def train(
     Args:
         scenario: A scenario's name.
         settings: Settings of the run.
-        device: Device of all tensors; on ``"cuda"`` also of the worlds (:class:`PosseEnv`).
+        device: Device of all tensors (:class:`PosseEnv`).
         report: Called with the figures of each update: ``score`` (mean over the rollout's steps),
             ``reward``, the losses, ``gradient_norm``, ``agent_steps`` so far.
         overrides: Settings of the scenario.

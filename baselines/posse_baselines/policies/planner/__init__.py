@@ -1,6 +1,5 @@
 """The planner: a reference that reads the state and plays ahead in copies of the worlds."""
 
-from posse_baselines.policies.planner.policy import Planner
-from posse_baselines.policies.planner.settings import PlannerSettings
+from posse_baselines.policies.planner.policy import Planner, PlannerSettings
 
 __all__ = ["Planner", "PlannerSettings"]

@@ -1,58 +1,231 @@
 """The law that the planner plays: slots by least total time, courses that meet them, the safeguard.
 
 It reads the state: poses, the slot frame, obstacles; the path on which the target was foreseen.
-What it leaves open for each tracker is a :data:`~posse_baselines.policies.planner.ways.WAY`.
+What it leaves open for each tracker is a :data:`WAY`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import Blocks, BoolArray, FloatArray, Record, Records, compiled, kernel, worlds_of
+from posse.numeric import MOST_THREADS, Blocks, BoolArray, FloatArray, Record, Records, compiled, kernel, worlds_of
 from posse.rules import NEVER
-from posse_baselines.laws.geometry import wrap
-from posse_baselines.laws.heading import regulate
-from posse_baselines.laws.safeguard import safe_velocity
+from posse_baselines.laws.assignment import WORK_ROWS, assign
+from posse_baselines.laws.geometry import length, wrap
+from posse_baselines.laws.heading import BODY, regulate
+from posse_baselines.laws.safeguard import DISC, PLAYS, put_disc, put_walls, safe_velocity
 from posse_baselines.laws.slots import rotate
-from posse_baselines.laws.steering import approach_velocity, meeting_velocity, way_round, write_motion
-from posse_baselines.policies.planner.assigning import WEAVE_TIME, assign_slots
-from posse_baselines.policies.planner.foresight import arrival_time, foreseen
-from posse_baselines.policies.planner.surroundings import surround
+from posse_baselines.laws.steering import approach_velocity, meeting_velocity, time_to_slot, way_round, write_motion
 
 _UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
+_WEAVE_TIME: Final = 1.5  # s; for which the target is assumed to keep its velocity; then its mean one is used
 _MEAN_TIME: Final = 6.0  # s; time constant of that mean
+_LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
+_TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
 _CLEARANCE: Final = 0.75  # m; distance at which the way to a slot leads round the target
-_MARGIN: Final = 0.15  # m; free width that is kept
+_MARGIN: Final = 0.15  # m; free width that is kept; twice as much to the target
+_NEAR: Final = 3.0  # m; farther things are no danger yet
+_MOST_DISCS: Final = 32
 _SOON: Final = 0.3  # s; a slot met sooner is followed as it moves now
+_FARTHEST: Final = 20.0  # s; later meetings are as good as this one
+_MET: Final = 0.02  # m
+_LEAST_STEP: Final = 0.01  # s
+_MOST_STEPS: Final = 40
+
+WAY: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("ahead", np.float64),  # shift of the slot along the target's heading, m
+                ("left", np.float64),  # shift of the slot to its left, m
+                ("gain", np.float64),  # of the slot law, 1/s
+                ("foresees", np.float64),  # 1: the target is met on the path that it was foreseen
+            ],
+            align=True,
+        ),
+    )
+)
+"""How one tracker plays."""
+
+PLAN: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("slot", np.int32),  # -1: none yet
+                ("mean_x", np.float32),  # running mean of the target's velocity, m/s; used only in
+                ("mean_y", np.float32),  # the first record
+            ],
+            align=True,
+        ),
+    )
+)
+"""Memory of one tracker."""
+
+
+class Scene(NamedTuple):
+    """One world as the law reads it."""
+
+    config: Record
+    """The scenario as kernels read it."""
+    slots: Records
+    """(N,) position of each slot in the slot frame, m."""
+    world: Record
+    trackers: Records
+    obstacles: Records
+    ways: Records
+    """(N,) :data:`WAY`."""
+    plans: Records
+    """(N,) :data:`PLAN`."""
+    path: FloatArray
+    """(T, 4) x, y of the target, cosine and sine of the slot frame, where it was foreseen."""
+    since: int
+    """Control steps since the path began; -1: there is none."""
+    frame_rate: float
+    """Turn rate of the slot frame, rad/s."""
+
+
+class Work(NamedTuple):
+    """Arrays that the law works in, one of each for a thread."""
+
+    cost: FloatArray
+    """(N, N) cost of each slot for each tracker, s."""
+    assigning: FloatArray
+    """(WORK_ROWS, N + 1) for the assignment."""
+    discs: Records
+    """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
+    body: Record
+    """:data:`~posse_baselines.laws.heading.BODY`."""
+    plays: Record
+    """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
+
+
+def work_for(num_trackers: int) -> Work:
+    """Return the arrays of all threads."""
+    n, threads = num_trackers, MOST_THREADS
+    return Work(
+        np.zeros((threads, n, n), np.float32),
+        np.zeros((threads, WORK_ROWS, n + 1), np.float32),
+        np.zeros((threads, _MOST_DISCS), DISC),
+        np.zeros(threads, BODY),
+        np.zeros(threads, PLAYS),
+    )
 
 
 @compiled
-def wanted_velocity(
-    c: Record,
-    slot: Record,
-    way: Record,
-    w: Record,
-    t: Record,
-    p: Record,
-    path: FloatArray,
-    since: int,
-    frame_rate: float,
-    acceleration: float,
-) -> tuple[float, float]:
-    """Return the velocity (m/s) on a course that meets a tracker's slot, round the target."""
+def foreseen(path: FloatArray, at: float, slot: Record) -> tuple[float, float]:
+    """Return where a slot will be, m, ``at`` control steps along a path.
+
+    The path (T, 4) is the target's x, y and the slot frame's cosine and sine at each step; beyond
+    its end the target goes straight on.
+    """
+    k = min(int(at), path.shape[0] - 2)
+    share = at - k
+    turned = min(share, 1.0)
+    c = path[k, 2] + turned * (path[k + 1, 2] - path[k, 2])
+    s = path[k, 3] + turned * (path[k + 1, 3] - path[k, 3])
+    arm_x, arm_y = rotate(slot.x, slot.y, c, s)
+    x = path[k, 0] + share * (path[k + 1, 0] - path[k, 0])
+    y = path[k, 1] + share * (path[k + 1, 1] - path[k, 1])
+    return x + arm_x, y + arm_y
+
+
+@compiled
+def arrival_time(path: FloatArray, at: float, slot: Record, x: float, y: float, max_speed: float, dt: float) -> float:
+    """Return when a tracker at (x, y) can be in a slot, straight on at full speed, s from now.
+
+    A slot never closes in faster than about ``max_speed`` itself, so the gap that is left bounds
+    the time that is left from below.
+    """
+    time = 0.0
+    for _ in range(_MOST_STEPS):
+        slot_x, slot_y = foreseen(path, at + time / dt, slot)
+        gap = length(slot_x - x, slot_y - y) - max_speed * time
+        if gap <= _MET or time > _FARTHEST:
+            break
+        time += max(0.5 * gap / max_speed, _LEAST_STEP)
+    return time
+
+
+@compiled
+def assign_slots(scene: Scene, work: Work) -> None:
+    """Assign the working trackers to slots with the least total arrival time."""
+    w, plans, rows = scene.world, scene.plans, 0
+    n = scene.config.num_trackers
+    vx, vy = float(w.speed * w.heading_cos), float(w.speed * w.heading_sin)
+    for i in range(n):
+        t = scene.trackers[i]
+        if t.broken_at != NEVER:
+            continue
+        speed = float(t.max_speed)
+        for k in range(n):
+            slot = scene.slots[k]
+            arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
+            x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
+            if scene.since >= 0 and scene.ways[i].foresees > 0.0:
+                time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, scene.config.dt)
+            else:
+                time = time_to_slot(x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, _WEAVE_TIME, speed)
+            # Time for turning towards it.
+            away = wrap(math.atan2(y, x) - math.atan2(t.heading_sin, t.heading_cos))
+            time += _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
+            if plans[i].slot == k:
+                time -= _LOYALTY
+            work.cost[rows, k] = time
+        rows += 1
+    assign(work.cost, rows, n, work.assigning)
+    rows = 0
+    for i in range(n):
+        if scene.trackers[i].broken_at == NEVER:
+            plans[i].slot = int(work.assigning[0, rows])
+            rows += 1
+
+
+@compiled
+def surround(scene: Scene, i: int, discs: Records) -> int:
+    """List what is near tracker i, as discs for the safeguard; return how many things that are."""
+    c, w, t = scene.config, scene.world, scene.trackers[i]
+    count, two = 0, 2.0 * c.radius
+    dx, dy = w.x - t.x, w.y - t.y
+    if dx * dx + dy * dy < _NEAR * _NEAR:
+        vx, vy = w.speed * w.heading_cos, w.speed * w.heading_sin
+        count = put_disc(discs, count, dx, dy, vx, vy, two, 2.0 * _MARGIN)
+    for j in range(c.num_trackers):
+        other = scene.trackers[j]
+        dx, dy = other.x - t.x, other.y - t.y
+        if j != i and dx * dx + dy * dy < _NEAR * _NEAR:
+            vx, vy = other.speed * other.heading_cos, other.speed * other.heading_sin
+            count = put_disc(discs, count, dx, dy, vx, vy, two, _MARGIN)
+    for k in range(c.num_obstacles):
+        disc = scene.obstacles[k]
+        dx, dy = disc.x - t.x, disc.y - t.y
+        reach = disc.radius + c.radius
+        if dx * dx + dy * dy < (_NEAR + reach) * (_NEAR + reach):
+            count = put_disc(discs, count, dx, dy, 0.0, 0.0, reach, _MARGIN)
+    if c.walled:
+        count = put_walls(discs, count, t.x, t.y, c.half_arena, _NEAR, c.radius, _MARGIN)
+    return count
+
+
+@compiled
+def wanted_velocity(scene: Scene, i: int, acceleration: float) -> tuple[float, float]:
+    """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
+    w, t, way = scene.world, scene.trackers[i], scene.ways[i]
+    slot, target, dt = scene.slots[scene.plans[i].slot], scene.plans[0], scene.config.dt
     speed = float(t.max_speed)
     arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
     shift_x, shift_y = rotate(way.ahead, way.left, w.heading_cos, w.heading_sin)
     from_x, from_y = t.x - w.x, t.y - w.y
-    if since >= 0 and way.foresees > 0.0:
-        time = arrival_time(path, float(since), slot, t.x, t.y, speed, c.dt)
+    if scene.since >= 0 and way.foresees > 0.0:
+        time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, dt)
         if time > _SOON:
-            to_x, to_y = foreseen(path, since + time / c.dt, slot)
+            to_x, to_y = foreseen(scene.path, scene.since + time / dt, slot)
             slot_vx, slot_vy = (to_x - w.x - arm_x) / time, (to_y - w.y - arm_y) / time
             round_x, round_y = way_round(from_x, from_y, arm_x, arm_y, _CLEARANCE)
             return approach_velocity(
@@ -65,10 +238,10 @@ def wanted_velocity(
         arm_y + shift_y,
         float(w.speed * w.heading_cos),
         float(w.speed * w.heading_sin),
-        float(p.mean_x),
-        float(p.mean_y),
-        frame_rate,
-        WEAVE_TIME,
+        float(target.mean_x),
+        float(target.mean_y),
+        scene.frame_rate,
+        _WEAVE_TIME,
         _CLEARANCE,
         way.gain,
         speed,
@@ -77,100 +250,83 @@ def wanted_velocity(
 
 
 @compiled
-def drive(
-    c: Record,
-    slots: Records,
-    ways: Records,
-    w: Record,
-    trackers: Records,
-    obstacles: Records,
-    plans: Records,
-    path: FloatArray,
-    begun: int,
-    cost: FloatArray,
-    work: FloatArray,
-    discs: Records,
-    body: Record,
-    plays: Record,
-    actions: FloatArray,
-) -> None:
-    """Write the actions (N, 2 + m) of one world's team.
+def frame_rate_of(c: Record, w: Record) -> float:
+    """Return the turn rate of the slot frame (rad/s): at its limit until it is at the target's heading."""
+    lag = wrap(math.atan2(w.heading_sin, w.heading_cos) - math.atan2(w.frame_sin, w.frame_cos))
+    most = math.atan2(c.frame_s, c.frame_c) / float(c.dt)
+    return min(max(lag / float(c.dt), -most), most)
 
-    ``begun`` is the control step at which ``path`` begins; -1: there is none.
-    """
-    n = c.num_trackers
-    dt = float(c.dt)
-    body.dt, body.acceleration, body.turn_acceleration = dt, _UNLIMITED, _UNLIMITED
+
+@compiled
+def drive(scene: Scene, work: Work, actions: FloatArray) -> None:
+    """Write the actions (N, 2 + m) of one world's team."""
+    c, w, body = scene.config, scene.world, work.body
+    body.dt, body.acceleration, body.turn_acceleration = float(c.dt), _UNLIMITED, _UNLIMITED
     if c.per_acceleration > 0.0:
         body.acceleration = 1.0 / c.per_acceleration
     if c.per_turn_acceleration > 0.0:
         body.turn_acceleration = 1.0 / c.per_turn_acceleration
-    # The slot frame turns towards the heading, at its limit until it is there.
-    lag = wrap(math.atan2(w.heading_sin, w.heading_cos) - math.atan2(w.frame_sin, w.frame_cos))
-    most = math.atan2(c.frame_s, c.frame_c) / dt
-    frame_rate = min(max(lag / dt, -most), most)
-    share = min(1.0, dt / _MEAN_TIME) if w.step > 0 else 1.0
-    p = plans[0]
-    p.mean_x += share * (w.speed * w.heading_cos - p.mean_x)
-    p.mean_y += share * (w.speed * w.heading_sin - p.mean_y)
-    since = w.step - begun if 0 <= begun <= w.step else -1
-    if w.step % _REPLAN_STEPS == 0 or p.slot < 0:
-        assign_slots(c, slots, ways, w, trackers, plans, path, since, cost, work)
-    for i in range(n):
-        t = trackers[i]
+    target = scene.plans[0]
+    share = min(1.0, float(c.dt) / _MEAN_TIME) if w.step > 0 else 1.0
+    target.mean_x += share * (w.speed * w.heading_cos - target.mean_x)
+    target.mean_y += share * (w.speed * w.heading_sin - target.mean_y)
+    if w.step % _REPLAN_STEPS == 0 or target.slot < 0:
+        assign_slots(scene, work)
+    for i in range(c.num_trackers):
+        t = scene.trackers[i]
         if t.broken_at != NEVER:
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
-        vx, vy = wanted_velocity(c, slots[plans[i].slot], ways[i], w, t, p, path, since, frame_rate, body.acceleration)
-        count = surround(c, w, trackers, obstacles, i, _MARGIN, discs)
+        vx, vy = wanted_velocity(scene, i, body.acceleration)
+        count = surround(scene, i, work.discs)
         body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
         body.speed, body.omega = t.speed, t.turn_rate
         body.max_speed, body.max_omega = t.max_speed, t.max_turn_rate
-        vx, vy, _ = safe_velocity(body, discs, count, vx, vy, plays)
+        vx, vy, _ = safe_velocity(body, work.discs, count, vx, vy, work.plays)
         v, omega = regulate(body, vx, vy, 0.0)
         write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
 
 
+class Played(NamedTuple):
+    """The worlds that the law drives, and what it knows of them."""
+
+    config: Records
+    slots: Records
+    world: Records
+    tracker: Records
+    obstacle: Records
+    going: BoolArray
+    """(E,) the worlds to drive."""
+    ways: Records
+    """(E, N) :data:`WAY`."""
+    plans: Records
+    """(E, N) :data:`PLAN`, brought up to date."""
+    paths: FloatArray
+    """(E / worlds_per_path, T, 4) where the target was foreseen."""
+    begun: npt.NDArray[np.int64]
+    """(E / worlds_per_path,) control step at which each path begins; -1: there is none."""
+
+
 @kernel
 def drive_all(
-    config: Records,
-    slots: Records,
-    costs: FloatArray,
-    work: FloatArray,
-    discs: Records,
-    bodies: Records,
-    plays: Records,
-    world: Records,
-    tracker: Records,
-    obstacle: Records,
-    going: BoolArray,
-    ways: Records,
-    plans: Records,
-    paths: FloatArray,
-    begun: npt.NDArray[np.int64],
-    worlds_per_path: int,
-    actions: FloatArray,
-    thread: int,
-    blocks: Blocks,
+    played: Played, work: Work, worlds_per_path: int, actions: FloatArray, thread: int, blocks: Blocks
 ) -> None:
-    """Write the actions of those of a thread's worlds that are going on."""
+    """Write the actions (E, rows, 2 + m) of those of a thread's worlds that are going on."""
+    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.body[thread], work.plays[thread])
     for e in worlds_of(thread, blocks):
-        if going[e]:
-            shared = e // worlds_per_path
-            drive(
-                config[0],
-                slots,
-                ways[e],
-                world[e],
-                tracker[e],
-                obstacle[e],
-                plans[e],
-                paths[shared],
-                begun[shared],
-                costs[thread],
-                work[thread],
-                discs[thread],
-                bodies[thread],
-                plays[thread],
-                actions[e],
+        if played.going[e]:
+            c, w, shared = played.config[0], played.world[e], e // worlds_per_path
+            begun = played.begun[shared]
+            scene = Scene(
+                c,
+                played.slots,
+                w,
+                played.tracker[e],
+                played.obstacle[e],
+                played.ways[e],
+                played.plans[e],
+                played.paths[shared],
+                w.step - begun if 0 <= begun <= w.step else -1,
+                frame_rate_of(c, w),
             )
+            drive(scene, mine, actions[e])

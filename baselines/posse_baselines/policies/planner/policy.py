@@ -3,18 +3,84 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
-from posse_baselines.policies.planner.ahead import Foresight, Law, play_ahead
-from posse_baselines.policies.planner.assigning import PLAN
-from posse_baselines.policies.planner.settings import PlannerSettings
-from posse_baselines.policies.planner.ways import TRIES, Variations, standard_ways
+from posse_baselines.policies.planner.law import PLAN
+from posse_baselines.policies.planner.model import RANGES, TRIES, Foresight, Law, play_ahead, standard_ways
 from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations, message_size_of
+from posse_baselines.tuning import check, number
+
+_REPEAT: Final = 64  # plannings after which the variations repeat
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSettings:
+    """How far the planner looks ahead, and what it tries. Units and ranges: each field's metadata.
+
+    Raises:
+        ValueError: A number out of its range.
+    """
+
+    look_ahead: float = number(4.0, "s", 0.1, 20.0)
+    """How far each try is played ahead."""
+    keep: float = number(0.5, "s", 0.01, 20.0)
+    """How long the best is kept before the next planning; no longer than ``look_ahead``."""
+    rounds: int = number(2, "", 0, 20)
+    """Rounds of variations on the best so far, after the standard ways of playing."""
+    varied: float = number(0.5, "", 0.0, 1.0)
+    """Share of the trackers whose way a variation changes."""
+    spread: float = number(0.2, "", 0.01, 1.0)
+    """Standard deviation of a change, as a share of the range."""
+    distance_cost: float = number(1.0, "1/m", 0.0, 100.0)
+    """What a metre of mean distance from free slots at the end of a try costs, in steps' scores."""
+    seed: int = number(0, "", 0, 2**63 - 1)
+    """Of the variations and of what copies draw."""
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.keep > self.look_ahead:
+            raise ValueError(
+                f"keep={self.keep!r} must be at most look_ahead={self.look_ahead!r}: what comes "
+                "after it was not played ahead"
+            )
+
+
+class Variations:
+    """Changes to try on the ways of a team, the same for all worlds at the same planning.
+
+    They are drawn once, so that what is tried in a world does not depend on the others.
+    """
+
+    def __init__(self, settings: PlannerSettings, num_trackers: int) -> None:
+        rng = np.random.default_rng(settings.seed)
+        shape = (_REPEAT, settings.rounds, TRIES - 1, num_trackers)
+        self._changed = rng.random(shape) < settings.varied
+        self._shifts = {
+            name: settings.spread * (high - low) * rng.normal(size=shape) for name, (low, high) in RANGES.items()
+        }
+        self._foresees = rng.random(shape) < 0.5
+
+    def of(self, best: Records, planning: npt.NDArray[np.int64], turn: int) -> Records:
+        """Return the best ways (E, N) and variations on them, (E, TRIES, N).
+
+        Args:
+            best: (E, N) :data:`WAY`.
+            planning: (E,) number of the planning in each world's episode.
+            turn: Which round of it.
+        """
+        tries = np.repeat(best[:, None], TRIES, axis=1)
+        drawn = planning % _REPEAT, turn
+        varied, changed = tries[:, 1:], self._changed[drawn]
+        for name, (low, high) in RANGES.items():
+            new = np.clip(varied[name] + self._shifts[name][drawn], low, high)
+            varied[name] = np.where(changed, new, varied[name])
+        varied["foresees"] = np.where(changed, self._foresees[drawn], varied["foresees"])
+        return tries
 
 
 @dataclass
@@ -23,11 +89,11 @@ class _Memory(OwnArrays):
     law: Law
     variations: Variations
     standard: Records
-    """(TRIES - 1, N) :data:`~posse_baselines.policies.planner.ways.WAY`."""
+    """(TRIES - 1, N) :data:`~posse_baselines.policies.planner.law.WAY`."""
     ways: Records
     """(E, N) what is kept until the next planning."""
     plans: Records
-    """(E, N) :data:`~posse_baselines.policies.planner.assigning.PLAN`."""
+    """(E, N) :data:`~posse_baselines.policies.planner.law.PLAN`."""
     seen: Foresight
     copies: Batch | None = None
 

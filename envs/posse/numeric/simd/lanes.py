@@ -116,7 +116,9 @@ def store_fields(record: Record, offset: int, value: Lanes) -> None:
     Lanes over fields of other types must hold what :func:`load_fields` returned.
     """
     for name, (kind, at, *_) in record.dtype.fields.items():
-        if kind == np.float32 and offset <= at < offset + 4 * WIDTH:
+        if kind.names is not None:  # a record within it
+            store_fields(record[name], offset - at, value)
+        elif kind == np.float32 and offset <= at < offset + 4 * WIDTH:
             record[name] = value[(at - offset) // 4]
 
 

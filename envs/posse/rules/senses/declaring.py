@@ -1,7 +1,7 @@
 """Declaration of target sensors, and their dispatch in a kernel.
 
 A sensor determines whether the target is in sight, and its measured position. The result is a
-*fix* (:data:`posse.rules.state.FIX_FIELDS`), of one of these kinds:
+*fix* (:data:`posse.rules.state.FIX_RECORD`), of one of these kinds:
 
 ============ ======================================================================================
 ``position`` position and heading of the target, slot frame; velocity from successive fixes

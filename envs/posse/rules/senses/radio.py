@@ -6,18 +6,12 @@ fix's time, and the policy's message. Range, delay and loss apply to the whole b
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
-from posse.numeric import FloatArray, Record, Records, compiled
+from posse.numeric import ZERO, FloatArray, Record, Records, compiled
 from posse.rules.randomness import RADIO_LOSS, uniform
 from posse.rules.senses.sensing import take_fix
-from posse.rules.state import NEVER
-
-_ZERO: Final = np.float32(0.0)
-_ONE_BIT: Final = np.uint64(1)
-_NO_BITS: Final = np.uint64(0)
+from posse.rules.state import BIT, NEVER, NO_BITS
 
 
 @compiled
@@ -41,7 +35,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.fix_step < b.fix_step:
-            take_fix(c, t, b.fix_step, b.fix_x, b.fix_y, b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin)
+            take_fix(c, t, b)
 
 
 @compiled(seldom=True)
@@ -53,9 +47,7 @@ def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
         b.sent = radio_works(c, w, t)
         b.x, b.y, b.heading_cos, b.heading_sin = t.x, t.y, t.heading_cos, t.heading_sin
         b.speed, b.turn_rate = t.speed, t.turn_rate
-        b.fix_step, b.fix_x, b.fix_y = t.fix_step, t.fix_x, t.fix_y
-        b.fix_cos, b.fix_sin = t.fix_cos, t.fix_sin
-        b.fix_frame_cos, b.fix_frame_sin = t.fix_frame_cos, t.fix_frame_sin
+        b.fix_step, b.fix = t.fix_step, t.fix
 
 
 @compiled(seldom=True)
@@ -86,7 +78,7 @@ def hear(
             dx, dy = b.x - t.x, b.y - t.y
             if dx * dx + dy * dy > reach2:
                 continue
-            lossy = c.radio_loss > _ZERO
+            lossy = c.radio_loss > ZERO
             if lossy and uniform(w.key, w.step, RADIO_LOSS, i * n + j) < c.radio_loss:
                 continue
             h = heard[i, j]
@@ -96,7 +88,7 @@ def hear(
             for k in range(c.message_size):
                 heard_message[i, j, k] = message[slot, j, k]
             if b.fix_step > t.fix_step and c.fix_bearing == 0:
-                take_fix(c, t, b.fix_step, b.fix_x, b.fix_y, b.fix_cos, b.fix_sin, b.fix_frame_cos, b.fix_frame_sin)
+                take_fix(c, t, b)
 
 
 @compiled(seldom=True)
@@ -107,31 +99,31 @@ def connected(c: Record, w: Record, trackers: Records) -> bool:
     """
     n = c.num_trackers
     reach2 = c.radio_range * c.radio_range
-    waiting = _NO_BITS  # still to be reached
+    waiting = NO_BITS  # still to be reached
     first = -1
     for i in range(n):
         if trackers[i].broken_at == NEVER:
             if first < 0:
                 first = i
             else:
-                waiting |= _ONE_BIT << np.uint64(i)
-    frontier = _NO_BITS
+                waiting |= BIT << np.uint64(i)
+    frontier = NO_BITS
     if first >= 0:
-        frontier = _ONE_BIT << np.uint64(first)
-    while frontier != _NO_BITS and waiting != _NO_BITS:
-        reached = _NO_BITS
+        frontier = BIT << np.uint64(first)
+    while frontier != NO_BITS and waiting != NO_BITS:
+        reached = NO_BITS
         for i in range(n):
-            if frontier & (_ONE_BIT << np.uint64(i)) == _NO_BITS:
+            if frontier & (BIT << np.uint64(i)) == NO_BITS:
                 continue
             t = trackers[i]
             if not radio_works(c, w, t):
                 continue
             for j in range(n):
-                bit = _ONE_BIT << np.uint64(j)
-                if waiting & bit != _NO_BITS and radio_works(c, w, trackers[j]):
+                bit = BIT << np.uint64(j)
+                if waiting & bit != NO_BITS and radio_works(c, w, trackers[j]):
                     dx, dy = trackers[j].x - t.x, trackers[j].y - t.y
                     if dx * dx + dy * dy <= reach2:
                         reached |= bit
         waiting &= ~reached
         frontier = reached
-    return bool(waiting == _NO_BITS)
+    return bool(waiting == NO_BITS)

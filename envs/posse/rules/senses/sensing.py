@@ -8,6 +8,9 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import (
+    ONE,
+    TINY,
+    ZERO,
     Lanes,
     Record,
     Records,
@@ -26,9 +29,6 @@ from posse.rules.randomness import SENSOR_NOISE, normal_pair
 from posse.rules.senses.declaring import sensor
 from posse.rules.state import FIX, NEVER
 
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_TINY: Final = np.float32(1e-9)
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; older fixes give no velocity
 
 
@@ -63,7 +63,7 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> b
         j = first + BLOCK * block
         ox, oy, radius = load(s.x, j) - t.x, load(s.y, j) - t.y, load(s.radius, j)
         along, across = ox * dx + oy * dy, ox * dy - oy * dx
-        meets = (along > _ZERO) & (along < d2) & (across * across < radius * radius * d2)
+        meets = (along > ZERO) & (along < d2) & (across * across < radius * radius * d2)
         if bits(meets) != 0:
             return True
     return False
@@ -76,38 +76,26 @@ def fix_velocity(c: Record, since: Lanes, dx: Lanes, dy: Lanes, old_vx: Lanes, o
     ``since`` counts the control steps between them; ``old_vx`` and ``old_vy`` are the previous
     velocity. All are numbers or lanes.
     """
-    rate = _ONE / (since * c.dt)
-    vx, vy, keep = dx * rate, dy * rate, lesser(_ONE, c.smoothing * since)
+    rate = ONE / (since * c.dt)
+    vx, vy, keep = dx * rate, dy * rate, lesser(ONE, c.smoothing * since)
     vx, vy = old_vx + keep * (vx - old_vx), old_vy + keep * (vy - old_vy)
     # No target is faster than a tracker (assumption ii): limit the effect of noise.
     speed2 = vx * vx + vy * vy
     too_fast = speed2 > c.fastest * c.fastest
-    cut = choose(too_fast, c.fastest / root(greater(speed2, _TINY)), _ONE)
+    cut = choose(too_fast, c.fastest / root(greater(speed2, TINY)), ONE)
     return vx * cut, vy * cut
 
 
 @compiled
-def take_fix(
-    c: Record,
-    t: Record,
-    step: int,
-    x: np.float32,
-    y: np.float32,
-    heading_cos: np.float32,
-    heading_sin: np.float32,
-    frame_cos: np.float32,
-    frame_sin: np.float32,
-) -> None:
-    """Store a newer fix of a tracker, with the velocity from this and the previous one."""
-    since = np.float32(step - t.fix_step)
+def take_fix(c: Record, t: Record, sender: Record) -> None:
+    """Take a sender's newer fix, with the velocity from this and the previous one."""
+    since = np.float32(sender.fix_step - t.fix_step)
     if t.fix_step >= 0 and since * c.dt <= _VELOCITY_MEMORY:
-        t.fix_vx, t.fix_vy = fix_velocity(c, since, x - t.fix_x, y - t.fix_y, t.fix_vx, t.fix_vy)
+        dx, dy = sender.fix.x - t.fix.x, sender.fix.y - t.fix.y
+        t.fix_vx, t.fix_vy = fix_velocity(c, since, dx, dy, t.fix_vx, t.fix_vy)
     else:
-        t.fix_vx, t.fix_vy = _ZERO, _ZERO
-    t.fix_step = step
-    t.fix_x, t.fix_y = x, y
-    t.fix_cos, t.fix_sin = heading_cos, heading_sin
-    t.fix_frame_cos, t.fix_frame_sin = frame_cos, frame_sin
+        t.fix_vx, t.fix_vy = ZERO, ZERO
+    t.fix_step, t.fix = sender.fix_step, sender.fix
 
 
 @compiled
@@ -142,9 +130,9 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
             dx, dy = load(s.seen_dx, i), load(s.seen_dy, i)
         x, y = own_x + dx, own_y + dy
         old_x, old_y, _, _, _, _, old_vx, old_vy = columns(trackers, i, n, FIX)
-        since = greater(np.float32(w.step) - before, _ONE)
+        since = greater(np.float32(w.step) - before, ONE)
         vx, vy = fix_velocity(c, since, x - old_x, y - old_y, old_vx, old_vy)
-        fresh = (before >= _ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
+        fresh = (before >= ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
         store_rows(
             x,
             y,
@@ -152,8 +140,8 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
             eight(w.heading_sin),
             eight(w.frame_cos),
             eight(w.frame_sin),
-            choose(fresh, vx, _ZERO),
-            choose(fresh, vy, _ZERO),
+            choose(fresh, vx, ZERO),
+            choose(fresh, vy, ZERO),
             s.new_fix,
             BLOCK * i,
         )
@@ -174,17 +162,17 @@ def note_bearings(c: Record, w: Record, trackers: Records, s: Record) -> None:
             dx, dy = w.x - t.x, w.y - t.y
             if c.measured != 0:
                 dx, dy = s.seen_dx[i], s.seen_dy[i]
-            per_metre = _ONE / max(np.float32(math.sqrt(dx * dx + dy * dy)), _TINY)
+            per_metre = ONE / max(np.float32(math.sqrt(dx * dx + dy * dy)), TINY)
             t.fix_step = w.step
-            t.fix_x, t.fix_y = dx * per_metre, dy * per_metre
-            t.fix_cos, t.fix_sin, t.fix_frame_cos, t.fix_frame_sin = _ZERO, _ZERO, _ZERO, _ZERO
+            t.fix.x, t.fix.y = dx * per_metre, dy * per_metre
+            t.fix.cos, t.fix.sin, t.fix.frame_cos, t.fix.frame_sin = ZERO, ZERO, ZERO, ZERO
 
 
 @compiled
 def add_noise(c: Record, w: Record, number: int, dx: np.float32, dy: np.float32) -> tuple[np.float32, np.float32]:
     """Return the vector (dx, dy) from a tracker with the scenario's noise."""
     first, second = normal_pair(w.key, w.step, SENSOR_NOISE, number)
-    scale = _ONE + c.range_noise * first
+    scale = ONE + c.range_noise * first
     turn = c.bearing_noise * second
     cosine, sine = np.float32(math.cos(turn)), np.float32(math.sin(turn))
     return scale * (dx * cosine - dy * sine), scale * (dx * sine + dy * cosine)

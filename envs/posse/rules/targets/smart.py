@@ -6,29 +6,48 @@ Then it darts: it takes the turn that disrupts the formation most, and holds it.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
-from posse.rules.state import NEVER
+from posse.numeric import HALF, ONE, WIDTH, ZERO, Record, Records, choose, compiled, eight, lesser, load, root, store
+from posse.rules.kinematics import arc, follow_heading
+from posse.rules.state import NEVER, NO_BITS
 from posse.rules.targets.declaring import Memory, target_motion
-from posse.rules.targets.smart_plans import DART_TURN, plan_dart, plan_escape
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""
 PATIENCE: Final = np.float32(3.0)
 """Time of station keeping by the whole team that triggers a dart, s."""
 
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 _TWO: Final = np.float32(2.0)
-_NO_BITS: Final = np.uint64(0)
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _STATION_MARGIN: Final = np.float32(1.0)  # m; beyond the outermost slot, counts as near
 _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
 _DANGER: Final = np.float32(0.6)  # times formation_distance; a nearer tracker triggers a dart
 _ALARM: Final = np.float32(1e3)
+DART_TURN: Final = np.float32(1.3 * math.pi)
+"""A dart lasts as long as a turn by this angle, rad."""
+SMART_DIRECTIONS: Final = 2 * WIDTH
+"""Number of candidate directions."""
+
+_TINY: Final = np.float32(1e-12)
+_HALF_ROUND: Final = WIDTH
+_FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by this time
+_LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
+_LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
+_DART_MOMENTS: Final = 6  # time samples of a simulated dart
+_DART_TURN_COS: Final = np.float32(math.cos(1.3 * math.pi / _DART_MOMENTS))  # between two of them
+_DART_TURN_SIN: Final = np.float32(math.sin(1.3 * math.pi / _DART_MOMENTS))
+_DART_STRIDE: Final = 2  # every second direction is simulated
+_CLEARANCE: Final = np.float32(0.3)  # m between the rims of the target and a tracker
+_FAR: Final = np.float32(1e3)  # for an unblocked direction
+_BLOCKED: Final = np.float32(100.0)  # m; penalty of a dart for a collision
+
+_ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
+_DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
+_DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 
 _PRESSED: Final = Memory(
     "pressed",
@@ -50,16 +69,16 @@ def smart(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record
 def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Set the goal heading until the next decision."""
     past = np.float32(SMART_REPLAN) * c.dt
-    if w.touching != _NO_BITS:
+    if w.touching != NO_BITS:
         # Blocked by contact: leave in a free direction.
-        w.pressed = _ZERO
+        w.pressed = ZERO
         plan_escape(c, w, trackers, obstacles, s)
         return
-    if w.pressed < _ZERO:
-        w.pressed = min(_ZERO, w.pressed + past)
+    if w.pressed < ZERO:
+        w.pressed = min(ZERO, w.pressed + past)
         return
     pressure = team_pressure(c, w, trackers)
-    w.pressed = max(_ZERO, w.pressed + pressure * past)
+    w.pressed = max(ZERO, w.pressed + pressure * past)
     if w.pressed >= PATIENCE:
         w.pressed = -DART_TURN / c.target_turn_rate
         plan_dart(c, w, trackers, obstacles)
@@ -77,7 +96,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
     near = c.slots_reach + _STATION_MARGIN
     danger = max(_DANGER * c.formation_distance, c.radius + c.radius)
     vx, vy = c.target_speed * w.heading_cos, c.target_speed * w.heading_sin
-    committed = _ZERO
+    committed = ZERO
     for i in range(c.num_trackers):
         t = trackers[i]
         if t.broken_at != NEVER:
@@ -89,5 +108,108 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
             return _ALARM
         ux, uy = t.speed * t.heading_cos - vx, t.speed * t.heading_sin - vy
         if d2 < near * near and ux * ux + uy * uy < slow * slow:
-            committed += _ONE
-    return _TWO * committed / np.float32(max(w.working, 1)) - _ONE
+            committed += ONE
+    return _TWO * committed / np.float32(max(w.working, 1)) - ONE
+
+
+@compiled
+def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
+    """Set the goal heading through the widest gap that the team leaves.
+
+    For every direction u, the earliest interception by any tracker moving straight at full speed is
+    the least root t of |p - u v t| = V t, with predicted positions of the trackers. The target
+    takes the direction with the latest interception, with hysteresis against oscillation.
+    """
+    v, most = c.target_speed, c.fastest
+    a = most * most - v * v
+    per_a = ONE / a
+    clear = c.radius + c.radius + _CLEARANCE
+    # No hysteresis for the initial heading, nor for a choice that ended in contact.
+    loyalty = _LOYALTY if w.step > 0 and w.touching == NO_BITS else ZERO
+    # Half the directions; the opposite ones share the square root.
+    ux, uy = load(_DIRECTION_COS, 0), load(_DIRECTION_SIN, 0)
+    ahead, astern = eight(_FAR), eight(_FAR)
+    for i in range(c.num_trackers):
+        t = trackers[i]
+        if t.broken_at != NEVER:
+            # A broken tracker is only an obstacle.
+            px, py = t.x - w.x, t.y - w.y
+            along, across = px * ux + py * uy, px * uy - py * ux
+            met = (across < clear) & (across > -clear)
+            along = along * (a / v)
+            ahead = lesser(ahead, choose(met & (along > ZERO), along, _FAR))
+            astern = lesser(astern, choose(met & (along < ZERO), ZERO - along, _FAR))
+        else:
+            px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
+            py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
+            b = v * (px * ux + py * uy)
+            until = root(b * b + a * (px * px + py * py))
+            ahead, astern = lesser(ahead, until - b), lesser(astern, until + b)
+    same_way = loyalty * (ux * w.goal_cos + uy * w.goal_sin)
+    store(s.worth, 0, ahead * per_a + same_way)
+    store(s.worth, _HALF_ROUND, astern * per_a - same_way)
+    best = np.float32(-1e9)
+    for k in range(_HALF_ROUND):
+        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
+        for side in range(2):
+            value = s.worth[_HALF_ROUND * side + k]
+            if c.walled and value + _LOOKOUT > best:
+                value += free_time(c, w, obstacles, ux, uy)
+            if value > best:
+                best = value
+                w.goal_cos, w.goal_sin = ux, uy
+            ux, uy = -ux, -uy
+
+
+@compiled(seldom=True)
+def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
+    """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
+    far = c.target_speed * _LOOKOUT
+    inner = c.half_arena - c.safe_distance
+    if abs(ux) > _TINY:
+        far = min(far, (inner - w.x) / ux if ux > ZERO else (-inner - w.x) / ux)
+    if abs(uy) > _TINY:
+        far = min(far, (inner - w.y) / uy if uy > ZERO else (-inner - w.y) / uy)
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        ox, oy = o.x - w.x, o.y - w.y
+        along, across = ox * ux + oy * uy, ox * uy - oy * ux
+        reach = o.radius + c.safe_distance
+        if along > ZERO and abs(across) < reach:
+            far = min(far, max(ZERO, along - reach))
+    return np.float32(far / c.target_speed)
+
+
+@compiled(seldom=True)
+def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
+    """Set the goal heading whose turn disrupts the formation most.
+
+    Candidate directions are simulated with the trackers holding speed and turn rate: the best one
+    displaces them farthest from their places around the target, without a collision.
+    """
+    moment = DART_TURN / (c.target_turn_rate * np.float32(_DART_MOMENTS))
+    clear = c.radius + c.radius + _CLEARANCE
+    best = np.float32(-1e9)
+    for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):
+        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
+        value = ZERO
+        for i in range(c.num_trackers):
+            t = trackers[i]
+            hc, hs, tc, ts = w.heading_cos, w.heading_sin, t.heading_cos, t.heading_sin
+            moved_x, moved_y = ZERO, ZERO  # displacement relative to the target
+            for _ in range(_DART_MOMENTS):
+                old_c, old_s = hc, hs
+                hc, hs = follow_heading(hc, hs, ux, uy, _DART_TURN_COS, _DART_TURN_SIN)
+                dx, dy, tc, ts = arc(tc, ts, t.speed, t.turn_rate, moment)
+                moved_x += dx - HALF * c.target_speed * moment * (old_c + hc)
+                moved_y += dy - HALF * c.target_speed * moment * (old_s + hs)
+                x, y = t.x - w.x + moved_x, t.y - w.y + moved_y
+                if x * x + y * y < clear * clear:
+                    value -= _BLOCKED
+            if t.broken_at == NEVER:
+                value += np.float32(math.sqrt(moved_x * moved_x + moved_y * moved_y))
+        if c.walled:
+            value += free_time(c, w, obstacles, ux, uy)
+        if value > best:
+            best = value
+            w.goal_cos, w.goal_sin = ux, uy

@@ -1,18 +1,24 @@
-"""Steering of a scripted target: turns to its goal heading within its turn limit.
+"""Steering of a scripted target: turns to its goal heading within its turn limit, clear of walls and obstacles.
 
-In an arena, turns that lead into a wall or an obstacle are avoided
-(:mod:`posse.rules.targets.walls`).
+In an arena the goal is mirrored near walls, and only turns that leave one of the two turning
+circles free are taken, so that the target can always keep turning without contact. If trackers
+block the target, which then turns on the spot, both circles may be occupied: then it turns to the
+wider side until one is free, and contacts stop it (:mod:`posse.rules.contact`).
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
-from posse.rules.kinematics import turn_towards
-from posse.rules.targets.walls import mirror_at_walls, safe_turn
+from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled
+from posse.rules.discs import obstacle_within
+from posse.rules.kinematics import arc, turn_towards
+
+_ROUNDING: Final = np.float32(1e-3)  # m, far more than the accumulated rounding of an episode
+_SOFT_WALL: Final = np.float32(2.0)  # m; distance to a wall at which goals are mirrored
 
 
 @compiled
@@ -27,3 +33,93 @@ def target_turn_rate(
     if c.walled:
         turn = safe_turn(c, w, obstacles, turn)
     return turn
+
+
+@compiled(seldom=True)
+def mirror_at_walls(c: Record, w: Record) -> None:
+    """Mirror the goal heading at a wall that is near and ahead."""
+    inner = max(c.half_arena - _SOFT_WALL, c.half_arena * HALF)
+    if (w.x > inner and w.goal_cos > ZERO) or (w.x < -inner and w.goal_cos < ZERO):
+        w.goal_cos = -w.goal_cos
+    if (w.y > inner and w.goal_sin > ZERO) or (w.y < -inner and w.goal_sin < ZERO):
+        w.goal_sin = -w.goal_sin
+
+
+@compiled
+def circle_is_free(c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32) -> bool:
+    """Return whether the disc of the target's turning circle is clear of walls and obstacles."""
+    room = radius + c.safe_distance
+    if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:
+        return False
+    # A circle that contains an obstacle is not free, either.
+    return not obstacle_within(obstacles, c.num_obstacles, x, y, room)
+
+
+@compiled
+def has_free_circle(
+    c: Record,
+    obstacles: Records,
+    x: np.float32,
+    y: np.float32,
+    heading_cos: np.float32,
+    heading_sin: np.float32,
+    side: np.float32,
+    allowance: np.float32 = ZERO,
+) -> bool:
+    """Return whether the turning circle on a side (+1 left, -1 right) is free, to an allowance."""
+    radius = c.target_speed / c.target_turn_rate
+    x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
+    return circle_is_free(c, obstacles, x, y, radius - allowance)
+
+
+@compiled(seldom=True)
+def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
+    """Return ``turn`` if a free turning circle remains after it, else the turn along a free one.
+
+    If there is none, the turn that leads to one.
+    """
+    dx, dy, hc, hs = w.heading_cos, w.heading_sin, w.heading_cos, w.heading_sin
+    x, y = w.x, w.y
+    for _ in range(c.physics_steps):
+        dx, dy, hc, hs = arc(hc, hs, c.target_speed, turn, c.physics_dt)
+        x, y = x + dx, y + dy
+    if has_free_circle(c, obstacles, x, y, hc, hs, ONE):
+        return turn
+    if has_free_circle(c, obstacles, x, y, hc, hs, -ONE):
+        return turn
+    # Allow for rounding, so that the target does not change sides on a free circle.
+    x, y, hc, hs = w.x, w.y, w.heading_cos, w.heading_sin
+    left = has_free_circle(c, obstacles, x, y, hc, hs, ONE, _ROUNDING)
+    right = has_free_circle(c, obstacles, x, y, hc, hs, -ONE, _ROUNDING)
+    if left and (turn >= ZERO or not right):
+        side = ONE
+    elif right:
+        side = -ONE
+    else:
+        side = way_out(c, w, obstacles)
+    return np.float32(side * c.target_turn_rate)
+
+
+@compiled(seldom=True)
+def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
+    """Return the side (+1 left, -1 right) to turn to if neither turning circle is free."""
+    if w.speed == ZERO:
+        # Blocked in the last step: keep turning the same way, which reaches every heading, whereas
+        # alternating could last forever.
+        return ONE if w.turn_rate >= ZERO else -ONE
+    radius = c.target_speed / c.target_turn_rate
+    aside_x, aside_y = -radius * w.heading_sin, radius * w.heading_cos
+    left = width_around(c, obstacles, w.x + aside_x, w.y + aside_y)
+    right = width_around(c, obstacles, w.x - aside_x, w.y - aside_y)
+    return ONE if left >= right else -ONE
+
+
+@compiled
+def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) -> np.float32:
+    """Return the distance from a point to the nearest obstacle or wall, m."""
+    width = c.half_arena - max(abs(x), abs(y))
+    for k in range(c.num_obstacles):
+        o = obstacles[k]
+        dx, dy = o.x - x, o.y - y
+        width = min(width, np.float32(math.sqrt(dx * dx + dy * dy)) - o.radius)
+    return np.float32(width)

@@ -15,6 +15,7 @@ from posse.numeric import Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
+from posse.scenarios.limits import FAR
 from posse.signals.observation.fields import SLACK, field, setting
 from posse.signals.observation.views import View, ego
 
@@ -161,7 +162,7 @@ def control_step(c: Record) -> np.float32:
 @setting("m", lambda s: s.sensing_range)
 def sensing_range(c: Record) -> np.float32:
     """Range of its target sensor; -1: unlimited."""
-    return np.float32(c.told_sensing_range)
+    return np.float32(c.sensing_range) if c.sensing_range < FAR else _MINUS_ONE
 
 
 @setting("m", lambda s: s.sonar_range)
@@ -173,7 +174,7 @@ def sonar_range(c: Record) -> np.float32:
 @setting("m", lambda s: s.arena)
 def arena(c: Record) -> np.float32:
     """Side of the walled square around the origin; -1: no walls."""
-    return np.float32(c.told_arena)
+    return np.float32(c.arena) if c.walled else _MINUS_ONE
 
 
 @field("s", 0, lambda s: s.duration * SLACK)

@@ -24,7 +24,7 @@ def test_every_field_equals_an_independent_working(case: Any) -> None:
     s, senses = recording.scenario, Senses(recording.scenario)
     for step, state in enumerate(recording.states):
         senses.follow(state, recording.actions[step - 1] if step else None)
-        if step % 6 and step not in (1, 2):
+        if step % (6 if s.num_trackers < 12 else 24) and step not in (1, 2):
             continue
         views = recording.batch.layout.views(recording.observations[step])
         for i in range(s.num_trackers):
@@ -56,12 +56,12 @@ def test_what_the_target_agent_is_given() -> None:
             assert mine["max_speed"] == np.float32(s.target_speed)
             assert mine["max_turn_rate"] == np.float32(s.target_turn_rate)
             assert mine["acceleration_time"] == 0, "an agent's limits act at once"
-            np.testing.assert_allclose(mine["sonar"], sonar(s, world, 4), atol=2e-3)
+            np.testing.assert_allclose(mine["sonar"], sonar(s, world, 4), rtol=1e-4, atol=2e-3)
             away = (p[:4] - p[4]) / h[4]
             at = mine["neighbour_bearing"][:4] @ [1, 1j] * mine["neighbour_range"][:4]
             order = [int(number) for number in mine["neighbour_number"][:4]]
             assert sorted(order) == [0, 1, 2, 3]
-            np.testing.assert_allclose(at, away[order], atol=1e-4)
+            np.testing.assert_allclose(at, away[order], rtol=1e-4, atol=1e-4)
             assert (np.diff(mine["neighbour_range"][:4]) >= 0).all(), "nearest first"
             assert mine["neighbour_number"][4:].tolist() == [-1, -1]
             assert mine["neighbour_range"][4:].tolist() == [-1, -1]
@@ -159,7 +159,7 @@ def test_one_to_sixty_four_trackers_nearest_first(name: str, number: int) -> Non
         away = np.abs(place[:, None] - place[None, :]) + np.diag(np.full(number, np.inf))
         for i in range(number):
             nearest = np.sort(away[i])[: min(5, number - 1)]
-            np.testing.assert_allclose(ranges[0, i][filled[0, i]], nearest, atol=1e-5)
+            np.testing.assert_allclose(ranges[0, i][filled[0, i]], nearest, rtol=1e-5, atol=1e-5)
     assert (views["neighbour_age"][~filled] == -1).all()
     assert (views["neighbour_range"][~filled] == -1).all()
     assert (views["neighbour_bearing"][~filled] == 0).all()

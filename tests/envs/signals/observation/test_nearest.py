@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posse
-from posse.engine.scratch import SCRATCH, SCRATCH_FOR_ONE
+from posse.engine.scratch import SCRATCH
 from posse.numeric import kernel
 from posse.rules.discs import BLOCK, lay_out_constants
 from posse.rules.scratch import new_scratch
@@ -55,7 +55,7 @@ def listed(trackers: Teams, places: int, across: int) -> tuple[Numbers, Numbers]
     lists = np.full((worlds, n, places), -1, np.float32)
     certain = np.zeros((worlds, n), np.float32)
     # Uninitialised memory must not have an effect.
-    scratch = new_scratch(SCRATCH if across else SCRATCH_FOR_ONE)
+    scratch = new_scratch(SCRATCH)
     scratch.view(np.float32)[:] = np.nan
     config = config_record(posse.get_scenario("constant"))
     beams = np.zeros((2, 0), np.float32)

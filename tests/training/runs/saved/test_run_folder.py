@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from tests.support.disk import largest_file
 from tests.support.runs import assert_equal, numbers, quiet, small
 
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError
 from posse_training.files import locked
+from posse_training.runs import callback
+from posse_training.runs.saved import checkpoint
 from posse_training.runs.saved.checkpoint import read_checkpoint
 from posse_training.runs.train import resume, train
 
 
 def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "run"
-    fsync, count = os.fsync, 0
+    write, count = checkpoint.write_checkpoint, 0
 
-    def full(file: int) -> None:
+    def full(*arguments: Any) -> None:
         nonlocal count
         count += 1
-        if count > 3:
-            raise OSError(28, "No space left on device")
-        fsync(file)
+        with largest_file(1000) if count == 3 else contextlib.nullcontext():
+            write(*arguments)
 
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(CheckpointError, match=r"No space left.*--resume"):
+    monkeypatch.setattr(callback, "write_checkpoint", full)
+    with pytest.raises(CheckpointError, match=r"File too large.*--resume"):
         train(small(folder), console=quiet())
     monkeypatch.undo()
-    assert not list(folder.glob(".*partial"))
+    assert not list(folder.glob(".*"))
     assert read_checkpoint(folder)[1]["model"]["num_timesteps"] >= 0
     resume(folder, console=quiet())
     train(small(tmp_path / "whole"), console=quiet())

@@ -22,7 +22,8 @@ from rich.table import Table
 from rich.text import Text
 
 import posse
-from posse_baselines.ddcs.family import FAMILY
+from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.files import replacing, write_atomically
 from posse_training.reports.pictures.style import RC
 from posse_training.reports.reproduce.laws import leader_loss, tracks
 from posse_training.reports.reproduce.motion import curves, frames
@@ -130,14 +131,15 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
         _write(settings.out, "leader-loss", loss)
     stated = {"seed": settings.seed, "split": SPLIT, "tolerance": settings.tolerance}
     text = json.dumps({**stated, "policies": rows}, indent=2)
-    (settings.out / "settling.json").write_text(text + "\n")
+    write_atomically(settings.out / "settling.json", f"{text}\n".encode())
     return rows
 
 
 def _write(folder: Path, name: str, figure: Figure) -> None:
     for suffix in ("png", "svg"):
         dated = {"Date": None} if suffix == "svg" else None
-        figure.savefig(folder / f"{name}.{suffix}", dpi=130, metadata=dated)
+        with replacing(folder / f"{name}.{suffix}") as part:
+            figure.savefig(part, dpi=130, metadata=dated)
     plt.close(figure)
 
 

@@ -17,8 +17,7 @@ from matplotlib.patches import Patch
 import posse
 from posse_baselines import with_settings
 from posse_baselines.ddcs import TASKS
-from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, GRID, ORANGE
-from posse_training.reports.pictures.parts import note
+from posse_training.reports.pictures.style import BLUE, GREEN, GREY, GRID, ORANGE, note
 from posse_training.reports.reproduce.motion import COLOURS, TARGET, draw_robots, look_of
 from posse_training.reports.reproduce.recording import Recording, median_world, played, record
 

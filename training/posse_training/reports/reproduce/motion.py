@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from posse_training.reports.pictures.palette import BLUE, GREEN, GREY, INK, PINK, RED
-from posse_training.reports.pictures.parts import note
+from posse_training.reports.pictures.style import BLUE, GREEN, GREY, INK, PINK, RED, note
 from posse_training.reports.reproduce.recording import Recording
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)

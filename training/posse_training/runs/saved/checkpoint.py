@@ -17,7 +17,7 @@ import numpy.typing as npt
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError
 
 Arrays = dict[str, npt.NDArray[Any]]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from collections.abc import Iterable
+from typing import Final
 
 Point = dict[str, float]
 POINT: Final = ("steps", "seconds", "safe_score", "low", "high", "score", "contact_free")
@@ -24,18 +24,3 @@ def as_csv(curve: Iterable[Point]) -> bytes:
     writer.writeheader()
     writer.writerows(curve)
     return text.getvalue().encode()
-
-
-def read_points(points: Iterable[Mapping[str, Any]]) -> list[Point]:
-    """Return a curve from the plain values of a checkpoint.
-
-    Raises:
-        ValueError: A point lacks a column, as those of earlier versions do.
-    """
-    curve = []
-    for point in points:
-        missing = [name for name in POINT if name not in point]
-        if missing:
-            raise ValueError(f"its curve has no {missing[0]!r}; an earlier version wrote it")
-        curve.append({name: float(point[name]) for name in POINT})
-    return curve

@@ -15,7 +15,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 import posse
-from posse_baselines.learned import LSTM, Encoding, LearnedPolicy, Network
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_baselines.learned.advice import Adviser, Advising
 from posse_training.provenance import commit
 from posse_training.runs.saved.curve import Point
@@ -37,7 +37,7 @@ def export(
     ``predict(..., deterministic=True)`` to rounding.
 
     Args:
-        model: PPO, recurrent PPO, SAC or TD3, with a :class:`Normaliser` before its networks.
+        model: PPO, SAC or TD3, with a :class:`Normaliser` before its networks.
         encoding: Which inputs the model reads from an observation.
         card: The policy's card.
         adviser: The policy whose proposals the model reads, if any.
@@ -64,7 +64,6 @@ def export(
         biases=tuple(_numbers(layer.bias) for layer in layers),
         activation=names[between.pop()] if between else "relu",
         output=output,
-        lstm=_lstm(model),
     )
     return LearnedPolicy(network, encoding, card, adviser, correction)
 
@@ -78,18 +77,6 @@ def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], str]:
         return [*_flat(policy.actor.latent_pi), policy.actor.mu], "tanh"
     layers = _flat(policy.actor.mu)
     return (layers[:-1] if isinstance(layers[-1], nn.Tanh) else layers), "tanh"
-
-
-def _lstm(model: BaseAlgorithm) -> LSTM | None:
-    """Return the recurrent layer before the other ones, if there is one."""
-    layer = getattr(model.policy, "lstm_actor", None)
-    if layer is None:
-        return None
-    if layer.num_layers != 1 or layer.bidirectional or layer.proj_size:
-        raise TypeError(f"no policy file holds {layer}")
-    return LSTM(
-        _numbers(layer.weight_ih_l0), _numbers(layer.weight_hh_l0), _numbers(layer.bias_ih_l0 + layer.bias_hh_l0)
-    )
 
 
 def _flat(module: nn.Module) -> list[nn.Module]:

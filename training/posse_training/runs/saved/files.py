@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_file
 from posse_training.cluster.shards import Arrays
 from posse_training.files import LOCK

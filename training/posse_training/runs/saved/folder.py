@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from posse_baselines.learned.policy_file import write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.errors import RunFolderError
 from posse_training.files import InUseError, locked
 from posse_training.runs.saved.checkpoint import CHECKPOINT, Arrays, read_checkpoint

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import random
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -86,7 +85,6 @@ def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:
     }
     arrays["last_obs"] = np.asarray(model._last_obs)
     arrays["last_starts"] = np.asarray(model._last_episode_starts)
-    arrays |= {name: state.numpy() for name, state in _lstm_states(model).items()}
     buffer = getattr(model, "replay_buffer", None)
     if buffer is not None:
         state["replay"] = [buffer.pos, buffer.full]
@@ -96,104 +94,27 @@ def model_state(model: BaseAlgorithm) -> tuple[Arrays, dict[str, Any]]:
 
 
 def restore_model(model: BaseAlgorithm, arrays: Arrays, state: Mapping[str, Any]) -> None:
-    """Set a model of the same settings to the state of :func:`model_state`.
-
-    Raises:
-        ValueError: Arrays of other shapes.
-    """
-    states = _lstm_states(model)
-    for name, shape in (
-        ("last_obs", (model.n_envs, *(model.observation_space.shape or ()))),
-        ("last_starts", (model.n_envs,)),
-        *((name, tuple(tensor.shape)) for name, tensor in states.items()),
-    ):
-        if arrays[name].shape != shape:
-            raise ValueError(f"{name} has the shape {arrays[name].shape}, wanted {shape}")
+    """Set a model of the same settings to the state of :func:`model_state`."""
     names, tensors = model._get_torch_save_params()
     parts, loose = (unflatten_tensors(state[name], arrays) for name in ("parts", "tensors"))
-    for given, wanted in ((parts, names), (loose, tensors)):
-        if set(given) != set(wanted):
-            raise ValueError(f"it holds {sorted(given)!s:.200}, wanted {sorted(wanted)}")
-    for name, values in parts.items():
-        part = _find(model, name)
-        fresh = part.state_dict()
-        part.load_state_dict(values)
-        if isinstance(part, torch.optim.Optimizer):
-            _check_optimiser(name, part, fresh["param_groups"])
-        else:
-            _check_finite(name, *part.state_dict().values())
-    for name, values in loose.items():
-        _check_finite(name, values)
-        _find(model, name).data.copy_(values)
+    for name in names:
+        _find(model, name).load_state_dict(parts[name])
+    for name in tensors:
+        _find(model, name).data.copy_(loose[name])
     model.num_timesteps = int(state["num_timesteps"])
     model._episode_num = int(state["episode_num"])
     model._n_updates = int(state["n_updates"])
     model._current_progress_remaining = float(state["progress"])
-    episodes = [{key: _checked_number(key, info[key]) for key in ("r", "l", "score")} for info in state["episodes"]]
-    model.ep_info_buffer = deque(episodes, maxlen=model._stats_window_size)
-    successes = [bool(success) for success in state["successes"]]
-    model.ep_success_buffer = deque(successes, maxlen=model._stats_window_size)
+    model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
+    model.ep_success_buffer = deque(state["successes"], maxlen=model._stats_window_size)
     model.action_space.np_random.bit_generator.state = state["action_space"]
     model._last_obs = arrays["last_obs"].copy()
     model._last_episode_starts = arrays["last_starts"].copy()
-    for name, tensor in states.items():
-        tensor.copy_(torch.from_numpy(arrays[name]))
-        _check_finite(name, tensor)
     buffer = getattr(model, "replay_buffer", None)
     if buffer is not None:
         buffer.pos, buffer.full = state["replay"]
         for name in _REPLAY:
             getattr(buffer, name)[: buffer.size()] = arrays[f"replay.{name}"]
-
-
-def _lstm_states(model: BaseAlgorithm) -> dict[str, torch.Tensor]:
-    """Return the states of recurrent networks by name, (1, slots, cells) each; none: empty."""
-    states = getattr(model, "_last_lstm_states", None)
-    if states is None:
-        return {}
-    (h, c), (value_h, value_c) = states.pi, states.vf
-    named = {"hidden": h, "cell": c, "value_hidden": value_h, "value_cell": value_c}
-    return {f"lstm.{name}": tensor for name, tensor in named.items()}
-
-
-def _checked_number(name: str, value: Any) -> float:
-    """Return an episode's length, return or score, or raise."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < _MOST:
-        raise ValueError(f"{name}={value!r:.80} of an episode must be a number below {_MOST:g}")
-    return value
-
-
-_MOST: Final = 1e30
-_MOMENTS: Final = {"step", "exp_avg", "exp_avg_sq"}  # of Adam
-
-
-def _check_optimiser(name: str, part: torch.optim.Optimizer, fresh: list[dict[str, Any]]) -> None:
-    """Raise if an optimiser's settings or moments are not such as it would have itself."""
-    for group, wanted in zip(part.param_groups, fresh, strict=True):
-        for key, value in wanted.items():
-            if key != "params" and not _is_alike(group.get(key), value):
-                raise ValueError(f"{key} of {name} is {group.get(key)!r:.80}, wanted {value!r}")
-    for parameter, values in part.state.items():
-        if values and set(values) != _MOMENTS:
-            raise ValueError(f"{name} holds {sorted(values)!s:.200}, wanted {sorted(_MOMENTS)}")
-        for key, value in values.items():
-            if value.numel() != 1 if key == "step" else value.shape != parameter.shape:
-                raise ValueError(f"{key} of {name} has the shape {tuple(value.shape)}, wanted {tuple(parameter.shape)}")
-            _check_finite(f"{key} of {name}", value)
-
-
-def _is_alike(value: Any, wanted: Any) -> bool:
-    """Return whether a value is a finite number where one is wanted, and else the wanted one."""
-    if isinstance(wanted, (list, tuple)):
-        return isinstance(value, (list, tuple)) and len(value) == len(wanted) and all(map(_is_alike, value, wanted))
-    if isinstance(wanted, float):
-        return isinstance(value, float) and math.isfinite(value)
-    return type(value) is type(wanted) and bool(value == wanted)
-
-
-def _check_finite(name: str, *tensors: torch.Tensor) -> None:
-    if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors):
-        raise ValueError(f"{name} has numbers that are not finite")
 
 
 def _find(model: BaseAlgorithm, name: str) -> Any:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from posse_training.cluster.settings import Cluster
 from posse_training.errors import RunFolderError, SettingsError
+from posse_training.files import read_json
 from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import check_before, train
@@ -64,10 +65,10 @@ def _check_folder(settings: TrainSettings) -> None:
     path = folder / SETTINGS
     wanted = json.loads(json.dumps({**settings.to_dict(), "folder": None}))
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path)
     except FileNotFoundError:
         return
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         raise RunFolderError(f"{path} is damaged: {error}") from error
     if found != wanted:
         other = next((n for n in wanted if not isinstance(found, dict) or found.get(n) != wanted[n]), "?")

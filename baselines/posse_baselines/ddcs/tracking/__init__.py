@@ -1,1 +1,0 @@
-"""The tracking layer: tasks, leadership, slots, and the motion wanted by each task."""

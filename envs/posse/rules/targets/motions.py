@@ -1,0 +1,52 @@
+"""The motions that need no knowledge of the team: constant, accelerating, and the target moved by a policy."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import ZERO, Record
+from posse.rules.kinematics import arc
+from posse.rules.randomness import TARGET, TWO_PI, between, uniform
+from posse.rules.targets.declaring import Memory, target_motion
+
+_SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
+_LEAST_RATE: Final = 0.2  # rad/s
+_MOST_RATE: Final = 0.8
+_LEAST: Final = 0.4  # least and greatest turn rate, as shares of the limit
+_MOST: Final = 0.9
+
+_MEMORY: Final = (
+    Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK, "of an accelerating target"),
+    Memory("weave_rate", "rad/s", 0, 1, "of an accelerating target"),
+    Memory("weave_phase", "rad", 0, 2 * math.pi * _SLACK, "of an accelerating target"),
+)
+
+
+@target_motion("constant")
+def constant(c: Record, w: Record) -> None:
+    """Straight ahead at the initial heading (paper, section 2)."""
+
+
+def draw_weave(c: Record, w: Record) -> None:
+    """Draw amplitude, rate and phase of the sine."""
+    limit = c.target_turn_rate
+    w.weave_amplitude = between(_LEAST, _MOST, w.key, 0, TARGET, 100) * limit
+    w.weave_rate = between(_LEAST_RATE, _MOST_RATE, w.key, 0, TARGET, 101)
+    w.weave_phase = TWO_PI * uniform(w.key, 0, TARGET, 102)
+
+
+@target_motion("accelerating", draw=draw_weave, memory=_MEMORY)
+def accelerating(c: Record, w: Record) -> None:
+    """Turn rate is a sine of random amplitude, rate and phase (paper, section 2)."""
+    time = np.float32(w.step) * c.dt
+    turn = w.weave_amplitude * np.float32(math.sin(w.weave_rate * time + w.weave_phase))
+    for _ in range(c.physics_steps):  # an arc turns by 1 rad at most
+        _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, ZERO, turn, c.physics_dt)
+
+
+@target_motion("agent", agent=True)
+def agent(c: Record, w: Record) -> None:
+    """A policy controls the target."""

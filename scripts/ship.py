@@ -1,0 +1,240 @@
+"""Makes a trained team or target part of the package; its card has every training seed's scores, and a check.
+
+    python scripts/ship.py runs/train/smart-ppo-1 runs/train/smart-ppo-2 --name learned-smart
+    python scripts/ship.py runs/train/duel-target-ppo-1 --name evader
+    python scripts/ship.py --again     the checks of all that ship, after a scenario's version rose
+
+Of several runs that differ in their training seeds, the best on validation worlds that none was evaluated on ships. A
+target ships only if it costs the reference team more than the scripted one.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+import tyro
+
+from posse import Scenario, get_scenario
+from posse_baselines import Target, load_target
+from posse_baselines.learned import LearnedPolicy
+from posse_baselines.registry import LEARNED, SHIPPED
+from posse_baselines.targets import SHIPPED_TARGETS
+from posse_training.errors import SettingsError
+from posse_training.provenance import commit
+from posse_training.reports.evaluation import evaluate
+from posse_training.reports.statistics import difference, mean
+from posse_training.runs.saved.command import command_of
+from posse_training.runs.saved.folder import BEST, SETTINGS
+from posse_training.runs.settings import TrainSettings, read_settings
+
+SPLIT: Final = "validation"
+CHOICE_SEED: Final = 1  # seed 0 is evaluated during training
+CHECK_SEED: Final = 2
+CHECK_WORLDS: Final = 32
+TARGET_SEED: Final = 7
+TARGET_WORLDS: Final = 16
+LARGEST: Final = 1_000_000
+"""Largest size of a shipped file, bytes."""
+REFERENCE: Final = ("ddcs-tuned", "smart", 0.10)
+"""A target must cost this team, compared with this scripted target, at least this share of the score."""
+_JUDGED: Final = ("safe_score", "score", "contact_free")
+"""The first one decides; the others are stated beside it."""
+_MAY_DIFFER: Final = frozenset(
+    ("seed", "folder", "steps", "evaluate_every", "evaluate_worlds", "beside", "checkpoint_every", "threads")
+) | {"tensorboard", "wandb"}
+_NOT_PLAYED: Final = {"name", "version", "reward_weights", "target_reward_weights", "message_size"}
+"""Fields of a scenario that change no score, or that a check states separately."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Command-line arguments."""
+
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Run folders; those of a team differ in their training seeds only."""
+    name: str = ""
+    """Name of the team, learned-..., or of the target."""
+    worlds: int = 200
+    """Worlds of each scenario and team size to judge on."""
+    out: Path | None = None
+    """Folder to write to; default: the package's own."""
+    again: bool = False
+    """Make the checks of all shipped teams anew."""
+
+
+def ship(settings: Settings) -> Path:
+    """Write the best policy of some runs to the package; return its file.
+
+    Raises:
+        SettingsError: Runs that differ in more than their seeds, a wrong name, a target that costs too little, or a
+            policy that is too large; nothing is written.
+        PolicyError: A run without a policy, or with a damaged one.
+    """
+    if not settings.runs:
+        raise SettingsError("no run folders given: pass at least one")
+    trained = [read_settings(run / SETTINGS) for run in settings.runs]
+    policies = [LearnedPolicy.from_file(run / BEST) for run in settings.runs]
+    make = _team if trained[0].side == "trackers" else _target
+    policy = make(settings, trained, policies)
+    home = SHIPPED if trained[0].side == "trackers" else SHIPPED_TARGETS
+    path = (settings.out or home) / f"{settings.name}.safetensors"
+    with tempfile.TemporaryDirectory() as folder:
+        policy.save(trial := Path(folder, path.name))
+        size = trial.stat().st_size
+    if size > LARGEST:
+        raise SettingsError(
+            f"{path} would have {size:,} bytes, {LARGEST:,} are allowed: train with smaller hidden layers"
+        )
+    policy.save(path)
+    return path
+
+
+def _team(settings: Settings, trained: Sequence[TrainSettings], policies: Sequence[LearnedPolicy]) -> LearnedPolicy:
+    if not settings.name.startswith(LEARNED):
+        raise SettingsError(f"name={settings.name!r} must begin with {LEARNED!r}")
+    _check_one_training(settings.runs, trained)
+    plays = []
+    for policy in policies:
+        played = [evaluate(policy, s, settings.worlds, CHOICE_SEED, split=SPLIT) for s in trained[0].scenarios]
+        plays.append({name: np.concatenate([r[name] for r in played]) for name in _JUDGED})
+    # A run may end where it began, as the policy that it corrects or copies: that is none to ship.
+    learned = [policy.card["steps"] > 0 for policy in policies]
+    scores = [play["safe_score"].mean() for play in plays]
+    best = int(np.argmax(np.where(learned if any(learned) else True, scores, -np.inf)))
+    seeds = [
+        {
+            "seed": run.seed,
+            "steps": policy.card.get("steps"),
+            "commit": policy.card.get("commit"),
+            "command": command_of(run),
+            **{name: mean(play[name]).to_dict() for name in _JUDGED},
+        }
+        for run, policy, play in zip(trained, policies, plays, strict=True)
+    ]
+    return policies[best].with_card(
+        {
+            **_card(settings.name, policies[best], trained[best]),
+            "chosen_on": SPLIT,
+            "training_seeds": seeds,
+            "choice": {"split": SPLIT, "seed": CHOICE_SEED, "worlds": settings.worlds},
+            **{f"validation_{name}": float(plays[best][name].mean()) for name in _JUDGED},
+            "curve": _curve(settings.runs[best]),
+            "check": make_check(policies[best], trained[0].scenarios),
+        }
+    )
+
+
+def _target(settings: Settings, trained: Sequence[TrainSettings], policies: Sequence[LearnedPolicy]) -> LearnedPolicy:
+    if len(policies) != 1:
+        raise SettingsError(f"a target ships from one run, these are {len(policies)}")
+    (policy,), scenario, (team, scripted, least) = policies, trained[0].scenarios[0], REFERENCE
+    new = Target(settings.name, "agent", policy)
+    played = {
+        target.name: evaluate(team, scenario, settings.worlds, TARGET_SEED, target=target, progress=False)
+        for target in (load_target(scripted), new)
+    }
+    cost = difference(played[scripted]["score"], played[settings.name]["score"])
+    if not cost.low >= least:
+        raise SettingsError(
+            f"{settings.name!r} costs {team} {cost} more than {scripted!r}: at least {least:g} is wanted"
+        )
+    comparison = {"team": team, "split": "test", "seed": TARGET_SEED, "worlds": settings.worlds}
+    comparison |= {"scores": {name: found.estimate("score").to_dict() for name, found in played.items()}}
+    card = {**_card(settings.name, policy, trained[0]), "comparison": {**comparison, "cost": cost.to_dict()}}
+    return policy.with_card({**card, "check": make_target_check(team, scenario, new)})
+
+
+def _card(name: str, policy: LearnedPolicy, run: TrainSettings) -> dict[str, Any]:
+    told = {"name": name, "settings": {**run.to_dict(), "folder": None}, "command": command_of(run)}
+    return {**policy.card, **told, "shipped_at": commit()}
+
+
+def _curve(run: Path) -> list[dict[str, float]]:
+    """Return the whole learning curve of a run; that on the card of its best policy ends with it."""
+    with (run / "curve.csv").open(newline="", encoding="utf-8") as file:
+        return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+
+
+def _check_one_training(runs: Sequence[Path], trained: Sequence[TrainSettings]) -> None:
+    seeds, first = [run.seed for run in trained], trained[0].to_dict()
+    if len(set(seeds)) < len(seeds):
+        raise SettingsError(f"the runs must have different training seeds, these have {seeds}")
+    for folder, run in zip(runs, trained, strict=True):
+        other = run.to_dict()
+        differing = [name for name in other if other[name] != first[name] and name not in _MAY_DIFFER]
+        if differing:
+            raise SettingsError(
+                f"{runs[0]} and {folder} must differ in their seeds only: they differ in {', '.join(differing)}"
+            )
+
+
+def make_check(policy: LearnedPolicy, scenarios: Sequence[Scenario]) -> dict[str, Any]:
+    """Return the scores of a policy on a few fixed worlds of each scenario, which tests reproduce."""
+    plays = [{"scenario": s.name, "version": s.version, "settings": _settings_of(s)} for s in scenarios]
+    worlds = max(4, CHECK_WORLDS // len(scenarios))
+    check: dict[str, Any] = {"split": SPLIT, "seed": CHECK_SEED, "worlds": worlds, "plays": plays}
+    for play, score in zip(plays, replay(policy, check), strict=True):
+        play["score"] = score
+    return check
+
+
+def replay(policy: LearnedPolicy, check: Mapping[str, Any]) -> list[float]:
+    """Return the current scores of a policy on the worlds of a check."""
+    played = {"split": check["split"], "progress": False}
+    return [
+        float(evaluate(policy, scenario, check["worlds"], check["seed"], **played)["score"].mean())
+        for scenario in check_scenarios(check)
+    ]
+
+
+def check_scenarios(check: Mapping[str, Any]) -> list[Scenario]:
+    """Return the scenarios of a check, in their current versions."""
+    return [
+        get_scenario(
+            play["scenario"], **{name: tuple(v) if isinstance(v, list) else v for name, v in play["settings"].items()}
+        )
+        for play in check["plays"]
+    ]
+
+
+def make_target_check(team: str, scenario: Scenario, target: Target) -> dict[str, Any]:
+    """Return the score of a team against a target on a few validation worlds, which tests reproduce."""
+    worlds = {"split": SPLIT, "seed": TARGET_SEED}
+    played = evaluate(team, scenario, TARGET_WORLDS, target=target, progress=False, **worlds)  # type: ignore[arg-type]
+    told = {"team": team, "scenario": scenario.name, "version": scenario.version}
+    return {**told, **worlds, "worlds": TARGET_WORLDS, "score": float(played["score"].mean())}
+
+
+def _settings_of(scenario: Scenario) -> dict[str, Any]:
+    """Return the settings that differ from those of the named scenario."""
+    named = get_scenario(scenario.name)
+    names = [field.name for field in dataclasses.fields(scenario) if field.name not in _NOT_PLAYED]
+    return {name: getattr(scenario, name) for name in names if getattr(scenario, name) != getattr(named, name)}
+
+
+def main() -> None:
+    """Ship, or check all that ships anew."""
+    settings = tyro.cli(Settings, description=__doc__)
+    if settings.again:
+        for path in sorted(SHIPPED.glob("*.safetensors")):
+            policy = LearnedPolicy.from_file(path)
+            check = make_check(policy, check_scenarios(policy.card["check"]))
+            policy.with_card({**policy.card, "check": check, "checked_at": commit()}).save(path)
+            print(path.stem, *(f"{play['scenario']} {play['score']:.3f}" for play in check["plays"]))
+        return
+    path = ship(settings)
+    card = LearnedPolicy.from_file(path).card
+    for run in card.get("training_seeds", ()):
+        print(f"training seed {run['seed']}: safe score {run['safe_score']['value']:.3f}")
+    print(f"{path} holds training seed {card['seed']}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""``make train-shipped``: train every team that ships, with the default settings of its scenario.
+
+Finished runs are skipped, an interrupted one resumes. To use more cores, start it several times with different --only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import tyro
+from rich.console import Console
+
+from posse_training.errors import SettingsError
+from posse_training.runs.defaults import default_settings
+from posse_training.runs.saved.folder import LAST, SETTINGS
+from posse_training.runs.settings import TrainSettings
+from posse_training.runs.train import resume, train
+
+ALGORITHMS: Final = {
+    "smart": "ppo",
+    "radio": "ppo",
+    "leader-loss": "ppo",
+    "obstacles": "ppo",
+    "field": "mappo",
+    "search": "mappo",
+}
+"""Scenarios with a learned team of their own, ``learned-SCENARIO``, and how it is trained."""
+SEEDS: Final = {"smart": 5, "field": 5}
+"""Number of training seeds, 3 for the other scenarios."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Command-line arguments."""
+
+    seeds: tuple[int, ...] = ()
+    """Training seeds; default: 1 to 3, for smart and field 1 to 5."""
+    only: tuple[str, ...] = tuple(ALGORITHMS)
+    """Scenarios to train on."""
+    folder: Path = Path("runs/shipped")
+    """Folder of the run folders SCENARIO-SEED."""
+
+
+def all_runs(settings: Settings) -> list[TrainSettings]:
+    """Return the settings of all runs, the first seed of every scenario first."""
+    for name in settings.only:
+        if name not in ALGORITHMS:
+            known = ", ".join(ALGORITHMS)
+            raise SettingsError(f"only={name!r:.80} has no learned team of its own; those that have: {known}")
+    return [
+        replace(default_settings(name, ALGORITHMS[name]), seed=seed, folder=settings.folder / f"{name}-{seed}")
+        for seed in settings.seeds or range(1, 1 + max(SEEDS.values()))
+        for name in settings.only
+        if settings.seeds or seed <= SEEDS.get(name, 3)
+    ]
+
+
+if __name__ == "__main__":
+    console = Console()
+    for run in all_runs(tyro.cli(Settings, description=__doc__)):
+        if (run.run_folder / LAST).is_file():
+            console.print(f"finished: {run.run_folder}", markup=False)
+        elif (run.run_folder / SETTINGS).is_file():
+            resume(run.run_folder, console=console, steps=run.steps)
+        else:
+            train(run, console=console)

@@ -1,0 +1,203 @@
+"""Selection and exchange of leaders by section 3.5, agreed on by radio."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from tests.support.drive import Instant, drive
+
+from posse_baselines import with_settings
+from posse_baselines.ddcs import EXCHANGING, SEARCHING
+from posse_baselines.ddcs.leadership import better_claim
+from posse_baselines.ddcs.messages import COUNT, decode, encode, is_newer
+from posse_baselines.ddcs.settings import NO_EXCHANGE
+
+
+def agree(now: Instant) -> Any:
+    """Whether all working trackers of a world name one leader, (E,)."""
+    leader = now.notes["leader"]
+    low = np.where(now.broken, 10**6, leader).min(axis=1)
+    high = np.where(now.broken, -(10**6), leader).max(axis=1)
+    return (low == high) & (low >= 0)
+
+
+def test_the_nearest_leads_from_the_first_step_on() -> None:
+    before = np.ones(30, np.bool_)
+    for k, now in enumerate(drive("pngl-l-phi", "constant", 30, 100, split="train")):
+        agreed = agree(now)
+        assert (agreed | before).all()  # a handover is heard of one step later
+        before = agreed
+        if k == 0:
+            assert agreed.all()
+            nearest = np.abs(now.line_of_sight).argmin(axis=1)
+            np.testing.assert_array_equal(now.notes["leader"][:, 0], nearest)
+
+
+def test_the_lead_passes_to_who_is_clearly_nearer_and_to_nobody_else() -> None:
+    passed, before = 0, None
+    for now in drive("pngl-l-phi", "smart", 60, 200, split="train"):
+        leader, away = now.notes["leader"][:, 0], np.abs(now.line_of_sight)
+        if before is not None:
+            for world in np.flatnonzero((leader != before) & agree(now)):
+                assert away[world, leader[world]] < away[world, before[world]] - 0.3
+                passed += 1
+        before = leader.copy()
+    assert passed > 10
+
+
+def test_a_broken_leader_is_followed_by_the_nearest_that_works() -> None:
+    worlds, rows = 40, np.arange(40)
+    waited, exchanging = np.zeros(worlds, np.int64), np.zeros(worlds, np.bool_)
+    rank, broke_leader = np.full(worlds, -1), np.zeros(worlds, np.bool_)
+    for now in drive("pngl-l-phi", "leader-loss", worlds, 299, horizon=300, split="train"):
+        leader = now.notes["leader"]
+        dead = now.broken[rows[:, None], np.maximum(leader, 0)] & ~now.broken
+        broke_leader |= dead.any(axis=1)
+        waited = np.where(dead.any(axis=1), waited + 1, 0)
+        assert waited.max() <= 20
+        exchanging |= broke_leader & ((now.notes["task"] == EXCHANGING) & ~now.broken).any(axis=1)
+        away = np.where(now.broken, np.inf, np.abs(now.line_of_sight))
+        order = away.argsort(axis=1).argsort(axis=1)
+        of_working = np.where(now.broken, -1, leader).max(axis=1)
+        fresh = broke_leader & ~dead.any(axis=1) & agree(now) & (rank < 0)
+        rank[fresh] = order[rows, of_working][fresh]
+    assert broke_leader.mean() > 0.9  # else the scenario does not break the leader
+    np.testing.assert_array_equal(exchanging, broke_leader)
+    assert (rank[broke_leader] == 0).mean() > 0.85  # two may be equally near
+    assert (agree(now) & (waited == 0)).all()
+
+
+def test_without_exchange_the_first_leader_stays() -> None:
+    first = None
+    for now in drive("ddcs-centralized-no-exchange", "leader-loss", 10, 299, horizon=300):
+        first = now.notes["leader"].copy() if first is None else first
+        np.testing.assert_array_equal(now.notes["leader"], first)
+    assert now.broken.any()
+    assert (now.notes["exchanges"] == 0).all()
+
+
+def test_without_exchange_the_first_leader_is_agreed_on_over_a_lossy_radio() -> None:
+    policy = with_settings("pngl-l-phi", forbidden=NO_EXCHANGE)
+    *_, last = drive(policy, "constant", 20, 60, split="train", radio_loss=0.5, radio_delay=2)
+    assert agree(last).all()
+
+
+def test_in_the_distributed_model_nobody_leads() -> None:
+    for now in drive("ddcs-distributed", "leader-loss", 5, 299, horizon=300):
+        assert not {"leader", "term", "exchanges"} & set(now.notes)
+        assert not (now.notes["task"] == EXCHANGING).any()
+
+
+# --- rule ii: who sees no other robot leads itself -----------------------------------------------
+
+
+def test_searchers_have_a_leader_and_who_hears_nobody_leads_itself() -> None:
+    # Three hear each other, the one in their middle leads; the fourth is out of everybody's reach.
+    pose = [(-9.0, -9.0, 0.0), (-9.0, -7.0, 0.0), (-9.0, -5.0, 0.0), (9.0, -9.0, 1.0)]
+    for k, now in enumerate(
+        drive(
+            "pngl-l-phi",
+            "search",
+            3,
+            20,
+            num_trackers=4,
+            tracker_pose=pose,
+            radio_range=6.0,
+            target_pose=(6.0, 6.0, 0.0),
+            start_distance=(4.0, 28.0),
+        )
+    ):
+        assert (now.notes["task"] == SEARCHING).all()
+        leader = now.notes["leader"]
+        assert (leader[:, 3] == 3).all()
+        if k == 0:
+            assert (leader[:, :3] == 1).all()
+        assert (leader[:, :1] == leader[:, :3]).all()
+
+
+def test_who_led_itself_yields_to_a_group_that_it_meets() -> None:
+    # The fourth comes into the others' reach while all of them are still searching.
+    pose = [(-1.0, -1.0, 0.0), (-1.0, 1.0, 0.0), (-3.0, 0.0, 0.0), (6.0, 0.0, math.pi)]
+    before, met = None, 0
+    for now in drive(
+        "pngl-l-phi",
+        "constant",
+        20,
+        250,
+        num_trackers=4,
+        tracker_pose=pose,
+        radio_range=6.0,
+        sensing_range=2.0,
+        target_pose=(8.0, 8.0, 0.0),
+        start_distance=(4.0, 20.0),
+        arena=24.0,
+    ):
+        leader = now.notes["leader"]
+        searching = (now.notes["task"] == SEARCHING).all(axis=1)
+        if before is None:
+            assert (leader[:, 3] == 3).all()
+        else:
+            yields = searching & (before[:, 3] == 3) & (leader[:, 3] != 3)
+            met += yields.sum()
+            np.testing.assert_array_equal(leader[yields, 3], before[yields, 0])
+        before = leader.copy()
+    assert met > 5
+
+
+def test_two_halves_out_of_reach_have_a_leader_each_and_agree_when_they_meet() -> None:
+    # Two groups see the target from far sides; each within its own radio range only.
+    left = [(-14.0, 0.0, 0.0), (-14.0, 1.0, 0.0)]
+    right = [(14.0, 0.0, 3.1), (14.0, 1.0, 3.1), (14.0, -1.0, 3.1)]
+    for k, now in enumerate(
+        drive(
+            "pngl-l-phi",
+            "constant",
+            6,
+            500,
+            radio_range=6.0,
+            radio_loss=0.2,
+            split="train",
+            start_distance=(4.0, 16.0),
+            tracker_pose=[*left, *right],
+            target_pose=(0.0, 0.0, 1.57),
+        )
+    ):
+        leader = now.notes["leader"]
+        if k == 30:
+            assert np.isin(leader[:, :2], [0, 1]).all()
+            assert np.isin(leader[:, 2:], [2, 3, 4]).all()
+            assert (leader[:, :1] == leader[:, :2]).all()
+            assert (leader[:, 2:3] == leader[:, 2:]).all()
+    assert agree(now).all()
+
+
+def test_a_lossy_radio_seldom_parts_the_team() -> None:
+    agreed = [agree(now).mean() for now in drive("pngl-l-phi", "radio", 30, 300, split="train", radio_range=40.0)]
+    assert np.mean(agreed[20:]) > 0.9
+
+
+# --- claims --------------------------------------------------------------------------------------
+
+
+def test_claims_are_ordered_without_a_tie() -> None:
+    claims = [(term, leader) for term in (COUNT - 1, 0, 1) for leader in (-1, 0, 3)]
+    for a in claims:
+        for b in claims:
+            if a != b and min(a[1], b[1]) >= 0:
+                assert better_claim(*a, *b) != better_claim(*b, *a)
+    assert better_claim(0, 4, COUNT - 1, 1)  # counts wrap round
+    assert better_claim(5, 1, 5, 2)
+    assert not better_claim(6, -1, 5, 2)
+    assert better_claim(0, 3, 9, -1)
+
+
+def test_whole_numbers_survive_the_message() -> None:
+    for value in range(-1, COUNT):
+        assert decode(float(np.float32(encode(value)))) == value
+        assert 0.0 <= encode(value) < 1.0
+    assert decode(0.0) == -1
+    assert is_newer(3, COUNT - 2)
+    assert not is_newer(COUNT - 2, 3)
+    assert not is_newer(7, 7)

@@ -1,0 +1,84 @@
+"""Files are written as a whole or not at all, and nowhere but where they are named."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from pathlib import Path
+
+import pytest
+from tests.support.disk import largest_file
+
+from posse_baselines.files import read_json, remove_unfinished, replacing, write_atomically
+
+
+def test_a_full_disk_keeps_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    write_atomically(path, b"old")
+    with largest_file(1000), pytest.raises(OSError, match="file") as caught:
+        write_atomically(path, bytes(10_000))
+    assert caught.value.filename == str(path)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_files_of_writers_at_once_are_whole(tmp_path: Path) -> None:
+    path, contents = tmp_path / "file", [bytes([k]) * 200_000 for k in range(4)]
+    path.write_bytes(contents[0])
+
+    def write(content: bytes) -> None:
+        for _ in range(20):
+            write_atomically(path, content)
+
+    writers = [threading.Thread(target=write, args=(content,)) for content in contents]
+    for writer in writers:
+        writer.start()
+    while any(writer.is_alive() for writer in writers):
+        assert path.read_bytes() in contents
+    assert path.read_bytes() in contents
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_error_while_writing_leaves_the_old_file_alone(tmp_path: Path) -> None:
+    path = tmp_path / "file.txt"
+    write_atomically(path, b"old")
+    with contextlib.suppress(KeyboardInterrupt), replacing(path) as partial:
+        partial.write_bytes(b"half")
+        raise KeyboardInterrupt
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_killed_writer_left_is_removed(tmp_path: Path) -> None:
+    kept = tmp_path / ".posse-notes"
+    kept.touch()
+    (tmp_path / f".posse-{'0123456789abcdef'}.safetensors").write_bytes(b"half")
+    remove_unfinished(tmp_path)
+    assert list(tmp_path.iterdir()) == [kept]
+
+
+def test_an_error_names_the_file_that_could_not_be_written(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match=r"none/file'") as caught:
+        write_atomically(tmp_path / "none" / "file", b"")
+    assert caught.value.filename == str(tmp_path / "none" / "file")
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_link_is_refused_and_what_it_leads_to_is_left_alone(tmp_path: Path, exists: bool) -> None:
+    elsewhere, path = tmp_path / "elsewhere", tmp_path / "file"
+    if exists:
+        elsewhere.write_bytes(b"precious")
+    path.symlink_to(elsewhere)
+    with pytest.raises(OSError, match="symbolic link is not written to: remove it"):
+        write_atomically(path, b"new")
+    assert path.is_symlink()
+    assert elsewhere.exists() == exists
+    if exists:
+        assert elsewhere.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{", "9" * 5000, ""])
+def test_json_that_cannot_be_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "file.json").write_text(text)
+    with pytest.raises(ValueError, match=r"nested too deeply|Expecting|digits"):
+        read_json(tmp_path / "file.json")

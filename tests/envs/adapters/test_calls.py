@@ -1,0 +1,84 @@
+"""Calls in any order, with valid and invalid arguments: what is refused changes nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
+from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject, unchanged
+
+SEEDS = st.integers(0, 2**63 - 1)
+
+
+class Calls(RuleBasedStateMachine):
+    """An environment, and a twin that gets the valid calls only; both go through the same worlds."""
+
+    kind = ""
+
+    @initialize(first=SEEDS)
+    def make(self, first: int) -> None:
+        self.one, self.twin = Subject(self.kind), Subject(self.kind)
+        self.first, self.started = first, False
+
+    def refused(self, call: Any) -> None:
+        before = self.one.held()
+        with pytest.raises((ValueError, ResetNeeded)) as caught:
+            call()
+        assert 0 < len(str(caught.value)) <= 1000
+        assert unchanged(before, self.one.held())
+
+    @rule(seed=st.none() | SEEDS)
+    def reset(self, seed: int | None) -> None:
+        if not self.started:
+            seed = self.first  # without one, a first reset draws its own
+        self.started = True
+        for subject in (self.one, self.twin):
+            subject.reset(seed=seed)
+
+    # Numbers stand for what hypothesis could not print: whole numbers of 5,000 digits.
+
+    @rule(bad=st.integers(0, len(BAD_SEEDS) - 1))
+    def bad_seed(self, bad: int) -> None:
+        self.refused(lambda: self.one.reset(seed=BAD_SEEDS[bad]))
+
+    @rule(bad=st.integers(0, len(BAD_OPTIONS) - 1), seed=st.none() | SEEDS)
+    def bad_options(self, bad: int, seed: int | None) -> None:
+        self.refused(lambda: self.one.reset(seed=seed, options=BAD_OPTIONS[bad]))
+
+    @rule(bad=st.integers(0, 100))
+    def bad_action(self, bad: int) -> None:
+        actions = [*self.one.bad_actions()]
+        self.refused(lambda: self.one.step(actions[bad % len(actions)]))
+
+    @rule(draw=st.integers(0, 1000))
+    def step(self, draw: int) -> None:
+        if not self.started:
+            action = None if self.kind == "turns" else self.one.good_action(np.random.default_rng(draw))
+            self.refused(lambda: self.one.step(action))
+            return
+        for subject in (self.one, self.twin):
+            try:
+                subject.step(subject.good_action(np.random.default_rng(draw)))
+            except ResetNeeded:
+                assert subject.batch.worlds["over"].any()
+        assert unchanged(self.one.held(), self.twin.held())
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_what_is_refused_changes_nothing_whatever_was_called_before(kind: str) -> None:
+    run_state_machine_as_test(
+        type("Calls", (Calls,), {"kind": kind}),
+        settings=settings(
+            derandomize=True,
+            database=None,
+            deadline=None,
+            max_examples=3 if kind == "torchrl" else 8,
+            stateful_step_count=25,
+            suppress_health_check=list(HealthCheck),
+        ),
+    )

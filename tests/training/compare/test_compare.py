@@ -1,0 +1,198 @@
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import posse
+from posse.scenarios.named import _named
+from posse_baselines import PolicyError
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_training.cli import main
+from posse_training.compare.compare import Settings, compare
+from posse_training.compare.contenders import read_contenders
+from posse_training.compare.table import ranked
+from posse_training.errors import ComparisonError
+from posse_training.reports.statistics import difference
+
+
+def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
+    names = ("idle", "pursuit")
+    settings = Settings(names, ("constant",), episodes=20, out=tmp_path, figures=False, planner_episodes=0)
+    rows = compare(settings).rows
+    scores = {}
+    for name in names:
+        with (tmp_path / f"constant-{name}.csv").open(newline="") as file:
+            scores[name] = np.array([float(row["safe_score"]) for row in csv.DictReader(file)])
+    assert rows[0]["difference"] is None
+    gap = scores["pursuit"] - scores["idle"]
+    assert rows[1]["difference"].value == pytest.approx(gap.mean())
+    assert rows[1]["improvement"].value == pytest.approx(((gap > 0) + 0.5 * (gap == 0)).mean())
+    assert rows[1]["difference"].count == 20
+    written = json.loads((tmp_path / "summary.json").read_text())
+    assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(scores["pursuit"].mean())
+    assert (written["seed"], written["split"]) == (7, "test")
+
+
+def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
+    settings = Settings(
+        ("idle", "pursuit", "ddcs-distributed"), ("smart",), episodes=4, out=tmp_path, figures=False, planner_episodes=3
+    )
+    found = compare(settings)
+    assert [row["policy"] for row in found.rows][-1] == "planner"
+    safe = {row["policy"]: found.plays["smart", row["policy"]]["safe_score"][0] for row in found.rows}
+    assert len(safe["planner"]) == 3, "it plays the first worlds of the others"
+    for row in found.rows:
+        share = safe[row["policy"]][:3].mean() / safe["planner"].mean()
+        assert row["of_planner"] == pytest.approx(share)
+        assert row["contact_free"].value in np.arange(5) / 4 or row["policy"] == "planner"
+    best = sorted(safe, key=lambda policy: -safe[policy].mean())
+    assert [row["policy"] for row in ranked(found.rows)] == best
+    assert best[0] == "planner"
+
+
+def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None:
+    for named, message in (
+        ("idel", "unknown policy 'idel'"),
+        ("mine=", "'mine=' is not a group of policies"),
+        ("mine=idle,,pursuit", "is not a group of policies"),
+        ("idle=pursuit", "two policies have the label 'idle'"),
+    ):
+        with pytest.raises(PolicyError, match=message):
+            compare(Settings(("idle", named), ("constant",), out=tmp_path))
+    with pytest.raises(PolicyError, match="No policies given"):
+        compare(Settings((), ("constant",), out=tmp_path))
+    with pytest.raises(posse.ScenarioError, match="unknown scenario 'konstant'"):
+        compare(Settings(("idle",), ("constant", "konstant"), out=tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
+    assert main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    row = next(k for k, line in enumerate(lines) if line.split()[:1] == ["pursuit"])
+    assert lines[row + 1].count("]") == 2, "safe score and difference with their intervals"
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
+    again = files[0].replace("0.safetensors", "again.safetensors")
+    learned(0).save(Path(again))
+    found = read_contenders((*files[:2], again, f"mine={files[2]}"))
+    assert [contender.label for contender in found] == ["any-0", "any-1", again, "mine"]
+    found = read_contenders((files[0], f"any-0={files[1]}"))
+    assert [contender.label for contender in found] == [files[0], "any-0"]
+
+
+def learned(seed: int, trained: str = "train") -> LearnedPolicy:
+    """A network of any numbers, for the layout of ``constant``."""
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "plain")
+    weight = np.random.default_rng(seed).normal(size=(2, encoding.size)).astype(np.float32)
+    network = Network(
+        np.zeros(encoding.size, np.float32),
+        np.ones(encoding.size, np.float32),
+        5.0,
+        (weight / np.float32(8),),
+        (np.array([0.5, 0], np.float32),),
+        "tanh",
+        "clip",
+    )
+    return LearnedPolicy(network, encoding, {"name": f"any-{seed}", "trained_splits": [trained]})
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[str]:
+    paths = [tmp_path / f"{seed}.safetensors" for seed in range(3)]
+    for seed, path in enumerate(paths):
+        learned(seed).save(path)
+    return [str(path) for path in paths]
+
+
+def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> None:
+    group = f"mine={','.join(files)}"
+    settings = Settings(
+        ("pursuit", group), ("constant",), episodes=15, out=tmp_path / "out", figures=False, planner_episodes=0
+    )
+    found = compare(settings)
+    assert [(row["policy"], row["seeds"]) for row in found.rows] == [("pursuit", 1), ("mine", 3)]
+    scores = []
+    for k in (1, 2, 3):
+        with (tmp_path / "out" / f"constant-mine-{k}.csv").open(newline="") as file:
+            scores.append([float(row["safe_score"]) for row in csv.DictReader(file)])
+    assert len({tuple(row) for row in scores}) == 3
+    reference = found.plays["constant", "pursuit"]["safe_score"]
+    assert found.rows[1]["difference"] == difference(scores, reference)
+    better = (np.array(scores) > reference) + 0.5 * (np.array(scores) == reference)
+    assert found.rows[1]["improvement"].value == pytest.approx(better.mean())
+
+
+def test_who_cannot_play_is_left_out_with_a_line(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario = replace(posse.get_scenario("constant"), name="few-beams", sonar_beams=4)
+    _named()["few-beams"] = scenario
+    try:
+        command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
+        options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
+        assert main([*command, *options]) == 0
+    finally:
+        del _named()["few-beams"]
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "left out: any-0 on few-beams:" in shown
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    left_out = [(row["what"], row["policy"]) for row in summary["left_out"]]
+    assert left_out == [("few-beams", "any-0")]
+    played = [(row["scenario"], row["policy"]) for row in summary["comparison"]]
+    assert played == [("few-beams", "pursuit"), ("constant", "any-0"), ("constant", "pursuit")]
+    # The baseline did not play, so there is no difference, not even to another policy.
+    assert summary["comparison"][0]["difference"] is None
+    assert summary["comparison"][2]["difference"] is not None
+
+
+def test_a_split_that_was_trained_on_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    learned(1, "test").save(tmp_path / "mine.safetensors")
+    options = ["--scenarios", "constant", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]
+    assert main(["compare", str(tmp_path / "mine.safetensors"), *options]) == 2
+    assert "was trained on the split 'test'" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--scenarios", "constant", "leader-loss", "--episodes", "3"]
+    assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
+    for suffix in ("png", "svg"):
+        assert {path.stem for path in tmp_path.glob(f"*.{suffix}")} == {"profile", "scenarios", "recovery"}
+    assert "planner" in capsys.readouterr().out
+
+
+def test_a_folder_with_any_file_is_refused_before_anything_is_played(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def played(*arguments: object, **settings: object) -> None:
+        raise AssertionError("it was played")
+
+    monkeypatch.setattr("posse_training.compare.compare.play", played)
+    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(ComparisonError, match="not an empty folder"):
+        compare(Settings(("idle",), ("constant",), out=tmp_path))
+    with pytest.raises(ComparisonError, match="not an empty folder"):
+        compare(Settings(("idle",), ("constant",), out=tmp_path / "mine.txt"))
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_without_a_folder_the_next_free_one_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    settings = Settings(("idle",), ("constant",), episodes=1, figures=False, planner_episodes=0)
+    assert [str(compare(settings).folder) for _ in range(2)] == ["runs/compare", "runs/compare-2"]
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["compare", "compare-2"]
+
+
+def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None:
+    policies = ("a/b=idle", "a?b=idle", "A/B=pursuit")
+    found = compare(Settings(policies, ("constant",), 1, out=tmp_path, figures=False, planner_episodes=0))
+    files = [name for row in found.rows for name in row["files"]]
+    assert files == ["constant-a_b.csv", "constant-a_b-2.csv", "constant-A_B-3.csv"]
+    assert all((tmp_path / name).is_file() for name in files)

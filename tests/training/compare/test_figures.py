@@ -1,0 +1,145 @@
+"""Figures show their data, and say what was played."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import posse
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_training.compare import figures
+from posse_training.compare.contenders import Contender
+from posse_training.compare.plays import Plays
+from posse_training.reports.pictures.style import BOUND, looks_of
+from posse_training.reports.results import Results
+
+LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
+
+
+def plays_of(label: str, scenario: str, **columns: list[float] | list[list[float]]) -> Plays:
+    given = {name: np.atleast_2d(values) for name, values in columns.items()}
+    seeds = len(next(iter(given.values())))
+    return Plays(
+        label,
+        tuple(
+            Results(
+                label,
+                posse.get_scenario(scenario),
+                7,
+                "test",
+                {name: np.asarray(values[k], np.float64) for name, values in given.items()},
+            )
+            for k in range(seeds)
+        ),
+    )
+
+
+def line(figure: Figure, policy: str) -> tuple[list[float], list[float]]:
+    """The longest line that is drawn in a policy's colour and kind of line."""
+    style = LOOKS[policy]
+    found = [
+        drawn
+        for axis in figure.axes
+        for drawn in axis.lines
+        if drawn.get_color() == style.colour and len(np.atleast_1d(drawn.get_xdata())) > 2
+    ]
+    assert found, policy
+    longest = max(found, key=lambda drawn: len(np.atleast_1d(drawn.get_xdata())))
+    return list(np.asarray(longest.get_xdata())), list(np.asarray(longest.get_ydata()))
+
+
+def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
+    scores = [0.2, 0.4, 0.4, 0.9]
+    figure = figures.profile(
+        {("smart", "pursuit"): plays_of("pursuit", "smart", safe_score=scores, bound=[1.0] * 4)}, LOOKS
+    )
+    x, y = line(figure, "pursuit")
+    at = dict(zip(np.round(x, 4), y, strict=True))
+    for score, expected in ((0.0, 1), (0.2, 1), (0.205, 0.75), (0.4, 0.75), (0.5, 0.25), (1, 0)):
+        assert at[score] == expected
+    _, bound = line(figure, BOUND)
+    assert set(bound) == {1.0}
+
+
+def test_scores_and_bounds_stand_where_they_should() -> None:
+    figure = figures.scores(
+        {
+            (name, policy): plays_of(policy, name, safe_score=[low, low + 0.2], bound=[0.9, 0.8])
+            for name, low in (("smart", 0.3), ("radio", 0.5))
+            for policy in ("planner", "pursuit")
+        },
+        LOOKS,
+    )
+    (axis,) = figure.axes
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["smart v1", "radio v1"]
+    points = [
+        (round(float(np.ravel(drawn.get_xdata())[0]), 6), round(float(np.ravel(drawn.get_ydata())[0])))
+        for drawn in axis.lines
+        if drawn.get_marker() == LOOKS["planner"].marker
+    ]
+    assert points == [(0.4, 0), (0.6, 1)]
+    upright = [drawn for drawn in axis.lines if len(set(np.atleast_1d(drawn.get_xdata()))) == 1]
+    bounds = [drawn for drawn in upright if drawn.get_color() == LOOKS[BOUND].colour]
+    assert {round(float(np.asarray(drawn.get_xdata())[0]), 6) for drawn in bounds} >= {0.85}
+
+
+def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
+    """Teams that never recover count, and no team counts after the end of its episode."""
+    taken = [1.0, 2.0, np.nan, np.nan]
+    figure = figures.recovery([plays_of("pursuit", "leader-loss", recovery_time=taken)], LOOKS)
+    x, y = line(figure, "pursuit")
+    at = dict(zip(np.round(x, 6), y, strict=True))
+    assert (at[0.9], at[1.0], at[1.9], at[2.0]) == (0, 0.25, 0.25, 0.5)
+    scenario = posse.get_scenario("leader-loss")
+    assert max(x) == pytest.approx(0.4 * scenario.duration - scenario.settle_time)
+    assert max(y) == 0.5
+
+
+def said(figure: Figure) -> list[str]:
+    """What a figure's note says, line by line."""
+    return str(figure.get_supxlabel()).splitlines()
+
+
+def test_figures_say_what_was_played() -> None:
+    plays = {
+        ("field", "idle"): plays_of("idle", "field", safe_score=[0.1] * 3, bound=[1.0] * 3),
+        ("field", "mine"): plays_of("mine", "field", safe_score=[0.1] * 3, bound=[1.0] * 3),
+        ("field", "planner"): plays_of("planner", "field", safe_score=[0.1], bound=[1.0]),
+    }
+    for draw in (figures.profile, figures.scores):
+        assert said(draw(plays, LOOKS))[0].endswith("3 worlds (planner 1), test split, seed 7")
+    losses = [plays_of("idle", "leader-loss", recovery_time=[1.0, 2.0], score=[0.0, 0.0])]
+    assert said(figures.recovery(losses, LOOKS)) == ["leader-loss v1: 2 worlds, test split, seed 7"]
+
+
+def learned(curve: object) -> Contender:
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "plain")
+    network = Network(
+        np.zeros(encoding.size, np.float32),
+        np.ones(encoding.size, np.float32),
+        5.0,
+        (np.zeros((2, encoding.size), np.float32),),
+        (np.zeros(2, np.float32),),
+        "tanh",
+        "clip",
+    )
+    card = {
+        "name": "mine",
+        "curve": curve,
+        "seed": 3,
+        "settings": {"evaluate_worlds": 64},
+        "scenarios": [posse.get_scenario("smart").to_dict()],
+    }
+    return Contender("mine", (LearnedPolicy(network, encoding, card),))
+
+
+def test_learning_curves_are_those_of_the_cards() -> None:
+    points = [{"steps": 1e6 * k, "safe_score": 0.2 * k, "low": 0.1 * k, "high": 0.3 * k} for k in (1, 2, 3)]
+    figure = figures.learning(figures.curves_of([learned(points), Contender("idle", ("idle",))]), LOOKS)
+    x, y = line(figure, "mine")
+    assert x == [1, 2, 3]
+    assert y == pytest.approx([0.2, 0.4, 0.6])
+    damaged: tuple[object, ...] = ([], points[:1], "none", [{"steps": 1}], [{**points[0], "low": float("nan")}] * 2)
+    for curve in damaged:
+        assert figures.curves_of([learned(curve)]) == []

@@ -1,0 +1,194 @@
+"""The failure of a policy is reported, and affects only its own rows."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from posse_baselines import PolicyError
+from posse_training import evaluate
+from posse_training.cli import main
+from posse_training.compare.compare import Settings, compare
+from posse_training.errors import SettingsError
+
+ROOT = Path(__file__).parents[4]
+BAD = "tests.support.bad_policies:"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """Compile the kernels outside the time limits."""
+    for policy in ("idle", "pursuit"):
+        evaluate(policy, "constant", 2, progress=False)
+
+
+def settings_for(tmp_path: Path, *names: str, limit: float = 60.0) -> Settings:
+    policies = ("idle", *(f"{BAD}{name}" for name in names), "pursuit")
+    return Settings(
+        policies, ("constant",), episodes=2, out=tmp_path / "out", figures=False, planner_episodes=0, time_limit=limit
+    )
+
+
+def test_failures_are_named_and_the_others_are_played(tmp_path: Path) -> None:
+    names = ("Raises", "RaisesUnpicklable", "Nan", "WrongShape", "NoActions", "Exits", "Crashes")
+    found = compare(settings_for(tmp_path, *names, "Still"))
+    assert [row["policy"] for row in found.rows] == ["idle", f"{BAD}Still", "pursuit"]
+    why = {row["policy"].removeprefix(BAD): row["why"] for row in found.failed}
+    assert tuple(why) == names
+    assert "ZeroDivisionError: [bold]by zero[/bold]" in why["Raises"]
+    assert "bad_policies.py, line" in why["Raises"]
+    assert "LocalError: local" in why["RaisesUnpicklable"]
+    assert "nan" in why["Nan"]
+    assert "shape (2, 1, 2)" in why["WrongShape"]
+    assert "real numbers" in why["NoActions"]
+    assert "exit code 0" in why["Exits"]
+    assert "exit code 9" in why["Crashes"]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["failed"] == found.failed
+    # The rows are those of a comparison without the failures.
+    alone = compare(settings_for(tmp_path / "alone"))
+    assert [row for row in found.rows if row["policy"] != f"{BAD}Still"] == alone.rows
+
+
+def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
+    """A separate process does not change results."""
+    settings = Settings(
+        ("posse_baselines.policies.pursuit:Pursuit", "pursuit"),
+        ("constant",),
+        episodes=3,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+    )
+    there, here = compare(settings).plays.values()
+    assert (there["score"] == here["score"]).all()
+
+
+UNGUARDED = """
+from posse_training.cli import main
+policies = ["posse_baselines.policies.pursuit:Pursuit", "--planner-episodes", "0", "--no-figures"]
+raise SystemExit(main(["compare", *policies, "--scenarios", "constant", "--episodes", "2", "--out", "out"]))
+"""
+
+
+def test_a_script_without_a_main_guard_may_compare(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(UNGUARDED)
+    sources = [ROOT / root for root in ("envs", "baselines", "training")]
+    done = subprocess.run(
+        [sys.executable, "script.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources))},
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out").is_dir()
+
+
+@pytest.mark.long
+def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
+    started = time.monotonic()
+    settings = settings_for(tmp_path, "Sleeps", "SleepsInC", "Slow", limit=12.0)
+    found = compare(settings)
+    assert time.monotonic() - started < 240
+    assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
+    assert len(found.failed) == 3
+    assert all("exceeded the time limit of 12 s" in row["why"] for row in found.failed)
+    with pytest.raises(PolicyError, match="HangsOnLoad' cannot be loaded: it exceeded the time"):
+        compare(settings_for(tmp_path / "load", "HangsOnLoad", limit=12.0))
+
+
+HANG = """
+import sys
+from pathlib import Path
+from posse_training.compare.compare import Settings, compare
+if __name__ == "__main__":
+    compare(Settings(("tests.support.bad_policies:HangsWithPid",), ("constant",), 1,
+                     out=Path(sys.argv[1], "out"), figures=False, planner_episodes=0,
+                     time_limit=30.0))
+"""
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_hanging_policy_does_not_outlive_a_killed_comparison(tmp_path: Path) -> None:
+    pid_file = tmp_path / "pid"
+    running = subprocess.Popen(
+        [sys.executable, "-c", HANG, str(tmp_path)],
+        env={**os.environ, "PID_FILE": str(pid_file), "PYTHONPATH": os.pathsep.join(sys.path)},
+        cwd=ROOT,
+    )
+    while not pid_file.exists() or not pid_file.read_text():
+        assert running.poll() is None
+        time.sleep(0.01)
+    running.kill()
+    running.wait()
+    pid = int(pid_file.read_text())
+    ends = time.monotonic() + 60
+    while alive(pid) and time.monotonic() < ends:
+        time.sleep(0.1)
+    assert not alive(pid)
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    stat = Path(f"/proc/{pid}/stat")
+    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+@pytest.mark.long
+def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
+    settings = Settings(
+        (f"{BAD}Sleeps", "idle"),
+        ("constant", "smart"),
+        episodes=1,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+        time_limit=10.0,
+    )
+    first, second = compare(settings).failed
+    assert first["what"] == "constant"
+    assert (second["what"], second["why"].partition(" it ")[0]) == ("smart", "not played: on constant")
+
+
+def test_a_failure_in_one_scenario_leaves_the_others(tmp_path: Path) -> None:
+    settings = Settings(
+        (f"{BAD}FailsOnSmart",),
+        ("smart", "constant"),
+        episodes=1,
+        out=tmp_path / "out",
+        figures=False,
+        planner_episodes=0,
+    )
+    found = compare(settings)
+    assert [(row["what"], "not this one" in row["why"]) for row in found.failed] == [("smart", True)]
+    assert [row["scenario"] for row in found.rows] == ["constant"]
+
+
+def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--scenarios", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
+    assert main(["compare", f"{BAD}Raises", "idle", *options, "--out", str(tmp_path / "a")]) == 1
+    shown = " ".join(capsys.readouterr().out.split())
+    assert f"failed: {BAD}Raises on constant: ZeroDivisionError: [bold]by zero[/bold]" in shown
+    assert main(["compare", f"{BAD}RaisesOnLoad", *options, "--out", str(tmp_path / "b")]) == 2
+    assert "cannot be created without arguments: LookupError: no weights" in capsys.readouterr().err
+    assert not (tmp_path / "b").exists()
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("inf"), float("nan")])
+def test_impossible_time_limits(tmp_path: Path, limit: float) -> None:
+    with pytest.raises(SettingsError, match="time_limit="):
+        compare(settings_for(tmp_path, limit=limit))
+    assert list(tmp_path.iterdir()) == []

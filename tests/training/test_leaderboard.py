@@ -1,0 +1,162 @@
+"""Claims for the leaderboard: written into a folder of their own, measured again on fresh worlds."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posse
+from posse_baselines import BasePolicy, PolicyError
+from posse_baselines.registry import shipped
+from posse_training import cli, evaluate
+from posse_training.errors import ResultFileError
+from posse_training.leaderboard import CLAIM, Standing, read_standings, standings_text, submit, verify
+
+SCENARIO = "paper-distributed"
+WORLDS = 60
+HOSTILE = ["![p](https://x.invalid/p){: onerror=alert(1) }", "<script>", "a|b", "`a`", "a\nb", "", "x" * 61]
+
+
+@pytest.fixture(scope="module")
+def claim(tmp_path_factory: pytest.TempPathFactory) -> Standing:
+    return submit("pngl", tmp_path_factory.mktemp("claim") / "sent", SCENARIO, worlds=WORLDS, progress=False)
+
+
+def sent(folder: Path, claim: Standing, **changes: Any) -> Path:
+    """Write a claim as anyone could."""
+    row = standings_text([claim]).splitlines()
+    values = dict(zip(row[0].split(","), row[1].split(","), strict=True)) | {n: str(v) for n, v in changes.items()}
+    (folder / CLAIM).write_text(f"{row[0]}\n{','.join(values.values())}\n", encoding="utf-8")
+    return folder
+
+
+def test_a_claim_is_what_an_evaluation_measures(claim: Standing) -> None:
+    played = evaluate("pngl", SCENARIO, WORLDS, 2026, progress=False)
+    assert claim.safe_score == pytest.approx(played["safe_score"].mean(), abs=1e-6, rel=0)
+    assert (claim.seed, claim.split, claim.worlds, claim.reads_state) == (2026, "test", WORLDS, False)
+
+
+def test_an_honest_claim_holds_on_fresh_worlds(
+    claim: Standing, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["verify", str(sent(tmp_path, claim)), "--worlds", str(WORLDS), "--seed", "3"]
+    assert cli.main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "claimed: " in out
+    assert "measured: " in out
+    assert "holds" in out
+
+
+def test_each_verification_draws_a_seed(claim: Standing, tmp_path: Path) -> None:
+    verdicts = [verify(sent(tmp_path, claim), worlds=2, progress=False) for _ in range(2)]
+    assert len({2026, *(verdict.measured.seed for verdict in verdicts)}) == 3
+
+
+def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Standing, tmp_path: Path) -> None:
+    raised = {"safe_score": claim.safe_score + 0.1, "high": 1.0, "low": 0.0, "score": 1.0}
+    folder = sent(tmp_path, claim, **raised)
+    verdict = verify(folder, worlds=WORLDS, seed=3, progress=False)
+    assert not verdict.holds
+    # The claim's own interval, which says nothing, widens no tolerance.
+    assert verdict.tolerance == pytest.approx(0.002 + 2**0.5 * (verdict.measured.high - verdict.measured.low) / 2)
+    assert verdict.measured.safe_score == pytest.approx(claim.safe_score, abs=verdict.tolerance)
+    assert cli.main(["verify", str(folder), "--worlds", str(WORLDS), "--seed", "3"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        *(({"label": label}, "label=|must have one row|line 2") for label in HOSTILE),
+        ({"policy": "../p.safetensors"}, "policy="),
+        ({"policy": "/tmp/p.safetensors"}, "policy="),
+        ({"scenario": "nowhere"}, "no scenario 'nowhere'"),
+        ({"version": 99}, "of version 99"),
+        ({"safe_score": "nan"}, "no evaluation gives"),
+        ({"safe_score": 1.5}, "no evaluation gives"),
+        ({"worlds": 0}, "no evaluation gives"),
+        ({"seed": "one"}, "invalid literal"),
+        ({"reads_state": "maybe"}, "maybe"),
+        ({"commit": "<script>"}, "a commit's hash"),
+        ({"policy": "forged_module:Policy"}, "--run-code"),
+    ],
+)
+def test_an_invalid_claim_is_named(claim: Standing, tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ResultFileError, match=message):
+        verify(sent(tmp_path, claim, **changes), progress=False)
+
+
+def test_a_folder_with_a_colon_in_its_name_is_no_code(
+    claim: Standing, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "planted.py").write_text("raise SystemExit('it ran')\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    folder = Path("planted:Team")
+    folder.mkdir()
+    with pytest.raises(ResultFileError, match="neither shipped nor a policy file"):
+        verify(sent(folder, claim, policy="mine"), progress=False)
+    with pytest.raises(PolicyError, match="there is no policy file"):
+        verify(sent(folder, claim, policy="mine.safetensors"), progress=False)
+
+
+def test_a_table_is_read_as_it_was_written(claim: Standing, tmp_path: Path) -> None:
+    rows = [claim, dataclasses.replace(claim, label="other 2", reads_state=True)]
+    (tmp_path / "t.csv").write_text(standings_text(rows), encoding="utf-8")
+    assert read_standings(tmp_path / "t.csv") == rows
+
+
+def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
+    given = tmp_path / "mine.safetensors"
+    given.write_bytes(shipped()["learned-smart"].read_bytes())
+    out = tmp_path / "sent"
+    assert cli.main(["submit", str(given), "--scenario", SCENARIO, "--worlds", "3", "--out", str(out)]) == 0
+    given.unlink()
+    assert sorted(file.name for file in out.iterdir()) == ["mine.safetensors", CLAIM]
+    assert verify(out, worlds=3, progress=False).measured.policy == "mine.safetensors"
+
+
+def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def played(*arguments: object, **settings: object) -> None:
+        raise AssertionError("it was played")
+
+    monkeypatch.setattr(posse.Batch, "step", played)
+    kept = tmp_path / "kept.txt"
+    kept.write_text("mine", encoding="utf-8")
+    for wrong in (
+        ["--out", str(tmp_path)],
+        ["--out", str(kept)],
+        ["--out", str(tmp_path / "new"), "--label", HOSTILE[0]],
+        ["--out", str(tmp_path / "new"), "--worlds", "0"],
+        ["--out", str(tmp_path / "new"), "--seed", "-1"],
+        ["--out", str(tmp_path / "new"), "--scenario", "nowhere"],
+    ):
+        assert cli.main(["submit", "pursuit", *wrong]) == 2, capsys.readouterr()
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.txt"]
+    assert kept.read_text(encoding="utf-8") == "mine"
+
+
+class Spy(BasePolicy):
+    """Says that it does not read the state, and asks for it."""
+
+    name, given = "spy", False
+
+    def watch(self, batch: posse.Batch) -> None:
+        self.given = True
+
+    def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
+        shape = (*observations.shape[:2], 2 + memory.scenario.message_size)
+        return np.zeros(shape, np.float32), memory
+
+
+@pytest.mark.parametrize("reads", [False, True])
+def test_only_a_policy_that_says_so_is_given_the_state(reads: bool) -> None:
+    spy = Spy()
+    spy.reads_state = reads
+    evaluate(spy, SCENARIO, 1, progress=False)
+    assert spy.given is reads

@@ -1,0 +1,172 @@
+"""Leagues: generations, cross-play, best responses, and going on after a kill."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from safetensors.numpy import load_file
+from tests.support.runs import HORIZON, quiet
+
+from posse_baselines import PolicyError
+from posse_training import league
+from posse_training.errors import RunFolderError, SettingsError
+from posse_training.league import (
+    FILE,
+    MATRIX,
+    SUMMARY,
+    LeagueSettings,
+    against,
+    draw_matrix,
+    main,
+    play_league,
+    shares,
+    tables,
+)
+from posse_training.runs.callback import TrainingCallback
+
+
+def tiny(folder: Path, **changes: Any) -> LeagueSettings:
+    settings = LeagueSettings(
+        scenario="smart",
+        generations=2,
+        teams=("idle",),
+        target_steps=160,
+        team_steps=320,
+        response_steps=160,
+        episodes=3,
+        overrides={"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 2},
+        training={
+            "num_worlds": 4,
+            "rollout": 20,
+            "minibatch": 32,
+            "epochs": 1,
+            "evaluate_worlds": 2,
+            "imitate_rounds": 1,
+        },
+        folder=folder,
+    )
+    return replace(settings, **changes)
+
+
+def everything(folder: Path) -> dict[str, Any]:
+    """All policies and results of a league, without its folder's name."""
+    found: dict[str, Any] = {}
+    for path in sorted(folder.rglob("*.safetensors")):
+        if path.name != "checkpoint.safetensors":
+            tensors = load_file(path)
+            found[str(path.relative_to(folder))] = {k: a.tobytes() for k, a in tensors.items()}
+    for name in (MATRIX, SUMMARY, FILE):
+        found[name] = (folder / name).read_text(encoding="utf-8").replace(str(folder), "FOLDER")
+    return found
+
+
+class Killed(BaseException):
+    pass
+
+
+def die_at(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, call: int) -> None:
+    """Have a function end the process, as it were, at one of its calls."""
+    original, calls = getattr(owner, name), [0]
+
+    def dying(*arguments: Any, **named: Any) -> Any:
+        calls[0] += 1
+        if calls[0] == call:
+            raise Killed
+        return original(*arguments, **named)
+
+    monkeypatch.setattr(owner, name, dying)
+
+
+@pytest.mark.long
+def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = play_league(tiny(tmp_path / "whole"), console=quiet())
+    assert [m.label for m in found.teams] == ["idle", "trackers-1", "trackers-2"]
+    assert [m.label for m in found.targets] == ["smart", "target-1", "target-2"]
+    assert len(found.cells) == 9
+    assert [e.label for e in found.exploited] == ["trackers-2", "target-2"]
+    gained = found.exploited[0]
+    assert gained.gain == pytest.approx(gained.before.score.value - gained.after.score.value)
+    for owner, name, call in (
+        (TrainingCallback, "_on_rollout_start", 4),
+        (TrainingCallback, "_checkpoint", 7),
+        (league, "evaluate", 9),
+    ):
+        with monkeypatch.context() as patched:
+            die_at(patched, owner, name, call)
+            with pytest.raises(Killed):
+                play_league(tiny(tmp_path / "cut"), console=quiet())
+    play_league(tiny(tmp_path / "cut"), console=quiet())
+    assert everything(tmp_path / "cut") == everything(tmp_path / "whole")
+
+    again = play_league(tiny(tmp_path / "whole"), console=quiet())
+    assert again.cells == found.cells
+    files = draw_matrix(again)
+    assert all(path.stat().st_size > 1000 for path in files)
+    told = "worlds a pair, test split, seed 7; training seed 1<"
+    assert told in files[1].read_text(), "the figure says what was played"
+    matrix, responses = tables(again)
+    assert matrix.row_count == 3
+    assert responses.row_count == 2
+    start = json.loads((tmp_path / "whole/generation-02/target/settings.json").read_text())
+    assert start["start"].endswith("generation-01/target"), "each begins where its side stood"
+
+
+def test_other_settings_are_refused(tmp_path: Path) -> None:
+    settings = tiny(tmp_path, generations=1, responses="none")
+    play_league(settings, console=quiet())
+    with pytest.raises(RunFolderError, match=r"league with seed=1: go on with these"):
+        play_league(replace(settings, seed=2), console=quiet())
+    more = play_league(replace(settings, episodes=2), console=quiet())
+    assert more.cells[0].score.count == 2, "what is no training may be changed"
+    (tmp_path / FILE).write_text("[")
+    with pytest.raises(RunFolderError, match="is damaged"):
+        play_league(settings, console=quiet())
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"generations": 0}, SettingsError, "generations=0 must be"),
+        ({"teams": ()}, SettingsError, "teams"),
+        ({"targets": ("smart,evader",)}, SettingsError, "without commas"),
+        ({"teams": ("a/best.json", "b/best.json")}, SettingsError, "must have different names"),
+        ({"teams": ("nobody",)}, PolicyError, "unknown policy 'nobody'"),
+        ({"targets": ("nobody",)}, PolicyError, "unknown target 'nobody'"),
+    ],
+)
+def test_what_is_impossible_is_refused_before_anything_is_made(
+    changes: dict[str, Any], error: type[Exception], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(error, match=message):
+        play_league(tiny(tmp_path / "league", **changes), console=quiet())
+    assert not (tmp_path / "league").exists()
+
+
+def test_harder_opponents_get_more_of_the_worlds() -> None:
+    parts = shares({"easy": 0.0, "hard": 0.9, "middle": 0.3}, "easy")
+    assert parts == {"easy": 1, "hard": 6, "middle": 2}
+    assert shares({"a": 0.0, "b": 0.0}, "b") == {"b": 1}
+    assert against({"a": 2, "b": 1}) == "a,a,b"
+
+
+def test_the_command_says_how_to_resume(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(settings: LeagueSettings) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("posse_training.league.play_league", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        main(["--generations", "1", "--folder", str(tmp_path)])
+    assert "run the same command again" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{", "[]", "{}"])
+def test_damaged_settings_are_named(tmp_path: Path, text: str) -> None:
+    (tmp_path / FILE).write_text(text)
+    with pytest.raises(RunFolderError, match=rf"{FILE} is damaged"):
+        play_league(tiny(tmp_path), console=quiet())

@@ -1,0 +1,206 @@
+"""Shipping: the best of several training seeds, with the scores of all seeds."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+import tyro
+from rich.console import Console
+from scripts.ship import CHOICE_SEED, Settings, replay, ship
+from scripts.train_shipped import ALGORITHMS, all_runs
+from scripts.train_shipped import Settings as Runs
+from scripts.tune_shipped import repeat_all
+from tests.support.runs import HORIZON, quiet, small
+from tests.support.tunable import small as small_tuning
+
+from posse_baselines import load_target
+from posse_baselines.learned import LearnedPolicy
+from posse_training import evaluate
+from posse_training.errors import SettingsError
+from posse_training.runs import TrainSettings, default_settings
+from posse_training.runs.saved.command import command_of
+from posse_training.runs.train import train
+from posse_training.tune import tune
+
+SETTINGS = TrainSettings(
+    scenario="constant",
+    steps=640,
+    num_worlds=4,
+    team_sizes=(2, 3),
+    overrides={"horizon": 40, "settle_time": 1.0},
+    hidden=(8,),
+    minibatch=64,
+    rollout=20,
+    evaluate_every=320,
+    evaluate_worlds=2,
+    beside=None,
+    tensorboard=False,
+)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
+    """Run folders of three training seeds."""
+    folder = tmp_path_factory.mktemp("runs")
+    for seed in (1, 2, 3):
+        settings = replace(SETTINGS, seed=seed, folder=folder / str(seed))
+        train(settings, console=Console(file=StringIO()))
+    return tuple(folder / str(seed) for seed in (1, 2, 3))
+
+
+def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], tmp_path: Path) -> None:
+    path = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
+    shipped = LearnedPolicy.from_file(path)
+    assert shipped.name == "learned-trial"
+    # The expected scores, computed separately.
+    scores = [
+        sum(
+            evaluate(
+                str(run / "best.safetensors"),
+                "constant",
+                10,
+                CHOICE_SEED,
+                split="validation",
+                progress=False,
+                num_trackers=size,
+                horizon=40,
+                settle_time=1.0,
+            )["safe_score"].mean()
+            for size in (2, 3)
+        )
+        / 2
+        for run in runs
+    ]
+    recorded = [run["safe_score"]["value"] for run in shipped.card["training_seeds"]]
+    assert recorded == pytest.approx(scores)
+    assert shipped.card["validation_safe_score"] == pytest.approx(max(scores))
+    assert {"score", "contact_free"} <= set(shipped.card["training_seeds"][0])
+    best = max(range(3), key=lambda k: scores[k])
+    assert [run["seed"] for run in shipped.card["training_seeds"]] == [1, 2, 3]
+    assert shipped.card["seed"] == best + 1
+    chosen = LearnedPolicy.from_file(runs[best] / "best.safetensors")
+    assert (shipped.network.weights[0] == chosen.network.weights[0]).all()
+    assert [point["steps"] for point in shipped.card["curve"]][-1] >= SETTINGS.steps
+    check = shipped.card["check"]
+    assert [play["settings"]["num_trackers"] for play in check["plays"]] == [2, 3]
+    assert all(play["settings"]["horizon"] == 40 for play in check["plays"])
+    assert replay(shipped, check) == [play["score"] for play in check["plays"]]
+    assert str(runs[0].parent) not in json.dumps(shipped.card)
+    assert path.stat().st_mode & 0o044 == 0o044
+
+
+def test_a_run_that_learned_nothing_is_not_shipped(runs: tuple[Path, ...], tmp_path: Path) -> None:
+    """Its best policy is that of step 0; it stays on record."""
+    first = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
+    best = LearnedPolicy.from_file(first).card["seed"]
+    copies = tuple(Path(shutil.copytree(run, tmp_path / f"run-{run.name}")) for run in runs)
+    path = copies[best - 1] / "best.safetensors"
+    policy = LearnedPolicy.from_file(path)
+    policy.with_card({**policy.card, "steps": 0}).save(path)
+    card = LearnedPolicy.from_file(ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path))).card
+    assert card["seed"] != best
+    assert [run["steps"] for run in card["training_seeds"]][best - 1] == 0
+
+
+def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Path) -> None:
+    def refused(*folders: Path, name: str = "learned-x") -> str:
+        with pytest.raises(SettingsError) as caught:
+            ship(Settings(folders, name, worlds=2, out=tmp_path))
+        return str(caught.value)
+
+    assert "must have different training seeds" in refused(runs[0], runs[0])
+    assert "must begin with 'learned-'" in refused(*runs, name="smart")
+    assert "no run folders given" in refused()
+    assert "is not a run folder" in refused(tmp_path)
+    other = tmp_path / "other"
+    train(replace(SETTINGS, seed=4, hidden=(4,), folder=other), console=Console(file=StringIO()))
+    assert "differ in hidden" in refused(runs[0], other)
+    assert not list(tmp_path.glob("*.safetensors"))
+
+
+def test_a_file_too_large_is_not_left_behind(
+    runs: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("scripts.ship.LARGEST", 1000)
+    with pytest.raises(SettingsError, match="1,000 are allowed"):
+        ship(Settings(runs[:1], "learned-x", worlds=2, out=tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_on_record_gives_the_settings_again() -> None:
+    for settings in (
+        replace(
+            default_settings("constant"),
+            overrides={"horizon": 40, "settle_time": 1.0},
+            seed=7,
+            reward_weights={"contact": -0.5, "progress": 0.5, "slot": 0.25},
+            team_sizes=(2, 3),
+            imitate="ddcs-distributed",
+            beside=None,
+            tensorboard=False,
+        ),
+        replace(default_settings("smart,radio", "sac"), wandb="my project"),
+        default_settings("field"),
+        replace(default_settings("smart"), imitate=None, log_deviation=-0.5),
+    ):
+        words = shlex.split(command_of(settings))[2:]
+        for own in (True, False):  # with the scenario's own defaults, and before there were any
+            default = default_settings(settings.scenario, settings.algorithm, own=own)
+            assert tyro.cli(TrainSettings, default=default, args=words) == settings
+
+
+def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = tmp_path / "run"
+    settings = small(
+        run,
+        side="target",
+        encoding="plain",
+        against="idle",
+        scenario="smart",
+        team_sizes=(),
+        steps=80,
+        evaluate_every=80,
+        overrides={"horizon": HORIZON, "settle_time": 1.0},
+        reward_weights={"team": -1.0},
+    )
+    train(settings, console=quiet())
+    asked = Settings((run,), "mine", worlds=4, out=tmp_path / "out")
+    monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", 0.1))
+    with pytest.raises(SettingsError, match=r"costs idle .* more than 'smart': at least 0.1"):
+        ship(asked)
+    assert not (tmp_path / "out").exists()
+    monkeypatch.setattr("scripts.ship.REFERENCE", ("idle", "smart", -1.0))
+    target = load_target(ship(asked))
+    card = target.policy.card  # type: ignore[union-attr]
+    assert target.name == "mine"
+    assert str(tmp_path) not in str(card)
+    assert card["comparison"]["cost"]["count"] == 4
+    assert card["check"]["score"] >= 0
+
+
+def test_every_scenario_has_its_own_training() -> None:
+    runs = all_runs(Runs(folder=Path("x")))
+    assert {(run.scenario, run.algorithm) for run in runs} == set(ALGORITHMS.items())
+    assert [run.seed for run in runs if run.scenario == "smart"] == [1, 2, 3, 4, 5]
+    assert [run.seed for run in runs if run.scenario == "radio"] == [1, 2, 3]
+    for run in runs:
+        # The corrections of a tuned team, before its safeguard, with a bound on contact.
+        assert (run.advise, run.correction, run.encoding) == ("ddcs-tuned", "velocity", "belief")
+        assert run.contact_bound is not None
+
+
+def test_tuning_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("posse_baselines.tuned.files", "posse_training.tune"):
+        monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")
+    settings = small_tuning(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1, ship=True)
+    card = json.loads(tune(settings, console=quiet()).read_text())
+    shipped = tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json"
+    shipped.write_text(json.dumps({**card, "settings": {}}))
+    (result,) = repeat_all(tmp_path / "again", quiet())
+    assert json.loads(result.read_text()) == json.loads(shipped.read_text()) == card

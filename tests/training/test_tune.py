@@ -1,0 +1,202 @@
+"""``posse tune``: what it finds, how it resumes, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.tunable import BEST, POLICY, quiet, small
+
+from posse_baselines import PolicyError, Tunable, settings_of, tunable
+from posse_training.cli import main
+from posse_training.errors import CheckpointError, RunFolderError, SettingsError
+from posse_training.files import locked
+from posse_training.tune import Space, TuneSettings, _Run, tune
+
+
+def card_of(settings: TuneSettings) -> dict[str, Any]:
+    card: dict[str, Any] = json.loads(tune(settings, console=quiet()).read_text())
+    return card
+
+
+def test_it_recovers_a_known_optimum(tmp_path: Path) -> None:
+    card = card_of(small(tmp_path / "run", generations=12, every=4))
+    assert card["searched"] == ["bias"]  # the other one changes nothing
+    assert card["settings"]["bias"] == pytest.approx(BEST, abs=0.1)
+    tuned, untuned = (card["scores"][k]["safe_score"]["value"] for k in ("tuned", "untuned"))
+    assert tuned > untuned + 0.1
+    assert card["curve"][0]["generation"] == 0
+    points = {point["generation"]: point["score"] for point in card["curve"]}
+    assert points[card["generation"]] == max(points.values())
+    assert card["command"].startswith(f"posse tune {POLICY} --scenario paper-distributed --gen")
+
+
+class Killed(BaseException):
+    """Ends a run as a signal does."""
+
+
+@pytest.mark.parametrize("after", [1, 3])
+def test_a_killed_run_resumes_to_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+    whole = card_of(small(tmp_path / "whole"))
+    generation = _Run._generation
+    made: list[int] = []
+
+    def kill(*arguments: Any) -> Any:
+        if len(made) == after:
+            raise Killed
+        made.append(1)
+        return generation(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_Run, "_generation", kill)
+        with pytest.raises(Killed):
+            tune(small(tmp_path / "killed"), console=quiet())
+    assert not (tmp_path / "killed/tuned.json").exists()
+    assert card_of(small(tmp_path / "killed")) == whole
+
+
+def test_a_run_that_ended_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
+    card_of(small(tmp_path / "run", generations=3))  # off the schedule of the validation
+    assert card_of(small(tmp_path / "run")) == card_of(small(tmp_path / "whole"))
+
+
+def test_threads_change_nothing(tmp_path: Path) -> None:
+    one = card_of(small(tmp_path / "one", threads=1, generations=2))
+    assert card_of(small(tmp_path / "two", threads=2, generations=2)) == one
+
+
+def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
+    card = card_of(small(tmp_path / "run", generations=None, minutes=0.001))
+    generations = int(card["command"].split("--generations ")[1].split()[0])
+    assert generations >= 1
+    assert card_of(small(tmp_path / "again", generations=generations)) == card
+
+
+def test_progress_is_lines_where_there_is_no_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = "--generations 2 --population 4 --worlds 2 --validation-worlds 3 --every 1"
+    assert (
+        main(["tune", POLICY, "--scenario", "paper-distributed", *words.split(), "--out", str(tmp_path / "run")]) == 0
+    )
+    out = capsys.readouterr().out
+    assert "searching 1 settings: bias" in out
+    assert "generation    2  safe score" in out
+    assert " tuned: safe score" in out
+    assert str(tmp_path / "run/tuned.json") in out.replace("\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["ddcs-distribute"], "did you mean 'ddcs-distributed'"),
+        (["idle"], "policy 'idle' has no tunable settings; those that have: pngl-l-phi, pngl"),
+        (["ddcs-tuned"], "policy 'ddcs-tuned' has no tunable settings"),
+        (["pngl", "--scenario", "smrt"], "unknown scenario 'smrt' (did you mean 'smart'"),
+        (["pngl", "--minutes", "0"], "minutes=0.0 is out of range: choose it from 0.001 to 10,000"),
+        (["pngl", "--minutes", "nan"], "minutes=nan is out of range"),
+        (["pngl", "--seed", "-1"], "seed=-1 is out of range"),
+        (["pngl", "--population", "3"], "population=3 is out of range"),
+        (["pngl", "--only", "gian"], "only='gian' is not a tunable setting of 'pngl'"),
+        (["pngl", "--ship"], "--ship needs a policy whose tuned version ships: ddcs-distributed"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    out = tmp_path / "run"
+    assert main(["tune", *arguments, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert message in " ".join(error.split())
+    assert "Traceback" not in error
+    assert not out.exists()
+
+
+def test_a_folder_that_is_not_its_own(tmp_path: Path) -> None:
+    (tmp_path / "diary.txt").write_text("mine")
+    with pytest.raises(RunFolderError, match=r"is not the folder of a tuning run.*diary.txt"):
+        tune(small(tmp_path), console=quiet())
+    assert [path.name for path in tmp_path.iterdir()] == ["diary.txt"]
+    with pytest.raises(RunFolderError, match=r"is a file\. Choose another"):
+        tune(small(tmp_path / "diary.txt"), console=quiet())
+
+
+def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    tune(small(run, generations=1), console=quiet())
+    with pytest.raises(RunFolderError, match="holds a tuning run with seed=3, not 4"):
+        tune(small(run, seed=4), console=quiet())
+    with locked(run), pytest.raises(RunFolderError, match="is in use by process"):
+        tune(small(run), console=quiet())
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text[: len(text) // 2],
+        lambda text: text.replace('"points": [[0.', '"points": [[1.', 1),
+        lambda text: "[" * 100_000,
+        lambda text: "{}",
+        lambda text: "\udcff",
+    ],
+)
+def test_a_damaged_state_is_named(tmp_path: Path, damage: Any) -> None:
+    tune(small(tmp_path / "run", generations=1), console=quiet())
+    path = tmp_path / "run/state.jsonl"
+    path.write_text(damage(path.read_text()), errors="surrogateescape")
+    with pytest.raises(CheckpointError, match=r"state\.jsonl is damaged"):
+        tune(small(tmp_path / "run"), console=quiet())
+
+
+def test_only_names_the_searched_settings(tmp_path: Path) -> None:
+    card = card_of(small(tmp_path / "run", policy="ddcs-distributed", only=("gain",), generations=1))
+    assert card["searched"] == ["gain"]
+    assert set(card["settings"]) <= {"gain"}
+    assert card["command"].endswith("--only gain")
+    assert "--only bias" in card_of(small(tmp_path / "all", generations=1))["command"]
+
+
+def test_nothing_has_an_effect(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
+        tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
+
+
+def test_the_result_ships_where_the_tuned_policy_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posse_training.tune.SHIPPED_TUNED", tmp_path / "shipped")
+    settings = small(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1)
+    card = json.loads(tune(replace(settings, ship=True), console=quiet()).read_text())
+    assert json.loads((tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json").read_text()) == card
+
+
+def test_code_that_is_no_policy(tmp_path: Path) -> None:
+    with pytest.raises(PolicyError, match="cannot import"):
+        tune(small(tmp_path / "run", policy="no_such_module:Team"), console=quiet())
+
+
+def test_every_point_is_a_setting_that_can_be_played() -> None:
+    tunables = tunable("ddcs-distributed")
+    space = Space(tunables)
+    rng = np.random.default_rng(1)
+    for point in [*rng.random((200, len(tunables))), np.zeros(len(tunables)), np.ones(len(tunables))]:
+        settings_of("ddcs-distributed").replace(**space.values(point))
+
+
+def test_a_setting_that_must_exceed_one_that_is_not_searched() -> None:
+    for name in ("near", "far"):
+        found = tunable("ddcs-distributed")
+        space = Space(tuple(t for t in found if t.name == name), tuple(t for t in found if t.name != name))
+        for end in (0.0, 1.0):
+            settings_of("ddcs-distributed").replace(**space.values(np.array([end])))
+
+
+def test_the_start_is_the_default_and_wide_ranges_are_logarithmic() -> None:
+    for t in tunable("pngl-l-phi"):
+        space = Space((t,), ())
+        values = Space((t,), tuple(o for o in tunable("pngl-l-phi") if o is not t)).values(space.start)
+        assert values[t.name] == pytest.approx(t.default, rel=1e-5, abs=1e-9)
+    wide = Space((Tunable("x", 1.0, 0.1, 10.0, "s"),))
+    assert wide.values(np.array([0.25]))["x"] == pytest.approx(10**-0.5, rel=1e-5)
+    narrow = Space((Tunable("x", 1.0, 0.5, 2.5, "s"),))
+    assert narrow.values(np.array([0.25]))["x"] == pytest.approx(1.0)

@@ -1,0 +1,1 @@
+"""Policies on the same worlds: played, estimated, drawn."""

@@ -1,0 +1,309 @@
+"""``posse compare``: policies on the same worlds, with intervals and paired differences."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import tyro
+from rich.console import Console
+
+import posse
+from posse import Batch, Scenario, get_scenario, scenario_names
+from posse_baselines import PolicyError, load_target
+from posse_training.cluster import Cluster
+from posse_training.cluster.settings import RayOption, of_option, work_of
+from posse_training.compare.contenders import Contender, read_contenders
+from posse_training.compare.marl_eval import write_marl_eval
+from posse_training.compare.playing import check, play, replay
+from posse_training.compare.plays import Plays
+from posse_training.compare.table import Row, row_of, table
+from posse_training.errors import ComparisonError, SettingsError, TimeLimitError, require
+from posse_training.provenance import commit
+from posse_training.replay import join, write_replay
+from posse_training.reports.episodes import refuse_trained_split
+from posse_training.reports.evaluation import progress_bar
+from posse_training.reports.failures import PlayError
+from posse_training.reports.statistics import Estimate
+
+PLANNER: Final = "planner"
+"""The reference that is shown with every team."""
+SUMMARY: Final = "summary.json"
+REPORT: Final = "report.html"
+_PIPED: Final = 240
+"""Width of the table where lines have no end (a pipe, a file)."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Score policies on the same worlds; write tables, figures and a report page."""
+
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Names, files, package.module:Class, or LABEL=FILE,FILE,... for several training seeds of one
+    policy; the first is the baseline of differences."""
+    scenarios: tuple[str, ...] = ("all",)
+    """Names of scenarios, or "all"."""
+    episodes: int = 1000
+    """Worlds for each policy and scenario."""
+    seed: int = 7
+    """Seed of the worlds."""
+    split: str = "test"
+    """Split of the worlds: train, validation or test."""
+    out: Path | None = None
+    """New or empty folder for the report (HTML), the rows (CSV), the summary (JSON) and the figures
+    (PNG and SVG); default: the first of runs/compare, runs/compare-2, ... that is free."""
+    figures: bool = True
+    """Draw figures, and write the report."""
+    replays: int = 3
+    """Largest wins, and as many largest losses, of all policies against the first one that are
+    recorded as replays beside the report; 0: none."""
+    planner_episodes: int = 100
+    """Largest number of the worlds that the planner plays as a reference; 0: none. It takes about
+    0.4 s of processor time per world. If named among the policies, it plays all worlds."""
+    export: tuple[Literal["marl-eval"], ...] = ()
+    """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval
+    and rliable read."""
+    time_limit: float = 1800.0
+    """Time limit of a policy on one scenario, for each training seed, s (with --ray: of a shard of
+    500 worlds); a policy that exceeds it is stopped and skipped on the remaining scenarios."""
+    ray: RayOption = None
+    """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
+    this machine, or else all its cores. Extra: cluster."""
+    target: str | None = None
+    """Target that all teams play against: a motion, a learned target, a file or
+    package.module:Class; default: the scenario's own."""
+
+
+@dataclass
+class Comparison:
+    """All results, with the policies that were omitted or failed."""
+
+    reference: str
+    """The baseline of the differences."""
+    folder: Path
+    """Where they are written."""
+    plays: dict[tuple[str, str], Plays] = field(default_factory=dict)
+    """By scenario and policy."""
+    rows: list[Row] = field(default_factory=list)
+    """The estimates of each, and the files of its rows."""
+    left_out: list[dict[str, str]] = field(default_factory=list)
+    """Policies that do not fit: ``policy``, ``what`` they cannot play, and ``why``."""
+    failed: list[dict[str, str]] = field(default_factory=list)
+    """Policies that raised, returned invalid actions, died or exceeded the time limit."""
+    figures: list[Path] = field(default_factory=list)
+    """The files that were drawn."""
+
+
+def compare(settings: Settings, *, console: Console | None = None) -> Comparison:
+    """Evaluate all policies; write rows, summary, figures and report.
+
+    A policy that is incompatible with a scenario is omitted there; one that fails is listed under ``failed``. The
+    other policies are not affected.
+
+    Args:
+        settings: What to play, and where to write.
+        console: Where to show progress; default: the standard error output.
+
+    Raises:
+        SettingsError: No episodes to play, or an invalid time limit.
+        PolicyError: An unknown policy or target, or no policy; nothing is played.
+        ScenarioError: An unknown scenario or split, an invalid seed; nothing is played.
+        TrainedSplitError: A split that a policy was trained on; nothing is played.
+        ComparisonError: The folder is not empty; nothing is played, nor written.
+        MissingExtraError: Ray is to be used and not installed.
+        ClusterError: There is no such cluster.
+    """
+    scenarios = _checked(settings)
+    contenders = read_contenders(settings.policies)
+    if settings.planner_episodes > 0 and PLANNER not in settings.policies:
+        contenders += read_contenders((PLANNER,))
+    for policy in (policy for contender in contenders for policy in contender.policies):
+        if not isinstance(policy, str):
+            refuse_trained_split(policy, settings.split)
+    if settings.target is not None:
+        refuse_trained_split(load_target(settings.target), settings.split)
+    folder = _free(settings.out)
+    if settings.ray is not None:
+        require("cluster", "ray")
+    for contender in contenders:
+        check(contender, settings.time_limit)
+    folder.mkdir(parents=True, exist_ok=True)
+    run = _Run(settings, scenarios, contenders, Comparison(contenders[0].label, folder))
+    with progress_bar(console=console or Console(stderr=True)) as bar:
+        task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
+        for scenario in scenarios:
+            run.play(scenario, lambda what: bar.update(task, description=what, advance=1))
+    run.write()
+    return run.found
+
+
+def _checked(settings: Settings) -> list[Scenario]:
+    for name, least in (("episodes", 1), ("planner_episodes", 0), ("replays", 0)):
+        value = getattr(settings, name)
+        if not least <= value <= 10**8:
+            raise SettingsError(f"{name}={value:g} must be at least {least} and at most 10**8")
+    if not (math.isfinite(settings.time_limit) and settings.time_limit > 0):
+        raise SettingsError(f"time_limit={settings.time_limit!r} s must be finite and above 0")
+    names = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
+    found = [get_scenario(name) for name in dict.fromkeys(names)]
+    for scenario in found:
+        Batch(scenario, 1, seed=settings.seed, split=settings.split)
+    return found
+
+
+def _free(out: Path | None) -> Path:
+    """Return a folder that is new or empty."""
+    if out is None:
+        names = itertools.chain(["compare"], (f"compare-{k}" for k in itertools.count(2)))
+        return next(path for name in names if not (path := Path("runs", name)).exists())
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ComparisonError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
+    return out
+
+
+@dataclass
+class _Run:
+    """One comparison while it is played and written."""
+
+    settings: Settings
+    scenarios: Sequence[Scenario]
+    contenders: Sequence[Contender]
+    found: Comparison
+    stopped: dict[str, str] = field(default_factory=dict)
+    """Why policies that exceeded the time limit are not played again, by label."""
+    stems: set[str] = field(default_factory=set)
+
+    def play(self, scenario: Scenario, report: Callable[[str], object]) -> None:
+        """Play one scenario with every contender, and write the rows."""
+        found, name = self.found, scenario.name
+        for contender in self.contenders:
+            plays = self._attempt(contender, scenario)
+            report(f"{contender.label} on {name}".replace("[", r"\["))
+            if plays is None:
+                continue
+            found.plays[name, contender.label] = plays
+            reference = None if contender is self.contenders[0] else found.plays.get((name, found.reference))
+            found.rows.append({**row_of(plays, reference), "files": self._write_rows(name, plays)})
+        best = found.plays.get((name, PLANNER))
+        for row in found.rows:
+            if row["scenario"] == name and best is not None:
+                row["of_planner"] = found.plays[name, row["policy"]].ratio(best)
+
+    def write(self) -> None:
+        """Write summary, export, figures and report."""
+        s, found = self.settings, self.found
+        if s.figures:
+            self._report()
+        if "marl-eval" in s.export:
+            write_marl_eval(found.plays, found.folder / "marl-eval.json")
+        rows = [{k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in found.rows]
+        about: dict[str, Any] = {"seed": s.seed, "split": s.split, "episodes": s.episodes, "target": s.target}
+        about |= {"comparison": rows, "left_out": found.left_out, "failed": found.failed}
+        (found.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+
+    def _cluster(self) -> Cluster | None:
+        return of_option(self.settings.ray, work_of(self.found.folder))
+
+    def _attempt(self, contender: Contender, scenario: Scenario) -> Plays | None:
+        """Play; return ``None`` and note why if the contender cannot or fails."""
+        s, label = self.settings, contender.label
+        worlds = s.episodes
+        if label == PLANNER and PLANNER not in s.policies:
+            worlds = min(worlds, s.planner_episodes)
+        why = {"policy": label, "what": scenario.name}
+        if label in self.stopped:
+            self.found.failed.append({**why, "why": self.stopped[label]})
+            return None
+        played = {"target": s.target, "limit": s.time_limit, "cluster": self._cluster()}
+        try:
+            return play(contender, scenario, worlds, s.seed, s.split, **played)  # type: ignore[arg-type]
+        except PolicyError as error:
+            self.found.left_out.append({**why, "why": str(error)})
+        except TimeLimitError as error:  # the next scenario would most likely take as long
+            self.stopped[label] = f"not played: on {scenario.name} {error}"
+            self.found.failed.append({**why, "why": str(error)})
+        except PlayError as error:
+            self.found.failed.append({**why, "why": str(error)})
+        return None
+
+    def _write_rows(self, scenario: str, plays: Plays) -> list[str]:
+        """Write the rows of a contender, one file for each training seed; return their names."""
+        written = []
+        for k, results in enumerate(plays.results):
+            member = f"-{k + 1}" if len(plays.results) > 1 else ""
+            stem = self._stem(f"{scenario}-{plays.label}{member}")
+            results.write(self.found.folder / f"{stem}.csv")
+            written.append(f"{stem}.csv")
+        return written
+
+    def _stem(self, wanted: str) -> str:
+        """Return a name of letters, digits and ``._-`` that no other file has, also where case is ignored."""
+        clean = re.sub(r"[^A-Za-z0-9._-]", "_", wanted)[:100].lstrip(".") or "_"
+        names = itertools.chain([clean], (f"{clean}-{k}" for k in itertools.count(2)))
+        stem = next(name for name in names if name.lower() not in self.stems)
+        self.stems.add(stem.lower())
+        return stem
+
+    def _report(self) -> None:
+        """Draw the figures, record the replays, and write the report of all of it."""
+        from posse_training.compare import figures, report  # matplotlib is slow
+
+        s, found = self.settings, self.found
+        found.figures = figures.draw(found.folder, found.plays, self.contenders)
+        shown = [(one, *self._record(one)) for one in report.extremes(found.plays, found.reference, s.replays)]
+        versions = ", ".join(f"{scenario.name} v{scenario.version}" for scenario in self.scenarios)
+        text = report.page(
+            f"{len(self.contenders)} policies, {len(self.scenarios)} scenarios",
+            f"{_facts(s)}; {versions}; posse {posse.__version__}, commit {commit() or 'unknown'}",
+            found.reference,
+            found.rows,
+            found.figures,
+            shown,
+            {"Left out": found.left_out, "Failed": found.failed},
+        )
+        (found.folder / REPORT).write_text(text, encoding="utf-8")
+
+    def _record(self, one: Any) -> tuple[str, str]:
+        """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""
+        s, by_label = self.settings, {each.label: each for each in self.contenders}
+        scenario = get_scenario(one.scenario)
+        played = {"target": s.target, "limit": s.time_limit}
+        try:
+            replays = [
+                replay(by_label[label], seed, scenario, s.seed, one.world, s.split, **played)  # type: ignore[arg-type]
+                for label, seed in ((self.found.reference, 0), (one.policy, one.seed))
+            ]
+            name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"
+            write_replay(join(replays), self.found.folder / name)
+        except (PlayError, SettingsError, TimeLimitError) as error:
+            return "", f"no replay: {error}"
+        return name, ""
+
+
+def _facts(settings: Settings) -> str:
+    target = "" if settings.target is None else f"target {settings.target}, "
+    return f"{settings.episodes:,} worlds each, {target}split {settings.split}, seed {settings.seed}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compare policies, print the table, and return 1 if a policy failed, else 0."""
+    settings = tyro.cli(Settings, prog="posse compare", args=arguments)
+    found = compare(settings)
+    console = Console(width=None if sys.stdout.isatty() else _PIPED)
+    title = f"{_facts(settings)}; 95 % intervals; differences of the safe score to {found.reference}, paired by world"
+    console.print(table(found.rows, title))
+    for word, problems in (("left out", found.left_out), ("failed", found.failed)):
+        for row in problems:
+            console.print(f"{word}: {row['policy']} on {row['what']}: {row['why']}", markup=False)
+    console.print(f"rows and summary: {found.folder}", markup=False, soft_wrap=True)
+    if settings.figures:
+        page = found.folder / REPORT
+        console.print(f"all of it, to open in a browser: {page}", markup=False, soft_wrap=True)
+    return 1 if found.failed else 0

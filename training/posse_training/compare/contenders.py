@@ -1,0 +1,65 @@
+"""Contenders of a comparison: one policy, or one policy for each of several training seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from posse_baselines import Policy, PolicyError, load
+from posse_baselines.registry import is_code, is_file
+
+LONGEST_LABEL: Final = 100
+"""Characters of a label, at most."""
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A policy under its label in reports, or one policy for each training seed.
+
+    Attributes:
+        label: The label.
+        policies: Loaded policies; a string is ``package.module:Class``, loaded in the process that
+            plays it.
+    """
+
+    label: str
+    policies: tuple[Policy | str, ...]
+
+
+def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
+    """Return the contenders of names, files, ``package.module:Class`` or ``LABEL=FILE,FILE,...``.
+
+    The label of a file is the name on its card, unless another contender has it.
+
+    Raises:
+        PolicyError: No contender, a policy that cannot be loaded, a group without files, a label
+            that cannot be printed, or that two contenders share.
+    """
+    if not texts:
+        raise PolicyError("No policies given. Pass at least one; the first is the baseline.")
+    found: list[Contender] = []
+    stated = {text.partition("=")[0] for text in texts}
+    for text in texts:
+        label, sign, members = (text, "", "") if is_file(text) else text.partition("=")
+        if sign and not (label and all(members.split(","))):
+            raise PolicyError(f"{text!r:.120} is not a group of policies: write LABEL=FILE,FILE,...")
+        taken = {other.label for other in found}
+        if label in taken:
+            raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
+        names = members.split(",") if sign else [text]
+        policies = tuple(name if is_code(name) else load(name) for name in names)
+        if not sign and is_file(text) and not isinstance(policies[0], str):
+            name = policies[0].name
+            label = name if name not in taken | stated else label
+        _check_label(label)
+        found.append(Contender(label, policies))
+    return tuple(found)
+
+
+def _check_label(label: str) -> None:
+    if len(label) > LONGEST_LABEL or not label.isprintable():
+        raise PolicyError(
+            f"the label {label[:60]!r}... ({len(label):,} characters) must have at most "
+            f"{LONGEST_LABEL} printable characters: give it another one, LABEL=..."
+        )

@@ -1,0 +1,93 @@
+"""The report of a comparison: one page with all estimates and figures, and links to replays beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from posse_training.compare.figures import CAPTIONS
+from posse_training.compare.plays import Plays
+from posse_training.compare.table import COLUMNS, Row, cell, ranked
+from posse_training.reports.pictures.style import PLANNER
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """One world that a policy, of a training seed from 0 on, and the baseline played, with their safe scores."""
+
+    scenario: str
+    policy: str
+    seed: int
+    world: int
+    mine: float
+    baseline: float
+
+    @property
+    def gain(self) -> float:
+        """How much higher the policy's safe score is than the baseline's."""
+        return self.mine - self.baseline
+
+
+def extremes(plays: Mapping[tuple[str, str], Plays], reference: str, count: int) -> list[Extreme]:
+    """Return the largest wins, then the largest losses against the reference, at most ``count`` each.
+
+    Of each policy on each scenario only the largest win and the largest loss are candidates, so that several of them
+    are shown. The planner, which reads the state, is one where nobody else is.
+    """
+    others = {policy for _, policy in plays} - {reference}
+    shown = others - {PLANNER} or others
+    wins: list[Extreme] = []
+    losses: list[Extreme] = []
+    for (scenario, policy), found in plays.items():
+        base = plays.get((scenario, reference))
+        if policy not in shown or base is None:
+            continue
+        mine, theirs = found["safe_score"], base["safe_score"][0]
+        both = min(mine.shape[1], len(theirs))
+        gains = mine[:, :both] - theirs[:both]
+        for kept, place in ((wins, gains.argmax()), (losses, gains.argmin())):
+            seed, world = divmod(int(place), both)
+            kept.append(Extreme(scenario, policy, seed, world, float(mine[seed, world]), float(theirs[world])))
+    wins = sorted((one for one in wins if one.gain > 0), key=lambda one: -one.gain)
+    losses = sorted((one for one in losses if one.gain < 0), key=lambda one: one.gain)
+    return wins[:count] + losses[:count]
+
+
+def page(
+    title: str,
+    facts: str,
+    baseline: str,
+    rows: Sequence[Row],
+    figures: Sequence[Path],
+    replays: Sequence[tuple[Extreme, str, str]],
+    problems: Mapping[str, Sequence[Mapping[str, str]]],
+) -> str:
+    """Return the page; names and messages of policies are text in it, whatever they hold.
+
+    Args:
+        title: Heading of the page.
+        facts: What was played.
+        baseline: Label of the baseline.
+        rows: Estimates.
+        figures: Files of the figures, in the page's folder.
+        replays: Worlds, each with the address of its replay, or else why there is none.
+        problems: Who was left out and who failed, by heading.
+    """
+    text = (resources.files(__package__) / "report.html").read_text(encoding="utf-8")
+    values: dict[str, Any] = {
+        "title": title,
+        "facts": facts,
+        "baseline": baseline,
+        "columns": COLUMNS,
+        "rows": ranked(rows),
+        "cell": cell,
+        "figures": [(path.name, CAPTIONS[path.stem]) for path in figures if path.suffix == ".svg"],
+        "replays": replays,
+        "problems": problems,
+    }
+    return jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(text).render(values)

@@ -1,0 +1,81 @@
+"""The estimates of a comparison, and their table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from posse_training.compare.plays import Plays
+from posse_training.reports.statistics import Estimate
+
+Row = dict[str, Any]
+"""The estimates of one policy on one scenario."""
+COLUMNS: Final = {
+    "safe_score": "safe score",
+    "of_planner": "of the planner's",
+    "score": "score",
+    "contact_free": "contact-free",
+    "settled": "settled",
+    "difference": "difference",
+    "improvement": "better in",
+    "interquartile_mean": "IQM",
+    "bound": "bound",
+}
+"""Estimates and their headers, as the report shows them."""
+_SHORT: Final = ("safe_score", "of_planner", "contact_free", "difference", "improvement")
+"""Columns that fit into 80 characters."""
+
+
+def row_of(plays: Plays, reference: Plays | None) -> Row:
+    """Return the estimates of one policy on one scenario; differences are of the safe score, to the reference."""
+    return {
+        "scenario": plays.scenario.name,
+        "policy": plays.label,
+        "seeds": len(plays.results),
+        "safe_score": plays.mean("safe_score"),
+        "of_planner": None,  # filled in once the planner has played
+        "score": plays.mean("score"),
+        "contact_free": plays.share([result["contact_free"] == 1 for result in plays.results]),
+        "interquartile_mean": plays.interquartile_mean("safe_score"),
+        "bound": plays.mean("bound"),
+        "settled": plays.share([result.settled for result in plays.results]),
+        "difference": None if reference is None else plays.difference(reference),
+        "improvement": None if reference is None else plays.improvement(reference),
+    }
+
+
+def ranked(rows: Sequence[Row]) -> list[Row]:
+    """Return rows by scenario in the order of play, the best safe score first."""
+    played = list(dict.fromkeys(row["scenario"] for row in rows))
+    return sorted(rows, key=lambda row: (played.index(row["scenario"]), -row["safe_score"].value))
+
+
+def table(rows: Sequence[Row], title: str) -> Table:
+    """Return the most important estimates, each interval below its value."""
+    shown = Table(title=Text(title), box=box.HORIZONTALS, pad_edge=False, collapse_padding=True)
+    shown.add_column("policy", overflow="fold")
+    for name in _SHORT:
+        shown.add_column(COLUMNS[name].replace("the planner", "the\nplanner"), no_wrap=True)
+    before = None
+    for row in ranked(rows):
+        if row["scenario"] != before:
+            if before is not None:
+                shown.add_section()
+            shown.add_row(Text(row["scenario"], style="bold", overflow="fold"))
+        before = row["scenario"]
+        many = f" ({row['seeds']} training seeds)" if row["seeds"] > 1 else ""
+        shown.add_row(Text(f"{row['policy']}{many}"), *(Text(cell(name, row[name])) for name in _SHORT))
+    return shown
+
+
+def cell(name: str, value: Estimate | float | None) -> str:
+    """Return an estimate with its interval below it; shares of worlds are shown without."""
+    if isinstance(value, Estimate):
+        if name in ("contact_free", "improvement", "settled"):
+            return f"{100 * value.value:.1f} %"
+        return f"{value.value:.3f}\n[{value.low:.3f}, {value.high:.3f}]"
+    return "" if value is None else f"{value:.2f}"

@@ -1,0 +1,259 @@
+"""The leaderboard: ``posse submit`` plays and claims a score, ``posse verify`` plays fresh worlds and measures it.
+
+A standing is a row of ``benchmarks/standings.csv``. A submission is a folder with a table of one row, the claim,
+and the policy file, if the policy is one.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import secrets
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import tyro
+
+from posse import get_scenario, scenario_names
+from posse_baselines import Policy, load, policy_names
+from posse_baselines.files import write_atomically
+from posse_baselines.registry import is_code, ships_or_is_file
+from posse_training.errors import ResultFileError
+from posse_training.provenance import commit
+from posse_training.reports.evaluation import Results, evaluate
+from posse_training.reports.statistics import mean
+
+__all__ = ["Standing", "Verdict", "read_standings", "submit", "verify"]
+
+SEED: Final = 2026
+WORLDS: Final = 1000
+"""Seed of a claim's worlds, and the least number of worlds that is ranked; of the split ``test``."""
+SLACK: Final = 0.002
+"""What a claim may differ beyond sampling errors: worlds play out differently on another processor."""
+CLAIM: Final = "standing.csv"
+_TEXTS: Final = {
+    "label": (r"[A-Za-z0-9._ -]{1,60}", "1 to 60 letters, digits and '._ -'"),
+    "policy": (r"[A-Za-z0-9_][A-Za-z0-9._:-]{0,199}", "a name, a file name of letters, digits and '._-', or code"),
+    "scenario": (r"[a-z0-9-]{1,60}", "the name of a scenario"),
+    "split": (r"train|validation|test", "one of train, validation, test"),
+    "commit": (r"([0-9a-f]{7,40}\+?)?", "a commit's hash"),
+}
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a policy scores on a scenario: mean safe score with its 95 % interval, score, share without contact.
+
+    Raises:
+        ResultFileError: A number that no evaluation gives, or a text that a page could not show as it is.
+    """
+
+    label: str
+    policy: str
+    reads_state: bool
+    scenario: str
+    version: int
+    split: str
+    seed: int
+    worlds: int
+    safe_score: float
+    low: float
+    high: float
+    score: float
+    contact_free: float
+    commit: str
+
+    def __post_init__(self) -> None:
+        for name in _TEXTS:
+            check_text(name, getattr(self, name))
+        ordered = 0 <= self.low <= self.safe_score <= min(self.high, self.score) <= max(self.high, self.score) <= 1
+        if not (ordered and 0 <= self.contact_free <= 1 and min(self.version, self.worlds) >= 1 and self.seed >= 0):
+            raise ResultFileError(f"no evaluation gives these numbers: {self}")
+
+
+_KINDS: Final[dict[str, Callable[[str], Any]]] = {
+    "bool": lambda text: {"true": True, "false": False}[text],
+    "int": int,
+    "float": float,
+    "str": str,
+}
+_COLUMNS: Final = {field.name: _KINDS[str(field.type)] for field in fields(Standing)}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A claim, the standing measured on other worlds, and how far apart their safe scores may be."""
+
+    claim: Standing
+    measured: Standing
+    tolerance: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the claimed safe score agrees with the measured one."""
+        return abs(self.claim.safe_score - self.measured.safe_score) <= self.tolerance
+
+
+def check_text(name: str, value: str) -> None:
+    """Raise a ``ResultFileError`` for a text that the column ``name`` cannot hold."""
+    pattern, allowed = _TEXTS[name]
+    if not re.fullmatch(pattern, value):
+        raise ResultFileError(f"{name}={value!r:.80} must be {allowed}")
+
+
+def standing_of(label: str, text: str, policy: Policy, results: Results) -> Standing:
+    """Return the row of an evaluation; ``text`` is what the policy was loaded from."""
+    safe, played = mean(results["safe_score"]), results.scenario
+    return Standing(
+        label=label,
+        policy=text,
+        reads_state=bool(policy.reads_state),
+        scenario=played.name,
+        version=played.version,
+        split=results.split,
+        seed=results.seed,
+        worlds=results.episodes,
+        safe_score=round(safe.value, 6),
+        low=round(safe.low, 6),
+        high=round(safe.high, 6),
+        score=round(float(results["score"].mean()), 6),
+        contact_free=round(float(results["contact_free"].mean()), 6),
+        commit=commit() or "",
+    )
+
+
+def standings_text(rows: Iterable[Standing]) -> str:
+    """Return a table as CSV."""
+    writer = csv.DictWriter(out := io.StringIO(), _COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({**asdict(row), "reads_state": str(row.reads_state).lower()} for row in rows)
+    return out.getvalue()
+
+
+def read_standings(path: str | Path) -> list[Standing]:
+    """Read and check a table; it loads no policy.
+
+    Raises:
+        ResultFileError: The file is missing, has other columns, or an invalid value; its line is named.
+    """
+    number = 1
+    try:
+        header, *lines = csv.reader(Path(path).read_text(encoding="utf-8").splitlines(), strict=True)
+        if header != list(_COLUMNS):
+            raise ValueError(f"the columns must be {','.join(_COLUMNS)}")
+        rows = []
+        for number, line in enumerate(lines, 2):  # noqa: B007 (for the message)
+            values: dict[str, Any] = {n: kind(x) for (n, kind), x in zip(_COLUMNS.items(), line, strict=True)}
+            rows.append(Standing(**values))
+    except (OSError, ValueError, KeyError, csv.Error) as error:
+        raise ResultFileError(f"{path}, line {number}: {error}") from error
+    return rows
+
+
+def submit(
+    policy: Annotated[str, tyro.conf.Positional],
+    out: Path,
+    scenario: str = "smart",
+    label: str | None = None,
+    worlds: int = WORLDS,
+    seed: int = SEED,
+    progress: bool = True,
+) -> Standing:
+    """Play a scenario for the leaderboard, on its split ``test``, and write the claim.
+
+    Args:
+        policy: A name, a policy file, which is copied, or ``package.module:Class``.
+        out: New or empty folder to write to.
+        scenario: Name of the scenario.
+        label: Name on the leaderboard; default: the policy's.
+        worlds: Number of worlds; 1,000 or more are ranked.
+        seed: Seed of the worlds.
+        progress: Whether to show a bar.
+
+    Raises:
+        ResultFileError: An invalid label or name, or a folder that is not empty; nothing is played.
+        PolicyError: An unknown or damaged policy, or one that does not fit the scenario.
+        ScenarioError: An unknown scenario, an invalid seed.
+        TrainedSplitError: The policy was trained on these worlds.
+    """
+    loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
+    text = Path(policy).name if is_file else policy
+    content = Path(policy).read_bytes() if is_file else None
+    label = label or (loaded.name if is_file else policy.replace(":", "."))
+    check_text("label", label)
+    check_text("policy", text)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise ResultFileError(f"{out} exists and is not an empty folder: choose another --out")
+    results = evaluate(loaded, scenario, worlds, seed, progress=progress)
+    claim = standing_of(label, text, loaded, results)
+    out.mkdir(parents=True, exist_ok=True)
+    if content is not None:
+        write_atomically(out / text, content)
+    write_atomically(out / CLAIM, standings_text([claim]).encode())
+    return claim
+
+
+def verify(
+    folder: Annotated[Path, tyro.conf.Positional],
+    run_code: bool = False,
+    worlds: int = WORLDS,
+    seed: int | None = None,
+    progress: bool = True,
+) -> Verdict:
+    """Play a submission's policy on worlds of a fresh seed and compare with its claim.
+
+    The claim holds within 0.002 and the sampling error of the difference of two means, h sqrt(1 + W / W'): h is the
+    half-width of the 95 % interval measured over W worlds, W' the number of worlds of the claim.
+
+    Args:
+        folder: Folder that ``posse submit`` wrote.
+        run_code: Import a policy that is code. It runs with all your rights: read it first.
+        worlds: Number of worlds.
+        seed: Seed of the worlds; default: drawn now, so that no submission can know them.
+        progress: Whether to show a bar.
+
+    Raises:
+        ResultFileError: An invalid claim, code without ``run_code``, or another version of the scenario.
+        PolicyError: A policy that is missing, damaged, or does not fit.
+    """
+    path = folder / CLAIM
+    rows = read_standings(path)
+    if len(rows) != 1:
+        raise ResultFileError(f"{path} must have one row, it has {len(rows)}")
+    claim, text = rows[0], rows[0].policy
+    if claim.scenario not in scenario_names() or get_scenario(claim.scenario).version != claim.version:
+        raise ResultFileError(f"{path}: this posse has no scenario {claim.scenario!r} of version {claim.version}")
+    if ":" in text and not run_code:
+        raise ResultFileError(f"{path}: the policy is code, {text}: read it, then pass --run-code")
+    if ":" not in text and not ships_or_is_file(text):
+        raise ResultFileError(f"{path}: policy={text!r} is neither shipped nor a policy file beside it, nor code")
+    policy = load(text if ":" in text or text in policy_names() else str(folder / text))
+    drawn = secrets.randbelow(2**31) if seed is None else seed
+    results = evaluate(policy, claim.scenario, worlds, drawn, progress=progress)
+    measured = standing_of(claim.label, text, policy, results)
+    error = (measured.high - measured.low) / 2 * math.sqrt(1 + worlds / claim.worlds)
+    return Verdict(claim, measured, SLACK + error)
+
+
+def submit_command(arguments: Sequence[str]) -> None:
+    """``posse submit``: play, write and print the claim."""
+    print(_shown(tyro.cli(submit, prog="posse submit", args=arguments)))
+
+
+def verify_command(arguments: Sequence[str]) -> int:
+    """``posse verify``: play, print the verdict and the row for the leaderboard; 1 if the claim does not hold."""
+    verdict = tyro.cli(verify, prog="posse verify", args=arguments)
+    difference = verdict.claim.safe_score - verdict.measured.safe_score
+    print(f"claimed:  {_shown(verdict.claim)}\nmeasured: {_shown(verdict.measured)}")
+    print("holds" if verdict.holds else "DOES NOT HOLD", f"({difference:+.4f}, allowed {verdict.tolerance:.4f})")
+    print("the measured row:", standings_text([verdict.measured]).splitlines()[1])
+    return 0 if verdict.holds else 1
+
+
+def _shown(row: Standing) -> str:
+    interval = f"{row.safe_score:.4f} [{row.low:.4f}, {row.high:.4f}]"
+    return f"{row.label} on {row.scenario}: safe score {interval}, {row.worlds:,} worlds, seed {row.seed}"

@@ -1,0 +1,470 @@
+"""``posse league``: trackers and targets that are trained in turns against the other side's past.
+
+Everything is kept in the folder, so that the same command resumes a league that was interrupted at any moment.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from posse import get_scenario
+from posse_baselines import load, load_target
+from posse_baselines.files import replacing, write_atomically
+from posse_training.errors import RunFolderError, SettingsError, require
+from posse_training.files import InUseError, locked, read_json
+from posse_training.reports.evaluation import evaluate
+from posse_training.reports.results import Results
+from posse_training.reports.statistics import Estimate
+from posse_training.runs.defaults import default_settings
+from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
+from posse_training.runs.settings import TrainSettings, read_settings
+
+FILE: Final = "league.json"
+MATRIX: Final = "matrix.csv"
+SUMMARY: Final = "summary.json"
+TEAM: Final = "trackers"
+TARGET: Final = "target"
+OTHER: Final = {TEAM: TARGET, TARGET: TEAM}
+TEST_SEED: Final = 7
+CHOICE: Final = (1, 32)
+"""Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
+_SHARES: Final = 8
+"""Parts that the worlds are divided into among the opponents, about."""
+_FREE: Final = ("generations", "responses", "response_steps", "episodes", "folder")
+"""Settings that the command that resumes a league may change."""
+_ESTIMATES: Final = ("score", "safe_score", "contact_free")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeagueSettings:
+    """Train trackers and targets in turns against the other side's past. The same command again resumes a league.
+
+    Raises:
+        SettingsError: A value out of its range.
+    """
+
+    scenario: str = "duel"
+    """Scenario of all plays."""
+    generations: int = 8
+    """Generations in all: in each a target is trained, then a team."""
+    opponents: Literal["pfsp", "fictitious"] = "pfsp"
+    """How the worlds are divided among the other side's past. fictitious: evenly; pfsp: an opponent
+    that is harder for the present policy gets more."""
+    teams: tuple[str, ...] = ("ddcs-tuned",)
+    """Teams at the beginning: names or files."""
+    targets: tuple[str, ...] = ("smart",)
+    """Targets at the beginning: names or files."""
+    target_steps: int = 2_000_000
+    """Steps of each target's training."""
+    team_steps: int = 4_000_000
+    """Steps of each team's training, of one tracker each."""
+    responses: Literal["last", "all", "none"] = "last"
+    """For which generations a best response is trained, which says how much it can be exploited."""
+    response_steps: int = 2_000_000
+    """Steps of the training of a best response."""
+    episodes: int = 200
+    """Test worlds of each pair of a team and a target."""
+    seed: int = 1
+    """Seed of the trainings."""
+    overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
+    """Settings of the scenario to change, by name."""
+    training: dict[str, bool | int | float | str] = field(default_factory=dict)
+    """Settings of the trainings to change, by name, such as num_worlds."""
+    folder: Path | None = None
+    """Folder; default: runs/league/SCENARIO."""
+
+    def __post_init__(self) -> None:
+        least = dict.fromkeys(("generations", "target_steps", "team_steps", "response_steps"), 1)
+        for name, low in {**least, "episodes": 2, "seed": 0}.items():
+            if getattr(self, name) < low:
+                raise SettingsError(f"{name}={getattr(self, name)!r:.80} must be a whole number of {low} or more")
+        for name in ("teams", "targets"):
+            named = getattr(self, name)
+            if not named or any("," in each or not each for each in named):
+                raise SettingsError(f"{name}={named!r:.80} must name one or more, without commas")
+            if len({label_of(each) for each in named}) < len(named):
+                raise SettingsError(
+                    f"{name}={named!r:.80} must have different names: rename the files, or leave one out"
+                )
+        if "," in str(self.path):
+            raise SettingsError(f"the folder {str(self.path)!r:.80} must have no comma in its name")
+
+    @property
+    def path(self) -> Path:
+        """The folder that the league is kept in."""
+        return self.folder or Path("runs/league") / self.scenario
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the settings as plain values, without the folder."""
+        values = json.loads(json.dumps({**dataclasses.asdict(self), "folder": None}))
+        return {name: value for name, value in values.items() if name != "folder"}
+
+
+@dataclass(frozen=True)
+class Member:
+    """A team or a target: its name in tables, and what loads it.
+
+    Attributes:
+        label: Its name in tables.
+        policy: What loads it: a name or a file.
+        run: The folder of its training; ``None``: it was there at the beginning.
+    """
+
+    label: str
+    policy: str
+    run: Path | None = None
+
+    @property
+    def trained(self) -> bool:
+        """Whether its training has ended, or it needed none."""
+        return self.run is None or (self.run / LAST).is_file()
+
+
+Pair = tuple[Member, Member]
+"""A team and a target."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a team scores against a target: score and safe score of the team, share of episodes without contact."""
+
+    team: str
+    target: str
+    score: Estimate
+    safe_score: Estimate
+    contact_free: Estimate
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the cell as plain values."""
+        return {
+            "team": self.team,
+            "target": self.target,
+            **{name: getattr(self, name).to_dict() for name in _ESTIMATES},
+        }
+
+
+@dataclass(frozen=True)
+class Exploited:
+    """What a best response gains against a member.
+
+    Attributes:
+        side: The member's side.
+        label: The member's label.
+        before: Its play against the strongest opponent of the league.
+        after: Its play against the best response.
+    """
+
+    side: str
+    label: str
+    before: Cell
+    after: Cell
+
+    @property
+    def gain(self) -> float:
+        """By how much the response moves the team's score in its own favour."""
+        change = self.after.score.value - self.before.score.value
+        return -change if self.side == TEAM else change
+
+
+@dataclass(frozen=True)
+class League:
+    """All results of a league."""
+
+    settings: LeagueSettings
+    teams: list[Member]
+    targets: list[Member]
+    cells: list[Cell]
+    exploited: list[Exploited]
+
+    def at(self, team: str, target: str) -> Cell:
+        """Return what a team scores against a target, by their labels."""
+        return next(c for c in self.cells if (c.team, c.target) == (team, target))
+
+
+def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
+    """Train the generations that are missing, play all against all, train best responses.
+
+    Args:
+        settings: All that the result depends on.
+        console: Where to show progress.
+
+    Raises:
+        PolicyError, ScenarioError: An unknown policy or scenario; nothing is made.
+        RunFolderError: The folder is in use, or has a league of other settings.
+        CheckpointError: A checkpoint cannot be written or read.
+    """
+    get_scenario(settings.scenario, **settings.overrides)
+    for team in settings.teams:
+        load(team)
+    for target in settings.targets:
+        load_target(target)
+    try:
+        with locked(settings.path):
+            _keep(settings)
+            found = _Run(settings, console or Console()).play()
+            write_results(found)
+            return found
+    except InUseError as error:
+        raise RunFolderError(f"league {error}: wait for it, or choose another --folder") from error
+
+
+def _keep(settings: LeagueSettings) -> None:
+    """Write the settings to the league's folder, or check that they are those that it has."""
+    path, mine = settings.path / FILE, settings.to_dict()
+    if path.is_file():
+        try:
+            theirs = read_json(path)
+            differing = [n for n in mine if n not in _FREE and mine[n] != theirs[n]]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise RunFolderError(f"{path} is damaged: {error!r:.200}") from error
+        if differing:
+            shown = ", ".join(f"{n}={theirs[n]!r:.60}" for n in differing)
+            raise RunFolderError(
+                f"{settings.path} has a league with {shown}: go on with these, or choose another --folder"
+            )
+    write_atomically(path, (json.dumps(mine, indent=2) + "\n").encode())
+
+
+class _Run:
+    """A league while it is played."""
+
+    def __init__(self, settings: LeagueSettings, console: Console) -> None:
+        self.settings, self.console = settings, console
+        self.scenario = get_scenario(settings.scenario, **settings.overrides)
+
+    def play(self) -> League:
+        """Generations, cross-play, best responses."""
+        s = self.settings
+        for generation in range(1, s.generations + 1):
+            for side in (TARGET, TEAM):
+                self._generation(side, generation)
+        teams, targets = self._members(TEAM, s.generations), self._members(TARGET, s.generations)
+        cells = self._cells([(team, target) for team in teams for target in targets])
+        return League(s, teams, targets, cells, self._exploit(teams, targets))
+
+    def _generation(self, side: str, generation: int) -> None:
+        """Train the member of a side, against the other's past and present."""
+        s = self.settings
+        *own, trained = self._members(side, generation)
+        if trained.trained:
+            return
+        others = self._members(OTHER[side], generation - (side == TARGET))
+        if s.opponents == "fictitious" or len(others) == 1:
+            parts = dict.fromkeys((other.policy for other in others), 1)
+        else:
+            parts = shares(self._difficulties(side, own[-1], others), others[-1].policy)
+        steps = s.target_steps if side == TARGET else s.team_steps
+        self._train(side, trained, against(parts), steps, own)
+
+    def _exploit(self, teams: list[Member], targets: list[Member]) -> list[Exploited]:
+        """Train best responses to the last members, or to all, and say what they gain."""
+        s = self.settings
+        first = {"none": s.generations, "last": s.generations - 1, "all": 0}[s.responses]
+        found = []
+        for side, of, others in ((TARGET, teams, targets), (TEAM, targets, teams)):
+            for to in [m for m in of if m.run is not None][first:]:
+                run = s.path / "responses" / f"{side}-to-{to.label}"
+                best = Member(f"response to {to.label}", str(run / BEST), run)
+                if not best.trained:
+                    self._train(side, best, to.policy, s.response_steps, others)
+                (after,) = self._cells([_pair(side, to, best)])
+                known = self._cells([_pair(side, to, other) for other in others])
+                # The strongest known opponent: a target's lowest score, a team's highest.
+                pick = min if side == TARGET else max
+                found.append(Exploited(OTHER[side], to.label, pick(known, key=lambda cell: cell.score.value), after))
+        return found
+
+    def _members(self, side: str, generations: int) -> list[Member]:
+        """Return those of a side that were there at the beginning, and those of its first generations."""
+        s = self.settings
+        found = [Member(label_of(name), name) for name in (s.teams if side == TEAM else s.targets)]
+        for generation in range(1, generations + 1):
+            run = s.path / f"generation-{generation:02d}" / side
+            found.append(Member(f"{side}-{generation}", str(run / BEST), run))
+        return found
+
+    def _train(self, side: str, trained: Member, opponents: str, steps: int, own: Sequence[Member]) -> None:
+        """Train a member, or go on with that; it begins with the networks of its side's latest."""
+        from posse_training.runs.train import train  # torch
+
+        s, run = self.settings, trained.run
+        assert run is not None
+        self.console.print(f"{trained.label}: {run}", markup=False)
+        if (run / SETTINGS).is_file():
+            train(replace(read_settings(run / SETTINGS), folder=run), console=self.console, resume=True)
+            return
+        start = next((m.run for m in reversed(own) if m.run is not None), None)
+        values = {
+            **default_settings(s.scenario, side=side).to_dict(),
+            "steps": steps,
+            "seed": s.seed,
+            "overrides": s.overrides,
+            "against": opponents,
+            "start": None if start is None else str(start),
+            "folder": str(run),
+            "evaluate_every": max(1, steps // 4),
+            "checkpoint_every": max(1, steps // 8),
+            "tensorboard": False,
+            "beside": None,
+        }
+        values |= {} if start is None else {"imitate": None}
+        train(TrainSettings.from_dict({**values, **s.training}), console=self.console)
+
+    def _difficulties(self, side: str, own: Member, others: Sequence[Member]) -> dict[str, float]:
+        """Return how hard each opponent is for a member, in [0, 1], by what loads it.
+
+        For a team 1 less its score; for a target the team's score.
+        """
+        seed, worlds = CHOICE
+        found = {}
+        for other in others:
+            pair = (other, own) if side == TARGET else (own, other)
+            score = float(self._play(pair, worlds, seed, "validation")["score"].mean())
+            found[other.policy] = score if side == TARGET else 1 - score
+        return found
+
+    def _cells(self, pairs: Sequence[Pair]) -> list[Cell]:
+        """Return what the team of each pair scores against its target; those played before are read."""
+        return [self._cell(pair) for pair in pairs]
+
+    def _cell(self, pair: Pair) -> Cell:
+        team, target = pair
+        name = f"{team.label}-{target.label}".replace(" ", "-").replace("/", "-")
+        path = self.settings.path / "cross-play" / f"{name}-{self.settings.episodes}.json"
+        if not path.is_file():
+            results = self._play(pair, self.settings.episodes, TEST_SEED, "test")
+            found = Cell(team.label, target.label, *(results.estimate(name) for name in _ESTIMATES))
+            path.parent.mkdir(exist_ok=True)
+            write_atomically(path, (json.dumps(found.to_dict(), indent=2) + "\n").encode())
+        values = read_json(path)
+        return Cell(values["team"], values["target"], *(Estimate(**values[name]) for name in _ESTIMATES))
+
+    def _play(self, pair: Pair, episodes: int, seed: int, split: str) -> Results:
+        team, target = pair
+        self.console.print(f"playing {team.label} against {target.label}", markup=False)
+        return evaluate(team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False)
+
+
+def _pair(side: str, to: Member, other: Member) -> Pair:
+    """Return a member and its opponent, of a side, as a team and a target."""
+    return (to, other) if side == TARGET else (other, to)
+
+
+def label_of(name: str) -> str:
+    """Return how tables name one that was there at the beginning: its name, or that of its file."""
+    return Path(name).stem if Path(name).suffix else name
+
+
+def shares(difficulties: Mapping[str, float], latest: str) -> dict[str, int]:
+    """Return how many of about eight parts of the worlds each opponent gets.
+
+    In proportion to its difficulty, in [0, 1]; the latest opponent gets one at least.
+    """
+    total = sum(difficulties.values()) or 1.0
+    parts = {name: round(_SHARES * d / total) for name, d in difficulties.items()}
+    parts[latest] = max(1, parts[latest])
+    return {name: part for name, part in parts.items() if part}
+
+
+def against(parts: Mapping[str, int]) -> str:
+    """Return opponents and their shares as the setting ``against`` has them."""
+    return ",".join(name for name, part in parts.items() for _ in range(part))
+
+
+def write_results(found: League) -> None:
+    """Write matrix and summary to the league's folder."""
+    folder = found.settings.path
+    writer = csv.writer(text := io.StringIO(newline=""))
+    writer.writerow(["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"])
+    for c in found.cells:
+        s = c.score
+        values = [s.value, s.low, s.high, c.safe_score.value, c.contact_free.value]
+        writer.writerow([c.team, c.target, *(f"{v:.4f}" for v in values), s.count])
+    write_atomically(folder / MATRIX, text.getvalue().encode())
+    summary: dict[str, Any] = {
+        "settings": found.settings.to_dict(),
+        "cells": [cell.to_dict() for cell in found.cells],
+        "exploited": [
+            {"side": e.side, "label": e.label, "gain": e.gain, "before": e.before.to_dict(), "after": e.after.to_dict()}
+            for e in found.exploited
+        ],
+    }
+    write_atomically(folder / SUMMARY, (json.dumps(summary, indent=2) + "\n").encode())
+
+
+def draw_matrix(found: League) -> list[Path]:
+    """Write the matrix of scores as PNG and SVG to the league's folder; return the files."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    from posse_training.reports.pictures.style import RC, WIDTH, note, plain
+
+    s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
+    scores = [[found.at(a, b).score for b in targets] for a in teams]
+    with mpl.rc_context({**RC, "axes.grid": False}):
+        figure = Figure(figsize=(WIDTH, 1.4 + 0.42 * len(teams)), layout="constrained")
+        axis = figure.subplots()
+        values = [[score.value for score in row] for row in scores]
+        image = axis.imshow(values, vmin=0, vmax=1, cmap="cividis", aspect="auto")
+        axis.set_xticks(range(len(targets)), targets, rotation=35, ha="right")
+        axis.set_yticks(range(len(teams)), teams)
+        axis.set(xlabel="target", ylabel="team")
+        for i, row in enumerate(scores):
+            for j, score in enumerate(row):
+                text = f"{score.value:.2f}\n±{(score.high - score.low) / 2:.2f}"
+                colour = "white" if score.value < 0.55 else "black"
+                axis.text(j, i, text, ha="center", va="center", color=colour, fontsize=7)
+        figure.colorbar(image, label="score of the team", shrink=0.8)
+        changed = "".join(f", {name}={value}" for name, value in s.overrides.items())
+        played = f"{s.scenario} v{get_scenario(s.scenario).version}{changed}: {s.episodes:,} worlds a pair"
+        note(figure, plain(f"{played}, test split, seed {TEST_SEED}; training seed {s.seed}"))
+        files = [s.path / "matrix.png", s.path / "matrix.svg"]
+        for path in files:
+            with replacing(path) as part:
+                figure.savefig(part, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+    return files
+
+
+def tables(found: League) -> list[Table]:
+    """Return the matrix and what the best responses gain, as tables."""
+    matrix = Table("team", title="score of the team (row) against the target (column), 95 % intervals")
+    for target in found.targets:
+        matrix.add_column(target.label)
+    for team in found.teams:
+        scores = [found.at(team.label, target.label).score for target in found.targets]
+        matrix.add_row(team.label, *(f"{s.value:.2f}\n[{s.low:.2f}, {s.high:.2f}]" for s in scores))
+    exploited = Table(
+        "member", "strongest opponent so far", "score", "with the response", "gain", title="best responses"
+    )
+    for e in found.exploited:
+        opponent = e.before.target if e.side == TEAM else e.before.team
+        exploited.add_row(e.label, opponent, str(e.before.score), str(e.after.score), f"{e.gain:+.3f}")
+    return [matrix, exploited] if found.exploited else [matrix]
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Play a league, and print its matrix."""
+    settings = tyro.cli(LeagueSettings, prog="posse league", args=arguments)
+    require("training", "torch", "stable_baselines3")
+    try:
+        found = play_league(settings)
+    except KeyboardInterrupt:
+        sys.stderr.write("\nto resume: run the same command again with the same --folder\n")
+        raise
+    console = Console(width=None if sys.stdout.isatty() else 240)
+    for table in tables(found):
+        console.print(table)
+    for path in draw_matrix(found):
+        print(path)

@@ -1,1 +1,0 @@
-"""Policies that ship with the package: chosen, saved with a card, and checked."""
