@@ -9,7 +9,6 @@ from functools import cache
 from typing import Any
 
 import posse.numeric
-from posse.numeric.blocks import END
 
 _ROOMS = ("posse_baselines.laws", "posse_baselines.ddcs")
 
@@ -20,7 +19,7 @@ def undecorated(function: Callable[..., Any] | None = None, **_: Any) -> Any:
 
 
 def _worlds_of(_: int, blocks: posse.numeric.Blocks) -> range:
-    return range(int(blocks[0, END]))
+    return range(int(blocks[-1]))
 
 
 PLAIN: dict[str, Any] = {"compiled": undecorated, "kernel": undecorated, "worlds_of": _worlds_of}

@@ -1,8 +1,8 @@
-"""Array types shared by kernels and their callers."""
+"""Array types and constants shared by kernels and their callers."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,13 @@ Records = npt.NDArray[Any]
 """A structured array, or a row of one."""
 FloatArray = npt.NDArray[np.float32]
 BoolArray = npt.NDArray[np.bool_]
+
+# Compiled code calculates in float32 only if its constants are float32.
+ZERO: Final = np.float32(0.0)
+HALF: Final = np.float32(0.5)
+ONE: Final = np.float32(1.0)
+TINY: Final = np.float32(1e-9)
+"""Less than any length or time that matters; keeps divisors from zero."""
 
 
 class OwnArrays:

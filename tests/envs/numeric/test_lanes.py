@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posse.numeric.compiling import kernel
-from posse.numeric.simd.lanes import (
+from posse.numeric.compile import kernel
+from posse.numeric.lanes import (
     WIDTH,
     bits,
     choose,

@@ -1,4 +1,4 @@
-"""Compilation of :mod:`posse.numeric.simd.lanes` to LLVM vectors of eight."""
+"""Compilation of :mod:`posse.numeric.lanes` to LLVM vectors of eight."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
 
-from posse.numeric.simd.lanes import (
+from posse.numeric.lanes import (
     WIDTH,
     bits,
     choose,
