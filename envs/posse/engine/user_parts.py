@@ -68,7 +68,7 @@ def _returned(function: Any) -> list[Any]:
 
 
 def _fits(found: Any, returns: str) -> bool:
-    parts = list(found) if isinstance(found, types.BaseTuple) else []
+    parts = [*found] if "Tuple" in type(found).__name__ else []
     numbers = all(isinstance(each, types.Number | types.Boolean | LanesType) for each in parts or [found])
     if returns == "nothing":
         return isinstance(found, types.NoneType)

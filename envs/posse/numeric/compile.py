@@ -40,7 +40,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
 import posse.numeric.lane_code  # noqa: F401 (registers lanes with numba)
-from posse.numeric.stamp import digest, stamp
+from posse.numeric.stamp import describe, digest, stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -69,7 +69,7 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
     ``@compiled(seldom=True)`` never does: long and rarely called functions would crowd the instruction cache.
     """
     if function is None:
-        return functools.partial(compiled, seldom=seldom)  # type: ignore[return-value]
+        return functools.partial(compiled, seldom=seldom)
     return function if UNCOMPILED else cast("F", _Function(function, {**_OPTIONS, "forceinline": not seldom}))
 
 
@@ -81,7 +81,7 @@ def kernel(function: F) -> F:
     """
     if UNCOMPILED:
         return function
-    dispatcher = CPUDispatcher(function, {}, _OPTIONS, _KernelCompiler)
+    dispatcher: Any = CPUDispatcher(function, {}, _OPTIONS, _KernelCompiler)
     dispatcher._cache = _Cache(function)
     return cast("F", dispatcher)
 
@@ -114,7 +114,7 @@ class _Cache(NullCache):
     def _path(self, sig: Any, target: Any) -> tuple[Path, bytes]:
         """Return the file for argument types and a processor, and the hash that it begins with."""
         f = self._function
-        key = repr((stamp(f), f.__module__, f.__qualname__, list(map(_described, sig)), target)).encode()
+        key = repr((stamp(f), f.__module__, f.__qualname__, describe(sig), target)).encode()
         name = hashlib.sha256(key)
         return _folder() / f"{f.__name__}-{name.hexdigest()[:32]}.kernel", name.digest()
 
@@ -144,11 +144,6 @@ def _folder() -> Path:
     user = os.environ.get("XDG_CACHE_HOME")
     chosen = os.environ.get("POSSE_CACHE_DIR") or (Path(user) if user else Path.home() / ".cache") / "posse"
     return Path(chosen).absolute()
-
-
-def _described(kind: Any) -> Any:
-    """Return a type's name, with the fields of named tuples, which numba's name lacks."""
-    return str(kind), digest(getattr(kind, "instance_class", None)), list(map(_described, getattr(kind, "types", ())))
 
 
 @functools.cache  # once per process

@@ -10,7 +10,7 @@ import hashlib
 import importlib.metadata
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any, Final
@@ -43,6 +43,11 @@ def stamp(*functions: Callable[..., Any]) -> str:
     """
     _known.clear()
     return _hash(_VERSIONS, _SOURCES, list(map(digest, functions))).hex()
+
+
+def describe(kinds: Iterable[Any]) -> list[Any]:
+    """Return the names of numba's types, with the fields of named tuples, which those names lack."""
+    return [(str(k), digest(getattr(k, "instance_class", None)), describe(getattr(k, "types", ()))) for k in kinds]
 
 
 def _hash(*parts: object) -> bytes:

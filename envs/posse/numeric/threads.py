@@ -6,7 +6,8 @@ import contextlib
 import functools
 import os
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
+from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 import numpy as np
@@ -55,29 +56,42 @@ def over_worlds(
 ) -> list[Any]:
     """Call ``kernel(*arguments, thread, blocks)`` in up to ``most`` threads; return the results by thread.
 
-    Each call takes the worlds of :func:`worlds_of`. An exception, such as a signal handler's, propagates when no
-    thread is at work.
+    Each call takes the worlds of :func:`worlds_of`. An exception, such as a signal handler's, propagates when all
+    shares are done.
     """
     threads = 1 if UNCOMPILED else threads_for(num_worlds, robots_each, most)
     blocks = divide(num_worlds, threads)
-    shares: list[Future[Any]] = [Future() for _ in range(threads - 1)]
+    # Not futures and their wait(), which an interrupt can leave locked.
+    outcomes: dict[int, tuple[Any, BaseException | None]] = {}
+    in_pool: dict[int, bool] = {}  # whoever is first to enter a share does it
+    ended: SimpleQueue[None] = SimpleQueue()
 
     def work(thread: int) -> None:
-        share = shares[thread - 1]
-        if share.set_running_or_notify_cancel():
+        if in_pool.setdefault(thread, True):
             try:
-                share.set_result(kernel(*arguments, thread, blocks))
+                outcomes[thread] = kernel(*arguments, thread, blocks), None
             except BaseException as error:
-                share.set_exception(error)
+                outcomes[thread] = None, error
+            ended.put(None)
+
+    def finish() -> None:
+        for thread in range(threads):
+            if not in_pool.setdefault(thread, False) and thread not in outcomes:
+                outcomes[thread] = None, None  # begun
+                outcomes[thread] = kernel(*arguments, thread, blocks), None
+        while len(outcomes) < threads:
+            with contextlib.suppress(Empty):
+                ended.get(timeout=0.01)
 
     try:
         with contextlib.suppress(RuntimeError):  # no thread can be started
             for thread in range(1, threads):
                 _pool().submit(work, thread)
-        results = [kernel(*arguments, 0, blocks)]
-        for thread, share in enumerate(shares, 1):
-            mine = share.cancel()  # not begun, since the pool is busy
-            results.append(kernel(*arguments, thread, blocks) if mine else share.result())
-        return results
-    finally:
-        wait([share for share in shares if not share.cancel()])
+        finish()
+    except BaseException:
+        finish()
+        raise
+    for _, error in outcomes.values():
+        if error is not None:
+            raise error
+    return [outcomes[thread][0] for thread in range(threads)]
