@@ -8,8 +8,8 @@ Three of numba's inner parts are overridden; ``tests/envs/numeric/test_compile.p
 What each gains, of 20 s until the first step with nothing cached, and in speed:
 
 =================== ================================================================================================
-``JITCodeLibrary``  functions are optimised only in the kernel, 16 s; no short loop is vectorised, 6 s and 5 % faster
-``CPUDispatcher``   a function is compiled once for all integers, not for each constant, 9 s
+``JITCodeLibrary``  functions are optimised only in the kernel, 12 s; no short loop is vectorised, 6 s and 5 % faster
+``CPUDispatcher``   a function is compiled once for all integers, not for each constant, 7 s
 ``CompilerBase``    chooses the library, and says that arrays do not overlap (``noalias``), up to 7 % faster
 =================== ================================================================================================
 """

@@ -103,7 +103,7 @@ def test_only_what_is_marked_is_inlined_and_arrays_do_not_overlap(
 MODULES = {
     "gains": "A = 1.0\nB = 2.0\n",
     "deep/__init__": "",
-    "deep/gains": "from posse.numeric import compiled\n\n@compiled\ndef helper(x):\n    return x + 4.0\n",
+    "deep/gains": "from posse.numeric import compiled\n\nC = 1.0\n\n@compiled\ndef helper(x):\n    return x + 4.0\n",
     "pairs": "from typing import NamedTuple\n\nclass Pair(NamedTuple):\n    a: float\n    b: float\n",
     "lists": "LIMITS = ((1.0, (2.0, 3.0)), 4.0)\n",
     "plain": "import numba\n\nSHIFT = 1.0\n\n@numba.njit\ndef shift(x):\n    return x + SHIFT\n",
@@ -116,7 +116,7 @@ from posse.numeric import compiled, kernel
 
 @compiled
 def first(x):
-    return x * gains.A
+    return x * gains.A * deep.gains.C
 
 @compiled
 def second(x, step=0.5):
@@ -132,7 +132,7 @@ print(answer, answer == total.py_func(1.0, Pair(1.0, 7.0)), sum(total.stats.cach
 """
 EDITS = {
     "the second of two attributes of a module": ("gains", "B = 2.0", "B = 20.0"),
-    "a helper in a module of a package": ("deep/gains", "x + 4.0", "x + 5.0"),
+    "a helper of a module that was named before": ("deep/gains", "x + 4.0", "x + 5.0"),
     "the order of a named tuple's fields": ("pairs", "    a: float\n    b: float", "    b: float\n    a: float"),
     "a constant in nested tuples": ("lists", "(2.0, 3.0)", "(2.0, 30.0)"),
     "a global of a function of numba's own": ("plain", "SHIFT = 1.0", "SHIFT = 11.0"),
@@ -183,7 +183,7 @@ def test_a_kernel_is_compiled_again_when_anything_that_it_reaches_changes(
 
 def test_what_a_kernel_does_not_reach_compiles_nothing(cached: Path, tmp_path: Path) -> None:
     write(tmp_path)
-    (tmp_path / "gains.py").write_text("# A comment, and another number.\nA = 1.0\nB = 2.0\nC = 3.0\n")
+    (tmp_path / "gains.py").write_text("# A comment, and another number.\nA = 1.0\nB = 2.0\nUNUSED = 3.0\n")
     assert play(tmp_path, cached / "cache")[0][1:] == ["True", "1"]
 
 
