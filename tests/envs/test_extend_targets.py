@@ -133,7 +133,7 @@ MISTAKES = {
     "another parameter": ({"more": ", team"}, r"own \(main.py:4\): its parameters are \(c, w, team\), not \(c, w, tr"),
     "an unknown field": (
         {"line": "w.goal_cos = w.headig_cos"},
-        r"own \(main.py:4\): line 7: w has no field 'headig_cos'; it has heading_cos",
+        r"own \(main.py:4\): line 7: unknown field 'headig_cos' \(did you mean heading_cos",
     ),
     "memory that is taken": (
         {"declaration": '"own", memory=[posse.Memory("speed", "1", 0, 1, "?")]'},

@@ -12,9 +12,9 @@ from posse.engine.arguments import action_error, as_array, real_numbers, to_floa
 from posse.engine.kernels import LOOK, STEP, TO_CLIP, Results, bad_action, kernel_of, tables_of
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
-from posse.engine.user_parts import check_fields, check_functions
+from posse.engine.user_parts import mistakes_named
 from posse.engine.world_views import WorldViews
-from posse.numeric import Blocks, BoolArray, FloatArray, checked_before_compiling, direct, run_threads, threads_for
+from posse.numeric import Blocks, BoolArray, FloatArray, direct, over_worlds, threads_for
 from posse.rules.scratch import new_scratch
 from posse.signals.parts import parts_for
 
@@ -32,7 +32,6 @@ class Stepping(WorldViews):
         scenario, (num_worlds, _, size) = self.scenario, self.observation_shape
         rows = scenario.num_agents
         parts = parts_for(scenario)
-        check_fields(parts, self._arrays)
         self._tables = tables_of(scenario)
         self._observations = Recycler((num_worlds, rows, size))
         self._rewards = Recycler((num_worlds, rows))
@@ -94,7 +93,7 @@ class Stepping(WorldViews):
         def work(thread: int, blocks: Blocks) -> int:
             return kernel(*arguments, scratch[thread], thread, blocks)
 
-        return sum(run_threads(work, self.num_worlds, len(scratch)))
+        return sum(over_worlds(work, (), self.num_worlds, self.scenario.num_agents, len(scratch)))
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds."""
@@ -110,11 +109,7 @@ class Stepping(WorldViews):
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         agents, length = self.scenario.num_agents, 2 + self.scenario.message_size
         actions = np.empty((self.num_worlds, agents, length), np.float32)  # not read
-        with checked_before_compiling(self._untyped, self._check_functions):
+        with mistakes_named(parts_for(self.scenario), self._arrays):
             self._run(orders, actions, results)
         self._kernel = direct(self._untyped)  # now compiled
         return results.observations
-
-    def _check_functions(self) -> None:
-        """Raise if a user's function cannot be compiled: sooner, and clearer, than the kernel."""
-        check_functions(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])

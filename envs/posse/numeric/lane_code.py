@@ -1,4 +1,4 @@
-"""Compilation of :mod:`posse.numeric.simd.lanes` to LLVM vectors of eight."""
+"""Compilation of :mod:`posse.numeric.lanes` to LLVM vectors of eight."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
 
-from posse.numeric.simd.lanes import (
+from posse.numeric.lanes import (
     WIDTH,
     bits,
     choose,
@@ -42,9 +42,6 @@ _INTEGERS: Final = ir.VectorType(ir.IntType(32), WIDTH)
 class LanesType(types.Type):
     """numba's type of eight float32."""
 
-    def __init__(self) -> None:
-        super().__init__(name="Lanes")
-
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
         """Convert a number to eight copies of itself (numba's interface)."""
         if other == types.float32:
@@ -54,9 +51,6 @@ class LanesType(types.Type):
 
 class MaskType(types.Type):
     """numba's type of eight truth values."""
-
-    def __init__(self) -> None:
-        super().__init__(name="Mask")
 
 
 @register_model(LanesType)
@@ -71,14 +65,8 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(manager, of, _BITS)
 
 
-_LANES: Final = LanesType()
-_MASK: Final = MaskType()
-
-
-def tuple_of_lanes(kind: type) -> types.NamedTuple:
-    """Return numba's type of a named tuple whose fields are declared as Lanes or Mask."""
-    fields = kind.__annotations__.values()
-    return types.NamedTuple([_MASK if each == "Mask" else _LANES for each in fields], kind)
+_LANES: Final = LanesType("Lanes")
+_MASK: Final = MaskType("Mask")
 
 
 def _spread(builder: Any, value: Any) -> Any:
@@ -205,81 +193,53 @@ for _number, _truth in ((types.float32, types.boolean), (_LANES, _MASK)):
     _declare(root, _number, (_number,), _emit_root)
 
 
-@infer_global(load)
-class _Load(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        array, _ = args
-        return signature(_LANES, array, types.intp)
+def _declare_memory(function: Any, kind: Any, result: Any, more: tuple[Any, ...], emit: Callable[..., Any]) -> None:
+    """Declare a function whose first argument is any array or record; ``emit`` is given its address."""
+
+    @infer_global(function)
+    class Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            return signature(result, args[0], *more)
+
+    @lower_builtin(function, kind, *more)
+    def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        array = kind is types.Array
+        address = context.make_array(sig.args[0])(context, builder, values[0]).data if array else values[0]
+        value = emit(builder, address, *values[1:])
+        return context.get_dummy_value() if result is types.none else value
 
 
-@infer_global(store)
-class _Store(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        array, _, _ = args
-        return signature(types.none, array, types.intp, _LANES)
+def _bytes(builder: Any, address: Any, offset: Any) -> Any:
+    return builder.gep(builder.bitcast(address, ir.IntType(8).as_pointer()), [offset])
 
 
-def _address(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
-    data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), _FLOATS.as_pointer())
+def _emit_load(builder: Any, address: Any) -> Any:
+    return builder.load(builder.bitcast(address, _FLOATS.as_pointer()), align=4)
 
 
-@lower_builtin(load, types.Array, types.intp)
-def _lower_load(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    return builder.load(_address(context, builder, sig.args[0], *values), align=4)
+def _emit_store(builder: Any, address: Any, value: Any) -> Any:
+    return builder.store(value, builder.bitcast(address, _FLOATS.as_pointer()), align=4)
 
 
-@lower_builtin(store, types.Array, types.intp, _LANES)
-def _lower_store(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    array, index, value = values
-    builder.store(value, _address(context, builder, sig.args[0], array, index), align=4)
-    return context.get_dummy_value()
+def _emit_fetch(builder: Any, address: Any, offset: Any) -> Any:
+    place, whole = _bytes(builder, address, offset), ir.IntType(32)
+    kind = ir.FunctionType(ir.VoidType(), [place.type, whole, whole, whole])
+    to_write, near, of_data = (ir.Constant(whole, number) for number in (1, 3, 1))
+    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+    return builder.call(function, [place, to_write, near, of_data])
 
 
-@infer_global(fetch)
-class _Fetch(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(types.none, args[0], types.intp)
-
-
-@lower_builtin(fetch, types.Array, types.intp)
-def _lower_fetch(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    array, offset = values
-    data = context.make_array(sig.args[0])(context, builder, array).data
-    first = builder.bitcast(data, ir.IntType(8).as_pointer())
-    address = builder.gep(first, [offset])
-    whole, name = ir.IntType(32), "llvm.prefetch.p0i8"
-    kind = ir.FunctionType(ir.VoidType(), [address.type, whole, whole, whole])
-    to_write, near, of_data = ir.Constant(whole, 1), ir.Constant(whole, 3), ir.Constant(whole, 1)
-    function = cgutils.get_or_insert_function(builder.module, kind, name)
-    builder.call(function, [address, to_write, near, of_data])
-    return context.get_dummy_value()
-
-
-@infer_global(load_fields)
-class _LoadFields(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(_LANES, args[0], types.intp)
-
-
-@infer_global(store_fields)
-class _StoreFields(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(types.none, args[0], types.intp, _LANES)
-
-
-def _field(builder: Any, record: Any, offset: Any) -> Any:
-    first = builder.bitcast(record, ir.IntType(8).as_pointer())
-    return builder.bitcast(builder.gep(first, [offset]), _FLOATS.as_pointer())
-
-
-@lower_builtin(load_fields, types.Record, types.intp)
-def _lower_load_fields(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    return builder.load(_field(builder, *values), align=4)
-
-
-@lower_builtin(store_fields, types.Record, types.intp, _LANES)
-def _lower_store_fields(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    record, offset, value = values
-    builder.store(value, _field(builder, record, offset), align=4)
-    return context.get_dummy_value()
+_AT: Final = (types.intp,)
+_declare_memory(load, types.Array, _LANES, _AT, lambda b, array, k: _emit_load(b, b.gep(array, [k])))
+_declare_memory(
+    store, types.Array, types.none, (*_AT, _LANES), lambda b, array, k, v: _emit_store(b, b.gep(array, [k]), v)
+)
+_declare_memory(fetch, types.Array, types.none, _AT, _emit_fetch)
+_declare_memory(load_fields, types.Record, _LANES, _AT, lambda b, record, k: _emit_load(b, _bytes(b, record, k)))
+_declare_memory(
+    store_fields,
+    types.Record,
+    types.none,
+    (*_AT, _LANES),
+    lambda b, record, k, v: _emit_store(b, _bytes(b, record, k), v),
+)

@@ -9,7 +9,7 @@ Lanes support ``+ - * /``, ``abs`` and the comparisons ``< <= > >= ==``, which r
 support ``&`` and ``|``. All other operations are the functions below; ``choose``, ``lesser``,
 ``greater`` and ``root`` also accept single numbers, so that a formula is written only once. The
 function bodies work on numpy arrays and are used only if nothing is compiled;
-:mod:`posse.numeric.simd.lane_code` defines what they compile to.
+:mod:`posse.numeric.lane_code` defines what they compile to.
 """
 
 from __future__ import annotations
