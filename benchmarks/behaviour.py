@@ -100,7 +100,7 @@ def look(name: str, scenario: str, worlds: int, s: Settings) -> Behaviour:
             "target's turn rate, either way, rad/s": np.abs(world["turn_rate"]),
         }.items():
             seen.setdefault(key, []).append(float(value.mean()))
-    end = infos["metrics"]
+    end = {name.removeprefix("metrics/"): value for name, value in infos.items() if name.startswith("metrics/")}
     settled = end["settling_time"]
     return Behaviour(
         worlds,

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 import posse
-import posse.engine.stepping
+import posse.engine.batch
 import posse.numeric.threads
 from posse.numeric import divide, run_threads
 from posse_baselines import begin, load
@@ -98,7 +98,7 @@ def rate(step: Callable[[], object], seconds: float, pool: bool) -> float:
     """Return steps per second, with the pool or with our own threads."""
     chosen = pooled if pool else run_threads
     with (
-        mock.patch.object(posse.engine.stepping, "run_threads", chosen),
+        mock.patch.object(posse.engine.batch, "run_threads", chosen),
         # Used by scripted policies, through over_worlds.
         mock.patch.object(posse.numeric.threads, "run_threads", chosen),
     ):

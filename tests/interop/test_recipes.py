@@ -61,6 +61,6 @@ def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", names())
 def test_it_is_short_and_on_the_page(name: str) -> None:
     lines = (RECIPES / f"{name}.py").read_text(encoding="utf-8").splitlines()
-    assert len([line for line in lines if line.strip()]) < LONGEST
+    assert len([line for line in lines if line.strip()]) <= LONGEST
     page = (ROOT / "docs" / "use_with.md").read_text(encoding="utf-8")
     assert f'--8<-- "docs/recipes/{name}.py"' in page

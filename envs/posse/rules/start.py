@@ -22,29 +22,46 @@ _TWO_PI: Final = np.float32(2 * math.pi)
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 _CLEARANCE: Final = np.float32(START_CLEARANCE)
+_ROUNDING: Final = np.float32(1e-3)  # m; a given pose is rounded to float32
 _TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come first
 
 
 @compiled
 def is_clear(
-    c: Record, w: Record, trackers: Records, placed: int, obstacles: Records, x: np.float32, y: np.float32
+    c: Record,
+    trackers: Records,
+    placed: int,
+    obstacles: Records,
+    x: np.float32,
+    y: np.float32,
+    clearance: np.float32 = _CLEARANCE,
 ) -> bool:
-    """Return whether a tracker at (x, y) is clear of walls, obstacles and ``placed`` trackers."""
+    """Return whether a robot at (x, y) is clear of walls, obstacles and the first ``placed`` trackers."""
     if c.walled:
-        inner = c.half_arena - c.radius - _CLEARANCE
+        inner = c.half_arena - c.radius - clearance
         if abs(x) > inner or abs(y) > inner:
             return False
     for k in range(c.num_obstacles):
         o = obstacles[k]
-        reach = o.radius + c.radius + _CLEARANCE
+        reach = o.radius + c.radius + clearance
         if (o.x - x) * (o.x - x) + (o.y - y) * (o.y - y) < reach * reach:
             return False
-    reach = c.radius + c.radius + _CLEARANCE
+    reach = c.radius + c.radius + clearance
     for j in range(placed):
         t = trackers[j]
         if (t.x - x) * (t.x - x) + (t.y - y) * (t.y - y) < reach * reach:
             return False
     return True
+
+
+@compiled
+def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.float32 = _ROUNDING) -> bool:
+    """Return whether a turning circle of a scripted target in an arena is free, but for an allowance, m."""
+    if not c.walled or c.target_agent != 0:
+        return True
+    left = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE, allowance)
+    right = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE, allowance)
+    return bool(left or right)
 
 
 @compiled
@@ -84,11 +101,7 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
             reach = o.radius + c.radius + _CLEARANCE
             if (o.x - w.x) * (o.x - w.x) + (o.y - w.y) * (o.y - w.y) < reach * reach:
                 clear = False
-        if clear and c.walled and c.target_agent == 0:
-            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ONE) or has_free_circle(
-                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -_ONE
-            )
-        if clear:
+        if clear and target_can_turn(c, w, obstacles, _ZERO):
             break
 
 
@@ -104,7 +117,7 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
             index += 2
             t.x = w.x + distance * np.float32(math.cos(bearing))
             t.y = w.y + distance * np.float32(math.sin(bearing))
-            if is_clear(c, w, trackers, i, obstacles, t.x, t.y):
+            if is_clear(c, trackers, i, obstacles, t.x, t.y):
                 break
         heading = _TWO_PI * uniform(w.key, 0, START, index)
         index += 1

@@ -7,7 +7,7 @@ import functools
 from typing import Any
 
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import ScenarioError, is_one_of
+from posse.scenarios.setting import ScenarioError, is_number, is_one_of
 from posse.shown import shown
 
 
@@ -115,6 +115,8 @@ def scenario_names() -> tuple[str, ...]:
 def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: Any) -> Scenario:
     """Return a scenario by name, or the given one, with fields overridden.
 
+    A ``horizon`` that is given without ``settle_time`` shortens ``settle_time`` to the episode.
+
     Args:
         scenario: Its name, or a scenario.
         target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
@@ -133,6 +135,10 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
         near = difflib.get_close_matches(shown(scenario), _named(), n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
         raise ScenarioError(f"unknown scenario {shown(scenario)}{hint}; scenarios are: {', '.join(_named())}")
+    if "horizon" in overrides and "settle_time" not in overrides:
+        length = overrides["horizon"], overrides.get("control_step", found.control_step)
+        if all(is_number(each) and each > 0 for each in length):
+            overrides = {**overrides, "settle_time": min(found.settle_time, length[0] * length[1])}
     return found.replace(**overrides) if overrides else found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, RecordVideo
-from tests.support.adapters import EVERYTHING, SOLO_SCENARIOS, f32, out_of_band, same
+from tests.support.adapters import EVERYTHING, SOLO_SCENARIOS, f32, out_of_band, part, same
 
 import posse
 from posse.adapters.actions import MOTIONS
@@ -103,8 +103,8 @@ def test_a_team_is_the_first_world_of_a_batch() -> None:
         batch_observations, rewards, _, _, infos = batch.step(actions)
         assert reward == pytest.approx(rewards[0].mean(), abs=1e-6)
         assert info["score"] == infos["score"][0]
-        for term, values in infos["reward_terms"].items():
-            assert np.array_equal(info["reward_terms"][term], values[0])
+        for term, values in part(infos, "reward/").items():
+            assert np.array_equal(info[f"reward/{term}"], values[0])
 
 
 def test_a_solo_is_a_team_of_one() -> None:
@@ -117,8 +117,8 @@ def test_a_solo_is_a_team_of_one() -> None:
         ours, reward, _, _, info = solo.step(action)
         theirs, team_reward, _, _, team_info = team.step(action[None])
         assert reward == team_reward
-        for term, value in info["reward_terms"].items():
-            assert value == team_info["reward_terms"][term][0]
+        for term, value in part(info, "reward/").items():
+            assert value == team_info[f"reward/{term}"][0]
 
 
 def test_reset_goes_on_to_the_next_episode() -> None:
@@ -148,10 +148,10 @@ def test_the_end_is_told_with_every_metric() -> None:
         env = gymnasium.make(name, horizon=5, settle_time=0.3)
         env.reset(seed=0)
         *before, (_, _, terminated, truncated, info) = play(env, 5)
-        assert all(set(step[-1]["metrics"].values()) == {0.0} for step in before)
+        assert all(set(part(step[-1], "metrics/").values()) == {0.0} for step in before)
         assert (terminated, truncated) == (False, True)
-        assert list(info["metrics"]) == [metric.name for metric in posse.METRICS]
-        assert info["metrics"]["duration"] == pytest.approx(0.5)
+        assert list(part(info, "metrics/")) == [metric.name for metric in posse.METRICS]
+        assert info["metrics/duration"] == pytest.approx(0.5)
 
 
 def test_contact_terminates_where_it_is_asked_for() -> None:

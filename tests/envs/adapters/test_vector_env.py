@@ -56,7 +56,7 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
         settings.update(breaks=1, break_window=(0.2, 0.4))
     else:  # one alone runs into something only if it is fast
         settings.update(tracker_speed=3.0)
-    ours = vector(name, autoreset_mode=mode, **settings)
+    ours = vector(name, autoreset=mode, **settings)
     theirs = SyncVectorEnv(
         [
             lambda i=i: gymnasium.make(name, first_world=i, **settings)  # type: ignore[misc]
@@ -90,7 +90,7 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
 @modes
 def test_it_agrees_where_all_episodes_end_at_once(mode: AutoresetMode) -> None:
     settings: dict[str, Any] = {"horizon": 3, "settle_time": 0.1}
-    ours = vector(autoreset_mode=mode, **settings)
+    ours = vector(autoreset=mode, **settings)
     theirs = SyncVectorEnv(
         [lambda i=i: gymnasium.make(TEAM, first_world=i, **settings) for i in range(E)],  # type: ignore[misc]
         autoreset_mode=mode,
@@ -106,8 +106,8 @@ def test_it_agrees_where_all_episodes_end_at_once(mode: AutoresetMode) -> None:
 
 @modes
 def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
-    for chosen in (mode, mode.value):
-        env = vector(autoreset_mode=chosen)
+    for chosen in (mode, mode.name.lower()):
+        env = vector(autoreset=chosen)
         assert env.autoreset_mode is mode
         assert env.metadata["autoreset_mode"] is mode
     assert TeamVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -116,7 +116,7 @@ def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
 @modes
 def test_what_is_returned_is_never_overwritten(mode: AutoresetMode) -> None:
     # Large enough that the memory of unreferenced arrays is reused.
-    env = vector(autoreset_mode=mode, num_envs=80, horizon=6, settle_time=0.3)
+    env = vector(autoreset=mode, num_envs=80, horizon=6, settle_time=0.3)
     returned: list[Any] = [env.reset(seed=0)]
     kept = copy.deepcopy(returned)
     for _ in range(15):
@@ -130,7 +130,7 @@ def test_what_is_returned_is_never_overwritten(mode: AutoresetMode) -> None:
 
 
 def test_a_mask_resets_only_its_worlds_and_is_left_alone() -> None:
-    env = vector(autoreset_mode=AutoresetMode.DISABLED)
+    env = vector(autoreset=AutoresetMode.DISABLED)
     env.reset(seed=0)
     before, *_ = env.step(env.action_space.sample())
     mask = np.array([False, True, False, True])
@@ -162,7 +162,7 @@ def test_without_a_seed_environments_differ() -> None:
 @modes
 @pytest.mark.parametrize("replica", [lambda e: pickle.loads(pickle.dumps(e)), out_of_band])  # noqa: S301
 def test_a_copy_made_in_mid_episode_goes_on_alike(mode: AutoresetMode, replica: Any) -> None:
-    env = vector(autoreset_mode=mode, horizon=8, settle_time=0.5)
+    env = vector(autoreset=mode, horizon=8, settle_time=0.5)
     env.reset(seed=0)
     env.step(env.action_space.sample())
     twin = replica(env)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 from tests.support.reference.state import snapshot
 
@@ -147,23 +146,3 @@ def test_breaks_to_come_are_drawn_from_what_is_left_of_their_window(choice: str)
     assert when.mean() == pytest.approx(375, abs=5)
     if choice == "given":
         assert (broken[:, 2] < 2**30).all()
-
-
-def test_bad_copies_are_refused_before_anything_changes() -> None:
-    batch = posse.batch("constant", 2)
-    with pytest.raises(ResetNeeded, match="copies before reset"):
-        batch.copies(2)
-    with pytest.raises(ResetNeeded, match="observe before reset"):
-        batch.observe()
-    batch.reset()
-    with pytest.raises(posse.ScenarioError, match="count=0"):
-        batch.copies(0)
-    with pytest.raises(posse.ScenarioError, match="seed=-1"):
-        batch.copies(1, seed=-1)
-    other = posse.batch("constant", 3)
-    with pytest.raises(ValueError, match=r"2 copies of 2 worlds .* do not fit 3 worlds"):
-        batch.copies(2, into=other)
-    with pytest.raises(ValueError, match="another Batch"):
-        batch.copies(1, into=batch)
-    with pytest.raises(ResetNeeded):
-        other.step(np.zeros(other.action_shape, np.float32))

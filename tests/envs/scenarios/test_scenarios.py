@@ -9,6 +9,7 @@ import pickle
 
 import numpy as np
 import pytest
+from tests.support.adapters import part
 
 import posse
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
@@ -124,7 +125,7 @@ def test_it_plays_to_its_horizon(name: str) -> None:
         assert (observations <= space[1] + 1e-4).all()
         assert not terminated.any()
         assert truncated.all() == (step == s.horizon)
-    metrics = infos["metrics"]
+    metrics = part(infos, "metrics/")
     assert ((metrics["score"] >= 0) & (metrics["score"] <= metrics["bound"] + 1e-6)).all()
     assert (metrics["bound"] < 1).all()
     broken = (batch.state["tracker_broken_at"] < s.horizon).sum(axis=1)

@@ -34,7 +34,7 @@ def play_episodes(batch: Batch, policy: Policy, first: int) -> Iterator[tuple[Ep
     """Play one episode in every world; yield its buffer and its metrics.
 
     Observations are (T + 1, N, F), actions (T, N, 2 + m), rewards (T,), the mean of the team's.
-    Infos are ``score`` (T + 1,) and ``reward_terms``, each (T + 1, N); those of the reset are 0.
+    Infos are ``score`` (T + 1,) and ``reward``, each term by name (T + 1, N); those of the reset are 0.
 
     Args:
         batch: The worlds, made with ``autoreset="same_step"``.
@@ -55,14 +55,14 @@ def play_episodes(batch: Batch, policy: Policy, first: int) -> Iterator[tuple[Ep
         acted, memory = policy.act(seen, memory)
         seen, gained, terminated, truncated, infos = batch.step(acted)
         ended = terminated | truncated
-        observations.append(infos["final_obs"] if ended.any() else seen)
+        observations.append(infos["final_obs"])
         actions.append(np.array(acted, np.float32))
         rewards.append(gained.mean(axis=1, dtype=np.float64))
         scores.append(infos["score"].astype(np.float64))
-        terms.append({name: np.array(infos["reward_terms"][name]) for name in batch.term_names})
+        terms.append({name: np.array(infos[f"reward/{name}"]) for name in zeros})
         for e in np.flatnonzero(ended & (lengths == 0)).tolist():
             lengths[e], terminations[e] = len(actions), terminated[e]
-            metrics[e] = {name: float(column[e]) for name, column in infos["metrics"].items()}
+            metrics[e] = {name: float(infos[f"metrics/{name}"][e]) for name in batch.metrics()}
         if ended.any():
             memory = policy.restart(memory, ended)
     for e, length in enumerate(lengths.tolist()):
@@ -77,9 +77,7 @@ def play_episodes(batch: Batch, policy: Policy, first: int) -> Iterator[tuple[Ep
             truncations=(last & ~terminations[e]).tolist(),
             infos={
                 "score": np.stack([step[e] for step in scores[: length + 1]]),
-                "reward_terms": {
-                    name: np.stack([step[name][e] for step in terms[: length + 1]]) for name in batch.term_names
-                },
+                "reward": {name: np.stack([step[name][e] for step in terms[: length + 1]]) for name in zeros},
             },
         )
         yield buffer, metrics[e]

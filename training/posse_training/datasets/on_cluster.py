@@ -71,7 +71,7 @@ def record_on_worker(players: Sequence[Policy], scenario: Scenario, seed: int, s
         infos: Any = buffer.infos
         found = {name: getattr(buffer, name) for name in _STEPS}
         found["score"] = infos["score"]
-        found |= {f"terms/{name}": column for name, column in infos["reward_terms"].items()}
+        found |= {f"reward/{name}": column for name, column in infos["reward"].items()}
         found |= {f"metrics/{name}": value for name, value in metadata.items() if name not in ("policy", "world")}
         arrays |= {f"{k}/{name}": np.asarray(value) for name, value in found.items()}
     return arrays
@@ -86,7 +86,7 @@ def _part(arrays: Arrays, shard: Shard, names: Sequence[str], seed: int) -> Part
         metrics = {
             name.removeprefix("metrics/"): float(array) for name, array in found.items() if name.startswith("metrics/")
         }
-        terms = {name.removeprefix("terms/"): array for name, array in found.items() if name.startswith("terms/")}
+        terms = {name.removeprefix("reward/"): array for name, array in found.items() if name.startswith("reward/")}
         buffers.append(
             EpisodeBuffer(
                 id=world,
@@ -96,7 +96,7 @@ def _part(arrays: Arrays, shard: Shard, names: Sequence[str], seed: int) -> Part
                 rewards=found["rewards"].tolist(),
                 terminations=found["terminations"].tolist(),
                 truncations=found["truncations"].tolist(),
-                infos={"score": found["score"], "reward_terms": terms},
+                infos={"score": found["score"], "reward": terms},
             )
         )
         about.append({"policy": names[world % len(names)], "world": world, **metrics})
