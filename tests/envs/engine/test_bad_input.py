@@ -8,7 +8,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import pettingzoo
 import pytest
 from gymnasium.error import ResetNeeded
 from hypothesis import given, settings
@@ -25,7 +24,6 @@ ENVIRONMENTS: dict[str, Any] = {
     "batch": posse.batch,
     "parallel": posse.parallel_env,
     "turns": posse.env,
-    "registry": lambda scenario="constant", **k: pettingzoo.make("parallel", "posse/track-v0", scenario=scenario, **k),
     "team": lambda scenario="constant", **k: gymnasium.make(TEAM, scenario=scenario, **k),
     "solo": lambda scenario="constant", **k: gymnasium.make(SOLO, scenario=scenario, **k),
     "team vector": lambda scenario="constant", **k: gymnasium.make_vec(TEAM, 2, scenario=scenario, **k),
