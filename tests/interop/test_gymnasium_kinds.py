@@ -95,13 +95,3 @@ def test_an_unknown_keyword_is_a_type_error_too() -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'") as caught:
         gymnasium.make("posse/Team-v0", frameskip=1)
     assert isinstance(caught.value, posse.ScenarioError)
-
-
-@pytest.mark.parametrize("scenario", posse.scenario_names())
-def test_bounds_of_settings_hold_0_1_and_the_setting(scenario: str) -> None:
-    batch = posse.batch(scenario, seed=1)
-    views = batch.layout.views(batch.reset())
-    for name in ("team_size", "tolerance", "robot_radius", "sensing_range", "arena"):
-        field = next(each for each in batch.layout.fields if each.name == name)
-        for held in (0.0, 1.0, float(views[name].flat[0])):
-            assert field.low <= held <= field.high, (name, held)

@@ -49,11 +49,7 @@ def box(low: npt.ArrayLike, high: npt.ArrayLike) -> spaces.Box:
 
 
 def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]:
-    """Return the action space of one robot.
-
-    Raises:
-        ScenarioError: ``discrete`` with messages, which are not discrete.
-    """
+    """Return the action space of one robot; ScenarioError for messages, which are not discrete."""
     if not isinstance(discrete, bool):
         raise ScenarioError(f"discrete_actions={reprlib.repr(discrete)} is not possible: it is True or False")
     if not discrete:
@@ -74,20 +70,14 @@ def spaces_of(
     if isinstance(rows, int):
         return box(low, high), single
     n = scenario.num_trackers
-    team = (
-        spaces.MultiDiscrete([len(MOTIONS)] * n)
-        if discrete
-        else spaces.Box(-1.0, 1.0, (n, 2 + scenario.message_size), np.float32)
-    )
+    team: spaces.Space[Any] = spaces.MultiDiscrete([len(MOTIONS)] * n)
+    if not discrete:
+        team = spaces.Box(-1.0, 1.0, (n, 2 + scenario.message_size), np.float32)
     return box(np.tile(low, (n, 1)), np.tile(high, (n, 1))), team
 
 
 def as_motions(name: str, action: object, shape: tuple[int, ...] | None, discrete: bool) -> npt.NDArray[Any]:
-    """Return an action of a shape as numbers, (..., 2 + m) float32; ``name`` is for messages.
-
-    Raises:
-        ValueError: A wrong type or shape, or a discrete action that does not exist; the range is not checked.
-    """
+    """Return an action of a shape as numbers, (..., 2 + m) float32, whose range is not checked; or ValueError."""
     array = real_numbers(name, action, "iu" if discrete else "fiu")
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}, wanted {shape}")
@@ -130,22 +120,14 @@ class ActionReader:
         return ActionReader, (self._agents, self._space, self._clip)
 
     def of_all(self, action: Any) -> None:
-        """Read one action of all robots.
-
-        Raises:
-            ValueError: A wrong type or shape, not finite, or out of the space; the message names the value.
-        """
+        """Read one action of all robots; ValueError if it is out of the space."""
         usual = type(action) is np.ndarray and action.dtype is self._usual and action.shape == self._shape
         # The usual case needs no conversion, which takes as long as the rest.
         self._plane[...] = action if usual else as_motions("action", action, self._shape, self._discrete)
         self._check()
 
     def by_agent(self, actions: Mapping[str, Any]) -> None:
-        """Read the actions of a dictionary by agent.
-
-        Raises:
-            ValueError: An agent is missing or unknown, or as :meth:`of_all`; the message names the agent.
-        """
+        """Read the actions of a dictionary by agent; ValueError if one is missing, unknown or out of the space."""
         # Assignment to a memoryview checks type and shape faster than explicit tests.
         try:
             if type(actions) is not dict or self._discrete or len(actions) != len(self._rows):

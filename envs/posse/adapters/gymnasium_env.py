@@ -15,11 +15,7 @@ from posse.scenarios import Scenario, ScenarioError, get_scenario
 
 
 def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
-    """Return the scenario of an environment of one agent, whose target is scripted.
-
-    Raises:
-        ScenarioError: It is invalid, or its target is an agent.
-    """
+    """Return the scenario of an environment of one agent; ScenarioError if its target is an agent."""
     found = get_scenario(scenario, **overrides)
     if found.target_motion == "agent":
         raise ScenarioError(
@@ -30,11 +26,7 @@ def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenar
 
 
 def solo_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
-    """Return the scenario with one tracker.
-
-    Raises:
-        ScenarioError: It is invalid, has more than one tracker, or one that breaks.
-    """
+    """Return the scenario with one tracker; ScenarioError if it is to have more, or one that breaks."""
     if overrides.get("num_trackers", 1) != 1:
         raise ScenarioError(
             f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has one: use posse/Team-v0"
@@ -121,11 +113,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start an episode; see the class for seeds and options.
-
-        Raises:
-            ValueError: A bad seed or option; nothing is changed.
-        """
+        """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         observations = self._start(seed, options)
         gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
         self._terms[...] = 0
@@ -136,8 +124,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
-            ValueError: An action of a wrong type or shape, not finite, or out of its space;
-                nothing is changed.
+            ValueError: An action out of its space; nothing is changed.
         """
         self._check_running()
         self._reader.of_all(action)
@@ -166,9 +153,6 @@ class SoloEnv(TeamEnv):
     As :class:`TeamEnv` with a team of one, without the team axis: **observation** ``Box`` (F,),
     **action** ``Box(-1, 1, (2 + message_size,))`` or ``Discrete(15)``, reward terms scalars.
     ``options["tracker_pose"]`` may be (3,).
-
-    Raises:
-        ScenarioError: As :class:`TeamEnv`, and where the team is not one tracker.
     """
 
     _rows = 0

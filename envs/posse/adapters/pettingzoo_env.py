@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -97,7 +98,6 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         single = self.action_spaces[self.possible_agents[0]]
         self._reader = ActionReader(self.possible_agents, single, clip_actions)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self._state_space: spaces.Box | None = None
         self._wrapper_seed = seed
         self._np_random: np.random.Generator | None = None
 
@@ -116,24 +116,15 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         """Return the action space of an agent; the same object at each call."""
         return self.action_spaces[agent]
 
-    @property
+    @functools.cached_property
     def state_space(self) -> spaces.Box:
         """Space of :meth:`state`."""
-        if self._state_space is None:
-            self._state_space = box(*self.state_layout.bounds())
-        return self._state_space
+        return box(*self.state_layout.bounds())
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, FloatArray], _Infos]:
-        """Start an episode; see the class for seeds and options.
-
-        Returns:
-            Observations and infos by agent.
-
-        Raises:
-            ValueError: A bad seed or option; nothing is changed.
-        """
+        """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         if options is not None:
             # PettingZoo's own tests send {"options": 1}, to see that options are taken.
             options = {key: value for key, value in options_of(options).items() if key != "options"}
@@ -147,18 +138,11 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos]:
-        """Advance the world by one control step.
-
-        Args:
-            actions: One for every agent, by name.
-
-        Returns:
-            Observations, rewards, terminations, truncations and infos, each by agent.
+        """Advance the world by one control step, given an action for every agent.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
-            ValueError: An agent is missing or unknown, or its action is of a wrong type or shape,
-                not finite, or out of its space; nothing is changed.
+            ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
         agents = self.agents
         self._check_running()

@@ -34,8 +34,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as in
     :class:`TeamEnv`.
 
-    Args:
-        scenario: Name of a scenario, or a scenario.
+    Args, beside those of :class:`posse.adapters.gymnasium_env.TeamEnv`:
         num_envs: E, at least 1.
         autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`, or a
             ``gymnasium.vector.AutoresetMode``. ``"next_step"``: the next step starts a new one and
@@ -43,19 +42,11 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             ``info["final_obs"]``, the last info ``info["final_info"]``; ``"disabled"``: the caller
             resets, with ``options={"reset_mask": mask}``.
         max_episode_steps: Gymnasium's name for ``horizon``.
-        discrete_actions: Whether actions are discrete.
-        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
-        render_mode: ``"human"`` (a window with world 0), ``"rgb_array"`` or ``None``.
-        seed: Seed of all random draws; ``None``: an arbitrary one.
-        split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the first world.
         num_threads: Threads that step the worlds; never changes a result.
-        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
-        overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown scenario, or an invalid setting or argument; the message states
-            the valid range.
+        ScenarioError: As for :class:`posse.adapters.gymnasium_env.TeamEnv`; or an unknown mode of autoreset.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -119,17 +110,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         return {**self.__dict__, "_renderer": None}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, _Info]:
-        """Start episodes, and return the observations of all worlds.
-
-        Args:
-            seed: One number: restart from episode 0 of this seed; ``None``: each world's next
-                episode.
-            options: ``"reset_mask"`` (E,) bool: only these worlds; ``"tracker_pose"`` and
-                ``"target_pose"``: start from these, as in :meth:`posse.Batch.reset`.
-
-        Raises:
-            ValueError: A bad seed or option; nothing is changed.
-        """
+        """Start episodes as :meth:`posse.Batch.reset` does, and return the observations and infos of all worlds."""
         if isinstance(seed, (list, tuple)):
             raise ValueError(
                 "seed must be one number, from which the seeds of all worlds are derived; got a "
@@ -148,16 +129,9 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
         """Advance every world by one control step.
 
-        Args:
-            actions: In ``action_space``.
-
-        Returns:
-            observations (E, ...), rewards (E,), terminated (E,), truncated (E,), infos.
-
         Raises:
-            ResetNeeded: Before the first reset, or after an end with ``DISABLED``.
-            ValueError: Actions of a wrong type or shape, not finite, or out of their space; nothing
-                is changed.
+            ResetNeeded: Before the first reset, or after an end with autoreset ``"disabled"``.
+            ValueError: Actions out of their space; nothing is changed.
         """
         motions = as_motions("actions", actions, self.action_space.shape, self._discrete)
         observations, rewards, terminated, truncated, found = self.batch.step(self._of_teams(motions))

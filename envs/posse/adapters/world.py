@@ -84,21 +84,13 @@ class WorldEnv:
         return StateLayout(self.scenario)
 
     def state(self) -> FloatArray:
-        """Return the full state of the world, (S,) float32.
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
+        """Return the full state of the world, (S,) float32."""
         self._check_started("state")
         state: FloatArray = self.state_layout.vector(self.batch.arrays)[0]
         return state
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array", a window in "human".
-
-        Raises:
-            ResetNeeded: Before the first reset.
-        """
+        """Draw the current state: (H, W, 3) uint8 in the mode "rgb_array", a window in "human"."""
         self._check_started("render")
         if self.render_mode is None:
             return None
@@ -168,11 +160,7 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 def with_horizon(overrides: dict[str, Any], **alias: int | None) -> dict[str, Any]:
-    """Return overrides with the episode's length under a library's name for it.
-
-    Raises:
-        ScenarioError: ``horizon`` is given, too.
-    """
+    """Return overrides with the episode's length under a library's name for it; ScenarioError for both names."""
     ((name, steps),) = alias.items()
     if steps is None:
         return overrides

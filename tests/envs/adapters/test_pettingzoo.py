@@ -82,13 +82,6 @@ def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     env.close()
 
 
-def test_agents_come_by_name_and_the_target_last() -> None:
-    env = posse.parallel_env("smart", target="agent", num_trackers=2)
-    assert env.possible_agents == ["tracker_0", "tracker_1", "target_0"]
-    observations, infos = env.reset(seed=0)
-    assert list(observations) == list(infos) == env.agents == env.possible_agents
-
-
 def test_a_target_that_is_an_agent_goes_where_it_wants() -> None:
     ahead, circling = f32([1, 0]), f32([1, 1])
     rest = {f"tracker_{i}": f32([-1, 0]) for i in range(5)}
@@ -115,17 +108,6 @@ def test_observations_lie_in_their_spaces_to_the_end() -> None:
         for observations, *_ in play(env, 130):
             for agent, observation in observations.items():
                 assert env.observation_space(agent).contains(observation), (name, agent)
-
-
-def test_the_same_seed_gives_the_same_episodes() -> None:
-    first, second = posse.parallel_env(**EVERYTHING), posse.parallel_env(**EVERYTHING)
-    assert same(first.reset(seed=7), second.reset(seed=7))
-    games = play(first, 40), play(second, 40)
-    assert same(*games)
-    assert not same(play(first, 5), play(second, 5, seed=4))
-    first.reset(seed=8)
-    second.reset(seed=7)
-    assert not np.array_equal(first.state(), second.state())
 
 
 def test_the_same_seed_gives_the_same_episodes_in_another_process() -> None:
@@ -207,21 +189,6 @@ def test_a_discrete_action_is_one_of_the_motions() -> None:
         assert tuple(motion) == (number // 5 - 1, (number % 5 - 2) / 2)
 
 
-def test_what_is_returned_is_never_overwritten() -> None:
-    env = posse.parallel_env(**EVERYTHING)
-    returned = [env.reset(seed=0)]
-    kept = copy.deepcopy(returned)
-    for _ in range(30):
-        step = play(env, 1)
-        returned.append(step)  # type: ignore[arg-type]
-        kept.append(copy.deepcopy(step))  # type: ignore[arg-type]
-    assert same(returned, kept)
-    state = env.state()
-    before = state.copy()
-    play(env, 1)
-    assert np.array_equal(state, before)
-
-
 @pytest.mark.parametrize(
     "replica",
     [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), out_of_band],  # noqa: S301
@@ -261,15 +228,6 @@ def test_the_state_holds_what_decides_how_a_world_goes_on() -> None:
     views = env.state_layout.views(env.state())
     assert np.array_equal(views["sent_x"][1], now[0])
     assert np.array_equal(views["message"][1], now[1])
-
-
-def test_the_state_has_no_memory_of_an_earlier_episode() -> None:
-    fresh, used = posse.parallel_env("field"), posse.parallel_env("field")
-    used.reset(seed=1)
-    play(used, 50)
-    fresh.reset(seed=2)
-    used.reset(seed=2)
-    assert np.array_equal(fresh.state(), used.state())
 
 
 @pytest.mark.skipif(not hasattr(pettingzoo, "parallel_registry"), reason="PettingZoo has a registry since 1.27")

@@ -6,7 +6,6 @@ import os
 import pickle
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -62,21 +61,6 @@ def test_the_number_of_threads_changes_nothing() -> None:
         assert_equal(play(posse.batch("field", 700, seed=3, num_threads=threads), 40), whole)
 
 
-def test_two_batches_in_two_python_threads_do_not_disturb_each_other() -> None:
-    expected = [play(posse.batch("field", 500, seed=seed), 25) for seed in (1, 2)]
-    got: dict[int, list[npt.NDArray[Any]]] = {}
-    threads = [
-        threading.Thread(target=lambda s=seed: got.update({s: play(posse.batch("field", 500, seed=s), 25)}))
-        for seed in (1, 2)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert_equal(got[1], expected[0])
-    assert_equal(got[2], expected[1])
-
-
 def test_seed_split_and_episode_each_make_other_worlds() -> None:
     starts = [
         posse.batch("constant", 50, seed=seed, split=split).reset()
@@ -88,15 +72,6 @@ def test_seed_split_and_episode_each_make_other_worlds() -> None:
     starts.append(again.reset())
     places = np.concatenate([start[:, 0, :10] for start in starts])
     assert len(np.unique(places, axis=0)) == len(places), "no world comes twice"
-
-
-def test_a_seed_given_to_reset_is_the_seed_of_the_batch() -> None:
-    given = posse.batch("field", 3, seed=9)
-    later = posse.batch("field", 3, seed=0)
-    later.reset()
-    later.step(actions_for(later, 0))
-    np.testing.assert_array_equal(later.reset(seed=9), given.reset())
-    np.testing.assert_array_equal(later.reset(), given.reset(), "and the next episode, too")
 
 
 def test_autoreset_modes_play_the_same_episodes() -> None:
@@ -204,18 +179,6 @@ def test_what_is_returned_is_never_overwritten(worlds: int) -> None:
             hold(batch.reset())
         for array, copy in held:
             np.testing.assert_array_equal(array, copy)
-
-
-def test_state_is_read_by_name_and_cannot_be_written() -> None:
-    batch = posse.batch("field", 2, message_size=1)
-    batch.reset()
-    state = batch.state
-    for key, array in state.items():
-        assert array.shape[0] == 2, key
-        with pytest.raises(ValueError, match="read-only"):
-            array[...] = 0
-    batch.step(actions_for(batch, 0))
-    assert state["world_step"].tolist() == [1, 1], "it follows the worlds"
 
 
 IN_ANOTHER_PROCESS = """
