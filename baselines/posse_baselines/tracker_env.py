@@ -16,7 +16,7 @@ from posse_baselines.registry import load
 
 
 class TrackerEnv(OwnArrays, TeamEnv):
-    """One tracker whose team-mates run a scripted or learned policy.
+    """``posse/Tracker-v0``, after ``import posse_baselines``: one tracker whose team-mates run a policy.
 
     **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages
     of its team-mates. **Action**: ``Box(-1, 1, (2 + message_size,))``, or ``Discrete(15)``.

@@ -378,8 +378,9 @@ class Batch:
         over = self._advance(actions, results)
         observations, rewards, terms, (terminated, truncated) = results
         working = self.working if self.scenario.breaks > 0 else None
-        ended, metrics = terminated | truncated, None
+        metrics = None
         if over:
+            ended = terminated | truncated
             metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
         infos = self._infos.build(self._score.copy(), terms.transpose(2, 0, 1), working, metrics)
         if self.autoreset == "same_step":

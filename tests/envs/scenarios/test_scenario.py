@@ -63,7 +63,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"formation_spacing": 9000.0}, "at most 2000 m"),
     ({"tolerance": 0.6}, "formation_spacing"),
     ({"settle_time": 61.0}, "horizon=600 steps of 0.1 s"),
-    ({"horizon": 5}, "settle_time=3.0"),
+    ({"horizon": 5, "settle_time": 3.0}, "settle_time=3.0"),
     ({"settle_time": 0.0}, "0"),
     ({"control_step": 0.12}, "physics_step"),
     ({"control_step": 0.01}, "physics_step"),
