@@ -34,7 +34,9 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as in
     :class:`TeamEnv`.
 
-    Args, beside those of :class:`posse.adapters.gymnasium_env.TeamEnv`:
+    Further arguments as for :class:`TeamEnv`.
+
+    Args:
         num_envs: E, at least 1.
         autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`, or a
             ``gymnasium.vector.AutoresetMode``. ``"next_step"``: the next step starts a new one and
