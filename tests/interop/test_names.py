@@ -48,15 +48,6 @@ def test_a_parameter_has_one_default_everywhere() -> None:
     assert {"scenario", "discrete_actions", "split", "first_world"} <= set(defaults)
 
 
-@pytest.mark.parametrize("made", [*SINGLE, *VECTORS], ids=lambda made: made.__name__)
-def test_every_environment_takes_a_scenario_and_its_settings(made: Any) -> None:
-    found = parameters(made)
-    assert next(iter(found)) == "scenario"
-    assert any(each.kind is inspect.Parameter.VAR_KEYWORD for each in found.values())
-    if made is not posse.batch:
-        assert "discrete_actions" in found
-
-
 def test_the_target_is_an_agent_by_one_name() -> None:
     parallel = posse.parallel_env("smart", target="agent")
     assert posse.batch("smart", target="agent").scenario == parallel.scenario

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -110,25 +108,6 @@ def test_observations_lie_in_their_spaces_to_the_end() -> None:
                 assert env.observation_space(agent).contains(observation), (name, agent)
 
 
-def test_the_same_seed_gives_the_same_episodes_in_another_process() -> None:
-    code = (
-        "import posse, numpy as np\n"
-        "env = posse.parallel_env('field', horizon=20, settle_time=1.0)\n"
-        "env.reset(seed=7)\n"
-        "for k in range(15):\n"
-        "    env.step({a: np.float32([np.sin(k + i), np.cos(k)])\n"
-        "              for i, a in enumerate(env.agents)})\n"
-        "print(env.state().tobytes().hex())\n"
-    )
-    results = {
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-        for _ in range(2)
-    }
-    namespace: dict[str, Any] = {}
-    exec(code.replace("print(env", "result = (env"), namespace)
-    assert results == {namespace["result"] + "\n"}
-
-
 def test_an_environment_is_the_first_world_of_a_batch() -> None:
     for first_world in (0, 3):
         env = posse.parallel_env("field", split="test", first_world=first_world)
@@ -165,13 +144,6 @@ def test_the_end_is_told_once_with_every_metric() -> None:
         assert list(part(info, "metrics/")) == [metric.name for metric in posse.METRICS]
         scores = [step[-1]["tracker_0"]["score"] for step in (*before, last)]
         assert info["metrics/score"] == pytest.approx(np.mean(scores))
-
-
-def test_info_says_who_is_broken() -> None:
-    env = posse.parallel_env("leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4))
-    env.reset(seed=0)
-    working = [sum(info["working"] for info in infos.values()) for *_, infos in play(env, 10)]
-    assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
 
 
 def test_a_discrete_action_is_one_of_the_motions() -> None:
