@@ -115,7 +115,7 @@ for step in range(60):
     observed, rewards, *_, infos = batch.step(actions)
     expected = plain.step(actions)[0]
     singles = [single.step(actions[e : e + 1])[0] for single, e in zip(alone, (0, 9))]
-    terms = infos["reward_terms"]
+    terms = {name: infos[f"reward/{name}"] for name in ("slot", "steady")}
     turn = abs(batch.state["tracker_turn_rate"]) / s.tracker_turn_rate
     np.testing.assert_allclose(terms["steady"][:, :4], 1 - turn, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(
@@ -131,10 +131,10 @@ parallel = posse.parallel_env("obstacles", **own)
 team.reset(seed=0)
 parallel.reset(seed=0)
 info = team.step(team.action_space.sample())[4]
-assert info["reward_terms"]["steady"].shape == (5,)
+assert info["reward/steady"].shape == (5,)
 rewards, infos = parallel.step({agent: [0.0, 0.5] for agent in parallel.agents})[1::3]
 for agent, info in infos.items():
-    terms = info["reward_terms"]
+    terms = {name: info[f"reward/{name}"] for name in ("slot", "steady")}
     assert abs(terms["steady"] - 0.5) < 1e-5
     assert abs(rewards[agent] - terms["slot"] - 0.5 * terms["steady"]) < 1e-5
 print("hits", sum(batch._untyped.stats.cache_hits.values()))

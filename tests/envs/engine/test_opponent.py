@@ -58,31 +58,20 @@ def test_it_plays_as_a_batch_whose_target_is_driven_from_outside(autoreset: str)
         theirs, *others, told = outside.step(whole)
         np.testing.assert_array_equal(rewards, others[0][:, :2])
         np.testing.assert_array_equal(truncated, others[2])
-        np.testing.assert_array_equal(infos["reward_terms"]["slot"], told["reward_terms"]["slot"][:, :2])
+        np.testing.assert_array_equal(infos["reward/slot"], told["reward/slot"][:, :2])
         if autoreset == "same_step" and truncated.any():
             age[truncated] = 0
             np.testing.assert_array_equal(infos["final_obs"], told["final_obs"][:, :2])
 
 
-def test_a_stepper_and_a_pickled_copy_go_on_as_the_batch_does() -> None:
+def test_a_pickled_copy_and_a_snapshot_go_on_as_the_batch_does() -> None:
     batch = posse.batch(SHORT, WORLDS, target_policy=Weaver())
     batch.reset()
     batch.step(actions_of(0))
-    copy, other = deepcopy(batch), deepcopy(batch)  # by way of pickling
-    given, seen = (np.zeros((WORLDS, 2, 2), np.float32), np.zeros(batch.observation_shape, np.float32))
-    rewards = np.zeros((WORLDS, 2), np.float32)
-    terms = np.zeros((WORLDS, 2, len(batch.term_names)), np.float32)
-    advance = other.stepper(given, seen, rewards, terms)
+    copy = deepcopy(batch)  # by way of pickling
     for step in range(1, 5):
-        observations, gained, *_ = batch.step(actions_of(step))
-        again, *_ = copy.step(actions_of(step))
-        given[...] = actions_of(step)
-        assert advance() == 0
-        for found in (again, seen):
-            np.testing.assert_array_equal(found, observations)
-        np.testing.assert_array_equal(rewards, gained)
-    snapshot = batch.save()
-    np.testing.assert_array_equal(batch.restore(snapshot), batch.observe())
+        np.testing.assert_array_equal(copy.step(actions_of(step))[0], batch.step(actions_of(step))[0])
+    np.testing.assert_array_equal(batch.restore(batch.save()), batch.observe())
 
 
 @pytest.mark.parametrize("vector", [False, True])
@@ -107,28 +96,75 @@ def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
 
 
 class Wrong(Weaver):
-    def __init__(self, actions: Any) -> None:
-        self.actions = actions
+    """Returns what it is told to from its third step on."""
+
+    def __init__(self, returned: Any) -> None:
+        self.returned = returned
 
     def act(self, observations: Any, memory: Any) -> Any:
-        return self.actions, memory
+        actions, after = super().act(observations, memory)
+        return (actions if memory[0] < 2 else self.returned), after
 
 
 @pytest.mark.parametrize(
-    ("actions", "message"),
-    [(np.zeros((WORLDS, 2)), "shape"), (np.full((WORLDS, 1, 2), np.nan), "nan"), (np.full((WORLDS, 1, 2), 1.5), "1.5")],
+    ("returned", "message"),
+    [
+        (None, "must be real numbers, got None"),
+        ("left", "must be real numbers, got 'left'"),
+        (np.full((WORLDS, 1, 2), 1j), "must be real numbers"),
+        ([[0], [0, 1]], "is not an array"),
+        (np.zeros((WORLDS, 2)), r"actions of shape \(3, 2\), wanted \(3, 1, 2\)"),
+        (np.full((WORLDS, 1, 2), np.nan), r"\[0, 0, 0\] = nan is not a number in \[-1, 1\]"),
+        (np.full((WORLDS, 1, 2), 1.5), r"= 1\.5 is not"),
+    ],
+    ids=str,
 )
-def test_invalid_actions_of_the_target_are_named(actions: Any, message: str) -> None:
-    batch = posse.batch(SHORT, WORLDS, target_policy=Wrong(actions))
-    batch.reset()
-    with pytest.raises(ValueError, match=f"target's policy.*{message}"):
-        batch.step(actions_of(0))
+def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) -> None:
+    """Whether it is the caller's action that is refused, or that of the policy inside."""
+    policy = Wrong(returned)
+    made: dict[str, Any] = {
+        "batch": posse.batch(SHORT, WORLDS, seed=1, target_policy=policy),
+        "environment": gym.make("posse/Team-v0", scenario=SHORT, seed=1, target_policy=policy).unwrapped,
+        "vector": gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy),
+    }
+    for kind, env in made.items():
+        batch = env if kind == "batch" else env.batch
+        action = actions_of(0, batch.action_shape)
+        action = action[0] if kind == "environment" else action
+        for refused in (action * 2, None, action * 1j):
+            env.reset(seed=1)
+            policy.returned = np.zeros((batch.num_worlds, 1, 2))
+            env.step(action)
+            before, memory = {k: v.copy() for k, v in batch.state.items()}, batch.memory
+            with pytest.raises(ValueError, match="action"):
+                env.step(refused)
+            assert batch.memory is memory
+        env.step(action)
+        policy.returned, memory = returned, batch.memory
+        before = {name: array.copy() for name, array in batch.state.items()}
+        if kind == "environment" and isinstance(returned, np.ndarray):
+            continue  # of another number of worlds
+        with pytest.raises(ValueError, match=f"target's policy.*{message}"):
+            env.step(action)
+        assert batch.memory is memory
+        for name, array in batch.state.items():
+            np.testing.assert_array_equal(array, before[name])
+
+
+def test_clipping_is_for_both_sides() -> None:
+    policy = Wrong(np.full((WORLDS, 1, 2), 30.0))
+    clipping, clipped = (posse.batch(SHORT, WORLDS, clip_actions=True, target_policy=policy) for _ in range(2))
+    clipping.reset()
+    clipped.reset()
+    for step in range(5):
+        seen = clipping.step(9 * actions_of(step))[0]
+        np.testing.assert_array_equal(seen, clipped.step((9 * actions_of(step)).clip(-1, 1))[0])
 
 
 def test_what_is_no_target_policy_is_refused() -> None:
     with pytest.raises(TypeError, match="begin, act, restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="cannot be copied"):
+    with pytest.raises(AttributeError, match=r"policy inside has no 'copies'; its worlds are .batch"):
         posse.batch(SHORT, 1, target_policy=Weaver()).copies(2)
     with pytest.raises(posse.ScenarioError, match="target_policy="):
         gym.make("posse/Team-v0", scenario=SHORT, target="agent")
@@ -145,7 +181,7 @@ def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
     for _ in range(HORIZON):
         actions = np.array([[[-1, 0], [-1, 0], [1, 0]]], np.float32)
         _, rewards, _, _, infos = batch.step(actions)
-        terms = {name: float(infos["reward_terms"][name][0, 2]) for name in batch.term_names}
+        terms = {name: float(infos[f"reward/{name}"][0, 2]) for name in batch.term_names}
         expected = sum(weights.get(name, 0) * value for name, value in terms.items())
         assert rewards[0, 2] == pytest.approx(expected)
         assert terms["slot"] == terms["distance"] == 0, "terms of trackers"
