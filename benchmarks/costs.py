@@ -25,9 +25,10 @@ from posse.engine.scratch import SCRATCH
 from posse.numeric import kernel
 from posse.rules import contact, motion, score
 from posse.rules import discs as survey
+from posse.rules.discs import lay_out_constants
 from posse.rules.scratch import new_scratch
+from posse.signals.generate import declarations_for, generated_for
 from posse.signals.observation import observing
-from posse.signals.parts import Writers, built_in_parts, rules_for, sums_for, writers_for
 
 PARTS = (
     "motion",
@@ -55,9 +56,7 @@ class Settings:
     out: Path = Path("runs/bench/costs.json")
 
 
-OWN, FIXED, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH = writers_for(built_in_parts())
-RULES = rules_for(built_in_parts())
-SUMS = sums_for(built_in_parts())
+MADE = generated_for(declarations_for(posse.get_scenario("constant")))
 
 
 @kernel
@@ -66,13 +65,12 @@ def one_part(  # type: ignore[no-untyped-def]
 ):
     """Execute one part of a step in every world."""
     scratch = memory[0]
-    writers = Writers(OWN, FIXED, MATE, REWARD, TARGET_REWARD, EMPTY, WIDTH, MATE_WIDTH)
-    world.prepare(tables, worlds, writers, scratch)
+    lay_out_constants(tables.config[0], tables.beams, scratch)
     c, observations = tables.config[0], results.observations
     for e in range(len(worlds.world)):
         w, t, o = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         if part == 0:
-            motion.motion(c, w, t, o, actions[e], RULES.set_goal, scratch)
+            motion.motion(c, w, t, o, actions[e], MADE.set_goal, scratch)
             continue
         survey.lay_out(c, w, t, o, scratch)  # input of the other parts
         survey.find_gaps(c, scratch)
@@ -80,19 +78,19 @@ def one_part(  # type: ignore[no-untyped-def]
             contact.meet(c, w, t, o, scratch)
         elif part == 3:
             w.step += 1
-            world.sense(c, worlds, e, RULES, scratch)
+            world.sense(c, worlds, e, MADE, scratch)
         elif part == 4:
             score.occupy(c, w, t, tables.slots, scratch)
         elif part == 5:
-            SUMS.add(c, w, t, tables.slots)
+            MADE.add_to_sums(c, w, t, tables.slots)
             score.settle(c, w)
         elif part == 6:
-            world.reward(c, w, t, tables, writers, results.rewards[e], results.terms[e])
+            world.reward(c, w, t, tables, MADE, results.rewards[e], results.terms[e])
         elif part == 7:
-            observing.observe_sonar(c, t, scratch, observations[e], WIDTH)
+            observing.observe_sonar(c, t, scratch, observations[e], MADE.width)
             begun = e % observing.TOGETHER + 1
             if begun == observing.TOGETHER or e == len(worlds.world) - 1:
-                observing.observe_together(c, worlds, e + 1 - begun, begun, writers, scratch, observations)
+                observing.observe_together(c, worlds, e + 1 - begun, begun, MADE, scratch, observations)
 
 
 def best(call: Callable[[], object], seconds: float) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -35,6 +35,8 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
+    fingerprints: Mapping[str, str] = field(default_factory=dict)
+    """Hashes of the declarations of users' modules that the scenario names."""
 
 
 class Batch(Stepping):
@@ -105,7 +107,7 @@ class Batch(Stepping):
             ResetNeeded: Before the first :meth:`reset`.
         """
         self._check_started("save")
-        return Snapshot(self.scenario, self._arrays.copy())
+        return Snapshot(self.scenario, self._arrays.copy(), self._declared.fingerprints())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Restore a snapshot and return its observations.
@@ -113,6 +115,7 @@ class Batch(Stepping):
         Raises:
             ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
                 changed.
+            DeclarationError: A declaration that the scenario names has changed.
         """
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {shown(snapshot)}")
@@ -122,6 +125,7 @@ class Batch(Stepping):
                 f"{snapshot.scenario.name!r} does not fit a batch of {self.num_worlds} worlds of "
                 f"{self.scenario.name!r}: scenario and number of worlds must be equal"
             )
+        self._declared.check_fingerprints(snapshot.fingerprints)
         self._arrays.write(snapshot.arrays)
         self._started = True
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
@@ -166,6 +170,7 @@ class Batch(Stepping):
             raise ValueError(f"copies go into another Batch, got {shown(into)}")
         else:
             check_fit(self.scenario, self.num_worlds, count, into.scenario, into.num_worlds)
+        into._declared.check_fingerprints(self._declared.fingerprints())
         write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
         into._started = True
         return into

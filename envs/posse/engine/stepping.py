@@ -12,11 +12,11 @@ from posse.engine.arguments import action_error, as_array, real_numbers, to_floa
 from posse.engine.kernels import LOOK, STEP, TO_CLIP, Results, bad_action, kernel_of, tables_of
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
-from posse.engine.user_parts import check_fields, check_functions
 from posse.engine.world_views import WorldViews
-from posse.numeric import Blocks, BoolArray, FloatArray, checked_before_compiling, direct, run_threads, threads_for
+from posse.numeric import Blocks, BoolArray, FloatArray, direct, run_threads, threads_for
 from posse.rules.scratch import new_scratch
-from posse.signals.parts import parts_for
+from posse.signals.generate import declarations_for
+from posse.signals.observation.layout import ObservationLayout
 
 
 class Stepping(WorldViews):
@@ -24,6 +24,8 @@ class Stepping(WorldViews):
 
     num_worlds: int
     num_threads: int
+    layout: ObservationLayout
+    _started: bool
     observation_shape: tuple[int, int, int]
     action_shape: tuple[int, int, int]
 
@@ -31,14 +33,13 @@ class Stepping(WorldViews):
         """Set the derived attributes, which are not pickled."""
         scenario, (num_worlds, _, size) = self.scenario, self.observation_shape
         rows = scenario.num_agents
-        parts = parts_for(scenario)
-        check_fields(parts, self._arrays)
+        self._declared = declarations_for(scenario)
         self._tables = tables_of(scenario)
         self._observations = Recycler((num_worlds, rows, size))
         self._rewards = Recycler((num_worlds, rows))
-        self.term_names = parts.term_names
+        self.term_names = self._declared.term_names
         self._terms = Recycler((num_worlds, rows, len(self.term_names)))
-        self._untyped: Callable[..., int] = kernel_of(parts)
+        self._untyped: Callable[..., int] = kernel_of(self._declared)
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
         self._orders = np.full(num_worlds, STEP, np.uint8)
@@ -47,6 +48,7 @@ class Stepping(WorldViews):
 
     def __getstate__(self) -> dict[str, Any]:
         derived = (
+            "_declared",
             "_tables",
             "_observations",
             "_rewards",
@@ -57,9 +59,11 @@ class Stepping(WorldViews):
             "_kernel",
             "_untyped",
         )
-        return {k: v for k, v in self.__dict__.items() if k not in derived}
+        state = {k: v for k, v in self.__dict__.items() if k not in derived}
+        return {**state, "fingerprints": self._declared.fingerprints()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        declarations_for(state["scenario"]).check_fingerprints(state.pop("fingerprints"))
         self.__dict__.update(state)
         self._prepare()
 
@@ -110,11 +114,8 @@ class Stepping(WorldViews):
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         agents, length = self.scenario.num_agents, 2 + self.scenario.message_size
         actions = np.empty((self.num_worlds, agents, length), np.float32)  # not read
-        with checked_before_compiling(self._untyped, self._check_functions):
-            self._run(orders, actions, results)
+        self._run(orders, actions, results)
         self._kernel = direct(self._untyped)  # now compiled
+        if not self._started:
+            self.layout.check_added(results.observations)
         return results.observations
-
-    def _check_functions(self) -> None:
-        """Raise if a user's function cannot be compiled: sooner, and clearer, than the kernel."""
-        check_functions(parts_for(self.scenario), self._tables, self._arrays, self._scratch[0])

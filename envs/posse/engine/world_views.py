@@ -10,6 +10,7 @@ import numpy.typing as npt
 from posse.numeric import BoolArray, FloatArray, Records
 from posse.rules.state import WorldArrays
 from posse.scenarios import Scenario
+from posse.signals.generate import Declarations
 from posse.signals.metrics import episode_metrics
 
 
@@ -19,6 +20,7 @@ class WorldViews:
     scenario: Scenario
     _arrays: WorldArrays
     _score: FloatArray
+    _declared: Declarations
 
     @property
     def state(self) -> dict[str, npt.NDArray[Any]]:
@@ -64,4 +66,4 @@ class WorldViews:
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
         """Return the metrics of the current episodes by name, (E,) each."""
-        return episode_metrics(self.scenario, self._arrays.world)
+        return episode_metrics(self._declared.metrics, self.scenario, self._arrays.world)

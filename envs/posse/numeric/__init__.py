@@ -30,7 +30,6 @@ from posse.numeric.simd.lanes import (
     transpose,
 )
 from posse.numeric.threads import MOST_THREADS, over_worlds, run_threads, threads_for
-from posse.numeric.written import written
 
 __all__ = [
     "MOST_THREADS",
@@ -71,5 +70,4 @@ __all__ = [
     "threads_for",
     "transpose",
     "worlds_of",
-    "written",
 ]

@@ -164,16 +164,16 @@ def world_record(scenario: Scenario) -> np.dtype[Any]:
     It includes the memories of the target motions and the sums of the metrics, both of the built-in
     ones and of those that the scenario names.
     """
-    return _world_record(scenario.target_motion, scenario.metrics)
+    return world_record_of(TARGET_MOTIONS.with_added(scenario.target_motion), METRICS.with_added(*scenario.metrics))
 
 
 @functools.cache
-def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
-    motions = TARGET_MOTIONS.with_added(motion)
+def world_record_of(motions: tuple[Any, ...], metrics: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return the record of one world for declared motions and metrics."""
     return _record(
         *_WORLD,
-        *(field for metric in METRICS.with_added(*metrics) for field in metric.fields),
-        *((memory.name, _F) for each in motions for memory in each.memory),
+        *(field for metric in metrics for field in metric.fields),
+        *((memory.name, _F) for motion in motions for memory in motion.memory),
     )
 
 
@@ -375,7 +375,7 @@ def config_record(scenario: Scenario) -> Records:
     c.break_number = s.break_number if s.break_choice == BREAK_CHOICES[2] else -1
     motions = TARGET_MOTIONS.with_added(s.target_motion)
     motion = TARGET_MOTIONS[s.target_motion]
-    c.motion, c.target_agent = motions.index(motion), motion.agent
+    c.motion, c.target_agent = motions.index(motion), s.num_agents - s.num_trackers
     c.mirrored = motion.mirrored and math.isfinite(s.arena)
     sensor = SENSORS[s.sensor]
     c.sensor = SENSORS.with_added(s.sensor).index(sensor)

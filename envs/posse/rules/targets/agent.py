@@ -6,6 +6,6 @@ from posse.numeric import Record
 from posse.rules.targets.declaring import target_motion
 
 
-@target_motion("agent", agent=True)
+@target_motion("agent")
 def agent(c: Record, w: Record) -> None:
     """A policy controls the target."""

@@ -30,7 +30,7 @@ from posse.numeric import (
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural
 from posse.rules.state import CONDITION, FIX, NEVER, POSE, STEP, WorldArrays
-from posse.signals.observation.columns import Observers
+from posse.signals.observation.rows import Observers
 from posse.signals.observation.team import lay_out_team, own_numbers, stride_of, team_columns
 
 _ZERO: Final = np.float32(0.0)
