@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Record, Records
+from posse.numeric import FloatArray, Lanes, Record, Records
 from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
@@ -25,20 +25,28 @@ NEVER: Final = np.int32(2**30)
 """A control step later than any."""
 
 
-def _record(*fields: tuple[str, type], size: int | None = None) -> np.dtype[Any]:
-    """Return a record of fields, at least ``size`` bytes long."""
-    layout = np.dtype(list(fields), align=True)
-    if size is not None:
-        names, formats = zip(*fields, strict=True)
-        offsets = [at for _, at, *_ in (layout.fields or {}).values()]
-        given = {"names": names, "formats": formats, "offsets": offsets, "itemsize": size}
-        layout = np.dtype(given, align=True)  # type: ignore[call-overload]
-    return np.dtype((np.record, layout))
+def _record(*fields: tuple[str, type]) -> np.dtype[Any]:
+    return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
-def _offset(record: np.dtype[Any], name: str) -> int:
-    """Return the offset of a field in a record, in bytes."""
-    return next(at for field, (_, at, *_) in (record.fields or {}).items() if field == name)
+def block_at(record: np.dtype[Any], block: type[tuple[Any, ...]]) -> int:
+    """Return where a block of eight fields begins in a record, bytes.
+
+    Kernels read and write such a block at once, as eight consecutive numbers of 4 bytes.
+
+    Args:
+        record: The record.
+        block: A named tuple with the names of the fields, in order.
+
+    Raises:
+        TypeError: The record does not have these fields one after the other.
+    """
+    names: tuple[str, ...] = block._fields  # type: ignore[attr-defined]
+    fields: Any = record.fields or {}
+    places = [(fields[name][1], fields[name][0].itemsize) if name in fields else (-1, 0) for name in names]
+    if len(names) != 8 or places != [(places[0][0] + 4 * k, 4) for k in range(8)]:
+        raise TypeError(f"{block.__name__}: a record must have {', '.join(names)} one after the other, 4 bytes each")
+    return int(places[0][0])
 
 
 _F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
@@ -153,7 +161,6 @@ _WORLD: Final = (
     ("contacts_target", _I),
     ("least_gap", _F),
 )
-STEP: Final = _offset(_record(*_WORLD), "step")
 WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
 """Fields of every world, without those of declared metrics and motions."""
 
@@ -225,11 +232,62 @@ TRACKER: Final = _record(
 )
 """One tracker."""
 
-# Kernels read and write these fields of a tracker in blocks of eight; unchanged fields are written
-# as they were read. From x on: pose, speed, turn rate, their limits. From fix_x on: the fix.
-POSE: Final = _offset(TRACKER, "x")
-FIX: Final = _offset(TRACKER, "fix_x")
-CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
+
+class Pose(NamedTuple):
+    """Pose, motion and limits of eight trackers."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    max_speed: Lanes
+    max_turn_rate: Lanes
+
+
+class Condition(NamedTuple):
+    """Whole numbers of eight trackers."""
+
+    broken_at: Lanes
+    sensor_dead_from: Lanes
+    radio_dead_from: Lanes
+    sees: Lanes
+    near: Lanes
+    touching: Lanes
+    onsets: Lanes
+    fix_step: Lanes
+
+
+class Fix(NamedTuple):
+    """The fixes of eight trackers."""
+
+    fix_x: Lanes
+    fix_y: Lanes
+    fix_cos: Lanes
+    fix_sin: Lanes
+    fix_frame_cos: Lanes
+    fix_frame_sin: Lanes
+    fix_vx: Lanes
+    fix_vy: Lanes
+
+
+class Heard(NamedTuple):
+    """The last messages that eight trackers received from a team-mate."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    step: Lanes
+    unused: Lanes
+
+
+POSE: Final = block_at(TRACKER, Pose)
+FIX: Final = block_at(TRACKER, Fix)
+CONDITION: Final = block_at(TRACKER, Condition)
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 
@@ -244,9 +302,10 @@ HEARD: Final = _record(
     ("speed", _F),
     ("turn_rate", _F),
     ("step", _I),  # when it was sent; -1: never heard
-    size=32,  # so that it can be read as a block of eight, like TRACKER from x on
+    ("unused", _I),  # makes a block of eight
 )
 """The last message that a tracker received from a team-mate: (E, receiver, sender)."""
+MESSAGE: Final = block_at(HEARD, Heard)
 
 BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent

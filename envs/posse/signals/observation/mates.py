@@ -28,7 +28,7 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.discs import natural
-from posse.rules.state import POSE, WorldArrays
+from posse.rules.state import MESSAGE, POSE, WorldArrays
 from posse.signals.generate import Generated
 from posse.signals.observation.nearest import keep_nearest, list_nearest
 from posse.signals.observation.rows import Observers, Rows, robot_of, world_of
@@ -169,7 +169,7 @@ def _pose(worlds: WorldArrays, heard: bool, place: int, lane: int, observers: Ob
     number = natural(int(s.listed[WIDTH * place + there]))
     to, who = world_of(observers, there), robot_of(observers, there)
     if heard:
-        return load_fields(worlds.heard[to, who, number], POSE)
+        return load_fields(worlds.heard[to, who, number], MESSAGE)
     return load_fields(worlds.tracker[to, number], POSE)
 
 
