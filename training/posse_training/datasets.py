@@ -154,10 +154,7 @@ def _played(
             rewards=rewards,
             terminations=(ends & terminated[0]).tolist(),
             truncations=(ends & ~terminated[0]).tolist(),
-            infos={
-                "score": np.array(scores),
-                "reward": {name: np.stack(column) for name, column in terms.items()},
-            },
+            infos={"score": np.array(scores), "reward": {name: np.stack(column) for name, column in terms.items()}},
         )
         metrics = {name: float(infos[f"metrics/{name}"][0]) for name in batch.metrics()}
         yield buffer, {"policy": policy.name, "world": world, **metrics}

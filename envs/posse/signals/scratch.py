@@ -5,15 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 from posse.numeric import WIDTH
-from posse.rules.scratch import ROBOTS, TEAM, Fields
+from posse.rules.scratch import TEAM, Fields
 
 MOST_IN_TEAM: Final = 16
 """Largest team size for which eight worlds are observed together."""
-
-FIXED_BLOCKS: Final = 2
-"""Most blocks of eight numbers of an observation that are kept since they never change."""
-KEPT: Final[Fields] = (("fixed", WIDTH * FIXED_BLOCKS * ROBOTS),)
-"""Fixed blocks of each robot, the target last."""
 
 
 def observing(worlds: int) -> Fields:
@@ -22,7 +17,6 @@ def observing(worlds: int) -> Fields:
     row = (2 * WIDTH * MOST_IN_TEAM if worlds > 1 else 2 * TEAM) + WIDTH
     return (
         # Eight team-mates, one of each observer.
-        ("column", 2 * WIDTH),  # values of one or two columns
         ("start", WIDTH),  # index in the observation at which each team-mate begins
         ("filled", WIDTH),  # number of team-mates that the observer knows of
         # A team that is observed as a whole.

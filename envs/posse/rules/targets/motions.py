@@ -47,6 +47,6 @@ def accelerating(c: Record, w: Record) -> None:
         _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, ZERO, turn, c.physics_dt)
 
 
-@target_motion("agent", agent=True)
+@target_motion("agent")
 def agent(c: Record, w: Record) -> None:
     """A policy controls the target."""

@@ -28,12 +28,12 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.discs import natural
-from posse.rules.state import POSE, WorldArrays
-from posse.signals.observation.columns import Observers, Rows, robot_of, world_of
+from posse.rules.state import MESSAGE, POSE, WorldArrays
+from posse.signals.generate import Generated
 from posse.signals.observation.nearest import keep_nearest, list_nearest
+from posse.signals.observation.rows import Observers, Rows, robot_of, world_of
 from posse.signals.observation.team import number_behind, seen_at, stride_of, way_behind
 from posse.signals.observation.views import View, ego, mate_heard, mate_now
-from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
 
 _ZERO: Final = np.float32(0.0)
@@ -46,7 +46,7 @@ def observe_mates(
     worlds: WorldArrays,
     observers: Observers,
     v: View,
-    writers: Writers,
+    made: Generated,
     s: Record,
     observations: FloatArray,
     k: int,
@@ -59,26 +59,26 @@ def observe_mates(
     if places == 0:
         return
     if c.perfect_radio == 0:
-        _observe_heard(c, worlds, observers, v, writers, s, observations, k)
+        _observe_heard(c, worlds, observers, v, made, s, observations, k)
         return
     if mates <= places and mates < MOST_IN_TEAM:
-        _observe_whole_team(c, observers, v, writers, s, observations, k)
+        _observe_whole_team(c, observers, v, made, s, observations, k)
     else:
         most = min(mates, places)
         list_nearest(mates + 1, most, observers.i, observers.number, observers.across, s)
-        _observe_listed(c, worlds, observers, False, most, v, writers, s, observations, k)
+        _observe_listed(c, worlds, observers, False, most, v, made, s, observations, k)
     if c.message_size > 0 or mates < places:
         for lane in range(observers.number):
             to, who = world_of(observers, lane), robot_of(observers, lane)
-            _write_the_rest(c, mates, worlds.message[to, 0], writers, observations[to, who], k)
+            _write_the_rest(c, mates, worlds.message[to, 0], made, observations[to, who], k)
 
 
 @compiled
 def _observe_whole_team(
-    c: Record, observers: Observers, v: View, writers: Writers, s: Record, observations: FloatArray, k: int
+    c: Record, observers: Observers, v: View, made: Generated, s: Record, observations: FloatArray, k: int
 ) -> None:
     """Write every team-mate."""
-    n, size = natural(c.num_trackers), np.float32(writers.mate_width + c.message_size)
+    n, size = natural(c.num_trackers), np.float32(made.mate_width + c.message_size)
     _, i, _, across = observers
     rows = Rows(observers, observations, k, s.start, True)
     _find_places(n, i, across, s)
@@ -99,7 +99,7 @@ def _observe_whole_team(
             load(s.team_turn_rate, at),
         )
         store(s.start, 0, load(s.place, WIDTH * m) * size)
-        writers.mate(c, v, mate, s, rows)
+        made.write_mate(c, v, mate, rows)
 
 
 @compiled
@@ -129,13 +129,13 @@ def _observe_listed(
     heard: bool,
     most: int,
     v: View,
-    writers: Writers,
+    made: Generated,
     s: Record,
     observations: FloatArray,
     k: int,
 ) -> None:
     """Write ``most`` team-mates of each list: current or as received."""
-    size = natural(writers.mate_width + c.message_size)
+    size = natural(made.mate_width + c.message_size)
     for place in range(natural(most)):
         x, y, cosine, sine, speed, turn_rate, step, _ = transpose(
             _pose(worlds, heard, place, 0, observers, s),
@@ -156,7 +156,7 @@ def _observe_listed(
             distance = root(ahead * ahead + left * left)
             mate = mate_now(number, dx, dy, distance, ahead, left, cosine, sine, speed, turn_rate)
         rows = Rows(observers, observations, natural(k + place * size), s.start, False)
-        writers.mate(c, v, mate, s, rows)
+        made.write_mate(c, v, mate, rows)
 
 
 @compiled
@@ -169,7 +169,7 @@ def _pose(worlds: WorldArrays, heard: bool, place: int, lane: int, observers: Ob
     number = natural(int(s.listed[WIDTH * place + there]))
     to, who = world_of(observers, there), robot_of(observers, there)
     if heard:
-        return load_fields(worlds.heard[to, who, number], POSE)
+        return load_fields(worlds.heard[to, who, number], MESSAGE)
     return load_fields(worlds.tracker[to, number], POSE)
 
 
@@ -179,7 +179,7 @@ def _observe_heard(
     worlds: WorldArrays,
     observers: Observers,
     v: View,
-    writers: Writers,
+    made: Generated,
     s: Record,
     observations: FloatArray,
     k: int,
@@ -191,12 +191,12 @@ def _observe_heard(
         filled = _list_heard(c, worlds, to, who, lane, s)
         s.filled[lane] = np.float32(filled)
         most = max(most, filled)
-    _observe_listed(c, worlds, observers, True, most, v, writers, s, observations, k)
+    _observe_listed(c, worlds, observers, True, most, v, made, s, observations, k)
     for lane in range(observers.number):
         to, who = world_of(observers, lane), robot_of(observers, lane)
         filled, o = natural(int(s.filled[lane])), observations[to, who]
         if c.message_size > 0 or filled < c.neighbours:
-            _write_the_rest(c, filled, worlds.heard_message[to, who], writers, o, k)
+            _write_the_rest(c, filled, worlds.heard_message[to, who], made, o, k)
 
 
 @compiled
@@ -215,7 +215,7 @@ def _list_heard(c: Record, worlds: WorldArrays, e: int, i: int, lane: int, s: Re
 
 @compiled
 def observe_trackers(
-    c: Record, worlds: WorldArrays, e: int, v: View, writers: Writers, s: Record, observations: FloatArray, k: int
+    c: Record, worlds: WorldArrays, e: int, v: View, made: Generated, s: Record, observations: FloatArray, k: int
 ) -> None:
     """Write the nearest trackers of a target agent, without messages, from k on."""
     w, n, filled = worlds.world[e], natural(c.num_trackers), 0
@@ -224,7 +224,7 @@ def observe_trackers(
         dx, dy = t.x - w.x, t.y - w.y
         if c.neighbours > 0:
             filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
-    size, o = natural(writers.mate_width + c.message_size), observations[e, n]
+    size, o = natural(made.mate_width + c.message_size), observations[e, n]
     for place in range(natural(c.neighbours)):
         start = natural(k + place * size)
         if place < filled:
@@ -242,25 +242,25 @@ def observe_trackers(
                 eight(t.turn_rate),
             )
             rows = Rows(Observers(e, n, 1, 0), observations, start, s.start, False)
-            writers.mate(c, v, mate, s, rows)
+            made.write_mate(c, v, mate, rows)
         else:
-            writers.empty(o, start)
+            made.write_empty(o, start)
         for q in range(c.message_size):
-            o[start + writers.mate_width + q] = _ZERO
+            o[start + made.mate_width + q] = _ZERO
 
 
 @compiled(seldom=True)
-def _write_the_rest(c: Record, filled: int, said: FloatArray, writers: Writers, o: FloatArray, k: int) -> None:
+def _write_the_rest(c: Record, filled: int, said: FloatArray, made: Generated, o: FloatArray, k: int) -> None:
     """Write the messages (N, m) of the first ``filled`` team-mates, and the empty places."""
-    size = natural(writers.mate_width + c.message_size)
+    size = natural(made.mate_width + c.message_size)
     for place in range(natural(c.neighbours)):
         start = natural(k + place * size)
-        message = start + writers.mate_width
+        message = start + made.mate_width
         if place < filled:
             number = natural(int(o[start]))  # the first field of a team-mate
             for q in range(c.message_size):
                 o[message + q] = said[number, q]
         else:
-            writers.empty(o, start)
+            made.write_empty(o, start)
             for q in range(c.message_size):
                 o[message + q] = _ZERO

@@ -15,28 +15,16 @@ from posse.numeric import WIDTH, FloatArray, Record, Records, compiled
 from posse.rules.discs import natural
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
-from posse.signals.observation.columns import Observers, Rows
+from posse.signals.generate import Generated
 from posse.signals.observation.mates import observe_mates, observe_trackers
+from posse.signals.observation.rows import Observers, Rows
 from posse.signals.observation.views import lay_out_observers, view_of_target, view_of_trackers
-from posse.signals.parts import Writers
 from posse.signals.scratch import MOST_IN_TEAM
 
 TOGETHER: Final = WIDTH
 """Worlds processed together."""
 
 _ZERO: Final = np.float32(0.0)
-
-
-@compiled(seldom=True)
-def lay_out_fixed(c: Record, worlds: WorldArrays, writers: Writers, s: Record) -> None:
-    """Write what never changes of each robot's observation, from world 0."""
-    n = natural(c.num_trackers)
-    lay_out_observers(worlds, 0, 0, s)
-    for i in range(0, n, WIDTH):
-        observers = Observers(0, i, min(WIDTH, n - i), 0)
-        writers.fixed(c, view_of_trackers(c, worlds, observers, s), s, observers)
-    view = view_of_target(c, worlds.world[0], worlds.obstacle[0])
-    writers.fixed(c, view, s, Observers(0, n, 1, 0))
 
 
 @compiled
@@ -47,33 +35,33 @@ def _observe_some(
     i: int,
     count: int,
     across: int,
-    writers: Writers,
+    made: Generated,
     s: Record,
     observations: FloatArray,
 ) -> None:
     """Write what ``count`` trackers, the first of them i of world e, observe, the sonar apart."""
     observers = Observers(e, i, count, across)
     view = view_of_trackers(c, worlds, observers, s)
-    writers.own(c, view, s, Rows(observers, observations, 0, s.start, False))
-    k = writers.width + natural(c.sonar_beams)
-    observe_mates(c, worlds, observers, view, writers, s, observations, k)
+    made.write_own(c, view, Rows(observers, observations, 0, s.start, False))
+    k = made.width + natural(c.sonar_beams)
+    observe_mates(c, worlds, observers, view, made, s, observations, k)
 
 
 @compiled
 def observe_together(
-    c: Record, worlds: WorldArrays, first: int, count: int, writers: Writers, s: Record, observations: FloatArray
+    c: Record, worlds: WorldArrays, first: int, count: int, made: Generated, s: Record, observations: FloatArray
 ) -> None:
     """Write the observations of ``count`` worlds, at most eight, without the sonar."""
     n = natural(c.num_trackers)
     if count == TOGETHER and n <= MOST_IN_TEAM:
         lay_out_observers(worlds, first, 1, s)
         for i in range(n):
-            _observe_some(c, worlds, first, i, WIDTH, 1, writers, s, observations)
+            _observe_some(c, worlds, first, i, WIDTH, 1, made, s, observations)
         return
     for e in range(first, first + count):
         lay_out_observers(worlds, e, 0, s)
         for i in range(0, n, WIDTH):
-            _observe_some(c, worlds, e, i, min(WIDTH, n - i), 0, writers, s, observations)
+            _observe_some(c, worlds, e, i, min(WIDTH, n - i), 0, made, s, observations)
 
 
 @compiled
@@ -90,13 +78,13 @@ def observe_sonar(c: Record, trackers: Records, s: Record, observations: FloatAr
 
 @compiled(seldom=True)
 def observe_target(
-    c: Record, worlds: WorldArrays, e: int, writers: Writers, s: Record, observations: FloatArray
+    c: Record, worlds: WorldArrays, e: int, made: Generated, s: Record, observations: FloatArray
 ) -> None:
     """Write the observation of a target agent, which observes the trackers without error."""
     w, n = worlds.world[e], natural(c.num_trackers)
     view = view_of_target(c, w, worlds.obstacle[e])
-    writers.own(c, view, s, Rows(Observers(e, n, 1, 0), observations, 0, s.start, False))
+    made.write_own(c, view, Rows(Observers(e, n, 1, 0), observations, 0, s.start, False))
     pose = (w.x, w.y, w.heading_cos, w.heading_sin)
-    ping(c, pose, n, _ZERO, s, observations[e, n], writers.width)
-    k = writers.width + natural(c.sonar_beams)
-    observe_trackers(c, worlds, e, view, writers, s, observations, k)
+    ping(c, pose, n, _ZERO, s, observations[e, n], made.width)
+    k = made.width + natural(c.sonar_beams)
+    observe_trackers(c, worlds, e, view, made, s, observations, k)

@@ -11,7 +11,7 @@ import numpy as np
 
 from posse.numeric import WIDTH, Lanes, Record, Records, choose, compiled, eight, load, load_fields, store, transpose
 from posse.rules.discs import columns, natural
-from posse.rules.state import POSE
+from posse.rules.state import POSE, Pose
 
 
 @compiled
@@ -48,14 +48,14 @@ def lay_out_team(tracker: Records, e: int, across: int, s: Record) -> None:
     # Backwards: the padding of the last block is overwritten by the second copy.
     for block in range((n + each - 1) // each - 1, -1, -1):
         i = natural(each * block)
-        x, y, cosine, sine, speed, turn_rate, _, _ = team_columns(tracker, e, i, across, POSE)
+        pose = Pose(*team_columns(tracker, e, i, across, POSE))
         for at in (stride * i, natural(stride * (i + n))):
-            store(s.team_x, at, x)
-            store(s.team_y, at, y)
-            store(s.team_cos, at, cosine)
-            store(s.team_sin, at, sine)
-            store(s.team_speed, at, speed)
-            store(s.team_turn_rate, at, turn_rate)
+            store(s.team_x, at, pose.x)
+            store(s.team_y, at, pose.y)
+            store(s.team_cos, at, pose.heading_cos)
+            store(s.team_sin, at, pose.heading_sin)
+            store(s.team_speed, at, pose.speed)
+            store(s.team_turn_rate, at, pose.turn_rate)
 
 
 @compiled

@@ -11,26 +11,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from posse.numeric import (
-    Lanes,
-    Mask,
-    Record,
-    Records,
-    choose,
-    compiled,
-    counts,
-    eight,
-    greater,
-    load,
-    load_fields,
-    root,
-    store,
-    transpose,
-)
+from posse.numeric import WIDTH, Lanes, Mask, Record, Records, choose, compiled, counts, eight, greater, load, root
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural
-from posse.rules.state import CONDITION, FIX, NEVER, POSE, STEP, WorldArrays
-from posse.signals.observation.columns import Observers
+from posse.rules.state import CONDITION, FIX, NEVER, POSE, Condition, Fix, Pose, WorldArrays
+from posse.signals.observation.rows import Observers
 from posse.signals.observation.team import lay_out_team, own_numbers, stride_of, team_columns
 
 _ZERO: Final = np.float32(0.0)
@@ -136,17 +121,17 @@ def mate_now(
     """Return a team-mate as it is now, (dx, dy) away: ``ahead`` and to the ``left``, all in m."""
     per_metre = _ONE / greater(distance, _TINY)
     return Mate(
-        number,
-        eight(_ZERO),
-        dx,
-        dy,
-        distance,
-        ahead * per_metre,
-        left * per_metre,
-        heading_cos,
-        heading_sin,
-        speed,
-        turn_rate,
+        number=number,
+        age=eight(_ZERO),
+        dx=dx,
+        dy=dy,
+        distance=distance,
+        ahead=ahead * per_metre,
+        left=left * per_metre,
+        heading_cos=heading_cos,
+        heading_sin=heading_sin,
+        speed=speed,
+        turn_rate=turn_rate,
     )
 
 
@@ -171,17 +156,17 @@ def mate_heard(
     per_metre = _ONE / choose(apart, distance, _ONE)
     ahead, left = ego(v, dx * per_metre, dy * per_metre)
     return Mate(
-        number,
-        age,
-        dx,
-        dy,
-        distance,
-        choose(apart, ahead, _ONE),
-        choose(apart, left, _ZERO),
-        heading_cos,
-        heading_sin,
-        speed,
-        turn_rate,
+        number=number,
+        age=age,
+        dx=dx,
+        dy=dy,
+        distance=distance,
+        ahead=choose(apart, ahead, _ONE),
+        left=choose(apart, left, _ZERO),
+        heading_cos=heading_cos,
+        heading_sin=heading_sin,
+        speed=speed,
+        turn_rate=turn_rate,
     )
 
 
@@ -189,20 +174,8 @@ def mate_heard(
 def lay_out_observers(worlds: WorldArrays, e: int, across: int, s: Record) -> None:
     """Write the team's rows of world e, or of eight worlds, and their control steps."""
     lay_out_team(worlds.tracker, e, across, s)
-    if across:
-        steps, _, _, _, _, _, _, _ = transpose(
-            load_fields(worlds.world[e], STEP),
-            load_fields(worlds.world[e + 1], STEP),
-            load_fields(worlds.world[e + 2], STEP),
-            load_fields(worlds.world[e + 3], STEP),
-            load_fields(worlds.world[e + 4], STEP),
-            load_fields(worlds.world[e + 5], STEP),
-            load_fields(worlds.world[e + 6], STEP),
-            load_fields(worlds.world[e + 7], STEP),
-        )
-        store(s.steps, 0, counts(steps))
-    else:
-        store(s.steps, 0, eight(np.float32(worlds.world[e].step)))
+    for lane in range(WIDTH):
+        s.steps[lane] = np.float32(worlds.world[natural(e + lane * across)].step)
 
 
 @compiled
@@ -211,40 +184,39 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
     e, i, _, across = observers
     at = natural(stride_of(across) * i)
     own_x, own_y = load(s.team_x, at), load(s.team_y, at)
-    _, _, _, _, _, _, max_speed, max_turn_rate = team_columns(worlds.tracker, e, i, across, POSE)
-    x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(worlds.tracker, e, i, across, FIX)
-    broken_at, _, _, sees, _, touching, _, fix_step = team_columns(worlds.tracker, e, i, across, CONDITION)
-    working = choose(counts(broken_at) == np.float32(NEVER), _ONE, _ZERO)
-    dx, dy, fixed_at = x, y, counts(fix_step)
+    limits = Pose(*team_columns(worlds.tracker, e, i, across, POSE))
+    fix = Fix(*team_columns(worlds.tracker, e, i, across, FIX))
+    condition = Condition(*team_columns(worlds.tracker, e, i, across, CONDITION))
+    dx, dy, fixed_at = fix.fix_x, fix.fix_y, counts(condition.fix_step)
     if c.fix_bearing == 0:
-        dx, dy = x - own_x, y - own_y
+        dx, dy = dx - own_x, dy - own_y
     return View(
-        own_numbers(i, across, s),
-        own_x,
-        own_y,
-        load(s.team_cos, at),
-        load(s.team_sin, at),
-        load(s.team_speed, at),
-        load(s.team_turn_rate, at),
-        counts(touching),
-        working,
-        load(s.steps, 0),
-        max_speed,
-        max_turn_rate,
-        max_speed * c.per_acceleration,
-        max_turn_rate * c.per_turn_acceleration,
-        fixed_at >= _ZERO,
-        counts(sees),
-        fixed_at,
-        dx,
-        dy,
-        root(dx * dx + dy * dy),
-        cosine,
-        sine,
-        frame_cos,
-        frame_sin,
-        vx,
-        vy,
+        number=own_numbers(i, across, s),
+        x=own_x,
+        y=own_y,
+        heading_cos=load(s.team_cos, at),
+        heading_sin=load(s.team_sin, at),
+        speed=load(s.team_speed, at),
+        turn_rate=load(s.team_turn_rate, at),
+        touching=counts(condition.touching),
+        working=choose(counts(condition.broken_at) == np.float32(NEVER), _ONE, _ZERO),
+        step=load(s.steps, 0),
+        max_speed=limits.max_speed,
+        max_turn_rate=limits.max_turn_rate,
+        acceleration_time=limits.max_speed * c.per_acceleration,
+        turn_acceleration_time=limits.max_turn_rate * c.per_turn_acceleration,
+        target_known=fixed_at >= _ZERO,
+        target_seen=counts(condition.sees),
+        target_step=fixed_at,
+        target_dx=dx,
+        target_dy=dy,
+        target_distance=root(dx * dx + dy * dy),
+        target_cos=fix.fix_cos,
+        target_sin=fix.fix_sin,
+        target_frame_cos=fix.fix_frame_cos,
+        target_frame_sin=fix.fix_frame_sin,
+        target_vx=fix.fix_vx,
+        target_vy=fix.fix_vy,
     )
 
 
@@ -254,30 +226,30 @@ def view_of_target(c: Record, w: Record, obstacles: Records) -> View:
     touching = w.touching != _NOBODY or touches_surroundings(c, w, obstacles)
     zero, never = eight(_ZERO), eight(_MINUS_ONE)
     return View(
-        eight(_MINUS_ONE),
-        eight(w.x),
-        eight(w.y),
-        eight(w.heading_cos),
-        eight(w.heading_sin),
-        eight(w.speed),
-        eight(w.turn_rate),
-        eight(np.float32(touching)),
-        eight(_ONE),
-        eight(np.float32(w.step)),
-        eight(c.target_speed),
-        eight(c.target_turn_rate),
-        zero,
-        zero,
-        never >= _ZERO,
-        zero,
-        never,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
+        number=eight(_MINUS_ONE),
+        x=eight(w.x),
+        y=eight(w.y),
+        heading_cos=eight(w.heading_cos),
+        heading_sin=eight(w.heading_sin),
+        speed=eight(w.speed),
+        turn_rate=eight(w.turn_rate),
+        touching=eight(np.float32(touching)),
+        working=eight(_ONE),
+        step=eight(np.float32(w.step)),
+        max_speed=eight(c.target_speed),
+        max_turn_rate=eight(c.target_turn_rate),
+        acceleration_time=zero,
+        turn_acceleration_time=zero,
+        target_known=never >= _ZERO,
+        target_seen=zero,
+        target_step=never,
+        target_dx=zero,
+        target_dy=zero,
+        target_distance=zero,
+        target_cos=zero,
+        target_sin=zero,
+        target_frame_cos=zero,
+        target_frame_sin=zero,
+        target_vx=zero,
+        target_vy=zero,
     )
