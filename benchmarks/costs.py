@@ -87,7 +87,7 @@ def one_part(  # type: ignore[no-untyped-def]
         elif part == 6:
             world.reward(c, w, t, tables, MADE, results.rewards[e], results.terms[e])
         elif part == 7:
-            observing.observe_sonar(c, t, scratch, observations[e], MADE.width)
+            observing.observe_sonar(c, w, t, scratch, observations[e], MADE.width)
             begun = e % observing.TOGETHER + 1
             if begun == observing.TOGETHER or e == len(worlds.world) - 1:
                 observing.observe_together(c, worlds, e + 1 - begun, begun, MADE, scratch, observations)
