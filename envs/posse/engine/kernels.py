@@ -48,9 +48,8 @@ from posse.rules.start import draw_start, rest
 from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, Generated, generated_for
-from posse.signals.observation.observing import TOGETHER, observe_sonar, observe_target, observe_together
+from posse.signals.observation.observing import TOGETHER, observe_sonar, observe_together
 from posse.signals.reward import target_weights_for, weights_for
-from posse.signals.scratch import MOST_IN_TEAM
 from posse.signals.user_functions import check_functions
 
 
@@ -168,7 +167,7 @@ LOOK: Final = 3
 
 LINE: Final = 64
 """Bytes of a cache line."""
-FETCHED: Final = MOST_IN_TEAM
+FETCHED: Final = 16
 """Greatest team size whose prefetched data fit in the first-level cache."""
 
 
@@ -232,9 +231,7 @@ def advance_worlds(
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe_sonar(c, trackers, scratch, observations, made.width)
-        if c.target_agent != 0:
-            observe_target(c, worlds, e, made, scratch, results.observations)
+        observe_sonar(c, w, trackers, scratch, observations, made.width)
     observe_together(c, worlds, first, count, made, scratch, results.observations)
     return over
 

@@ -85,9 +85,9 @@ class Generated(NamedTuple):
     """The generated functions, for compiled code, and the lengths of what they write."""
 
     write_own: Any
-    """(c, v, rows): writes the own fields of eight observers."""
+    """(c, v, s, rows): writes the own fields of eight observers."""
     write_mate: Any
-    """(c, v, m, rows): writes the fields of a team-mate of each."""
+    """(c, v, m, s, rows): writes the fields of a team-mate of each."""
     write_empty: Any
     """(o, k): writes an empty place of a team-mate."""
     reward: Any
@@ -148,6 +148,8 @@ def source_of(declarations: Declarations) -> str:
     return _Module(declarations).text()
 
 
+_FEW: Final = 2
+"""Number of columns up to which writing single numbers is faster than a transposition."""
 _HEAD: Final = '''"""Functions that posse compiles for the declarations of a scenario."""
 
 from numpy import float32
@@ -155,7 +157,7 @@ from numpy import float32
 from posse.numeric import compiled, eight
 from posse.rules.senses import add_noise
 from posse.rules.state import NEVER
-from posse.signals.observation.rows import write_block'''
+from posse.signals.observation.rows import write_block, write_column'''
 _TAIL: Final = "\nZERO = float32(0)"
 
 
@@ -211,6 +213,7 @@ class _Module:
         columns: list[str] = []
         lines: list[str] = []
         width, written = sum(field.size for field in fields), 0
+        few = width % WIDTH if width % WIDTH <= _FEW else 0
         for field in fields:
             mine = [f"{field.name}_{q}" for q in range(field.size)]
             lines.append(f"{', '.join(mine)} = {self._call('field', field.name, field.function)}")
@@ -218,13 +221,14 @@ class _Module:
                 lines += [f"{column} = eight(float32({column}))" for column in mine]
             columns += mine
             # As soon as there are eight, so that few have to be kept at a time.
-            while len(columns) - written >= WIDTH or 0 < width - written == len(columns) - written:
+            while len(columns) - written >= WIDTH or few < width - written == len(columns) - written:
                 first = min(written, width - WIDTH)  # the last block repeats columns of the one before
                 block = columns[first : first + WIDTH]
                 halves = (f"    {', '.join(half)}," for half in (block[: WIDTH // 2], block[WIDTH // 2 :]))
                 lines += ["write_block(", *halves, f"    {first}, rows,", ")"]
                 written = first + WIDTH
-        yield from _function(name, (*parameters, "rows"), f"Write the {what}.", lines)
+        lines += [f"write_column({columns[q]}, {q}, s, rows)" for q in range(written, width)]
+        yield from _function(name, (*parameters, "s", "rows"), f"Write the {what}.", lines)
 
     def _empty_place(self, fields: Sequence[FieldDeclaration]) -> Iterator[str]:
         values = [float(field.unknown or 0.0) for field in fields for _ in range(field.size)]

@@ -1,26 +1,29 @@
 """Columns of eight observers are transposed and written to the rows of the observations.
 
-A column is one number of a field for eight observers (:mod:`posse.signals.generate`).
+The eight are the same robot of eight worlds. With fewer worlds the last one is repeated, and
+written once. A column is one number of a field (:mod:`posse.signals.generate`).
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from posse.numeric import FloatArray, Lanes, compiled, store, transpose
+from posse.numeric import FloatArray, Lanes, Record, compiled, store, transpose
 from posse.rules.discs import natural
 
 
 class Observers(NamedTuple):
-    """At most eight robots, the first of them robot i of world e.
-
-    They are one robot of several worlds (``across`` is 1) or several of one world (0).
-    """
+    """Robot i of ``number`` worlds, at most eight, from world e on."""
 
     e: int
     i: int
     number: int
-    across: int
+
+
+@compiled
+def world_of(observers: Observers, lane: int) -> int:
+    """Return the world of a lane."""
+    return natural(observers.e + min(lane, observers.number - 1))
 
 
 class Rows(NamedTuple):
@@ -31,9 +34,6 @@ class Rows(NamedTuple):
     """(E, rows, F)."""
     start: int
     """Place in an observation that the first column goes to."""
-    starts: FloatArray
-    """(8,) or more: of each observer by itself, to be added where ``scattered``."""
-    scattered: bool
 
 
 @compiled
@@ -54,21 +54,16 @@ def write_block(
 
 
 @compiled
+def write_column(column: Lanes, number: int, s: Record, rows: Rows) -> None:
+    """Write one column."""
+    store(s.column, 0, column)
+    for lane in range(rows.observers.number):
+        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
+        o[natural(rows.start) + number] = s.column[lane]
+
+
+@compiled
 def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
-    """Write eight numbers of one observer, if there are so many observers."""
     if lane < rows.observers.number:
-        o = rows.observations[world_of(rows.observers, lane), robot_of(rows.observers, lane)]
-        scattered = natural(int(rows.starts[lane])) if rows.scattered else 0
-        store(o, natural(rows.start) + scattered + first, row)
-
-
-@compiled
-def world_of(observers: Observers, lane: int) -> int:
-    """Return the world of the robot in a lane."""
-    return natural(observers.e + lane * observers.across)
-
-
-@compiled
-def robot_of(observers: Observers, lane: int) -> int:
-    """Return the number of the robot in a lane."""
-    return natural(observers.i + lane * (1 - observers.across))
+        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
+        store(o, natural(rows.start) + first, row)
