@@ -5,7 +5,7 @@ distribution of work over threads. It depends on no other room, and every room m
 """
 
 from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records
-from posse.numeric.compile import UNCOMPILED, compiled, direct, kernel
+from posse.numeric.compile import UNCOMPILED, compiled, direct, kernel, stamp
 from posse.numeric.lanes import (
     WIDTH,
     Lanes,
@@ -24,11 +24,8 @@ from posse.numeric.lanes import (
     root,
     store,
     store_fields,
-    tag,
-    tagged,
     transpose,
 )
-from posse.numeric.stamp import stamp
 from posse.numeric.threads import MOST_THREADS, Blocks, divide, over_worlds, threads_for, worlds_of
 
 __all__ = [
@@ -67,8 +64,6 @@ __all__ = [
     "stamp",
     "store",
     "store_fields",
-    "tag",
-    "tagged",
     "threads_for",
     "transpose",
     "worlds_of",

@@ -17,6 +17,7 @@ What each gains, of 20 s until the first step with nothing cached, and in speed:
 from __future__ import annotations
 
 import contextlib
+import enum
 import functools
 import hashlib
 import os
@@ -25,22 +26,16 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Final, TypeVar, cast, overload
 
+import llvmlite
 import numba
 import numpy as np
-from numba.core import types
-from numba.core.caching import NullCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
-from numba.core.extending import models, register_model
-from numba.core.imputils import lower_constant
+from numba.core import caching, codegen, compiler, extending, imputils, serialize, types
 from numba.core.registry import CPUDispatcher
-from numba.core.serialize import dumps
 
 import posse.numeric.lane_code  # noqa: F401 (registers lanes with numba)
-from posse.numeric.stamp import describe, digest, stamp
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -70,7 +65,7 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
     """
     if function is None:
         return functools.partial(compiled, seldom=seldom)
-    return function if UNCOMPILED else cast("F", _Function(function, {**_OPTIONS, "forceinline": not seldom}))
+    return function if UNCOMPILED else cast("F", _Function(function, forceinline=not seldom))
 
 
 def kernel(function: F) -> F:
@@ -99,66 +94,130 @@ def direct(function: F) -> F:
     return cast("F", forms[0].entry_point) if len(forms) == 1 else function
 
 
-# The cache.
+# What a kernel is a function of: the cache's key.
+
+_POSSE: Final = Path(__file__).resolve().parents[1]
+_SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).hexdigest()
+_VERSIONS: Final = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
+_DEBUGGING: Final = (_CONFIG.OPT, _CONFIG.BOUNDSCHECK)  # options that change the machine code
+_PROCESS: Final = os.urandom(16)
+_PLAIN: Final = int | float | complex | str | bytes | enum.Enum | np.dtype | BuiltinFunctionType | np.ufunc | None
+_known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
+_unknown: dict[int, Any] = {}  # values that cannot be hashed; kept, so that no other gets their address
+_compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
 
 
-_KEPT: Final = 256  # files, of up to 1 MB
+def stamp(*functions: Callable[..., Any]) -> str:
+    """Return a hash of functions with all that they reach, as it is now.
+
+    Functions of posse count by its sources; others by their code, defaults, closures, and the globals and attributes
+    of modules that they name, recursively.
+    """
+    _known.clear()
+    return _hash(_VERSIONS, _DEBUGGING, _SOURCES, list(map(_digest, functions))).hex()
 
 
-class _Cache(NullCache):
+def _hash(*parts: object) -> bytes:
+    return hashlib.sha256(repr(parts).encode()).digest()
+
+
+def _digest(value: Any, names: frozenset[str] = frozenset()) -> bytes:
+    """Return a hash of a value that compiled code may hold; of a module, only what has one of the names."""
+    function = getattr(value, "py_func", getattr(value, "_defn", value))  # compiled, or numba's intrinsic
+    if isinstance(function, FunctionType):
+        found = _digest_function(function)
+        if type(value) is CPUDispatcher and _compiled_with.get(value) != found:
+            value.recompile()
+            _compiled_with[value] = found
+        return found
+    if isinstance(value, ModuleType):
+        inside = () if value.__name__.partition(".")[0] in ("numba", "numpy") else sorted(names)
+        reached = [(n, _digest(getattr(value, n), names - {n})) for n in inside if hasattr(value, n)]
+        return _hash(value.__name__, reached)
+    if isinstance(value, np.ndarray | np.generic):
+        return _hash(value.dtype, value.shape, value.tobytes())
+    if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
+        return _hash(str(value), _digest(getattr(value, "instance_class", None)), _digest(getattr(value, "types", ())))
+    if isinstance(value, type):
+        return _hash(value.__qualname__, getattr(value, "_fields", ()), getattr(value, "__members__", ()))
+    if isinstance(value, tuple | list):
+        return _hash(_digest(type(value)), list(map(_digest, value)))
+    if isinstance(value, _PLAIN):
+        return _hash(type(value).__name__, value)
+    return _hash(_PROCESS, id(_unknown.setdefault(id(value), value)))
+
+
+def _digest_function(function: FunctionType) -> bytes:
+    if function not in _known:
+        _known[function] = b"itself"  # if it is recursive
+        code, names, scope = function.__code__, _names(function.__code__), function.__globals__
+        cells = [cell.cell_contents for cell in function.__closure__ or ()]
+        reached = [*cells, function.__defaults__, sorted((function.__kwdefaults__ or {}).items())]
+        digests = [_digest(each, names) for each in reached]
+        if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):
+            digests += [_hash(_text(code)), *(_digest(scope[name], names) for name in sorted(names & scope.keys()))]
+        _known[function] = _hash(function.__name__, digests)
+    return _known[function]
+
+
+def _text(code: CodeType) -> tuple[Any, ...]:
+    """Return what code does, without its place in a file."""
+    constants = [_text(each) if isinstance(each, CodeType) else each for each in code.co_consts]
+    return code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants
+
+
+def _names(code: CodeType) -> frozenset[str]:
+    """Return the names of globals and attributes in code, and in functions inside it."""
+    inside = (_names(each) for each in code.co_consts if isinstance(each, CodeType))
+    return frozenset(code.co_names).union(*inside)
+
+
+class _Cache(caching.NullCache):
     """The machine code of a kernel in files, each under a hash of all that it depends on."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
 
-    def _path(self, sig: Any, target: Any) -> tuple[Path, bytes]:
-        """Return the file for argument types and a processor, and the hash that it begins with."""
+    def _path(self, sig: Any, target: Any) -> Path:
         f = self._function
-        key = repr((stamp(f), f.__module__, f.__qualname__, describe(sig), target)).encode()
-        name = hashlib.sha256(key)
-        return _folder() / f"{f.__name__}-{name.hexdigest()[:32]}.kernel", name.digest()
+        key = _hash(stamp(f), f.__module__, f.__qualname__, _digest(tuple(sig)), target)
+        return _folder() / f"{f.__name__}-{key.hex()[:32]}.kernel"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with contextlib.suppress(Exception):  # what cannot be read is compiled
-            path, name = self._path(sig, target_context.codegen().magic_tuple())
-            content = path.read_bytes()
-            if content[:32] == hashlib.sha256(name + content[32:]).digest():  # numba would run flipped bits
-                return CompileResult._rebuild(target_context, *pickle.loads(content[32:]))  # noqa: S301
+            path = self._path(sig, target_context.codegen().magic_tuple())
+            written = path.read_bytes()
+            if written[:32] == _hash(path.name, written[32:]):  # numba would run flipped bits
+                return compiler.CompileResult._rebuild(target_context, *pickle.loads(written[32:]))  # noqa: S301
         _announce()
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         if not data.library.has_dynamic_globals:  # addresses
             with contextlib.suppress(Exception):  # no room or permission: the next process compiles, too
-                path, name = self._path(sig, data.codegen.magic_tuple())
-                content = dumps(data._reduce())
+                path, content = self._path(sig, data.codegen.magic_tuple()), serialize.dumps(data._reduce())
                 path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
                 with tempfile.TemporaryDirectory(dir=path.parent) as unfinished:
-                    Path(unfinished, "kernel").write_bytes(hashlib.sha256(name + content).digest() + content)
+                    Path(unfinished, "kernel").write_bytes(_hash(path.name, content) + content)
                     Path(unfinished, "kernel").replace(path)
-                for old in sorted(path.parent.glob("*.kernel"), key=lambda each: each.stat().st_mtime)[:-_KEPT]:
-                    old.unlink(missing_ok=True)
 
 
 def _folder() -> Path:
-    user = os.environ.get("XDG_CACHE_HOME")
-    chosen = os.environ.get("POSSE_CACHE_DIR") or (Path(user) if user else Path.home() / ".cache") / "posse"
-    return Path(chosen).absolute()
+    user = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(os.environ.get("POSSE_CACHE_DIR") or Path(user).expanduser() / "posse").absolute()
 
 
 @functools.cache  # once per process
 def _announce() -> None:
-    kept = "in each process; set POSSE_CACHE_DIR to a directory that you can write to"
-    with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: no home
-        _folder().mkdir(mode=0o700, parents=True, exist_ok=True)
-        kept = f"once; cached in {_folder()}" if os.access(_folder(), os.W_OK) else kept
-    sys.stderr.write(f"posse: compiling kernels, which takes some seconds ({kept})\n")
+    with contextlib.suppress(RuntimeError):  # no home
+        once = f"once, if {_folder()} can be written to; otherwise set POSSE_CACHE_DIR"
+        sys.stderr.write(f"posse: compiling kernels, which takes some seconds ({once})\n")
 
 
 # numba's inner parts.
 
 
-class _Library(JITCodeLibrary):
+class _Library(codegen.JITCodeLibrary):
     """LLVM code in which only what is marked is inlined, and no short loop is vectorised."""
 
     def add_ir_module(self, ir_module: Any) -> None:
@@ -187,7 +246,7 @@ class _InnerLibrary(_Library):
         self._finalized = True
 
 
-class _KernelCompiler(CompilerBase):
+class _KernelCompiler(compiler.CompilerBase):
     library: type[_Library] = _Library
 
     def define_pipelines(self) -> list[Any]:
@@ -195,7 +254,7 @@ class _KernelCompiler(CompilerBase):
         state.flags.noalias = self.library is _Library
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return [compiler.DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
 class _InnerCompiler(_KernelCompiler):
@@ -206,23 +265,24 @@ class _FunctionType(types.Dispatcher):
     """Type of a function without a value at run time: numba's own holds an address, which cannot be cached."""
 
 
-register_model(_FunctionType)(models.OpaqueModel)
-lower_constant(_FunctionType)(lambda context, builder, kind, function: context.get_dummy_value())
+extending.register_model(_FunctionType)(extending.models.OpaqueModel)
+imputils.lower_constant(_FunctionType)(lambda context, builder, kind, function: context.get_dummy_value())
 
 
 class _Function(CPUDispatcher):
     """A function that Python can call, with a form to link into kernels for each state of what it reaches."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        super().__init__(function, {}, options)
-        self.options = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    def __init__(self, function: Callable[..., Any], *, forceinline: bool) -> None:
+        super().__init__(function, {}, _OPTIONS)
+        wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        self.inner_options = {**_OPTIONS, **wrappers, "forceinline": forceinline}
         self.inner: dict[bytes, _Inner] = {}
 
     @property
     def _numba_type_(self) -> _FunctionType:
-        state = digest(self)
+        state = _digest(self)
         if state not in self.inner:
-            self.inner[state] = _Inner(self.py_func, {}, self.options, _InnerCompiler)
+            self.inner[state] = _Inner(self.py_func, {}, self.inner_options, _InnerCompiler)
         return _FunctionType(self.inner[state])
 
 

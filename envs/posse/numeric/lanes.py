@@ -74,21 +74,6 @@ def least(value: Lanes) -> np.float32:
     return np.float32(np.min(value))
 
 
-def tagged(value: Lanes, number: int) -> Lanes:
-    """Return non-negative numbers with their last six bits replaced by a tag below 64.
-
-    The order of numbers that differ by more than 1/65,536 relatively is kept; :func:`tag` reads
-    the tag.
-    """
-    whole = np.asarray(value, np.float32).view(np.uint32)
-    return (whole & np.uint32(0xFFFFFFC0) | np.uint32(number)).view(np.float32)
-
-
-def tag(value: Lanes) -> Lanes:
-    """Return the tags set by :func:`tagged`, as float32."""
-    return (np.asarray(value, np.float32).view(np.uint32) & np.uint32(63)).astype(np.float32)
-
-
 def counts(value: Lanes) -> Lanes:
     """Return int32 values, loaded from a record as raw bits, converted to float32."""
     return np.asarray(value, np.float32).view(np.int32).astype(np.float32)

@@ -7,7 +7,7 @@ import functools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Any, Final
 
 import numpy as np
@@ -61,27 +61,29 @@ def over_worlds(
     """
     threads = 1 if UNCOMPILED else threads_for(num_worlds, robots_each, most)
     blocks = divide(num_worlds, threads)
-    # Not futures and their wait(), which an interrupt can leave locked.
-    outcomes: dict[int, tuple[Any, BaseException | None]] = {}
+    # Futures are not used: an interrupt within their wait() can leave one locked, and its thread waits for ever.
+    # A thread of the pool writes its outcome before it wakes the caller, so no interrupt loses one.
+    outcomes: dict[int, Any] = {}
+    errors: list[BaseException] = []
     in_pool: dict[int, bool] = {}  # whoever is first to enter a share does it
     ended: SimpleQueue[None] = SimpleQueue()
 
     def work(thread: int) -> None:
         if in_pool.setdefault(thread, True):
             try:
-                outcomes[thread] = kernel(*arguments, thread, blocks), None
+                outcomes[thread] = kernel(*arguments, thread, blocks)
             except BaseException as error:
-                outcomes[thread] = None, error
+                errors.append(error)
+                outcomes[thread] = None
             ended.put(None)
 
     def finish() -> None:
         for thread in range(threads):
             if not in_pool.setdefault(thread, False) and thread not in outcomes:
-                outcomes[thread] = None, None  # begun
-                outcomes[thread] = kernel(*arguments, thread, blocks), None
+                outcomes[thread] = None  # begun
+                outcomes[thread] = kernel(*arguments, thread, blocks)
         while len(outcomes) < threads:
-            with contextlib.suppress(Empty):
-                ended.get(timeout=0.01)
+            ended.get()
 
     try:
         with contextlib.suppress(RuntimeError):  # no thread can be started
@@ -91,7 +93,6 @@ def over_worlds(
     except BaseException:
         finish()
         raise
-    for _, error in outcomes.values():
-        if error is not None:
-            raise error
-    return [outcomes[thread][0] for thread in range(threads)]
+    if errors:
+        raise errors[0]
+    return [outcomes[thread] for thread in range(threads)]
