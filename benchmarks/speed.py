@@ -1,7 +1,8 @@
 """``make bench``: throughput on this machine.
 
 Agent-steps/s of batches, steps/s of single-world environments, and the time of the first step of a new process
-without and with cached kernels. Median, least and greatest of five runs each.
+without and with cached kernels. Median, least and greatest of five runs each. ``--against PATH`` compares with another
+checkout instead.
 """
 
 from __future__ import annotations
@@ -45,6 +46,10 @@ class Settings:
     """Total time of the five runs of each figure, s."""
     cold: bool = True
     """Also time the first step of a new process, without and with cached kernels."""
+    against: Path | None = None
+    """Another checkout of posse: measure both in turns, and print this one's figures divided by the other's."""
+    starts: int = 7
+    """Processes of each, with ``against``."""
     out: Path = Path("runs/bench/speed.json")
 
 
@@ -63,7 +68,7 @@ def per_second(step: Callable[[], object], seconds: float) -> list[float]:
                 step()
             calls += together
         rates.append(calls / (time.perf_counter() - started))
-    return [statistics.median(rates), min(rates), max(rates)]
+    return _spread(rates)
 
 
 def batches(settings: Settings) -> list[dict[str, Any]]:
@@ -119,6 +124,44 @@ def first_step() -> dict[str, float]:
     return found
 
 
+def compare(settings: Settings, other: Path) -> None:
+    """Measure another checkout and this one in new processes, in turns; print a table of figures and ratios."""
+    command = [sys.executable, __file__, "--scenario", settings.scenario, "--seconds", str(settings.seconds)]
+    command += ["--worlds", *map(str, settings.worlds), "--cold" if settings.cold else "--no-cold"]
+    if settings.overrides:
+        command += ["--overrides", *(str(word) for item in settings.overrides.items() for word in item)]
+    roots = (other.resolve(), Path(__file__).resolve().parents[1])
+    found: tuple[list[dict[str, float]], ...] = ([], [])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "figures.json")
+        for _ in range(settings.starts):
+            for root, figures in zip(roots, found, strict=True):
+                sources = os.pathsep.join(str(root / name) for name in ("envs", "baselines", "training"))
+                environment = {**os.environ, "PYTHONPATH": sources}
+                subprocess.run([*command, "--out", file], check=True, env=environment, stdout=subprocess.DEVNULL)
+                figures.append(_named(json.loads(file.read_text(encoding="utf-8"))))
+    print("| figure | other | this | ratio: median [least, greatest] |\n|---|---|---|---|")
+    for name in found[0][0]:
+        theirs, ours = ([figures[name] for figures in each] for each in found)
+        ratios = [mine / yours for mine, yours in zip(ours, theirs, strict=True)]
+        medians = [f"{statistics.median(each):,.4g}" for each in (theirs, ours)]
+        print("|", name, "|", " | ".join(medians), "| {:.2f} [{:.2f}, {:.2f}] |".format(*_spread(ratios)))
+
+
+def _named(figures: dict[str, Any]) -> dict[str, float]:
+    """Return the figures of a run by name."""
+    return {
+        **{f"{r['worlds']:,} worlds, {r['threads']} threads": r["agent_steps"][0] for r in figures["batches"]},
+        **{f"{name}, one world": rate[0] for name, rate in figures["one_world"].items()},
+        **{f"first step {name}, s": each for name, each in figures.get("first_step_seconds", {}).items()},
+        "cores used by other processes": max(figures["other_work"], 0.01),
+    }
+
+
+def _spread(values: list[float]) -> list[float]:
+    return [statistics.median(values), min(values), max(values)]
+
+
 def _shown(rate: list[float]) -> str:
     return "{:,.0f} [{:,.0f}, {:,.0f}]".format(*rate)
 
@@ -126,6 +169,9 @@ def _shown(rate: list[float]) -> str:
 def main() -> None:
     """Measure, print and write the figures."""
     settings = tyro.cli(Settings, description=__doc__)
+    if settings.against is not None:
+        compare(settings, settings.against)
+        return
     others, own = machine.OtherWork(), time.process_time()
     figures: dict[str, Any] = {"machine": machine.describe()}
     figures["batches"], figures["one_world"] = batches(settings), one_world(settings)

@@ -4,19 +4,14 @@
 each compiled together with all that it calls. There is no fast-math, since a result must not depend on a world's
 position in its batch. With ``NUMBA_DISABLE_JIT=1`` both return the plain function, for debugging.
 
-Three of numba's inner parts are overridden; ``tests/envs/numeric/test_compile.py`` fails if a new numba lacks them.
-What each gains, of 20 s until the first step with nothing cached, and in speed:
-
-=================== ================================================================================================
-``JITCodeLibrary``  functions are optimised only in the kernel, 12 s; no short loop is vectorised, 6 s and 5 % faster
-``CPUDispatcher``   a function is compiled once for all integers, not for each constant, 7 s
-``CompilerBase``    chooses the library, and says that arrays do not overlap (``noalias``), up to 7 % faster
-=================== ================================================================================================
+Two of numba's inner parts are overridden, ``JITCodeLibrary`` and ``CompilerBase``, and its type of functions; the
+classes at the end say what each gains. ``tests/envs/numeric/test_compile.py`` fails if a new numba lacks them.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dis
 import enum
 import functools
 import hashlib
@@ -61,7 +56,7 @@ def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable
     """Compile a function that kernels and other compiled functions call.
 
     ``@compiled`` inlines it into its callers, since passing arrays takes longer than most functions.
-    ``@compiled(seldom=True)`` never does: long and rarely called functions would crowd the instruction cache.
+    ``@compiled(seldom=True)`` leaves that to LLVM: long and rarely called functions would crowd the instruction cache.
     """
     if function is None:
         return functools.partial(compiled, seldom=seldom)
@@ -94,14 +89,14 @@ def direct(function: F) -> F:
     return cast("F", forms[0].entry_point) if len(forms) == 1 else function
 
 
-# What a kernel is a function of: the cache's key.
+# What a kernel depends on.
 
 _POSSE: Final = Path(__file__).resolve().parents[1]
 _SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).hexdigest()
 _VERSIONS: Final = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
 _DEBUGGING: Final = (_CONFIG.OPT, _CONFIG.BOUNDSCHECK)  # options that change the machine code
+_PLAIN: Final = int | float | complex | str | bytes | np.dtype | BuiltinFunctionType | np.ufunc | None
 _PROCESS: Final = os.urandom(16)
-_PLAIN: Final = int | float | complex | str | bytes | enum.Enum | np.dtype | BuiltinFunctionType | np.ufunc | None
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
 _unknown: dict[int, Any] = {}  # values that cannot be hashed; kept, so that no other gets their address
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
@@ -139,7 +134,10 @@ def _digest(value: Any, names: frozenset[str] = frozenset()) -> bytes:
     if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
         return _hash(str(value), _digest(getattr(value, "instance_class", None)), _digest(getattr(value, "types", ())))
     if isinstance(value, type):
-        return _hash(value.__qualname__, getattr(value, "_fields", ()), getattr(value, "__members__", ()))
+        members = [(name, _digest(each.value)) for name, each in getattr(value, "__members__", {}).items()]
+        return _hash(value.__qualname__, getattr(value, "_fields", ()), members)
+    if isinstance(value, enum.Enum):
+        return _hash(_digest(type(value)), value.name)
     if isinstance(value, tuple | list):
         return _hash(_digest(type(value)), list(map(_digest, value)))
     if isinstance(value, _PLAIN):
@@ -150,26 +148,28 @@ def _digest(value: Any, names: frozenset[str] = frozenset()) -> bytes:
 def _digest_function(function: FunctionType) -> bytes:
     if function not in _known:
         _known[function] = b"itself"  # if it is recursive
-        code, names, scope = function.__code__, _names(function.__code__), function.__globals__
+        text, read, names = _parts_of(function.__code__)
         cells = [cell.cell_contents for cell in function.__closure__ or ()]
-        reached = [*cells, function.__defaults__, sorted((function.__kwdefaults__ or {}).items())]
-        digests = [_digest(each, names) for each in reached]
-        if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):
-            digests += [_hash(_text(code)), *(_digest(scope[name], names) for name in sorted(names & scope.keys()))]
-        _known[function] = _hash(function.__name__, digests)
+        kept = (*cells, function.__defaults__, sorted((function.__kwdefaults__ or {}).items()))
+        reached: list[Any] = [_digest(each, names) for each in kept]
+        if not function.__code__.co_filename.startswith(f"{_POSSE}{os.sep}"):
+            scope = function.__globals__
+            reached += [text, *((name, _digest(scope[name], names)) for name in read if name in scope)]
+        _known[function] = _hash(function.__name__, reached)
     return _known[function]
 
 
-def _text(code: CodeType) -> tuple[Any, ...]:
-    """Return what code does, without its place in a file."""
-    constants = [_text(each) if isinstance(each, CodeType) else each for each in code.co_consts]
-    return code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants
-
-
-def _names(code: CodeType) -> frozenset[str]:
-    """Return the names of globals and attributes in code, and in functions inside it."""
-    inside = (_names(each) for each in code.co_consts if isinstance(each, CodeType))
-    return frozenset(code.co_names).union(*inside)
+@functools.cache
+def _parts_of(code: CodeType) -> tuple[str, list[str], frozenset[str]]:
+    """Return what code says, with functions inside it; the globals that it reads; and all names in it."""
+    codes = [code]
+    for each in codes:
+        codes += (constant for constant in each.co_consts if isinstance(constant, CodeType))
+    text = [(c.co_code, c.co_names, c.co_varnames, c.co_freevars) for c in codes]
+    constants = [constant for each in codes for constant in each.co_consts if not isinstance(constant, CodeType)]
+    steps = (step for each in codes for step in dis.get_instructions(each))
+    read = {step.argval for step in steps if step.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
+    return repr((text, constants)), sorted(read), frozenset(name for each in codes for name in each.co_names)
 
 
 class _Cache(caching.NullCache):
@@ -218,26 +218,17 @@ def _announce() -> None:
 
 
 class _Library(codegen.JITCodeLibrary):
-    """LLVM code in which only what is marked is inlined, and no short loop is vectorised."""
-
-    def add_ir_module(self, ir_module: Any) -> None:
-        for function in ir_module.functions:
-            if function.blocks and "alwaysinline" not in function.attributes:
-                function.attributes.add("noinline")
-        super().add_ir_module(ir_module)
+    """LLVM code of a kernel: no short loop is vectorised, which makes it 6 % faster and saves 1.5 s of compiling."""
 
     def _optimize_final_module(self) -> None:
         passes, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=True)
         passes.run(self._final_module, builder)
 
 
-class _InnerLibrary(_Library):
-    """LLVM code of one function, which is optimised only where it is linked."""
+class _InnerLibrary(codegen.JITCodeLibrary):
+    """LLVM code of a function, which is optimised and made machine code only where it is linked; saves 12 s."""
 
     codegen: Any = SimpleNamespace(set_env=lambda name, environment: None)  # numba's requires machine code
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         pass
@@ -247,11 +238,10 @@ class _InnerLibrary(_Library):
 
 
 class _KernelCompiler(compiler.CompilerBase):
-    library: type[_Library] = _Library
+    library: Any = _Library
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
-        state.flags.noalias = self.library is _Library
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(state)]
@@ -263,6 +253,9 @@ class _InnerCompiler(_KernelCompiler):
 
 class _FunctionType(types.Dispatcher):
     """Type of a function without a value at run time: numba's own holds an address, which cannot be cached."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        return super().get_call_type(context, tuple(map(types.unliteral, args)), kws)  # not once for each constant
 
 
 extending.register_model(_FunctionType)(extending.models.OpaqueModel)
@@ -276,21 +269,11 @@ class _Function(CPUDispatcher):
         super().__init__(function, {}, _OPTIONS)
         wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         self.inner_options = {**_OPTIONS, **wrappers, "forceinline": forceinline}
-        self.inner: dict[bytes, _Inner] = {}
+        self.inner: dict[bytes, CPUDispatcher] = {}
 
     @property
     def _numba_type_(self) -> _FunctionType:
         state = _digest(self)
         if state not in self.inner:
-            self.inner[state] = _Inner(self.py_func, {}, self.inner_options, _InnerCompiler)
+            self.inner[state] = CPUDispatcher(self.py_func, {}, self.inner_options, _InnerCompiler)
         return _FunctionType(self.inner[state])
-
-
-class _Inner(CPUDispatcher):
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        return super().get_call_template(tuple(map(_widest, args)), {name: _widest(kws[name]) for name in kws})
-
-
-def _widest(kind: Any) -> Any:
-    plain = types.unliteral(kind)
-    return types.int64 if plain in (types.int32, types.uint8) else plain
