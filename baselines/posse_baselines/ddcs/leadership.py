@@ -69,7 +69,7 @@ def place_of(team: Team, me: Record, mates: Records, j: int) -> tuple[float, flo
     return (me.x, me.y) if j == me.number else mate_now(team, me, mates[j])
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def central_tracker(team: Team, me: Record, mates: Records) -> tuple[int, int]:
     """Return the tracker with the least sum of distances to all heard, and their number."""
     n, others = len(mates), 0

@@ -32,7 +32,7 @@ def mark_seen(team: Team, me: Record, seen: npt.NDArray[np.uint16], x: float, y:
             seen[k] = step + 1
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def begin_search(team: Team, me: Record, seen: npt.NDArray[np.uint16]) -> None:
     """Mark the target as lost; on the open plane, search around its predicted position."""
     world = team.world
@@ -55,7 +55,7 @@ def look_around(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uin
             mark_seen(team, me, seen, mates[j].x, mates[j].y, me.step)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def wander(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> tuple[float, float]:
     """Return the velocity (m/s) of a tracker that searches from (x, y)."""
     world, settings = team.world, team.settings

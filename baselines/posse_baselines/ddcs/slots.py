@@ -33,7 +33,7 @@ def slot_place(me: Record, slot: Record) -> tuple[float, float, float, float]:
     return me.target_x + arm_x, me.target_y + arm_y, arm_x, arm_y
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     """Set the own slot by the assignment of least total arrival time."""
     at, world, settings = team.at, team.world, team.settings

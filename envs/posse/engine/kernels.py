@@ -95,7 +95,7 @@ def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Reco
         hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def begin(
     c: Record,
     w: Record,

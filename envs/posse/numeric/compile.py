@@ -49,22 +49,22 @@ def compiled(function: F) -> F: ...
 
 
 @overload
-def compiled(*, seldom: bool = ...) -> Callable[[F], F]: ...
+def compiled(*, out_of_line: bool = ...) -> Callable[[F], F]: ...
 
 
-def compiled(function: F | None = None, *, seldom: bool = False) -> F | Callable[[F], F]:
+def compiled(function: F | None = None, *, out_of_line: bool = False) -> F | Callable[[F], F]:
     """Compile a function that kernels and other compiled functions call.
 
     ``@compiled`` inlines it into its callers, since passing arrays takes longer than most functions.
-    ``@compiled(seldom=True)`` leaves that to LLVM: long and rarely called functions would crowd the instruction cache.
+    ``out_of_line=True`` leaves that to LLVM: long and rarely called functions would crowd the instruction cache.
     """
     if function is None:
-        return functools.partial(compiled, seldom=seldom)
-    return function if UNCOMPILED else cast("F", _Function(function, forceinline=not seldom))
+        return functools.partial(compiled, out_of_line=out_of_line)
+    return function if UNCOMPILED else cast("F", _Function(function, forceinline=not out_of_line))
 
 
 def kernel(function: F) -> F:
-    """Compile a function that is called from Python; its arrays must not overlap.
+    """Compile a function that is called from Python.
 
     The machine code is kept in ``$POSSE_CACHE_DIR``, or ``posse`` in the user's cache directory. It is compiled again
     if a source of posse changes, or anything that a function from elsewhere reaches (:func:`stamp`).
@@ -172,6 +172,9 @@ def _parts_of(code: CodeType) -> tuple[str, list[str], frozenset[str]]:
     return repr((text, constants)), sorted(read), frozenset(name for each in codes for name in each.co_names)
 
 
+_KEPT: Final = 256  # files, of up to 1 MB
+
+
 class _Cache(caching.NullCache):
     """The machine code of a kernel in files, each under a hash of all that it depends on."""
 
@@ -200,6 +203,8 @@ class _Cache(caching.NullCache):
                 with tempfile.TemporaryDirectory(dir=path.parent) as unfinished:
                     Path(unfinished, "kernel").write_bytes(_hash(path.name, content) + content)
                     Path(unfinished, "kernel").replace(path)
+                for old in sorted(path.parent.glob("*.kernel"), key=lambda each: each.stat().st_mtime)[:-_KEPT]:
+                    old.unlink(missing_ok=True)
 
 
 def _folder() -> Path:

@@ -147,7 +147,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     w.least_gap = smallest
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
     """Find the contacts of a tracker with something near; return whether it touches the target."""
     touches_target = meet_target(c, w, t, i)

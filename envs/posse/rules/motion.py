@@ -64,7 +64,7 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
     s.near_x[place], s.near_y[place] = robot.x, robot.y
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, s: Record) -> None:
     """Move the robots with something near in physics steps, the target first.
 

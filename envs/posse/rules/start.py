@@ -147,7 +147,7 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
         t.start_x, t.start_y = t.x, t.y
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)

@@ -38,7 +38,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
             take_fix(c, t, b)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
     """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
     slot = w.step % (c.radio_delay + 1)
@@ -50,7 +50,7 @@ def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
         b.fix_step, b.fix = t.fix_step, t.fix
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def hear(
     c: Record,
     w: Record,
@@ -91,7 +91,7 @@ def hear(
                 take_fix(c, t, b)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def connected(c: Record, w: Record, trackers: Records) -> bool:
     """Return whether the radio graph of the working trackers is connected.
 

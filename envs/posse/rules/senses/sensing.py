@@ -152,7 +152,7 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
     return seeing
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def note_bearings(c: Record, w: Record, trackers: Records, s: Record) -> None:
     """Store bearing fixes of the trackers that see the target."""
     for i in range(c.num_trackers):

@@ -63,7 +63,7 @@ def echo_of_disc(c: Record, robot: Pose, j: int, s: Record) -> None:
         store(s.reading, k, reading)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def echo_of_walls(c: Record, robot: Pose, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
     half, (x, y, _, _) = c.half_arena, robot

@@ -161,7 +161,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
             ux, uy = -ux, -uy
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
@@ -180,7 +180,7 @@ def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.f
     return np.float32(far / c.target_speed)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Set the goal heading whose turn disrupts the formation most.
 

@@ -35,7 +35,7 @@ def target_turn_rate(
     return turn
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def mirror_at_walls(c: Record, w: Record) -> None:
     """Mirror the goal heading at a wall that is near and ahead."""
     inner = max(c.half_arena - _SOFT_WALL, c.half_arena * HALF)
@@ -72,7 +72,7 @@ def has_free_circle(
     return circle_is_free(c, obstacles, x, y, radius - allowance)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.float32:
     """Return ``turn`` if a free turning circle remains after it, else the turn along a free one.
 
@@ -100,7 +100,7 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
     return np.float32(side * c.target_turn_rate)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
     """Return the side (+1 left, -1 right) to turn to if neither turning circle is free."""
     if w.speed == ZERO:

@@ -192,7 +192,7 @@ def _mate(
     )
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def _write_the_rest(
     c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
 ) -> None:

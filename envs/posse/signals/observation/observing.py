@@ -36,7 +36,7 @@ def observe_together(
         _observe_targets(c, worlds, Observers(first, c.num_trackers, count), made, s, observations)
 
 
-@compiled(seldom=True)
+@compiled(out_of_line=True)
 def _observe_targets(
     c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
 ) -> None:
