@@ -17,7 +17,7 @@ import numpy as np
 
 from posse import TargetPolicy
 from posse_baselines import Policy, Target
-from posse_baselines.match import Match
+from posse_baselines.playing import Match
 
 _PACKAGES: Final = ("posse", "posse_baselines", "posse_training")
 _SUFFIXES: Final = (".py", ".json", ".safetensors", ".toml")

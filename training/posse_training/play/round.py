@@ -9,10 +9,10 @@ import numpy as np
 from posse import Batch, Scenario
 from posse.rendering.content.history import History
 from posse.rendering.content.scene import Scene, read_scene
-from posse_baselines import Policy, begin
+from posse_baselines import Policy, Recorder, begin
 from posse_training.play.session import points_of
 from posse_training.play.steering import Wheel
-from posse_training.replay import Recorder, Replay
+from posse_training.replay import RECORD, Replay, replay_of
 
 
 class Round:
@@ -35,7 +35,8 @@ class Round:
         self._policy, self._robot, self._n = policy, robot, scenario.num_trackers
         batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
         who = "you as the target" if robot == self._n else f"you as tracker {robot}"
-        self._recorder = Recorder(batch, f"{policy.name}, {who}")
+        self._label = f"{policy.name}, {who}"
+        self._recorder = Recorder(batch, RECORD)
         self._memory = begin(policy, batch)
         self._observations = self._recorder.reset()
         self._annotations: dict[str, Any] = {}
@@ -45,7 +46,7 @@ class Round:
     @property
     def over(self) -> bool:
         """Whether the round has ended."""
-        return self._recorder.over
+        return bool(self._recorder.over[0])
 
     @property
     def points(self) -> float:
@@ -70,7 +71,7 @@ class Round:
 
     def replay(self) -> Replay:
         """Return what has been played so far."""
-        return self._recorder.replay()
+        return replay_of(self._recorder.trajectory(), self._label)
 
     def _look(self) -> None:
         self.scene: Scene = read_scene(self._recorder.batch, 0, self._annotations, self._observations)

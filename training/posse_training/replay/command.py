@@ -10,7 +10,7 @@ import tyro
 
 from posse_training.replay.episode import Replay, join
 from posse_training.replay.page import read_replay, write_replay
-from posse_training.replay.playing import record
+from posse_training.replay.recording import record
 
 _PAGES = (".html", ".htm")
 

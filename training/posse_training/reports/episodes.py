@@ -5,11 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 import posse
 from posse import Scenario
-from posse_baselines import Policy, Target, rollout
+from posse_baselines import Played, Policy, Target, rollout
 from posse_training.cluster.shards import Shard
 from posse_training.errors import TimeLimitError, TrainedSplitError
 from posse_training.reports.exchanges import ExchangeCounter, leaders_of
@@ -63,19 +61,10 @@ def play_episode(
     They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority
     changed, ``nan`` for policies without leaders.
     """
-    columns: dict[str, Column] = {}
-    running = np.ones(batch.num_worlds, np.bool_)
     exchanges = ExchangeCounter(batch.num_worlds)
-    for step in rollout(batch, policy):
-        exchanges.count(leaders_of(policy, step.memory), running)
-        ended = running & (step.terminated | step.truncated)
-        if ended.any():
-            for name, values in step.infos["metrics"].items():
-                column = columns.setdefault(name, np.full(batch.num_worlds, np.nan))
-                column[ended] = values[ended]
-            running &= ~ended
+
+    def note(step: Played) -> None:
+        exchanges.count(leaders_of(policy, step.memory), step.running)
         advance(1)
-        if not running.any():
-            break
-    columns["leader_exchanges"] = exchanges.total
-    return columns
+
+    return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}

@@ -18,7 +18,6 @@ const KEYS = [
   ["R", "show everything again (double click)"],
   ["wheel, drag", "zoom, move; on a touch screen pinch, drag"],
   ["L, S, T", "links, sensing, trails"],
-  ["D", "dark or light"],
   ["P, V", "save a picture; record a film"],
 ];
 

@@ -15,11 +15,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 import posse
-from posse_baselines import with_settings
+from posse_baselines import Trajectory, with_settings
 from posse_baselines.ddcs import TASKS
 from posse_training.reports.pictures.style import BLUE, GREEN, GREY, GRID, ORANGE, note
-from posse_training.reports.reproduce.motion import COLOURS, TARGET, draw_robots, look_of
-from posse_training.reports.reproduce.recording import Recording, median_world, played, record
+from posse_training.reproduce.formations import COLOURS, TARGET, draw_robots, look_of
+from posse_training.reproduce.runs import median_world, played, relative, run_of, slot_error, times, told, working
 
 _HEADING: Final = 2.6  # rad; of the target in the tracks
 _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
@@ -33,7 +33,7 @@ def tracks(seed: int) -> Figure:
     for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
         for number, k in enumerate((0.9, 1.0, 1.1)):
             policy = with_settings(name, navigation_constant=k)
-            run = record(policy, alone, 1, seed, start)
+            run = run_of(policy, alone, 1, seed, start)
             _track(axes[0, column], run, 0, number)
             _bearing(axes[1, column], run, 0, number, f"K = {k:g}")
             if column == 0:
@@ -44,7 +44,7 @@ def tracks(seed: int) -> Figure:
     rng = np.random.default_rng(seed)
     pose = [(5.0 + rng.uniform(-1, 1), y, rng.uniform(2, 4)) for y in (-3.0, -1.8, -0.6, 0.6, 1.8)]
     start = {"tracker_pose": pose, "target_pose": (0.0, 0.0, _HEADING)}
-    run = record("deviated-pursuit", team, 1, seed, start)
+    run = run_of("deviated-pursuit", team, 1, seed, start)
     for number in range(5):
         _track(axes[0, 2], run, number, number)
         _bearing(axes[1, 2], run, number, number, f"robot {number}")
@@ -66,68 +66,50 @@ def tracks(seed: int) -> Figure:
     return figure
 
 
-def _track(axis: Axes, run: Recording, number: int, look: int) -> None:
-    path = run.trackers[:, 0, number]
-    axis.plot(run.target[:, 0, 0], run.target[:, 0, 1], color=TARGET, lw=1.0)
+def _track(axis: Axes, run: Trajectory, number: int, look: int) -> None:
+    target, path = run["target_pose"][:, 0], run["tracker_pose"][:, 0, number]
+    axis.plot(target[:, 0], target[:, 1], color=TARGET, lw=1.0)
     axis.plot(path[:, 0], path[:, 1], lw=1.4, **look_of(look))
     for marker, instant in (("o", 0), ("s", -1)):
         axis.plot(*path[instant, :2], marker, ms=4, color=COLOURS[look % 5])
 
 
-def _bearing(axis: Axes, run: Recording, number: int, look: int, label: str) -> None:
-    x, y = -run.relative[:, 0, number].T
+def _bearing(axis: Axes, run: Trajectory, number: int, look: int, label: str) -> None:
+    x, y = -relative(run)[:, 0, number].T
     sigma = np.unwrap(np.arctan2(y, x))
     sigma += 2 * math.pi * round((_HEADING - sigma[-1]) / (2 * math.pi))
-    axis.plot(run.time, sigma, lw=1.4, label=label, **look_of(look))
+    axis.plot(times(run), sigma, lw=1.4, label=label, **look_of(look))
 
 
 def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     """Draw a run in which the leader breaks: error, task and leader of each robot over time."""
     scenario = posse.get_scenario("leader-loss")
-    run = record(policy, scenario, worlds, seed)
+    run = run_of(policy, scenario, worlds, seed)
     world, broke, recovered = _shown(run)
+    time, alive, error = times(run), working(run)[:, world], slot_error(run)[:, world]
     figure, axes = plt.subplots(
         4, 1, figsize=(8.4, 8.2), layout="constrained", gridspec_kw={"height_ratios": (2.6, 2, 1, 1)}
     )
     start = max(0.0, broke - 5.0)
-    end = min(run.time[-1], max(recovered, broke) + 5.0)
-    keep = (run.time >= start) & (run.time <= end)
-    instant = int(np.searchsorted(run.time, broke))
-    draw_robots(axes[0], run, world, instant, int(np.searchsorted(run.time, start)))
+    end = min(time[-1], max(recovered, broke) + 5.0)
+    keep = (time >= start) & (time <= end)
+    draw_robots(axes[0], run, world, *(int(np.searchsorted(time, when)) for when in (broke, start)))
     axes[0].set_title(f"{policy}: the leader (thick rim) breaks at {broke:.1f} s", loc="left")
     axes[0].set_xlabel("x, m")
     axes[0].set_ylabel("y, m")
-    robots = run.trackers.shape[2]
+    robots = scenario.num_trackers
     for number in range(robots):
-        alive = run.working[:, world, number] & keep
-        axes[1].plot(run.time[alive], run.error[alive, world, number], lw=1.3, **look_of(number))
+        at = alive[:, number] & keep
+        axes[1].plot(time[at], error[at, number], lw=1.3, **look_of(number))
     axes[1].axhline(0.3, color=GREY, lw=0.8)
     axes[1].set_ylabel("distance from\nthe nearest slot, m")
     axes[1].set_ylim(0.0, None)
     extent = (start, end, robots - 0.5, -0.5)
-    working = run.working[keep, world].T
-    tasks = np.ma.masked_where(~working, run.task[keep, world].T)
-    axes[2].imshow(
-        tasks,
-        aspect="auto",
-        extent=extent,
-        interpolation="nearest",
-        cmap=ListedColormap(_TASK_COLOURS),
-        vmin=-0.5,
-        vmax=3.5,
-    )
-    leaders = np.ma.masked_where(~working, run.leader[keep, world].T)
-    axes[3].imshow(
-        leaders,
-        aspect="auto",
-        extent=extent,
-        interpolation="nearest",
-        cmap=ListedColormap(COLOURS),
-        vmin=-0.5,
-        vmax=4.5,
-    )
-    for axis, label in ((axes[2], "task of\nrobot"), (axes[3], "leader of\nrobot")):
-        axis.set_ylabel(label)
+    for axis, name, colours in ((axes[2], "task", _TASK_COLOURS), (axes[3], "leader", COLOURS)):
+        known = np.ma.masked_where(~alive[keep].T, told(run, name)[keep, world].T)
+        look = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": len(colours) - 0.5}
+        axis.imshow(known, aspect="auto", extent=extent, interpolation="nearest", **look)
+        axis.set_ylabel(f"{name} of\nrobot")
         axis.set_yticks(range(robots))
         axis.grid(visible=False)
     for axis in axes[1:]:
@@ -143,14 +125,14 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     return figure
 
 
-def _shown(run: Recording) -> tuple[int, float, float]:
+def _shown(run: Trajectory) -> tuple[int, float, float]:
     """Return the world of the median recovery, when its leader broke, and when it recovered (s)."""
-    broken = np.asarray(~run.working.all(axis=2))
-    broke = np.where(broken.any(axis=0), run.time[broken.argmax(axis=0)], np.nan)
-    held = (~run.working | (run.error < 0.3)).all(axis=2)
-    off = np.asarray(broken & ~held)  # (T + 1, E)
-    last = len(run.time) - 1 - off[::-1].argmax(axis=0)
-    recovered = run.time[np.minimum(last + 1, len(run.time) - 1)]
+    time, alive = times(run), working(run)
+    broken = ~alive.all(axis=2)
+    broke = np.where(broken.any(axis=0), time[broken.argmax(axis=0)], np.nan)
+    off = broken & ~(~alive | (slot_error(run) < 0.3)).all(axis=2)  # (T + 1, E)
+    last = run.steps - off[::-1].argmax(axis=0)
+    recovered = time[np.minimum(last + 1, run.steps)]
     taken = np.where(off.any(axis=0) & ~off[-1], recovered - broke, np.nan)
     world = median_world(taken)
     return world, float(broke[world]), float(broke[world] + taken[world])

@@ -25,17 +25,17 @@ import posse
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import replacing, write_atomically
 from posse_training.reports.pictures.style import RC
-from posse_training.reports.reproduce.laws import leader_loss, tracks
-from posse_training.reports.reproduce.motion import curves, frames
-from posse_training.reports.reproduce.recording import (
+from posse_training.reproduce.announced import leader_loss, tracks
+from posse_training.reproduce.formations import Shown, curves, frames
+from posse_training.reproduce.runs import (
     SPLIT,
     Floats,
-    Recording,
     draw_starts,
     median_world,
     played,
-    record,
+    run_of,
     settling_times,
+    slot_error,
 )
 
 HORIZON: Final = 250
@@ -51,15 +51,14 @@ class Model:
     """One model of the paper: its policies here, and the paper's figures."""
 
     name: str
-    scenario: str
     paper_policy: str
     our_policy: str
     paper_settling_time: float
 
 
 MODELS: Final = (
-    Model("centralized", "paper-centralized", "pngl-l-phi", "ddcs-centralized", 1.6),
-    Model("distributed", "paper-distributed", "pngl", "ddcs-distributed", 2.0),
+    Model("centralized", "pngl-l-phi", "ddcs-centralized", 1.6),
+    Model("distributed", "pngl", "ddcs-distributed", 2.0),
 )
 MEMBERS: Final = tuple(name for name in FAMILY if name != "ddcs-no-radio")
 """Policies whose settling times are measured."""
@@ -77,14 +76,6 @@ class Settings:
     """Seed of the starts, in the test split."""
     tolerance: float = 0.1
     """Distance of a relative position from its last value at which it counts as settled, m."""
-
-
-def play_member(policy: str, settings: Settings) -> Recording:
-    """Play a policy from the drawn starts."""
-    scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
-    tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
-    options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
-    return record(policy, scenario, settings.starts, settings.seed, options)
 
 
 def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
@@ -106,26 +97,24 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
     """Play every member of the family, write figures and numbers, and return the numbers."""
     mpl.use("Agg")
     settings.out.mkdir(parents=True, exist_ok=True)
-    rows, shown = [], {}
+    scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
+    tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
+    starts = {"tracker_pose": tracker_pose, "target_pose": target_pose}
+    rows, runs = [], {}
     for policy in MEMBERS:
-        run = play_member(policy, settings)
-        times = settling_times(run, settings.tolerance)
-        rows.append(summary(policy, times, run.error[-1]))
-        shown[policy] = (run, times)
+        run = run_of(policy, scenario, settings.starts, settings.seed, starts)
+        runs[policy] = run, settling_times(run, settings.tolerance)
+        rows.append(summary(policy, runs[policy][1], slot_error(run)[-1]))
     with mpl.rc_context(RC):
         for model in MODELS:
-            world = median_world(shown[model.paper_policy][1])
+            world = median_world(runs[model.paper_policy][1])
             pair = [
-                (policy, shown[policy][0], world, float(shown[policy][1][world]))
+                Shown(policy, runs[policy][0], world, float(runs[policy][1][world]))
                 for policy in (model.paper_policy, model.our_policy)
             ]
-            facts = (
-                f"start {world}, the median of {settings.starts:,} starts, "
-                f"{played(posse.get_scenario(PLAYED), settings.seed)}"
-            )
+            facts = f"start {world}, the median of {settings.starts:,} starts, {played(scenario, settings.seed)}"
             _write(settings.out, f"{model.name}-frames", frames(pair, facts))
-            paper = model.paper_settling_time
-            _write(settings.out, f"{model.name}-curves", curves(pair, paper, facts))
+            _write(settings.out, f"{model.name}-curves", curves(pair, model.paper_settling_time, facts))
         _write(settings.out, "tracks", tracks(settings.seed))
         loss = leader_loss("pngl-l-phi", settings.starts, settings.seed)
         _write(settings.out, "leader-loss", loss)

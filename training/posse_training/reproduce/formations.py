@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import matplotlib as mpl
@@ -11,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from posse_baselines import Trajectory
 from posse_training.reports.pictures.style import BLUE, GREEN, GREY, INK, PINK, RED, note
-from posse_training.reports.reproduce.recording import Recording
+from posse_training.reproduce.runs import relative, slot_error, slots, times, told
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
 LINES: Final[tuple[Any, ...]] = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3)))
@@ -26,19 +29,30 @@ def look_of(number: int) -> dict[str, Any]:
     return {"color": COLOURS[number % 5], "ls": LINES[number % 5]}
 
 
-def frames(shown: list[tuple[str, Recording, int, float]], played: str) -> Figure:
-    """Draw start, half the settling time and the settled formation, a row for each (name, ...).
+@dataclass(frozen=True)
+class Shown:
+    """A world of a run, and the time at which it settled, s; nan: it did not."""
+
+    policy: str
+    run: Trajectory
+    world: int
+    settled: float
+
+
+def frames(shown: Sequence[Shown], played: str) -> Figure:
+    """Draw start, half the settling time and the settled formation, a row for each policy.
 
     ``played`` is written below: world, split, seed and version.
     """
     figure, axes = plt.subplots(len(shown), 3, figsize=(9.6, 3.3 * len(shown)), layout="constrained", squeeze=False)
-    for row, (name, recording, world, settled) in zip(axes, shown, strict=True):
-        last = settled if np.isfinite(settled) else recording.time[-1]
-        for axis, time in zip(row, (0.0, last / 2, last), strict=True):
-            instant = int(np.searchsorted(recording.time, time - 1e-9))
-            draw_robots(axis, recording, world, instant)
-            axis.set_title(f"t = {recording.time[instant]:.1f} s", loc="left")
-        row[0].set_ylabel(f"{name}\ny, m")
+    for row, one in zip(axes, shown, strict=True):
+        time = times(one.run)
+        last = one.settled if np.isfinite(one.settled) else time[-1]
+        for axis, when in zip(row, (0.0, last / 2, last), strict=True):
+            frame = int(np.searchsorted(time, when - 1e-9))
+            draw_robots(axis, one.run, one.world, frame)
+            axis.set_title(f"t = {time[frame]:.1f} s", loc="left")
+        row[0].set_ylabel(f"{one.policy}\ny, m")
     for axis in axes[-1]:
         axis.set_xlabel("x, m")
     handles = [
@@ -46,7 +60,7 @@ def frames(shown: list[tuple[str, Recording, int, float]], played: str) -> Figur
         Line2D([], [], marker="o", ls="", mfc=TARGET, mec=TARGET, ms=7, label="target"),
         Line2D([], [], color=GREY, lw=1.2, label="trail"),
     ]
-    if any((recording.leader[:, world] >= 0).any() for _, recording, world, _ in shown):
+    if any((told(one.run, "leader")[:, one.world] >= 0).any() for one in shown):
         rim = Line2D([], [], marker="o", ls="", mfc="w", mec=TARGET, mew=2.2, ms=8, label="leader")
         handles.append(rim)
     note(figure, played)
@@ -54,18 +68,18 @@ def frames(shown: list[tuple[str, Recording, int, float]], played: str) -> Figur
     return figure
 
 
-def draw_robots(axis: Axes, recording: Recording, world: int, instant: int, since: int = 0) -> None:
-    """Draw robots with headings, trails since an instant, slots; the leader has a thick rim."""
-    target, trackers = recording.target[instant, world], recording.trackers[instant, world]
-    r = recording.radius
-    for x, y in recording.slots[instant, world]:
+def draw_robots(axis: Axes, run: Trajectory, world: int, frame: int, since: int = 0) -> None:
+    """Draw robots with headings, trails since a frame, slots; the leader has a thick rim."""
+    targets, teams = run["target_pose"][:, world], run["tracker_pose"][:, world]
+    target, trackers = targets[frame].astype(np.float64), teams[frame].astype(np.float64)
+    r = run.scenario.robot_radius
+    for x, y in slots(run)[frame, world]:
         axis.add_patch(mpl.patches.Circle((x, y), 1.35 * r, fill=False, ec=GREY, lw=0.8))
-    trail = recording.target[since : instant + 1, world]
-    axis.plot(trail[:, 0], trail[:, 1], color=TARGET, lw=0.9)
+    trail = slice(since, frame + 1)
+    axis.plot(targets[trail, 0], targets[trail, 1], color=TARGET, lw=0.9)
     for number in range(len(trackers)):
-        trail = recording.trackers[since : instant + 1, world, number]
-        axis.plot(trail[:, 0], trail[:, 1], lw=1.1, **look_of(number))
-    leader = recording.leader[instant, world].max()
+        axis.plot(teams[trail, number, 0], teams[trail, number, 1], lw=1.1, **look_of(number))
+    leader = told(run, "leader")[frame, world].max()
     for number, (x, y, theta) in enumerate([*trackers, target]):
         is_target = number == len(trackers)
         edge = TARGET if is_target else COLOURS[number % 5]
@@ -84,8 +98,8 @@ def draw_robots(axis: Axes, recording: Recording, world: int, instant: int, sinc
     axis.set_aspect("equal")
 
 
-def curves(shown: list[tuple[str, Recording, int, float]], paper: float, played: str) -> Figure:
-    """Draw every tracker against time, a column for each (name, recording, world, settled)."""
+def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
+    """Draw every tracker against time, a column for each policy."""
     rows = (
         "x from the\ntarget, m",
         "y from the\ntarget, m",
@@ -102,31 +116,26 @@ def curves(shown: list[tuple[str, Recording, int, float]], paper: float, played:
         sharey="row",
         squeeze=False,
     )
-    for column, (name, recording, world, settled) in zip(axes.T, shown, strict=True):
-        end = max(_LEAST, _AFTER * settled) if np.isfinite(settled) else recording.time[-1]
-        keep = recording.time <= end + 1e-9
-        relative = recording.relative[keep, world]
-        turned = recording.trackers[keep, world, :, 2] - recording.target[keep, world, None, 2]
+    for column, one in zip(axes.T, shown, strict=True):
+        run, world, settled, time = one.run, one.world, one.settled, times(one.run)
+        end = max(_LEAST, _AFTER * settled) if np.isfinite(settled) else time[-1]
+        keep = time <= end + 1e-9
+        place = relative(run)[keep, world]
+        turned = run["tracker_pose"][keep, world, :, 2].astype(np.float64) - run["target_pose"][keep, world, None, 2]
         heading = np.unwrap((turned + np.pi) % (2 * np.pi) - np.pi, axis=0)
-        values = (
-            relative[..., 0],
-            relative[..., 1],
-            recording.speeds[keep, world],
-            heading,
-            recording.error[keep, world],
-        )
-        for axis, what in zip(column, values, strict=True):
+        speeds, error = run["tracker_speed"][keep, world], slot_error(run)[keep, world]
+        for axis, what in zip(column, (place[..., 0], place[..., 1], speeds, heading, error), strict=True):
             for number in range(what.shape[1]):
-                axis.plot(recording.time[keep], what[:, number], lw=1.3, **look_of(number))
+                axis.plot(time[keep], what[:, number], lw=1.3, **look_of(number))
             axis.axvline(paper, color=GREY, ls=":", lw=1.2)
             if np.isfinite(settled):
                 axis.axvline(settled, color=GREY, lw=1.0)
         when = f"settled at {settled:.1f} s" if np.isfinite(settled) else "not settled"
-        column[0].set_title(f"{name}: {when}", loc="left")
+        column[0].set_title(f"{one.policy}: {when}", loc="left")
         column[-1].set_xlabel("time, s")
     for axis, label in zip(axes[:, 0], rows, strict=True):
         axis.set_ylabel(label)
-    robots = range(shown[0][1].trackers.shape[2])
+    robots = range(shown[0].run.scenario.num_trackers)
     handles = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in robots]
     handles += [
         Line2D([], [], color=GREY, lw=1.0, label="settled"),
