@@ -138,13 +138,14 @@ class Recorder:
         self._lengths[~self.over] += 1
         ended = ~self.over & (terminated | truncated)
         if ended.any():
-            for name, values in infos["metrics"].items():
-                self._metrics.setdefault(name, np.full(len(ended), np.nan))[ended] = values[ended]
+            for name in self.batch.metrics():
+                column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
+                column[ended] = infos[f"metrics/{name}"][ended]
             self.over |= ended
         if "annotations" in self._names:
             self._keep(noted)
         if "terms" in self._names:
-            self._keep({f"reward/{name}": infos["reward_terms"][name] for name in self.batch.term_names})
+            self._keep({name: infos[name] for name in (f"reward/{term}" for term in self.batch.term_names)})
         told = {"actions": np.array(actions, np.float32), "rewards": rewards, "score": infos["score"]}
         told |= {"terminated": terminated, "truncated": truncated}
         self._keep({name: array for name, array in told.items() if name in self._names})

@@ -23,9 +23,9 @@ from matplotlib.lines import Line2D
 
 import posse
 from posse_baselines import Trajectory
-from posse_training.reports.pictures.style import RC, note
 from posse_training.reproduce.formations import TARGET, draw_robots, look_of
 from posse_training.reproduce.runs import played, relative, run_of, slot_error, times
+from posse_training.style import RC, note
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
 SEED: Final = 7

@@ -74,4 +74,5 @@ def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
     for row in rows:
         if row["policy"] != "velocity-pursuit":  # all pursue to one point behind the target
             assert row["settled"] >= 7
-            assert row["in_slots"] >= 7
+            # With the law as printed, the team settles beside its slots.
+            assert row["in_slots"] >= 7 or row["policy"] == "pngl-l-phi-literal"

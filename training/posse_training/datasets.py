@@ -148,7 +148,7 @@ def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: s
     """Play a world and return its buffer and metadata.
 
     Observations are (T + 1, N, F), actions (T, N, 2 + m), rewards (T,), the mean of the team's. Infos are ``score``
-    (T + 1,) and ``reward_terms``, each (T + 1, N); those of the reset are 0.
+    (T + 1,) and ``reward``, each term by name (T + 1, N); those of the reset are 0.
     """
     from minari.data_collector import EpisodeBuffer
 
@@ -163,7 +163,7 @@ def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: s
         rewards=played["rewards"][:, 0].mean(axis=1, dtype=np.float64).tolist(),
         terminations=played["terminated"][:, 0].tolist(),
         truncations=(played["truncated"] & ~played["terminated"])[:, 0].tolist(),
-        infos={"score": _after_zero(played["score"][:, 0].astype(np.float64)), "reward_terms": terms},
+        infos={"score": _after_zero(played["score"][:, 0].astype(np.float64)), "reward": terms},
     )
     metrics = {name: float(column[0]) for name, column in played.metrics.items()}
     return buffer, {"policy": policy.name, "world": world, **metrics}

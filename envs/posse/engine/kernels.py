@@ -17,14 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import (
+    ONE,
     WIDTH,
+    ZERO,
     Blocks,
     BoolArray,
     FloatArray,
     Lanes,
     Record,
     Records,
-    blocks_of,
     choose,
     compiled,
     eight,
@@ -33,6 +34,7 @@ from posse.numeric import (
     least,
     lesser,
     load,
+    stamp,
 )
 from posse.rules.contact import meet
 from posse.rules.declared import Rules
@@ -49,9 +51,6 @@ from posse.signals.observation.observing import TOGETHER, lay_out_fixed, observe
 from posse.signals.parts import Parts, Sums, Writers, rules_for, sums_for, writers_for
 from posse.signals.reward import target_weights_for, weights_for
 from posse.signals.scratch import MOST_IN_TEAM
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 
 
 class Tables(NamedTuple):
@@ -111,8 +110,8 @@ def begin(
     rest(c, w, trackers)
     clear_sums(w)
     heard["step"][:] = -1
-    heard_message[:] = _ZERO
-    message[:] = _ZERO
+    heard_message[:] = ZERO
+    message[:] = ZERO
     broadcast["sent"][:] = 0
 
 
@@ -139,7 +138,7 @@ def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, rules: Rule
     for i in range(c.num_trackers):
         works = trackers[i].broken_at == NEVER
         for k in range(c.message_size):
-            message[slot, i, k] = actions[i, 2 + k] if works else _ZERO
+            message[slot, i, k] = actions[i, 2 + k] if works else ZERO
 
 
 @compiled
@@ -234,9 +233,9 @@ def advance_worlds(
             reward(c, w, trackers, tables, writers, rewards, terms)
         else:
             if order != LOOK:
-                w.held, w.score = 0, _ZERO
-            rewards[:] = _ZERO
-            terms[:, :] = _ZERO
+                w.held, w.score = 0, ZERO
+            rewards[:] = ZERO
+            terms[:, :] = ZERO
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
@@ -265,13 +264,18 @@ def tables_of(scenario: Scenario) -> Tables:
     )
 
 
-@functools.cache
 def kernel_of(parts: Parts) -> Callable[..., int]:
     """Return the kernel that steps worlds of any scenario with these parts.
 
-    It executes the orders of the worlds that a thread claims (:func:`advance_worlds`), and returns
-    the number of those whose episodes are over.
+    It executes the orders of a thread's worlds (:func:`advance_worlds`), and returns the number of those whose
+    episodes are over. A user's parts are compiled again when a value that they reach has changed.
     """
+    functions = (*writers_for(parts), *rules_for(parts), *sums_for(parts))
+    return _kernel_of(parts, stamp(*filter(callable, functions)))
+
+
+@functools.cache
+def _kernel_of(parts: Parts, state: str) -> Callable[..., int]:
     own_fields, fixed, mate, terms, target_terms, empty, width, mate_width = writers_for(parts)
     draw_motion, set_goal, sees, measure = rules_for(parts)
     clear_sums, add_to_sums = sums_for(parts)
@@ -291,14 +295,14 @@ def kernel_of(parts: Parts) -> Callable[..., int]:
         writers = Writers(own_fields, fixed, mate, terms, target_terms, empty, width, mate_width)
         rules = Rules(draw_motion, set_goal, sees, measure)
         sums = Sums(clear_sums, add_to_sums)
-        if s.prepared[0] == _ZERO:
+        if s.prepared[0] == ZERO:
             prepare(tables, worlds, writers, s)
-            s.prepared[0] = _ONE
+            s.prepared[0] = ONE
         over = 0
-        for first, end in blocks_of(thread, blocks):
-            for e in range(natural(first), end, TOGETHER):
-                count = min(TOGETHER, end - e)
-                over += advance_worlds(e, count, tables, worlds, actions, results, orders, rules, sums, writers, s)
+        end = blocks[thread + 1]
+        for e in range(natural(blocks[thread]), end, TOGETHER):
+            count = min(TOGETHER, end - e)
+            over += advance_worlds(e, count, tables, worlds, actions, results, orders, rules, sums, writers, s)
         return over
 
     return advance
@@ -322,7 +326,7 @@ _AT_ONCE: Final = 4 * WIDTH
 
 @compiled
 def _in_box(action: Lanes) -> Lanes:
-    return (action >= -_ONE) & (action <= _ONE)
+    return (action >= -ONE) & (action <= ONE)
 
 
 @kernel
@@ -332,13 +336,13 @@ def bad_action(actions: FloatArray) -> int:
     :data:`IN_BOX` if there is none; :data:`TO_CLIP` if some lie outside by rounding.
     """
     flat = actions.reshape(-1)
-    whole, worst = len(flat) // _AT_ONCE * _AT_ONCE, eight(_ZERO)
+    whole, worst = len(flat) // _AT_ONCE * _AT_ONCE, eight(ZERO)
     for at in range(0, whole, _AT_ONCE):
         k = natural(at)
         first = _in_box(load(flat, k)) & _in_box(load(flat, k + WIDTH))
         last = _in_box(load(flat, k + 2 * WIDTH)) & _in_box(load(flat, k + 3 * WIDTH))
-        worst = lesser(worst, choose(first & last, _ZERO, -_ONE))
-    outside = least(worst) < _ZERO
+        worst = lesser(worst, choose(first & last, ZERO, -ONE))
+    outside = least(worst) < ZERO
     for k in range(whole, len(flat)):
         outside |= not _in_box(flat[k])
     if not outside:

@@ -1,80 +1,81 @@
-"""Errors in functions that users' modules declare, reported by function and line."""
+"""Compile errors in functions that users' modules declare, reported by function and line."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Iterator
+import contextlib
+import difflib
+import dis
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, Final
 
-import numba
-import numpy as np
+from numba.core import types
+from numba.core.errors import NumbaError
 
-from posse.engine.kernels import Tables
-from posse.numeric import UNCOMPILED, Records
-from posse.numeric.compiler.complaints import Complaint, unknown_attribute, why_not_compiled
-from posse.numeric.simd.lane_code import tuple_of_lanes
-from posse.registry import DeclarationError, Function, Registry
+from posse.numeric.lane_code import LanesType
 from posse.rules.state import CONFIG, TRACKER, WorldArrays
 from posse.signals.observation.views import Mate, View
 from posse.signals.parts import Parts, added
 
-typeof: Final[Any] = numba.typeof
+_NOISE: Final = re.compile(r"\x1b\[[0-9;]*m|Failed in nopython mode.*\n")
+_LONGEST: Final = 200
+_ARTICLES: Final = {"nothing": "nothing", "number": "a number", "pair": "a pair", "truth": "a truth"}
 
 
-def check_fields(parts: Parts, worlds: WorldArrays) -> None:
-    """Raise if a user's function accesses a field that a record lacks.
-
-    Raises:
-        DeclarationError: Names the function, the line and the field.
-    """
-    fields = {
-        "c": CONFIG.names or (),
-        "w": worlds.world.dtype.names or (),
-        "t": TRACKER.names or (),
-        "v": View._fields,
-        "m": Mate._fields,
-    }
-    for registry, function, _ in _functions(parts):
-        _raise(registry, function, unknown_attribute(function, fields))
-
-
-def check_functions(parts: Parts, tables: Tables, worlds: WorldArrays, scratch: Records) -> None:
-    """Raise if a user's function cannot be compiled. Takes some tenths of a second for each.
+@contextlib.contextmanager
+def mistakes_named(parts: Parts, worlds: WorldArrays) -> Iterator[None]:
+    """Report an error of the compiler in a user's function.
 
     Raises:
         DeclarationError: Names the function, the line and the reason.
     """
-    if UNCOMPILED:
-        return
-    tracker = np.zeros(1, TRACKER)
-    examples: dict[str, Any] = {
-        "c": tables.config[0],
-        "w": worlds.world[0],
-        "t": tracker[0],
-        "trackers": tracker,
-        "obstacles": worlds.obstacle[0],
-        "slots": tables.slots,
-        "s": scratch[0],
-        "number": 0,
-        "dx": np.float32(0),
-        "dy": np.float32(0),
-    }
-    types = {name: typeof(example) for name, example in examples.items()}
-    types |= {"v": tuple_of_lanes(View), "m": tuple_of_lanes(Mate)}
-    for registry, function, returns in _functions(parts):
-        names = inspect.signature(function).parameters
-        if all(name in types for name in names):
-            arguments = [types[name] for name in names]
-            _raise(registry, function, why_not_compiled(function, arguments, returns))
+    try:
+        yield
+    except (NumbaError, KeyError) as error:  # KeyError: a field that a record lacks
+        names = {*(CONFIG.names or ()), *(worlds.world.dtype.names or ()), *(TRACKER.names or ())}
+        for registry, thing in added(parts):
+            for function, returns in thing.functions:
+                reason = _mistake(error, function, returns, names.union(View._fields, Mate._fields))
+                if reason is not None:
+                    raise registry.error(function, reason) from error
+        raise
 
 
-def _functions(parts: Parts) -> Iterator[tuple[Registry[Any], Function, str]]:
-    for registry, thing in added(parts):
-        for function, returns in thing.functions:
-            yield registry, function, returns
+def _mistake(error: Exception, function: Callable[..., Any], returns: str, names: set[str]) -> str | None:
+    """Return the line and the reason if the error is in this function."""
+    code = getattr(function, "py_func", function).__code__
+    text = _NOISE.sub("", str(error))
+    fields = error.args if isinstance(error, KeyError) else re.findall(r"Unknown attribute '(\w+)'", text)
+    for step in dis.get_instructions(code):
+        if "ATTR" in step.opname and step.argval in fields and step.positions is not None:
+            near = difflib.get_close_matches(step.argval, names, n=3)
+            hint = f" (did you mean {' or '.join(near)}?)" if near else ""
+            return f"line {step.positions.lineno}: unknown field {step.argval!r}{hint}"
+    for found in _returned(function):
+        if not _fits(found, returns):
+            return f"line {code.co_firstlineno}: it returns {_short(str(found))}, not {_ARTICLES.get(returns, returns)}"
+    file, last = re.escape(Path(code.co_filename).name), max(line or 0 for *_, line in code.co_lines())
+    lines = [int(line) for line in re.findall(rf'{file}(?:" *, line | \()(\d+)', text)]
+    inside = [line for line in lines if code.co_firstlineno <= line <= last]
+    return f"line {inside[-1]}: {_short(text.strip().splitlines()[0])}" if inside else None
 
 
-def _raise(registry: Registry[Any], function: Function, complaint: Complaint | None) -> None:
-    if complaint is not None:
-        error: DeclarationError = registry.error(function, f"line {complaint.line}: {complaint.reason}")
-        raise error from None
+def _returned(function: Any) -> list[Any]:
+    """Return the types that compiled forms of a function return."""
+    inner = getattr(function, "inner", {}).values()
+    return [form.signature.return_type for each in inner for form in each.overloads.values()]
+
+
+def _fits(found: Any, returns: str) -> bool:
+    parts = [*found] if "Tuple" in type(found).__name__ else []
+    numbers = all(isinstance(each, types.Number | types.Boolean | LanesType) for each in parts or [found])
+    if returns == "nothing":
+        return isinstance(found, types.NoneType)
+    if returns == "pair":
+        return len(parts) == 2
+    return numbers and len(parts) == (int(returns.split()[0]) if returns[0].isdigit() else 0)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"

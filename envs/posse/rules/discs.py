@@ -2,7 +2,7 @@
 
 Discs (trackers, the target, obstacles) are stored in rows of a thread's scratch memory. Contact,
 score, target sensor and sonar read these rows in blocks of eight
-(:mod:`posse.numeric.simd.lanes`); the padding of the last block is far away.
+(:mod:`posse.numeric.lanes`); the padding of the last block is far away.
 """
 
 from __future__ import annotations

@@ -6,9 +6,8 @@ and reported in every scenario, others in scenarios that give them a weight.
 
 from __future__ import annotations
 
-import functools
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -179,42 +178,3 @@ def _summing(name: str, parameters: tuple[str, ...], lines: list[str], functions
     sums = [f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in range(len(lines) - 1, -1, -1)]
     names = {"ZERO": _ZERO, "float32": np.float32, **functions}
     return written(name, parameters, [*lines, "reward = ZERO", *sums, "return reward"], names)
-
-
-@functools.cache
-def namer(names: tuple[str, ...]) -> Callable[..., dict[str, float]]:
-    """Return a function from a tracker's terms, in order, to a dictionary by name.
-
-    The dictionary is a literal, created in half the time of ``dict(zip(...))``; this is a third of
-    the time of a step of one world.
-    """
-    literal = ", ".join(f"{name!r}: {name}" for name in names)
-    naming: Callable[..., dict[str, float]] = eval(f"lambda {', '.join(names)}: {{{literal}}}")
-    return naming
-
-
-class TermsByName(Mapping[str, FloatArray]):
-    """The terms (E, rows, K) of a step by name, (E, rows) each.
-
-    Views are created on access: creating all of them takes a third of the time of a world's step.
-    """
-
-    __slots__ = ("_names", "_terms")
-
-    def __init__(self, names: tuple[str, ...], terms: FloatArray) -> None:
-        self._names, self._terms = names, terms
-
-    def __getitem__(self, name: str) -> FloatArray:
-        if name not in self._names:
-            raise KeyError(name)
-        term: FloatArray = self._terms[..., self._names.index(name)]
-        return term
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return repr(dict(self))

@@ -18,6 +18,7 @@ from posse.rendering import style
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.replay import read_replay, record, write_replay
+from posse_training.replay.colours import PLAYERS, TASK_COLOURS
 from posse_training.replay.page import MODULES, colours, page
 
 WEB = resources.files("posse_training.replay") / "web"
@@ -119,8 +120,8 @@ def test_the_colours_are_those_of_figures_and_films() -> None:
         return "#{:02x}{:02x}{:02x}".format(*colour)
 
     assert colours()["TARGET"] == css(style.TARGET)
-    assert colours()["TASKS"] == [css(colour) for colour in style.TASK_COLOURS]
-    assert colours()["PLAYERS"] == [css(colour) for colour in style.PLAYERS]
+    assert colours()["TASKS"] == [css(colour) for colour in TASK_COLOURS]
+    assert colours()["PLAYERS"] == [css(colour) for colour in PLAYERS]
 
 
 def test_a_path_or_file_that_is_no_page_is_named(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from typing import Any, Final
 from posse.rendering import style
 from posse_baselines.files import write_atomically
 from posse_training.errors import SettingsError
+from posse_training.replay.colours import PLAYERS, TASK_COLOURS
 from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
 
@@ -154,8 +155,8 @@ def colours() -> dict[str, Any]:
 
     return {
         **{name: css(getattr(style, name)) for name in _COLOURS},
-        "TASKS": [css(colour) for colour in style.TASK_COLOURS],
-        "PLAYERS": [css(colour) for colour in style.PLAYERS],
+        "TASKS": [css(colour) for colour in TASK_COLOURS],
+        "PLAYERS": [css(colour) for colour in PLAYERS],
     }
 
 

@@ -17,9 +17,9 @@ from matplotlib.patches import Patch
 import posse
 from posse_baselines import Trajectory, with_settings
 from posse_baselines.ddcs import TASKS
-from posse_training.reports.pictures.style import BLUE, GREEN, GREY, GRID, ORANGE, note
 from posse_training.reproduce.formations import COLOURS, TARGET, draw_robots, look_of
 from posse_training.reproduce.runs import median_world, played, relative, run_of, slot_error, times, told, working
+from posse_training.style import BLUE, GREEN, GREY, GRID, ORANGE, note
 
 _HEADING: Final = 2.6  # rad; of the target in the tracks
 _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)

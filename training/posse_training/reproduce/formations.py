@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from posse_baselines import Trajectory
-from posse_training.reports.pictures.style import BLUE, GREEN, GREY, INK, PINK, RED, note
 from posse_training.reproduce.runs import relative, slot_error, slots, times, told
+from posse_training.style import BLUE, GREEN, GREY, INK, PINK, RED, note
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
 LINES: Final[tuple[Any, ...]] = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3)))

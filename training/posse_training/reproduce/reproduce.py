@@ -24,7 +24,6 @@ from rich.text import Text
 import posse
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import replacing, write_atomically
-from posse_training.reports.pictures.style import RC
 from posse_training.reproduce.announced import leader_loss, tracks
 from posse_training.reproduce.formations import Shown, curves, frames
 from posse_training.reproduce.runs import (
@@ -37,6 +36,7 @@ from posse_training.reproduce.runs import (
     settling_times,
     slot_error,
 )
+from posse_training.style import RC
 
 HORIZON: Final = 250
 """Control steps of an episode, enough for the slowest law to settle."""
