@@ -128,9 +128,10 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
 def _shown(run: Trajectory) -> tuple[int, float, float]:
     """Return the world of the median recovery, when its leader broke, and when it recovered (s)."""
     time, alive = times(run), working(run)
-    broken = ~alive.all(axis=2)
+    broken = np.asarray(~alive.all(axis=2))
     broke = np.where(broken.any(axis=0), time[broken.argmax(axis=0)], np.nan)
-    off = broken & ~(~alive | (slot_error(run) < 0.3)).all(axis=2)  # (T + 1, E)
+    away = np.asarray(alive & (slot_error(run) >= 0.3))
+    off = broken & away.any(axis=2)  # (T + 1, E)
     last = run.steps - off[::-1].argmax(axis=0)
     recovered = time[np.minimum(last + 1, run.steps)]
     taken = np.where(off.any(axis=0) & ~off[-1], recovered - broke, np.nan)
