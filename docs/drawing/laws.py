@@ -23,7 +23,7 @@ from matplotlib.lines import Line2D
 
 import posse
 from posse_baselines import Trajectory
-from posse_training.reproduce.formations import TARGET, draw_robots, look_of
+from posse_training.reproduce.figures import TARGET, draw_robots, look_of
 from posse_training.reproduce.runs import played, relative, run_of, slot_error, times
 from posse_training.style import RC, note
 

@@ -25,47 +25,21 @@ from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
 
 MODULES: Final = (
-    "data.js",
-    "colours.js",
-    "state.js",
-    "geometry.js",
-    "camera.js",
-    "world.js",
-    "sensing.js",
-    "robots.js",
-    "view.js",
-    "events.js",
-    "timeline.js",
-    "values.js",
-    "panel.js",
-    "header.js",
-    "export.js",
-    "legend.js",
-    "controls.js",
+    *(
+        "data.js",
+        "colours.js",
+        "state.js",
+        "geometry.js",
+        "camera.js",
+        "world.js",
+        "sensing.js",
+        "robots.js",
+        "view.js",
+    ),
+    *("events.js", "timeline.js", "values.js", "panel.js", "header.js", "export.js", "legend.js", "controls.js"),
     "main.js",
 )
 """Modules of the page's code, each after those that it imports from."""
-_COLOURS: Final = (
-    "PAPER",
-    "GROUND",
-    "GRID",
-    "WALL",
-    "OBSTACLE",
-    "OBSTACLE_RIM",
-    "INK",
-    "FAINT_INK",
-    "TARGET",
-    "SLOT",
-    "SLOT_FILLED",
-    "TRACKER",
-    "TRACKER_RIM",
-    "TRAIL",
-    "BROKEN",
-    "LINK",
-    "SENSING",
-    "SENSING_RIM",
-    "CONTACT",
-)
 _OF_A_WORLD: Final = ("scenario", "settings", "obstacles", "seed", "split", "world", "episode", "fields")
 _IMPORT: Final = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT: Final = re.compile(r"^export ", re.MULTILINE)
@@ -154,7 +128,7 @@ def colours() -> dict[str, Any]:
         return "#" + "".join(f"{part:02x}" for part in colour)
 
     return {
-        **{name: css(getattr(style, name)) for name in _COLOURS},
+        **{name: css(colour) for name, colour in vars(style).items() if isinstance(colour, tuple)},
         "TASKS": [css(colour) for colour in TASK_COLOURS],
         "PLAYERS": [css(colour) for colour in PLAYERS],
     }

@@ -18,7 +18,6 @@ from posse_training.provenance import commit
 PLACES: Final = ("world_seed", "world_index", "world_episode", "obstacle_x", "obstacle_y", "obstacle_radius")
 """Names of the state arrays that say which world was played."""
 _OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")
-_BLOCKS: Final = ("own motion", "task", "target", "sonar", "team-mates")
 
 
 def describe_world(
@@ -58,7 +57,7 @@ def describe_world(
             for term in REWARD_TERMS
             if term.name in weights
         ],
-        "fields": [_describe(field) for field in trajectory.layout.fields if observations or field.name == "sonar"],
+        "fields": [_described(field) for field in trajectory.layout.fields if observations or field.name == "sonar"],
         "metrics": [{"name": metric.name, "unit": metric.unit, "meaning": metric.meaning} for metric in posse.METRICS],
     }
 
@@ -68,28 +67,22 @@ def _settings(scenario: Scenario) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in scenario.to_dict().items()}
 
 
-def _describe(field: Field) -> dict[str, Any]:
-    return {
-        "name": field.name,
-        "block": block_of(field),
-        "size": field.size,
-        "unit": field.unit,
-        "low": float(field.low),
-        "high": float(field.high),
-        "meaning": field.meaning,
-        "unknown": None if field.unknown is None else float(field.unknown),
-    }
+def _described(field: Field) -> dict[str, Any]:
+    numbers = {"low": float(field.low), "high": float(field.high)}
+    unknown = None if field.unknown is None else float(field.unknown)
+    told = {"size": field.size, "unit": field.unit, **numbers, "meaning": field.meaning, "unknown": unknown}
+    return {"name": field.name, "block": _block_of(field), **told}
 
 
-def block_of(field: Field) -> str:
+def _block_of(field: Field) -> str:
     """Return the heading in the panel under which a field is listed."""
     if field.of_neighbour:
-        return _BLOCKS[4]
+        return "team-mates"
     if field.name == "sonar":
-        return _BLOCKS[3]
+        return "sonar"
     if field.name.startswith("target_"):
-        return _BLOCKS[2]
-    return _BLOCKS[0] if field.name in _OWN else _BLOCKS[1]
+        return "target"
+    return "own motion" if field.name in _OWN else "task"
 
 
 def changed_settings(scenario: Scenario) -> dict[str, list[Any]]:

@@ -24,8 +24,7 @@ from rich.text import Text
 import posse
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import replacing, write_atomically
-from posse_training.reproduce.announced import leader_loss, tracks
-from posse_training.reproduce.formations import Shown, curves, frames
+from posse_training.reproduce.figures import Shown, curves, frames, leader_loss, tracks
 from posse_training.reproduce.runs import (
     SPLIT,
     Floats,
@@ -40,8 +39,6 @@ from posse_training.style import RC
 
 HORIZON: Final = 250
 """Control steps of an episode, enough for the slowest law to settle."""
-
-
 PLAYED: Final = "paper-distributed"
 """Scenario of all runs; that of the centralized model differs only in name."""
 
@@ -133,29 +130,18 @@ def _write(folder: Path, name: str, figure: Figure) -> None:
 
 
 def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
-    """Return the settling times with those of the paper, at most 80 characters wide."""
+    """Return the settling times with those of the paper."""
     shown = Table(
+        *("policy", "model", "paper", Text("median\n[quartiles]"), "settled", "in slots"),  # brackets are not markup
         title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
         f"{settings.starts:,} starts of {played(posse.get_scenario(PLAYED), settings.seed)}",
         box=box.HORIZONTALS,
-        show_edge=False,
-        pad_edge=False,
-        padding=0,
     )
-    shown.add_column("policy", overflow="fold")
-    for column in ("model", "paper", "median\n[quartiles]", "settled", "all in\nslots"):
-        shown.add_column(Text(column), no_wrap=True)  # brackets are not markup
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
-        paper = row["paper_settling_time"]
-        shown.add_row(
-            row["policy"],
-            row["model"],
-            "-" if paper is None else f"{paper:.1f}",
-            "-" if middle is None else f"{middle:.1f} [{low:.1f}, {high:.1f}]",
-            str(row["settled"]),
-            str(row["in_slots"]),
-        )
+        paper = "-" if row["paper_settling_time"] is None else f"{row['paper_settling_time']:.1f}"
+        median = "-" if middle is None else f"{middle:.1f} \\[{low:.1f}, {high:.1f}]"
+        shown.add_row(row["policy"], row["model"], paper, median, str(row["settled"]), str(row["in_slots"]))
     return shown
 
 
