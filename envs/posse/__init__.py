@@ -12,8 +12,8 @@ from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
-from posse.signals.measuring import Metric, metric
-from posse.signals.metrics import METRICS
+from posse.signals.generate import declarations_for, source_of
+from posse.signals.metrics import METRICS, Metric, metric
 from posse.signals.observation.fields import Field, field
 from posse.signals.observation.layout import ObservationLayout
 from posse.signals.reward import REWARD_TERMS, RewardTerm, reward_term
@@ -62,6 +62,15 @@ def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) 
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
 
 
+def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> str:
+    """Return the source text of what the kernel of a scenario calls for its declarations.
+
+    It is a Python module: one function each for the own observation fields, those of a team-mate, an
+    empty place, the rewards, the target's motion, the sensor and the sums of the metrics.
+    """
+    return source_of(declarations_for(get_scenario(scenario, **overrides)))
+
+
 __all__ = [
     "METRICS",
     "REWARD_TERMS",
@@ -85,6 +94,7 @@ __all__ = [
     "env",
     "field",
     "get_scenario",
+    "kernel_source",
     "metric",
     "observation_fields",
     "parallel_env",

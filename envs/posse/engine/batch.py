@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -22,19 +22,29 @@ from posse.engine.kernels import LOOK, START, START_FROM_POSES, STEP, Results, f
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
 from posse.engine.start_poses import check_poses, poses_of, write_poses
-from posse.engine.user_parts import mistakes_named
 from posse.numeric import Blocks, BoolArray, FloatArray, Records, direct, divide, over_worlds, threads_for
 from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
+from posse.signals.generate import declarations_for
 from posse.signals.metrics import episode_metrics
 from posse.signals.observation.layout import ObservationLayout
-from posse.signals.parts import parts_for
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
-_DERIVED: Final = ("_tables", "_kernel", "_untyped", "_scratch", "_orders", "_whole", "_score", "_recyclers", "_infos")
+_DERIVED: Final = (
+    "_declared",
+    "_tables",
+    "_kernel",
+    "_untyped",
+    "_scratch",
+    "_orders",
+    "_whole",
+    "_score",
+    "_recyclers",
+    "_infos",
+)
 """Attributes that are not pickled but prepared again."""
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
@@ -46,6 +56,8 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
+    fingerprints: Mapping[str, str] = field(default_factory=dict)
+    """Hashes of the declarations of users' modules that the scenario names."""
 
 
 class Batch:
@@ -99,7 +111,7 @@ class Batch:
         self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
         self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
-        self.term_names = parts_for(scenario).term_names
+        self.term_names = declarations_for(scenario).term_names
         self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
         self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)
         try:
@@ -115,9 +127,10 @@ class Batch:
 
     def _prepare(self) -> None:
         """Set the attributes that are not pickled."""
-        parts, (worlds, rows, size) = parts_for(self.scenario), self.observation_shape
+        worlds, rows, size = self.observation_shape
+        self._declared = declarations_for(self.scenario)
         self._tables = tables_of(self.scenario)
-        self._untyped: Callable[..., int] = kernel_of(parts)
+        self._untyped: Callable[..., int] = kernel_of(self._declared)
         self._kernel: Callable[..., int] = direct(self._untyped)
         self._orders, self._whole = np.full(worlds, STEP, np.uint8), divide(worlds, 1)
         self._scratch = [new_scratch(SCRATCH) for _ in range(threads_for(worlds, rows, self.num_threads))]
@@ -129,9 +142,11 @@ class Batch:
         self._infos = Infos(self.scenario, zeros)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
+        state = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
+        return {**state, "fingerprints": self._declared.fingerprints()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        declarations_for(state["scenario"]).check_fingerprints(state.pop("fingerprints"))
         self.__dict__.update(state)
         self._prepare()
 
@@ -186,7 +201,7 @@ class Batch:
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
         """Return the metrics of the current episodes by name, (E,) each."""
-        return episode_metrics(self.scenario, self._arrays.world)
+        return episode_metrics(self._declared.metrics, self.scenario, self._arrays.world)
 
     def save(self) -> Snapshot:
         """Return the current state of the worlds, for :meth:`restore`.
@@ -195,7 +210,7 @@ class Batch:
             ResetNeeded: Before the first :meth:`reset`.
         """
         self._check_started("save")
-        return Snapshot(self.scenario, self._arrays.copy())
+        return Snapshot(self.scenario, self._arrays.copy(), self._declared.fingerprints())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Restore a snapshot and return its observations.
@@ -203,10 +218,12 @@ class Batch:
         Raises:
             ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
                 changed.
+            DeclarationError: A declaration that the scenario names has changed.
         """
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
         self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
+        self._declared.check_fingerprints(snapshot.fingerprints)
         self._arrays.write(snapshot.arrays)
         self._started = self._restarts = True
         return self.observe()
@@ -249,6 +266,7 @@ class Batch:
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
+        into._declared.check_fingerprints(self._declared.fingerprints())
         write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
         into._started = True
         return into
@@ -326,9 +344,10 @@ class Batch:
         results = self._new_results()
         orders = np.where(chosen, order, LOOK).astype(np.uint8)
         actions = np.empty((self.num_worlds, *self.action_shape[1:]), np.float32)  # not read
-        with mistakes_named(parts_for(self.scenario), self._arrays):
-            self._run(orders, actions, results)
+        self._run(orders, actions, results)
         self._kernel = direct(self._untyped)  # now compiled
+        if not self._started:
+            self.layout.check_added(results.observations)
         return results.observations
 
     # The step.

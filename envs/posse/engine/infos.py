@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from posse.scenarios import Scenario
-from posse.signals.parts import parts_for
+from posse.signals.generate import declarations_for
 
 
 class Infos:
@@ -25,7 +25,7 @@ class Infos:
     """
 
     def __init__(self, scenario: Scenario, zero: Any) -> None:
-        parts = parts_for(scenario)
+        parts = declarations_for(scenario)
         self._rewards = tuple(f"reward/{name}" for name in parts.term_names)
         self._template = {
             "score": zero,

@@ -30,7 +30,6 @@ from posse.numeric.lanes import (
 )
 from posse.numeric.stamp import stamp
 from posse.numeric.threads import MOST_THREADS, Blocks, divide, over_worlds, threads_for, worlds_of
-from posse.numeric.written import written
 
 __all__ = [
     "HALF",
@@ -73,5 +72,4 @@ __all__ = [
     "threads_for",
     "transpose",
     "worlds_of",
-    "written",
 ]

@@ -69,6 +69,12 @@ _LANES: Final = LanesType("Lanes")
 _MASK: Final = MaskType("Mask")
 
 
+def tuple_of_lanes(kind: type) -> types.NamedTuple:
+    """Return numba's type of a named tuple whose fields are declared as Lanes or Mask."""
+    fields = kind.__annotations__.values()
+    return types.NamedTuple([_MASK if each == "Mask" else _LANES for each in fields], kind)
+
+
 def _spread(builder: Any, value: Any) -> Any:
     nothing = ir.Constant(ir.VectorType(value.type, WIDTH), ir.Undefined)
     first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
