@@ -7,7 +7,7 @@ import pytest
 
 import posse
 from posse_baselines import Trajectory
-from posse_training.reproduce import MEMBERS, MODELS, Settings, reproduce
+from posse_training.reproduce.reproduce import MEMBERS, MODELS, Settings, reproduce
 from posse_training.reproduce.runs import Floats, draw_starts, median_world, settling_times
 
 

@@ -19,17 +19,8 @@ from matplotlib.patches import Circle, Patch
 import posse
 from posse_baselines import Trajectory, with_settings
 from posse_baselines.ddcs import TASKS
-from posse_training.reproduce.runs import (
-    median_world,
-    played,
-    relative,
-    run_of,
-    slot_error,
-    slots,
-    times,
-    told,
-    working,
-)
+from posse_training.reproduce import runs
+from posse_training.reproduce.runs import relative, slot_error, times, told
 from posse_training.style import BLUE, GREEN, GREY, GRID, INK, ORANGE, PINK, RED, note
 
 COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
@@ -90,7 +81,7 @@ def draw_robots(axis: Axes, run: Trajectory, world: int, frame: int, since: int 
     targets, teams = run["target_pose"][:, world], run["tracker_pose"][:, world]
     target, trackers = targets[frame].astype(np.float64), teams[frame].astype(np.float64)
     r = run.scenario.robot_radius
-    for x, y in slots(run)[frame, world]:
+    for x, y in runs.slots(run)[frame, world]:
         axis.add_patch(Circle((x, y), 1.35 * r, fill=False, ec=GREY, lw=0.8))
     trail = slice(since, frame + 1)
     axis.plot(targets[trail, 0], targets[trail, 1], color=TARGET, lw=0.9)
@@ -117,21 +108,8 @@ def draw_robots(axis: Axes, run: Trajectory, world: int, frame: int, since: int 
 
 def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
     """Draw every tracker against time, a column for each policy."""
-    rows = (
-        "x from the\ntarget, m",
-        "y from the\ntarget, m",
-        "speed V, m/s",
-        "heading from the\ntarget's, rad",
-        "distance from\nthe slot, m",
-    )
     figure, axes = plt.subplots(
-        len(rows),
-        len(shown),
-        figsize=(4.6 * len(shown), 8.6),
-        layout="constrained",
-        sharex="col",
-        sharey="row",
-        squeeze=False,
+        5, len(shown), figsize=(4.6 * len(shown), 8.6), layout="constrained", sharex="col", sharey="row", squeeze=False
     )
     for column, one in zip(axes.T, shown, strict=True):
         run, world, settled, time = one.run, one.world, one.settled, times(one.run)
@@ -139,19 +117,24 @@ def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
         keep = time <= end + 1e-9
         place = relative(run)[keep, world]
         turned = run["tracker_pose"][keep, world, :, 2].astype(np.float64) - run["target_pose"][keep, world, None, 2]
-        heading = np.unwrap((turned + np.pi) % (2 * np.pi) - np.pi, axis=0)
-        speeds, error = run["tracker_speed"][keep, world], slot_error(run)[keep, world]
-        for axis, what in zip(column, (place[..., 0], place[..., 1], speeds, heading, error), strict=True):
+        values = {
+            "x from the\ntarget, m": place[..., 0],
+            "y from the\ntarget, m": place[..., 1],
+            "speed V, m/s": run["tracker_speed"][keep, world],
+            "heading from the\ntarget's, rad": np.unwrap((turned + np.pi) % (2 * np.pi) - np.pi, axis=0),
+            "distance from\nthe slot, m": slot_error(run)[keep, world],
+        }
+        for axis, (label, what) in zip(column, values.items(), strict=True):
             for number in range(what.shape[1]):
                 axis.plot(time[keep], what[:, number], lw=1.3, **look_of(number))
             axis.axvline(paper, color=GREY, ls=":", lw=1.2)
             if np.isfinite(settled):
                 axis.axvline(settled, color=GREY, lw=1.0)
+            if one is shown[0]:
+                axis.set_ylabel(label)
         when = f"settled at {settled:.1f} s" if np.isfinite(settled) else "not settled"
         column[0].set_title(f"{one.policy}: {when}", loc="left")
         column[-1].set_xlabel("time, s")
-    for axis, label in zip(axes[:, 0], rows, strict=True):
-        axis.set_ylabel(label)
     robots = range(shown[0].run.scenario.num_trackers)
     handles = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in robots]
     handles += [
@@ -171,7 +154,7 @@ def tracks(seed: int) -> Figure:
     for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
         for number, k in enumerate((0.9, 1.0, 1.1)):
             policy = with_settings(name, navigation_constant=k)
-            run = run_of(policy, alone, 1, seed, start)
+            run = runs.run_of(policy, alone, 1, seed, start)
             _track(axes[0, column], run, 0, number)
             _bearing(axes[1, column], run, 0, number, f"K = {k:g}")
             if column == 0:
@@ -182,7 +165,7 @@ def tracks(seed: int) -> Figure:
     rng = np.random.default_rng(seed)
     pose = [(5.0 + rng.uniform(-1, 1), y, rng.uniform(2, 4)) for y in (-3.0, -1.8, -0.6, 0.6, 1.8)]
     start = {"tracker_pose": pose, "target_pose": (0.0, 0.0, _HEADING)}
-    run = run_of("deviated-pursuit", team, 1, seed, start)
+    run = runs.run_of("deviated-pursuit", team, 1, seed, start)
     for number in range(5):
         _track(axes[0, 2], run, number, number)
         _bearing(axes[1, 2], run, number, number, f"robot {number}")
@@ -199,7 +182,7 @@ def tracks(seed: int) -> Figure:
     axes[1, 0].set_ylabel("line of sight σ, rad")
     handles = [Line2D([], [], lw=1.4, label=f"robot {n}", **look_of(n)) for n in range(5)]
     handles.append(Line2D([], [], color=TARGET, lw=1.0, label="target"))
-    note(figure, f"one run each from a given start, {played(team, seed)}")
+    note(figure, f"one run each from a given start, {runs.played(team, seed)}")
     figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
     return figure
 
@@ -222,9 +205,9 @@ def _bearing(axis: Axes, run: Trajectory, number: int, look: int, label: str) ->
 def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     """Draw a run in which the leader breaks: error, task and leader of each robot over time."""
     scenario = posse.get_scenario("leader-loss")
-    run = run_of(policy, scenario, worlds, seed)
+    run = runs.run_of(policy, scenario, worlds, seed)
     world, broke, recovered = _shown(run)
-    time, alive, error = times(run), working(run)[:, world], slot_error(run)[:, world]
+    time, alive, error = times(run), runs.working(run)[:, world], slot_error(run)[:, world]
     figure, axes = plt.subplots(
         4, 1, figsize=(8.4, 8.2), layout="constrained", gridspec_kw={"height_ratios": (2.6, 2, 1, 1)}
     )
@@ -258,14 +241,14 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     axes[3].set_xlabel("time, s (line: the leader breaks; dotted: all slots are held again)")
     handles: list[Artist] = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)]
     handles += [Patch(fc=c, label=t) for c, t in zip(_TASK_COLOURS, TASKS, strict=True)]
-    note(figure, f"world {world}, the median of {worlds:,} worlds, {played(scenario, seed)}")
+    note(figure, f"world {world}, the median of {worlds:,} worlds, {runs.played(scenario, seed)}")
     figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)
     return figure
 
 
 def _shown(run: Trajectory) -> tuple[int, float, float]:
     """Return the world of the median recovery, when its leader broke, and when it recovered (s)."""
-    time, alive = times(run), working(run)
+    time, alive = times(run), runs.working(run)
     broken = np.asarray(~alive.all(axis=2))
     broke = np.where(broken.any(axis=0), time[broken.argmax(axis=0)], np.nan)
     away = np.asarray(alive & (slot_error(run) >= 0.3))
@@ -273,5 +256,5 @@ def _shown(run: Trajectory) -> tuple[int, float, float]:
     last = run.steps - off[::-1].argmax(axis=0)
     recovered = time[np.minimum(last + 1, run.steps)]
     taken = np.where(off.any(axis=0) & ~off[-1], recovered - broke, np.nan)
-    world = median_world(taken)
+    world = runs.median_world(taken)
     return world, float(broke[world]), float(broke[world] + taken[world])

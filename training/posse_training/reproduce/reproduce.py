@@ -19,22 +19,13 @@ from matplotlib.figure import Figure
 from rich import box
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 import posse
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import replacing, write_atomically
+from posse_training.reproduce import runs
 from posse_training.reproduce.figures import Shown, curves, frames, leader_loss, tracks
-from posse_training.reproduce.runs import (
-    SPLIT,
-    Floats,
-    draw_starts,
-    median_world,
-    played,
-    run_of,
-    settling_times,
-    slot_error,
-)
+from posse_training.reproduce.runs import SPLIT, Floats, draw_starts, median_world, settling_times, slot_error
 from posse_training.style import RC
 
 HORIZON: Final = 250
@@ -97,19 +88,19 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
     scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
     tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
     starts = {"tracker_pose": tracker_pose, "target_pose": target_pose}
-    rows, runs = [], {}
+    rows, played = [], {}
     for policy in MEMBERS:
-        run = run_of(policy, scenario, settings.starts, settings.seed, starts)
-        runs[policy] = run, settling_times(run, settings.tolerance)
-        rows.append(summary(policy, runs[policy][1], slot_error(run)[-1]))
+        run = runs.run_of(policy, scenario, settings.starts, settings.seed, starts)
+        played[policy] = run, settling_times(run, settings.tolerance)
+        rows.append(summary(policy, played[policy][1], slot_error(run)[-1]))
     with mpl.rc_context(RC):
         for model in MODELS:
-            world = median_world(runs[model.paper_policy][1])
+            world = median_world(played[model.paper_policy][1])
             pair = [
-                Shown(policy, runs[policy][0], world, float(runs[policy][1][world]))
+                Shown(policy, played[policy][0], world, float(played[policy][1][world]))
                 for policy in (model.paper_policy, model.our_policy)
             ]
-            facts = f"start {world}, the median of {settings.starts:,} starts, {played(scenario, settings.seed)}"
+            facts = f"start {world}, the median of {settings.starts:,} starts, {runs.played(scenario, settings.seed)}"
             _write(settings.out, f"{model.name}-frames", frames(pair, facts))
             _write(settings.out, f"{model.name}-curves", curves(pair, model.paper_settling_time, facts))
         _write(settings.out, "tracks", tracks(settings.seed))
@@ -132,9 +123,9 @@ def _write(folder: Path, name: str, figure: Figure) -> None:
 def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
     """Return the settling times with those of the paper."""
     shown = Table(
-        *("policy", "model", "paper", Text("median\n[quartiles]"), "settled", "in slots"),  # brackets are not markup
+        *("policy", "model", "paper", "median\n\\[quartiles]", "settled", "in slots"),  # not markup
         title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
-        f"{settings.starts:,} starts of {played(posse.get_scenario(PLAYED), settings.seed)}",
+        f"{settings.starts:,} starts of {runs.played(posse.get_scenario(PLAYED), settings.seed)}",
         box=box.HORIZONTALS,
     )
     for row in rows:
