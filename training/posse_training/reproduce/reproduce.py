@@ -127,6 +127,9 @@ def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
         title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
         f"{settings.starts:,} starts of {runs.played(posse.get_scenario(PLAYED), settings.seed)}",
         box=box.HORIZONTALS,
+        padding=0,
+        pad_edge=False,
+        show_edge=False,  # names are whole in 80 columns
     )
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
