@@ -22,8 +22,8 @@ from PIL import Image
 
 from posse.rendering.style import PLAYERS
 from posse_baselines import load
+from posse_training.evaluation import evaluate
 from posse_training.replay import Replay, record
-from posse_training.reports import evaluate
 from posse_training.reports.pictures.film import film
 from posse_training.reports.pictures.gif import write_gif
 from posse_training.reports.pictures.style import RC

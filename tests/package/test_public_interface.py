@@ -19,7 +19,6 @@ MODULES = (
     "posse_baselines",
     "posse_baselines.learned",
     "posse_training",
-    "posse_training.cluster",
     "posse_training.datasets",
     "posse_training.replay",
     "posse_training.sb3",
