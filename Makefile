@@ -15,14 +15,16 @@ INSTALL := install --no-compile --constraint
 COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|debugpy|mypy|mypyc|pip|setuptools)/'
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
-# everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone.
+# everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone. AgileRL's pins
+# differ from theirs, too, and it brings 60 packages: an environment and a command of its own.
 RECIPES := .venv-recipes
+AGILERL := .venv-agilerl
 
 # Suppresses a notice about later versions of mkdocs, which pyproject.toml excludes.
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes recipe-agilerl lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,6 +43,8 @@ test-long: $(FULL) ## Run the long tests: kills, full trainings, kernels compile
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
 recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
+
+recipe-agilerl: $(AGILERL)/recipes.stamp ## Install AgileRL, whose recipe the tests then run too (1 GB)
 
 lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check
@@ -81,7 +85,7 @@ train-shipped: $(FULL) ## Train the learned teams that ship again (hours); inter
 	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv
-	rm -rf $(VENV) $(RECIPES) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(RECIPES) $(AGILERL) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find envs baselines training tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Checked first, so that an old Python gives a clear message and not a syntax error.
@@ -104,15 +108,25 @@ $(FULL): $(PINS) | $(BIN)/python
 	@$(BIN)/$(COMPILE) $(VENV)/lib || true
 	@touch $(BASE) $@
 
+define BESIDE
+rm -rf $(1)
+$(BIN)/python -m venv --without-pip $(1)
+echo "import site; site.addsitedir('$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" \
+	> "$$($(1)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/posse_base.pth"
+endef
+
 $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
-	rm -rf $(RECIPES)
-	$(BIN)/python -m venv --without-pip $(RECIPES)
-	echo "import site; site.addsitedir('$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" \
-		> "$$($(RECIPES)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/posse_base.pth"
+	$(call BESIDE,$(RECIPES))
 	grep -viE '^(gymnasium|tensordict|torchrl)==' constraints.txt > $(RECIPES)/constraints.txt
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) $(RECIPES)/constraints.txt \
-		--constraint constraints-recipes.txt 'ray[rllib]' benchmarl
+		--constraint constraints-recipes.txt 'ray[rllib]' benchmarl skrl
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps pufferlib gym gym-notices
 	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours
 	@$(RECIPES)/bin/$(COMPILE) $(RECIPES)/lib || true
+	@touch $@
+
+$(AGILERL)/recipes.stamp: constraints-recipes.txt $(FULL)
+	$(call BESIDE,$(AGILERL))
+	grep -viE '^(gymnasium|pettingzoo|tensordict|torchrl)==' constraints.txt > $(AGILERL)/constraints.txt
+	$(PIP) --python $(AGILERL)/bin/python $(INSTALL) $(AGILERL)/constraints.txt $$(grep -E '^(agilerl|peft)==' constraints-recipes.txt)
 	@touch $@

@@ -83,12 +83,12 @@ def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, 
     metrics: dict[str, npt.NDArray[np.float64]] = {}
     waiting = np.ones(batch.num_worlds, np.bool_)
     for step in rollout(batch, policy, seed=seed):
-        if "metrics" not in step.infos:
+        ended = waiting & (step.terminated | step.truncated)
+        if not ended.any():
             continue
-        ended = waiting & step.infos["_metrics"]
-        for name, values in step.infos["metrics"].items():
+        for name in batch.metrics():
             column = metrics.setdefault(name, np.full(batch.num_worlds, np.nan))
-            column[ended] = values[ended]
+            column[ended] = step.infos[f"metrics/{name}"][ended]
         waiting &= ~ended
         if not waiting.any():
             break

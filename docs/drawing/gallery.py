@@ -14,7 +14,8 @@ from PIL import Image
 
 import posse
 from posse.rendering.renderer import Renderer
-from posse_baselines import begin, load
+from posse_baselines import load
+from posse_training.film import Team
 
 PICTURES: Final = Path(__file__).parents[1] / "media" / "scenarios"
 SEED: Final = 7
@@ -41,15 +42,12 @@ class _Arguments:
 def picture(scenario: str) -> Image.Image:
     """Return a picture of a team on a scenario."""
     name, seconds = SHOWN[scenario]
-    policy, settings = load(name), posse.get_scenario(scenario)
-    settings = settings.replace(message_size=max(settings.message_size, policy.message_size))
-    batch = posse.Batch(settings, 1, seed=SEED, split="test")
-    renderer = Renderer(settings, size=(SIDE, SIDE), title="")
-    memory, observations = begin(policy, batch), batch.reset()
-    for _ in range(round(seconds / settings.control_step)):
-        actions, memory = policy.act(observations, memory)
-        frame = renderer.draw(batch, annotations=policy.annotations(memory))
-        observations, *_ = batch.step(actions)
+    team = Team(load(name), posse.get_scenario(scenario), SEED, 0, "test")
+    renderer = Renderer(team.batch.scenario, size=(SIDE, SIDE))
+    for _ in range(round(seconds / team.batch.scenario.control_step)):
+        renderer.follow(team.batch)
+        team.step()
+    frame = renderer.draw(team.batch, colours=team.colours)
     assert frame is not None
     return Image.fromarray(frame).quantize(64)
 

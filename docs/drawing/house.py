@@ -22,7 +22,7 @@ COLOURS = {"posse_training": "#d5e8f0", "posse_baselines": "#e8e3f1", "posse": "
 LINES = (
     ("posse_training.cli",),
     ("posse_training.commands", "posse_training.leaderboard"),
-    ("posse_training.viewer", "posse_training.play", "posse_training.league"),
+    ("posse_training.play", "posse_training.film", "posse_training.league"),
     ("posse_training.datasets", "posse_training.tune"),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl", "posse_training.evaluation"),

@@ -9,4 +9,4 @@ while not done:
     *_, terminated, truncated, info = env.step(env.action_space.sample())
     done = terminated or truncated
 env.close()
-print(info["metrics"]["score"])
+print(info["metrics/score"])

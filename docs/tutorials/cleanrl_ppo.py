@@ -113,7 +113,7 @@ while done < args.steps:
             over = terminated[agents[0]] or truncated[agents[0]]
             ends[t, mine] = float(over)
             if over:
-                scores.append(infos[agents[0]]["metrics"]["score"])
+                scores.append(infos[agents[0]]["metrics/score"])
                 row, _ = env.reset()
             rows.append(row)
         observation = stacked(rows)

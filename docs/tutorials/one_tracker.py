@@ -41,5 +41,5 @@ for _ in range(arguments.episodes):
         action, _ = learned.predict(observation, deterministic=True)
         observation, _, terminated, truncated, info = test.step(action)
         over = terminated or truncated
-    scores.append(info["metrics"]["score"])
+    scores.append(info["metrics/score"])
 print(f"score of the team {np.mean(scores):.3f} in {len(scores)} worlds")

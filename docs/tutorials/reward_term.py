@@ -28,6 +28,5 @@ for _ in range(arguments.steps):
 
 # Terms are reported unscaled, by name; the reward is their weighted sum.
 for agent, info in infos.items():
-    terms = info["reward_terms"]
-    expected = sum(weight * terms[name] for name, weight in weights.items())
-    print(f"{agent}: steady {terms['steady']:.0f}, reward {rewards[agent]:.2f} = {expected:.2f}")
+    expected = sum(weight * info[f"reward/{name}"] for name, weight in weights.items())
+    print(f"{agent}: steady {info['reward/steady']:.0f}, reward {rewards[agent]:.2f} = {expected:.2f}")

@@ -8,4 +8,4 @@ memory = policy.begin(env.layout, 1)
 while env.agents:
     actions, memory = policy.act(stack_agents(observations), memory)
     observations, *_, infos = env.step(split_agents(actions, env.agents))
-print(infos["tracker_0"]["metrics"]["safe_score"])
+print(infos["tracker_0"]["metrics/safe_score"])

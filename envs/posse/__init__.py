@@ -7,13 +7,13 @@ from typing import Any
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.engine.batch import Batch, Snapshot
-from posse.engine.paired_batch import PairedBatch, TargetPolicy, with_agent
+from posse.engine.opponent import PairedBatch, TargetPolicy, batch_with
 from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
-from posse.signals.measuring import Metric, metric
-from posse.signals.metrics import METRICS
+from posse.signals.generate import declarations_for, source_of
+from posse.signals.metrics import METRICS, Metric, metric
 from posse.signals.observation.fields import Field, field
 from posse.signals.observation.layout import ObservationLayout
 from posse.signals.reward import REWARD_TERMS, RewardTerm, reward_term
@@ -32,6 +32,7 @@ def batch(
     first_world: int = 0,
     autoreset: str = "next_step",
     num_threads: int | None = None,
+    clip_actions: bool = False,
     target_policy: TargetPolicy | None = None,
     team_policy: TargetPolicy | None = None,
     **overrides: Any,
@@ -40,30 +41,34 @@ def batch(
 
     With ``target_policy`` that policy moves the target of every world; observations, actions and
     rewards are those of the trackers. With ``team_policy`` a policy moves the trackers, and they
-    are those of the target, one row and actions of two numbers. See
-    :class:`posse.engine.paired_batch.PairedBatch`.
+    are those of the target, one row and actions of two numbers. Both return a :class:`PairedBatch`.
     """
-    inside = team_policy if target_policy is None else target_policy
-    if team_policy is not None and target_policy is not None:
-        raise ValueError("target_policy= and team_policy= exclude each other: give one of them")
-    side = "target" if team_policy is None else "team"
-    settings = with_agent(get_scenario(scenario, **overrides), inside, side)
-    arguments: dict[str, Any] = {
-        "seed": seed,
-        "split": split,
-        "first_world": first_world,
-        "autoreset": autoreset,
-        "num_threads": num_threads,
-    }
-    if inside is not None:
-        moves_target = team_policy is None
-        return PairedBatch(settings, num_worlds, inside, moves_target=moves_target, **arguments)
-    return Batch(settings, num_worlds, **arguments)
+    return batch_with(
+        get_scenario(scenario, **overrides),
+        num_worlds,
+        target_policy,
+        team_policy,
+        seed=seed,
+        split=split,
+        first_world=first_world,
+        autoreset=autoreset,
+        num_threads=num_threads,
+        clip_actions=clip_actions,
+    )
 
 
 def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
     """Return the fields of a scenario's observation, in order: name, size, unit, range, ..."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
+
+
+def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> str:
+    """Return the source text of what the kernel of a scenario calls for its declarations.
+
+    It is a Python module: one function each for the own observation fields, those of a team-mate, an
+    empty place, the rewards, the target's motion, the sensor and the sums of the metrics.
+    """
+    return source_of(declarations_for(get_scenario(scenario, **overrides)))
 
 
 __all__ = [
@@ -89,6 +94,7 @@ __all__ = [
     "env",
     "field",
     "get_scenario",
+    "kernel_source",
     "metric",
     "observation_fields",
     "parallel_env",

@@ -1,22 +1,30 @@
-"""Registries of declarations by name: observation fields, reward terms, metrics, ...
+"""Declarations by name: observation fields, reward terms, metrics, target motions, sensors.
 
-A registry holds the declarations of one kind in order. Those of posse's own modules are *built in*
-and apply to every world. Those of a user's module are available after its import, and a scenario
-selects them by name.
+A declaration is a function with a name, a unit and a meaning, which is its docstring. Those of
+posse's own modules are *built in* and apply to every world. Those of a user's module are available
+after its import, and a scenario selects them by name.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
+import hashlib
 import inspect
+import keyword
+import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, Final, Generic, TypeVar
 
-from posse.shown import shown
+import numpy as np
 
-T = TypeVar("T")
+from posse.numeric import compiled
+
 Function = Callable[..., Any]
+Parameters = tuple[str, ...]
 
 _PACKAGE: Final = __name__.partition(".")[0]
 
@@ -25,108 +33,250 @@ class DeclarationError(ValueError):
     """An invalid declaration. The message names the function, its file and line."""
 
 
+def plain(function: Any) -> Any:
+    """Return the Python function of a compiled one."""
+    return getattr(function, "py_func", function)
+
+
+def parameters_of(function: Function) -> Parameters:
+    """Return the names of a function's parameters."""
+    return tuple(inspect.signature(plain(function)).parameters)
+
+
 def place_of(function: Function) -> str:
     """Return a function's name, file and line, for messages."""
-    code = getattr(function, "py_func", function).__code__
-    return f"{function.__name__} ({os.path.relpath(code.co_filename)}:{code.co_firstlineno})"
+    code = getattr(plain(function), "__code__", None)
+    if code is None:
+        return repr(function)
+    return f"{plain(function).__name__} ({os.path.relpath(code.co_filename)}:{code.co_firstlineno})"
 
 
-class Registry(Mapping[str, T], Generic[T]):
+def is_number(value: object) -> bool:
+    """Return whether a value is a finite number; truth values are none."""
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Declaration:
+    """A declared function.
+
+    Attributes:
+        name: Its name.
+        unit: Unit of its value; empty for rules, which have none.
+        meaning: Its docstring.
+        function: The function, compiled.
+    """
+
+    name: str
+    unit: str = ""
+    meaning: str
+    function: Function
+
+    @property
+    def functions(self) -> tuple[tuple[Function, str], ...]:
+        """The functions for compiled code, and what each returns."""
+        return ((self.function, "a number"),)
+
+    @property
+    def built_in(self) -> bool:
+        """Whether posse itself declares it."""
+        return str(plain(self.function).__module__).partition(".")[0] == _PACKAGE
+
+    def fingerprint(self) -> str:
+        """Return a hash of the options and of the code of all functions that they reach."""
+        digest = hashlib.sha256()
+        values = [getattr(self, field.name) for field in dataclasses.fields(self)]
+        for part in _parts(values, set()):
+            digest.update(part.encode())
+        return digest.hexdigest()[:16]
+
+
+D = TypeVar("D", bound=Declaration)
+
+
+class Registry(Mapping[str, D], Generic[D]):
     """Declarations of one kind by name, in order.
 
     Args:
         kind: Name of the kind for messages, such as ``"reward term"``.
+        *allowed: The lists of parameters that its functions may have.
     """
 
-    def __init__(self, kind: str) -> None:
+    def __init__(self, kind: str, *allowed: Parameters) -> None:
         self.kind = kind
-        self._things: dict[str, T] = {}
-        self._functions: dict[str, Function] = {}
+        self.allowed = allowed
+        self._declared: dict[str, D] = {}
 
-    def add(self, name: str, thing: T, function: Function) -> None:
-        """Add a declaration and the function that it is made on.
+    def declare(
+        self, make: type[D], function: Any, *, name: Any = None, parameters: Parameters | None = None, **options: Any
+    ) -> Function:
+        """Add the declaration that is made on a function, and return the function, compiled.
+
+        It replaces one that was made on a function of the same module and qualified name.
+
+        Args:
+            make: The class of the declaration.
+            function: The function.
+            name: The declaration's name; default: that of the function.
+            parameters: Those of a function that is called from Python, and not compiled.
+            **options: Further attributes of the declaration.
 
         Raises:
-            DeclarationError: The name is invalid or taken, or the function has no docstring.
+            DeclarationError: The name is invalid or taken, the function has no docstring or other
+                parameters, or its unit is none.
         """
-        if not name.replace("-", "_").isidentifier():
-            raise self.error(function, f"invalid name {shown(name)}: use letters, digits, _ and -")
-        taken = self._functions.get(name)
-        if taken is not None:
-            raise self.error(function, f"the name {name!r} is taken by {place_of(taken)}")
-        if not (function.__doc__ or "").strip():
+        self.check_function(function, *(self.allowed if parameters is None else (parameters,)))
+        name = plain(function).__name__ if name is None else name
+        if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
+            raise self.error(function, f"invalid name {name!r}: use letters, digits, _ and -")
+        taken = self._declared.get(name)
+        if taken is not None and _home(taken.function) != _home(function):
+            raise self.error(function, f"the name {name!r} is taken by {place_of(taken.function)}")
+        meaning = inspect.getdoc(plain(function)) or ""
+        if not meaning.strip():
             raise self.error(function, "its docstring, which must state its meaning, is missing")
-        self._things[name], self._functions[name] = thing, function
+        unit = options.get("unit", "-")
+        if not isinstance(unit, str) or not unit:
+            raise self.error(function, f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
+        working: Function = compiled(plain(function)) if parameters is None else function
+        self._declared[name] = make(name=name, meaning=meaning, function=working, **options)
+        return working
+
+    def check_function(self, function: Any, *allowed: Parameters) -> Parameters:
+        """Return the parameters of a function; raise unless it is one, and they are among those allowed.
+
+        Raises:
+            DeclarationError: It is not.
+        """
+        if not isinstance(plain(function), FunctionType):
+            raise self.error(function, f"declare a function, made by def, not a {type(function).__name__}")
+        names = parameters_of(function)
+        signature = inspect.signature(plain(function))
+        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
+        given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
+        wanted = [f"({', '.join(each)})" for each in allowed]
+        if given not in wanted:
+            raise self.error(function, f"its parameters are {given}, not {' or '.join(wanted)}")
+        return names
+
+    def check_argument(self, argument: object, usage: str) -> None:
+        """Raise if a decorator was used without its arguments.
+
+        Raises:
+            DeclarationError: The first argument is the function itself.
+        """
+        if callable(argument):
+            raise self.error(argument, f"the decorator needs arguments: {usage}")
 
     def error(self, function: Function, reason: str) -> DeclarationError:
         """Return the error for an invalid declaration."""
         return DeclarationError(f"{self.kind} {place_of(function)}: {reason}")
 
-    def check_parameters(self, function: Function, allowed: tuple[str, ...], least: int | None = None) -> None:
-        """Check a function's parameter names: all of ``allowed``, or at least the first few.
-
-        Args:
-            function: The declared function.
-            allowed: Parameter names in order.
-            least: Minimum number of parameters; default: all.
-
-        Raises:
-            DeclarationError: The parameters differ.
-        """
-        names = tuple(inspect.signature(function).parameters)
-        least = len(allowed) if least is None else least
-        if len(names) < least or names != allowed[: len(names)]:
-            wanted = f"({', '.join(allowed)})"
-            if least < len(allowed):
-                wanted += f" or the first {least} or more of them"
-            raise self.error(function, f"its parameters are ({', '.join(names)}), not {wanted}")
-
     def is_built_in(self, name: str) -> bool:
         """Return whether posse itself declares this name."""
-        return self._functions[name].__module__.partition(".")[0] == _PACKAGE
+        return self._declared[name].built_in
 
-    def built_in(self) -> tuple[T, ...]:
+    def built_in(self) -> tuple[D, ...]:
         """Return the built-in declarations, in order."""
-        return tuple(thing for name, thing in self._things.items() if self.is_built_in(name))
+        return tuple(each for each in self._declared.values() if each.built_in)
 
-    def with_added(self, *names: str) -> tuple[T, ...]:
+    def with_added(self, *names: str) -> tuple[D, ...]:
         """Return the built-in declarations, then the named ones, each once.
 
         Raises:
             KeyError: An unknown name; the message suggests similar ones.
         """
-        added = dict.fromkeys(names)
-        return (*self.built_in(), *(self[name] for name in added if name not in self or not self.is_built_in(name)))
+        added = (self[name] for name in dict.fromkeys(names))
+        return (*self.built_in(), *(each for each in added if not each.built_in))
 
     def unknown(self, name: object) -> str:
         """Return the message for an unknown name."""
-        near = difflib.get_close_matches(shown(name), self._things, n=3)
+        near = difflib.get_close_matches(repr(name), self._declared, n=3)
         hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-        known = ", ".join(self._things) or "none"
+        known = ", ".join(self._declared) or "none"
         return (
-            f"unknown {self.kind} {shown(name)}{hint}; known: {known}. "
+            f"unknown {self.kind} {name!r}{hint}; known: {known}. "
             "To use a declaration of your own, import its module first"
         )
 
-    def __getitem__(self, name: str) -> T:
-        if name not in self._things:
+    def __getitem__(self, name: str) -> D:
+        if name not in self._declared:
             raise KeyError(self.unknown(name))
-        return self._things[name]
+        return self._declared[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._things)
+        return iter(self._declared)
 
     def __len__(self) -> int:
-        return len(self._things)
+        return len(self._declared)
 
 
-FIELDS: Final[Registry[Any]] = Registry("observation field")
+def check_memory_name(registry: Registry[Any], function: Function, name: object, taken: Iterable[str]) -> None:
+    """Raise unless a name is free for a field of a world's record.
+
+    Raises:
+        DeclarationError: It is taken, or no name in Python.
+    """
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise registry.error(function, f"invalid name {name!r} of a memory: use a name that Python allows")
+    if name in taken:
+        raise registry.error(function, f"a world has a field {name!r}: choose another name")
+
+
+def _home(function: Function) -> tuple[str, str]:
+    return plain(function).__module__, plain(function).__qualname__
+
+
+def _parts(value: Any, seen: set[int]) -> Iterator[str]:
+    """Yield texts that differ if a value, or the code of a function that it reaches, does."""
+    value = plain(value)
+    if isinstance(value, FunctionType):
+        if id(value) not in seen and value.__module__.partition(".")[0] not in (_PACKAGE, "numpy", "numba"):
+            seen.add(id(value))
+            yield from _parts([value.__code__, value.__defaults__], seen)
+            yield from _parts([cell.cell_contents for cell in value.__closure__ or ()], seen)
+            yield from _reached(value.__code__, value.__globals__, seen)
+        yield f"{value.__module__}.{value.__qualname__}"
+    elif isinstance(value, CodeType):
+        yield f"{value.co_code.hex()} {value.co_names} {value.co_varnames}"
+        yield from _parts(value.co_consts, seen)
+    elif isinstance(value, (tuple, list, frozenset)):
+        for each in sorted(value, key=repr) if isinstance(value, frozenset) else value:
+            yield from _parts(each, seen)
+    elif isinstance(value, (np.ndarray, np.generic)):
+        yield f"{value.dtype} {np.shape(value)} {np.asarray(value).tobytes().hex()}"
+    elif value is None or isinstance(value, (bool, int, float, str, bytes)):
+        yield repr(value)
+    else:
+        yield type(value).__name__
+
+
+def _reached(code: CodeType, scope: Mapping[str, Any], seen: set[int]) -> Iterator[str]:
+    """Yield the texts of the globals, and of the attributes of modules, that code names."""
+    for name in code.co_names:
+        value = scope.get(name)
+        if isinstance(value, ModuleType):
+            if value.__name__.partition(".")[0] not in (_PACKAGE, "numpy", "numba", "math"):
+                yield from _reached(code, vars(value), seen)
+        elif value is not None:
+            yield from _parts(value, seen)
+
+
+FIELDS: Final[Registry[Any]] = Registry("observation field", ("c",), ("c", "v"), ("c", "v", "m"))
 """Values are :class:`posse.signals.observation.fields.FieldDeclaration`."""
-METRICS: Final[Registry[Any]] = Registry("metric")
-"""Values are :class:`posse.signals.measuring.Metric`."""
-REWARD_TERMS: Final[Registry[Any]] = Registry("reward term")
+METRICS: Final[Registry[Any]] = Registry(
+    "metric", ("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots")
+)
+"""Values are :class:`posse.signals.metrics.Metric`."""
+REWARD_TERMS: Final[Registry[Any]] = Registry("reward term", ("c", "w", "t"), ("c", "w"))
 """Values are :class:`posse.signals.reward.RewardTerm`."""
-SENSORS: Final[Registry[Any]] = Registry("sensor")
+SENSORS: Final[Registry[Any]] = Registry("sensor", ("c", "w", "t", "dx", "dy"), ("c", "w", "t", "dx", "dy", "s"))
 """Values are :class:`posse.rules.senses.declaring.Sensor`."""
-TARGET_MOTIONS: Final[Registry[Any]] = Registry("target motion")
+TARGET_MOTIONS: Final[Registry[Any]] = Registry(
+    "target motion",
+    ("c", "w"),
+    ("c", "w", "trackers"),
+    ("c", "w", "trackers", "obstacles"),
+    ("c", "w", "trackers", "obstacles", "s"),
+)
 """Values are :class:`posse.rules.targets.declaring.TargetMotion`."""

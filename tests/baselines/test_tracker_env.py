@@ -36,7 +36,7 @@ def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
         assert reward == pytest.approx(float(rewards[0, 2]))
         assert info["score"] == pytest.approx(float(infos["score"][0]))
     assert truncated
-    assert info["metrics"]["score"] == pytest.approx(float(infos["metrics"]["score"][0]))
+    assert info["metrics/score"] == pytest.approx(float(infos["metrics/score"][0]))
 
 
 def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
@@ -52,10 +52,10 @@ def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
 def test_the_learners_action_moves_its_tracker_and_no_other() -> None:
     env = TrackerEnv("constant", number=1, teammates="idle", seed=3, **SHORT)
     env.reset()
-    before = env.layout.views(env._observations)["position"].copy()
+    before = env.layout.views(env.batch.observe())["position"].copy()
     for _ in range(10):
         env.step(np.array([1.0, 0.0], np.float32))
-    moved = np.linalg.norm(env.layout.views(env._observations)["position"] - before, axis=-1)[0]
+    moved = np.linalg.norm(env.layout.views(env.batch.observe())["position"] - before, axis=-1)[0]
     assert moved[1] == pytest.approx(1.0, abs=1e-4)
     assert (np.delete(moved, 1) == 0).all()
 
@@ -66,7 +66,7 @@ def test_a_silent_learner_says_zeros() -> None:
     env.reset()
     for _ in range(5):
         env.step(np.zeros(2, np.float32))
-    views = env.layout.views(env._observations[0, 1])
+    views = env.layout.views(env.batch.observe()[0, 1])
     heard = views["neighbour_message"][views["neighbour_number"] == 0]
     np.testing.assert_array_equal(heard, 0)
 

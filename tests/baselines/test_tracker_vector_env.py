@@ -36,7 +36,7 @@ def vector(**settings: Any) -> Any:
 @pytest.mark.parametrize("kind", [{}, {"silent": False}, {"discrete_actions": True}])
 def test_it_agrees_with_gymnasiums_own(mode: AutoresetMode, kind: dict[str, bool]) -> None:
     settings = {**SETTINGS, **kind}
-    ours = vector(autoreset_mode=mode, **settings)
+    ours = vector(autoreset=mode, **settings)
     theirs: Any = SyncVectorEnv(
         [
             lambda i=i: gymnasium.make(NAME, first_world=i, **settings)  # type: ignore[misc]

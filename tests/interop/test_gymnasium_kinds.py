@@ -7,104 +7,79 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from torchrl.envs import GymEnv
+from torchrl.envs import GymEnv, PettingZooWrapper
 from torchrl.envs.utils import check_env_specs
 
 import posse
 import posse_baselines  # noqa: F401  registers posse/Tracker-v0
 
 BREAKING = [name for name in posse.scenario_names() if posse.get_scenario(name).breaks > 0]
-SHORT: dict[str, Any] = {"horizon": 4, "settle_time": 0.2}
+SHORT: dict[str, Any] = {"horizon": 4}
+KEYS = {"score", *(f"reward/{t.name}" for t in posse.REWARD_TERMS), *(f"metrics/{m.name}" for m in posse.METRICS)}
 
 
 def shape_of(info: Any) -> Any:
-    """Return the keys of an info and the types of its values, nested."""
-    if isinstance(info, dict):
-        return {key: shape_of(value) for key, value in info.items()}
-    return (type(info), getattr(info, "shape", None), getattr(info, "dtype", None))
+    """Return the keys of an info and the types of its values."""
+    return {key: (type(value), np.shape(value), np.asarray(value).dtype) for key, value in info.items()}
+
+
+def run(env: Any, steps: int, action: Any) -> list[dict[str, Any]]:
+    infos = [env.reset(seed=1)[1]]
+    return infos + [env.step(action)[-1] for _ in range(steps)]
 
 
 @pytest.mark.parametrize("scenario", ["smart", BREAKING[0]])
-@pytest.mark.parametrize("name", ["posse/Team-v0", "posse/Tracker-v0", "posse/Solo-v0"])
+@pytest.mark.parametrize("name", ["Team", "Tracker", "Solo", "parallel"])
 def test_info_keeps_its_keys_and_types(name: str, scenario: str) -> None:
-    if name == "posse/Solo-v0" and scenario != "smart":
-        pytest.skip("one tracker cannot play it")
-    env = gymnasium.make(name, scenario=scenario, break_window=(0.1, 0.3), **SHORT)
-    shapes = [shape_of(env.reset(seed=1)[1])]
-    over = False
-    while not over:
-        *_, terminated, truncated, info = env.step(env.action_space.sample())
-        over = terminated or truncated
-        shapes.append(shape_of(info))
-    assert len(shapes) == 5
-    assert all(shape == shapes[0] for shape in shapes)
-    assert {"score", "reward_terms", "metrics"} <= shapes[0].keys()
-
-
-def test_infos_of_agents_keep_their_keys_and_types() -> None:
-    env = posse.parallel_env(BREAKING[0], break_window=(0.1, 0.3), **SHORT)
-    infos = [env.reset(seed=1)[1]]
-    while env.agents:
-        infos.append(env.step({agent: np.zeros(2, np.float32) for agent in env.agents})[-1])
+    settings: dict[str, Any] = {**SHORT, "scenario": scenario, "break_window": (0.1, 0.3)}
+    if name == "Solo":
+        settings["breaks"] = 0
+    if name == "parallel":
+        parallel = posse.parallel_env(**settings)
+        infos = run(parallel, 4, dict.fromkeys(parallel.possible_agents, np.zeros(2, np.float32)))
+        infos = [info for each in infos for info in each.values()]
+    else:
+        env = gymnasium.make(f"posse/{name}-v0", **settings)
+        infos = run(env, 4, np.zeros(env.action_space.shape or (), np.float32))
+    working = {"working"} if scenario in BREAKING and name != "Solo" else set()
+    assert infos[0].keys() == KEYS | working
     assert all(shape_of(info) == shape_of(infos[0]) for info in infos)
+    assert all(info["metrics/settling_time"] == 0 for info in infos[:4])
+    assert infos[-1]["metrics/duration"] == pytest.approx(0.4)
 
 
-def flat(info: dict[str, Any]) -> dict[str, Any]:
-    """Return an info with nested names joined, written out for the two names that are nested."""
-    nested = {f"{name}/{key}": value for name in ("reward_terms", "metrics") for key, value in info[name].items()}
-    return {k: v for k, v in info.items() if not isinstance(v, dict)} | nested
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+def test_infos_of_batches_and_vectors_keep_their_keys(autoreset: str) -> None:
+    batch = posse.batch(BREAKING[0], 3, autoreset=autoreset, **SHORT)
+    batch.reset()
+    infos = [batch.step(np.zeros(batch.action_shape))[-1] for _ in range(4)]
+    assert infos[0].keys() == KEYS | {"working"} | ({"final_obs"} if autoreset == "same_step" else set())
+    assert all(shape_of(info) == shape_of(infos[0]) for info in infos)
+    assert all((info["metrics/duration"] == 0).all() for info in infos[:-1])
+    assert infos[-1]["metrics/duration"] == pytest.approx(0.4)
+    with pytest.raises(ValueError, match="read-only"):
+        infos[0]["metrics/duration"][0] = 1.0
+    for name in ("Team", "Tracker"):
+        env = gymnasium.make_vec(f"posse/{name}-v0", 3, scenario=BREAKING[0], autoreset=autoreset, **SHORT)
+        told = run(env, 4, np.zeros(env.action_space.shape or (), np.float32))
+        last = told[-1]["final_info"] if autoreset == "same_step" else told[-1]
+        assert told[0].keys() == last.keys() == KEYS | {"working"} | {f"_{key}" for key in (*KEYS, "working")}
+        assert last["metrics/duration"] == pytest.approx(0.4)
 
 
-@pytest.mark.parametrize("name", ["posse/Team-v0", "posse/Tracker-v0", "posse/Solo-v0"])
-def test_flat_infos_hold_the_same(name: str) -> None:
-    env, other = (gymnasium.make(name, scenario="smart", flat_infos=told, **SHORT) for told in (False, True))
-    infos = [(env.reset(seed=1)[1], other.reset(seed=1)[1])]
-    for _ in range(4):
-        action = np.zeros(env.action_space.shape or (), np.float32)
-        infos.append((env.step(action)[-1], other.step(action)[-1]))
-    for nested, found in infos:
-        np.testing.assert_equal(found, flat(nested))
-    assert infos[-1][1]["metrics/duration"] > 0.0
-
-
-@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
-@pytest.mark.parametrize("name", ["posse/Team-v0", "posse/Tracker-v0", "posse/Solo-v0"])
-def test_flat_infos_of_many_worlds_hold_the_same(name: str, autoreset: str) -> None:
-    env, other = (
-        gymnasium.make_vec(
-            name,
-            3,
-            vectorization_mode="vector_entry_point",
-            scenario="smart",
-            seed=1,
-            autoreset=autoreset,
-            flat_infos=told,
-            **SHORT,
-        )
-        for told in (False, True)
-    )
-    infos = [(env.reset()[1], other.reset()[1])]
-    for _ in range(4):
-        action = np.zeros(env.action_space.shape or (), np.float32)
-        infos.append((env.step(action)[-1], other.step(action)[-1]))
-    for nested, found in infos:
-        assert not any(isinstance(v, dict) for k, v in found.items() if k != "final_info")
-        for entry in ("score", "reward_terms/slot", "metrics/safe_score"):
-            outer, _, inner = entry.partition("/")
-            wanted = nested[outer][inner] if inner else nested[outer]
-            np.testing.assert_array_equal(found[entry], wanted)
-            np.testing.assert_array_equal(found[f"_{entry}"], nested[f"_{outer}"])
-    last = infos[-1][1]
-    ended = last["final_info"] if autoreset == "same_step" else last
-    assert ended["metrics/duration"].all()
+@pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL")
+def test_torchrl_wraps_the_pettingzoo_environment() -> None:
+    env = PettingZooWrapper(posse.parallel_env("constant"))
+    assert env.rollout(5)["next", "tracker", "info", "reward/slot"].shape == (5, 5)
+    check_env_specs(PettingZooWrapper(posse.parallel_env("constant", target="agent"), return_state=True))
 
 
 @pytest.mark.parametrize("name", ["posse:posse/Team-v0", "posse:posse/Solo-v0"])
 def test_torchrl_starts_processes_of_its_own(name: str) -> None:
-    envs = GymEnv(name, num_envs=2, scenario="smart", flat_infos=True, **SHORT)
+    envs = GymEnv(name, num_envs=2, scenario="smart", **SHORT)
     check_env_specs(envs)
     rollout = envs.rollout(6, break_when_any_done=False)
-    assert rollout["next", "reward_terms/slot"].shape[:2] == (2, 6)
+    assert rollout["next", "reward/slot"].shape[:2] == (2, 6)
     assert rollout["next", "done"].sum() == 2
     envs.close()
 
@@ -120,13 +95,3 @@ def test_an_unknown_keyword_is_a_type_error_too() -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'") as caught:
         gymnasium.make("posse/Team-v0", frameskip=1)
     assert isinstance(caught.value, posse.ScenarioError)
-
-
-@pytest.mark.parametrize("scenario", posse.scenario_names())
-def test_bounds_of_settings_hold_0_1_and_the_setting(scenario: str) -> None:
-    batch = posse.batch(scenario, seed=1)
-    views = batch.layout.views(batch.reset())
-    for name in ("team_size", "tolerance", "robot_radius", "sensing_range", "arena"):
-        field = next(each for each in batch.layout.fields if each.name == name)
-        for held in (0.0, 1.0, float(views[name].flat[0])):
-            assert field.low <= held <= field.high, (name, held)

@@ -13,6 +13,7 @@ import minari
 import numpy as np
 import pytest
 from minari.data_collector.data_collector import _check_infos_same_shape
+from tests.support.adapters import part
 
 import posse
 from posse_baselines import PolicyError
@@ -45,10 +46,10 @@ def test_a_data_set_replays_in_the_environment_that_it_recovers(tmp_path: Path) 
             assert reward == pytest.approx(episode.rewards[t])
             assert (terminated, truncated) == (episode.terminations[t], episode.truncations[t])
             assert info["score"] == pytest.approx(episode.infos["score"][t + 1])
-            for name, term in info["reward_terms"].items():
-                np.testing.assert_array_equal(term, episode.infos["reward_terms"][name][t + 1])
+            for name, term in part(info, "reward/").items():
+                np.testing.assert_array_equal(term, episode.infos["reward"][name][t + 1])
         assert truncated
-        assert told["score"] == pytest.approx(info["metrics"]["score"])
+        assert told["score"] == pytest.approx(info["metrics/score"])
     assert who == ["pursuit", "random"] * 2 + ["pursuit"]
 
 

@@ -11,9 +11,11 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
-OWN_ENVIRONMENT = {"benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared"}
-"""Recipes with libraries that pin other versions than ours: ``make recipes`` installs those."""
-ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
+OWN_ENVIRONMENT = dict.fromkeys(
+    ("benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared", "skrl_ippo", "skrl_mappo"), "recipes"
+) | {"agilerl_ippo": "agilerl"}
+"""Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
+MADE_BY = {"recipes": "make recipes", "agilerl": "make recipe-agilerl"}
 LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
 """Recipes that train, which takes long."""
 LONGEST = 15
@@ -53,9 +55,11 @@ def test_it_runs(name: str, tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", sorted(OWN_ENVIRONMENT))
 def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
-    if not ELSEWHERE.exists():
-        pytest.skip("needs .venv-recipes: make recipes")
-    run(name, tmp_path, ELSEWHERE)
+    folder = OWN_ENVIRONMENT[name]
+    python = ROOT / f".venv-{folder}" / "bin" / "python"
+    if not python.exists():
+        pytest.skip(f"needs .venv-{folder}: {MADE_BY[folder]}")
+    run(name, tmp_path, python)
 
 
 @pytest.mark.parametrize("name", names())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -31,7 +30,6 @@ TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 MAKERS: dict[str, Callable[[], Any]] = {
     "batch": lambda: posse.batch("constant", 2, **SHORT),
     "parallel": lambda: posse.parallel_env(**SHORT),
-    "turns": lambda: posse.env(**SHORT),
     "team": lambda: gymnasium.make(TEAM, disable_env_checker=True, **SHORT).unwrapped,
     "solo": lambda: gymnasium.make(SOLO, disable_env_checker=True, **{**SHORT, "num_trackers": 1}).unwrapped,
     "team vector": lambda: _vector(TEAM),
@@ -50,21 +48,14 @@ class Subject:
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
-        self.env = MAKERS[kind]()
-        inner = self.env.unwrapped if kind == "turns" else self.env
-        self.batch: posse.Batch = {
-            "batch": lambda: inner,
-            "parallel": lambda: inner._world.batch,
-            "turns": lambda: inner._world.batch,
-            "team": lambda: inner._world.batch,
-            "solo": lambda: inner._world.batch,
-        }.get(kind, lambda: inner.batch)()
+        self.env = inner = MAKERS[kind]()
+        self.batch: posse.Batch = inner if kind == "batch" else inner.batch
 
     def reset(self, **arguments: Any) -> Any:
         return self.env.reset(**arguments)
 
     def step(self, action: Any) -> Any:
-        """Step with an argument of the kind's ``step``; one turn if agents act in turns."""
+        """Step with an argument of the kind's ``step``."""
         return self.env.step(action)
 
     def good_action(self, rng: np.random.Generator) -> Any:
@@ -74,12 +65,6 @@ class Subject:
         actions = drawn.astype(np.float32)
         if self.kind == "parallel":
             return {f"tracker_{i}": row for i, row in enumerate(actions[0])}
-        if self.kind == "turns":
-            env = self.env
-            if not env.agents:
-                return None
-            over = env.terminations[env.agent_selection] or env.truncations[env.agent_selection]
-            return None if over else actions[0, 0]
         if self.kind == "torchrl":
             import torch
 
@@ -134,9 +119,9 @@ class Subject:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""
         batch, env = self.batch, self.env
         kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}, [batch.seed, batch._started]]
-        if self.kind in ("parallel", "turns", "team", "solo"):
-            world = env.unwrapped._world
-            kept.append([world.running, world._started, world._seeded])
+        if self.kind in ("parallel", "team", "solo"):
+            world = env.unwrapped
+            kept.append([world._running, world._started, world._seeded])
         if self.kind in ("team vector", "solo vector"):
             kept.append([env._seeded, repr(env.np_random.bit_generator.state)])
         if self.kind in ("team", "solo"):
@@ -145,20 +130,6 @@ class Subject:
             kept.append(list(env.agents))
         if self.kind == "torchrl":
             kept.append(env._seed)
-        if self.kind == "turns":
-            inner = env.env
-            names = (
-                "agents",
-                "agent_selection",
-                "rewards",
-                "terminations",
-                "truncations",
-                "infos",
-                "_cumulative_rewards",
-                "_actions",
-                "_observations",
-            )
-            kept.append([env._has_reset, {n: copy.deepcopy(getattr(inner, n, None)) for n in names}])
         return kept
 
 

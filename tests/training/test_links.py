@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tests.support.runs import quiet, small
 
 import posse
+from posse_baselines import load
 from posse_training.cli import main
 from posse_training.errors import RunFolderError
 from posse_training.files import locked
+from posse_training.film import film
 from posse_training.replay import record, write_replay
-from posse_training.reports.pictures.gif import write_gif
-from posse_training.reports.pictures.mp4 import write_mp4
 from posse_training.runs.train import resume, train
 
 PRECIOUS = b"precious"
@@ -70,12 +69,11 @@ def test_a_subfolder_that_leads_elsewhere(tmp_path: Path, elsewhere: Path) -> No
 def test_a_replay_and_a_film(tmp_path: Path, elsewhere: Path, name: str) -> None:
     path = tmp_path / name
     path.symlink_to(elsewhere)
-    frames = [np.full((20, 20, 3), k, np.uint8) for k in range(3)]
     scenario = posse.get_scenario("constant", horizon=20, settle_time=1.0)
     write: dict[str, Callable[[], object]] = {
         "page.html": lambda: write_replay(record(["pursuit"], scenario), path),
-        "film.gif": lambda: write_gif(path, frames, 0.1),
-        "film.mp4": lambda: write_mp4(path, frames, 0.1),
+        "film.gif": lambda: film([("a", load("idle"))], scenario, path=path, seconds=0.3, size=200),
+        "film.mp4": lambda: film([("a", load("idle"))], scenario, path=path, seconds=0.3, size=200),
     }
     with pytest.raises(OSError, match=f"symbolic link.*{name}"):
         write[name]()

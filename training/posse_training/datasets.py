@@ -144,7 +144,7 @@ def _played(
             rewards.append(float(gained[0].mean(dtype=np.float64)))
             scores.append(float(infos["score"][0]))
             for name, column in terms.items():
-                column.append(np.array(infos["reward_terms"][name][0]))
+                column.append(np.array(infos[f"reward/{name}"][0]))
         ends = np.arange(len(actions)) == len(actions) - 1
         buffer = EpisodeBuffer(
             id=world,
@@ -154,12 +154,9 @@ def _played(
             rewards=rewards,
             terminations=(ends & terminated[0]).tolist(),
             truncations=(ends & ~terminated[0]).tolist(),
-            infos={
-                "score": np.array(scores),
-                "reward_terms": {name: np.stack(column) for name, column in terms.items()},
-            },
+            infos={"score": np.array(scores), "reward": {name: np.stack(column) for name, column in terms.items()}},
         )
-        metrics = {name: float(column[0]) for name, column in infos["metrics"].items()}
+        metrics = {name: float(infos[f"metrics/{name}"][0]) for name in batch.metrics()}
         yield buffer, {"policy": policy.name, "world": world, **metrics}
 
 

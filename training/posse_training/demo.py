@@ -21,8 +21,8 @@ from posse_baselines import Policy, load, policy_names
 from posse_training.evaluation import Results, evaluate
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import Estimate, mean, share
+from posse_training.film import film
 from posse_training.replay import record, write_replay
-from posse_training.reports.pictures.film import film
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")
 POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned")

@@ -4,22 +4,44 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium
 import numpy as np
-from gymnasium import spaces
 
-from posse.adapters.actions import MOTIONS, single_action_space
-from posse.adapters.single_world import shortened
-from posse.adapters.spaces import box
-from posse.adapters.world_env import OneAgentEnv
-from posse.engine.arguments import options_of, real_numbers
-from posse.engine.paired_batch import TargetPolicy, with_agent
+from posse.adapters.actions import ActionReader, Rows, agent_names, spaces_of
+from posse.adapters.world import WorldEnv
+from posse.engine.opponent import TargetPolicy
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError, get_scenario
-from posse.shown import shown
-from posse.signals.observation.layout import ObservationLayout
 
 
-class TeamEnv(OneAgentEnv):
+def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+    """Return the scenario of an environment of one agent; ScenarioError if its target is an agent."""
+    found = get_scenario(scenario, **overrides)
+    if found.target_motion == "agent":
+        raise ScenarioError(
+            "target_motion='agent' is not possible in an environment of one agent: use posse.parallel_env(..., "
+            "target='agent'), a scripted target_motion, or target_policy="
+        )
+    return found
+
+
+def solo_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+    """Return the scenario with one tracker; ScenarioError if it is to have more, or one that breaks."""
+    if overrides.get("num_trackers", 1) != 1:
+        raise ScenarioError(
+            f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has one: use posse/Team-v0"
+        )
+    whole = get_scenario(scenario)
+    if whole.breaks > 0 and "breaks" not in overrides:
+        raise ScenarioError(
+            f"scenario {whole.name!r} does not fit posse/Solo-v0: in it breaks={whole.breaks} "
+            "of the trackers break down, and a team of one would be left with none. Pass "
+            "breaks=0, or use posse/Team-v0"
+        )
+    return team_scenario(scenario, {**overrides, "num_trackers": 1})
+
+
+class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     """``posse/Team-v0``: one agent controls the whole team.
 
     **Observation**: ``Box`` (N, F) float32, the observation of each tracker; its fields are
@@ -33,9 +55,9 @@ class TeamEnv(OneAgentEnv):
     **Reward**: the mean over the trackers of the weighted sum of named terms.
 
     **Info**, with the same keys at every reset and step: ``"score"`` in [0, 1];
-    ``"reward_terms"``, each term by name, unscaled, (N,); ``"working"`` (N,), if trackers may
-    break; ``"metrics"``, each metric of the episode by name (``posse.METRICS``): 0 before the step
-    that ends the episode.
+    ``"reward/<term>"``, each term, unscaled, (N,); ``"metrics/<metric>"``, each metric of the
+    episode (``posse.METRICS``), 0 before the step that ends it; ``"working"`` (N,), if trackers
+    may break.
 
     **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
     world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
@@ -46,116 +68,83 @@ class TeamEnv(OneAgentEnv):
     Args:
         scenario: Name of a scenario, or a scenario.
         discrete_actions: Whether actions are discrete.
+        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
         render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
         seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
         first_world: Index of the world within the seed.
         target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
-        flat_infos: Whether infos are without nested dictionaries: ``info["metrics/score"]`` for
-            ``info["metrics"]["score"]``.
         overrides: Any field of :class:`posse.Scenario`.
 
     Raises:
         ScenarioError: An unknown scenario, or an unknown or invalid setting.
-        ValueError: An unknown split or render mode, a negative seed.
         TypeError: ``target_policy`` is not the policy of a target.
     """
+
+    _rows: Rows = slice(None)
+    _silent = False
+    _fit = staticmethod(team_scenario)
 
     def __init__(
         self,
         scenario: str | Scenario = "constant",
         *,
         discrete_actions: bool = False,
+        clip_actions: bool = False,
         render_mode: str | None = None,
         seed: int | None = None,
         split: str = "train",
         first_world: int = 0,
         target_policy: TargetPolicy | None = None,
-        flat_infos: bool = False,
         **overrides: Any,
     ) -> None:
-        self._flat_infos = flat_infos
-        fitting = with_agent(self.fitting_scenario(scenario, None, overrides), target_policy)
         self._open(
-            fitting,
+            self._fit(scenario, overrides),
             render_mode=render_mode,
-            discrete_actions=discrete_actions,
             seed=seed,
             split=split,
             first_world=first_world,
             target_policy=target_policy,
         )
-        self.observation_space, self.action_space = self.spaces_of(self.scenario, discrete_actions)
-
-    @classmethod
-    def fitting_scenario(cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
-        """Return the scenario with overrides and ``horizon`` steps per episode.
-
-        Raises:
-            ScenarioError: It is invalid, or not suited to an environment of one agent.
-        """
-        return _with_scripted_target(scenario, horizon, overrides)
-
-    @classmethod
-    def spaces_of(cls, scenario: Scenario, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:
-        """Return the spaces of observations and actions."""
-        n = scenario.num_trackers
-        low, high = ObservationLayout(scenario).bounds()
-        observation_space = box((np.tile(low, (n, 1)), np.tile(high, (n, 1))))
-        single = single_action_space(scenario, discrete_actions)
-        if discrete_actions:
-            return observation_space, spaces.MultiDiscrete([len(MOTIONS)] * n)
-        assert single.shape is not None
-        return observation_space, spaces.Box(-1.0, 1.0, (n, *single.shape), np.float32)
+        self.observation_space, self.action_space = spaces_of(self.scenario, self._rows, discrete_actions, self._silent)
+        moved = np.atleast_1d(agent_names(self.scenario)[: self.scenario.num_trackers][self._rows])
+        self._reader = ActionReader(moved.tolist(), self.action_space, clip_actions)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start an episode; see the class for seeds and options.
-
-        Raises:
-            ValueError: A bad seed or option; nothing is changed.
-        """
-        observations = self._begin(seed, options)
-        info: dict[str, Any] = {
-            "score": 0.0,
-            "reward_terms": self._no_terms(),
-            "metrics": self._world.no_metrics.copy(),
-        }
-        if self._breakable:
-            info["working"] = self._world.working()
-        return observations, self._told(info)
-
-    def _no_terms(self) -> dict[str, Any]:
-        n = self.scenario.num_trackers
-        return {name: np.zeros(n, np.float32) for name in self._world.batch.term_names}
+        """Start an episode; a bad seed or option is a ValueError that changes nothing."""
+        observations = self._start(seed, options)
+        gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
+        self._terms[...] = 0
+        return observations[self._rows].copy(), self._own_info()
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
-            ValueError: An action of a wrong type or shape, not finite, or out of its space;
-                nothing is changed.
+            ValueError: An action out of its space; nothing is changed.
         """
-        world = self._world
-        if not world.running:
-            world.check_running()
-        world.actions.by_row(action)
-        over = world.advance()
-        info: dict[str, Any] = {
-            "score": world.score(),
-            # An array by rows already; name_terms(*rows) would take longer.
-            "reward_terms": dict(zip(world.batch.term_names, world.terms.T.copy())),  # noqa: B905
-            "metrics": world.no_metrics.copy(),
-        }
+        self._check_running()
+        self._reader.of_all(action)
+        terminated, truncated = self._advance(self._of_team(self._reader.read))
+        rewards = self._rewards[self._rows].tolist()
+        reward = sum(rewards) / len(rewards) if isinstance(rewards, list) else rewards
+        return self._observations[self._rows].copy(), reward, terminated, truncated, self._own_info()
+
+    def _of_team(self, own: FloatArray) -> FloatArray:
+        """Return the actions of all trackers (1, N, 2 + m), given the agent's."""
+        return own
+
+    def _own_info(self) -> dict[str, Any]:
+        terms = self._terms[self._rows].T
+        working: Any = None
         if self._breakable:
-            info["working"] = world.working()
-        terminated = truncated = False
-        if over or self._flat_infos or self.render_mode is not None:
-            terminated, truncated, info = self._end(over, info)
-        rewards = world.rewards.tolist()
-        return world.observations.copy(), sum(rewards) / len(rewards), terminated, truncated, info
+            working = self.batch.working[0, self._rows]
+            working = working if working.ndim else bool(working)
+        told = terms.copy() if terms.ndim == 2 else terms.tolist()
+        return self._infos.build(self._score(), told, working, self._last_metrics())
 
 
 class SoloEnv(TeamEnv):
@@ -164,84 +153,7 @@ class SoloEnv(TeamEnv):
     As :class:`TeamEnv` with a team of one, without the team axis: **observation** ``Box`` (F,),
     **action** ``Box(-1, 1, (2 + message_size,))`` or ``Discrete(15)``, reward terms scalars.
     ``options["tracker_pose"]`` may be (3,).
-
-    Raises:
-        ScenarioError: As :class:`TeamEnv`, and where the team is not one tracker.
     """
 
-    @classmethod
-    def fitting_scenario(cls, scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
-        """Return the scenario with one tracker.
-
-        Raises:
-            ScenarioError: It is invalid, has more than one tracker, or one that breaks.
-        """
-        if not np.array_equal(overrides.get("num_trackers", 1), 1):
-            raise ScenarioError(
-                f"num_trackers={shown(overrides['num_trackers'])} does not fit posse/Solo-v0, "
-                "which has one: use posse/Team-v0"
-            )
-        whole = get_scenario(scenario)
-        if whole.breaks > 0 and "breaks" not in overrides:
-            raise ScenarioError(
-                f"scenario {whole.name!r} does not fit posse/Solo-v0: in it breaks={whole.breaks} "
-                "of the trackers break down, and a team of one would be left with none. Pass "
-                "breaks=0, or use posse/Team-v0"
-            )
-        return _with_scripted_target(scenario, horizon, {**overrides, "num_trackers": 1})
-
-    @classmethod
-    def spaces_of(cls, scenario: Scenario, discrete_actions: bool) -> tuple[spaces.Box, spaces.Space[Any]]:
-        """Return the spaces of observations and actions."""
-        bounds = ObservationLayout(scenario).bounds()
-        return box(bounds), single_action_space(scenario, discrete_actions)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start an episode; see :class:`TeamEnv`."""
-        observations, info = super().reset(seed=seed, options=solo_options(options))
-        return observations[0], info
-
-    def _no_terms(self) -> dict[str, Any]:
-        return self._world.no_terms
-
-    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
-        """Advance the world by one control step; see :class:`TeamEnv`."""
-        world = self._world
-        if not world.running:
-            world.check_running()
-        world.actions.by_agent({"tracker_0": action})
-        over = world.advance()
-        info: dict[str, Any] = {
-            "score": world.score(),
-            "reward_terms": world.name_terms(*world.terms[0].tolist()),
-            "metrics": world.no_metrics.copy(),
-        }
-        terminated, truncated, info = self._end(over, info)
-        return world.observations[0].copy(), world.rewards.item(), terminated, truncated, info
-
-
-def solo_options(options: dict[str, Any] | None) -> dict[str, Any] | None:
-    """Return the options with a tracker's pose (3,) as a team's, (1, 3)."""
-    found = options_of(options)
-    if found.get("tracker_pose") is not None:
-        pose = real_numbers("tracker_pose", found["tracker_pose"])
-        found["tracker_pose"] = pose[None] if pose.ndim == 1 else pose
-    return found
-
-
-def _with_scripted_target(scenario: str | Scenario, horizon: int | None, overrides: dict[str, Any]) -> Scenario:
-    settings = dict(overrides)
-    if settings.pop("target", None) is not None:
-        raise ScenarioError(_NO_PLACE.format(f"target={shown(overrides['target'])}"))
-    found = shortened(scenario, horizon, settings)
-    if found.target_motion == "agent":
-        raise ScenarioError(_NO_PLACE.format("target_motion='agent'"))
-    return found
-
-
-_NO_PLACE = (
-    "{} is not possible in an environment of one agent: use posse.parallel_env(..., "
-    "target='agent'), a scripted target_motion, or target_policy="
-)
+    _rows = 0
+    _fit = staticmethod(solo_scenario)

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 from gymnasium import spaces
-from gymnasium.error import ResetNeeded
-from pettingzoo import ParallelEnv
-from pettingzoo.utils.conversions import parallel_to_aec_wrapper
-from pettingzoo.utils.wrappers import OrderEnforcingWrapper
+from pettingzoo import AECEnv, ParallelEnv
+from pettingzoo.utils.conversions import parallel_to_aec
 
-from posse.adapters.actions import agent_names, single_action_space
-from posse.adapters.single_world import shortened
-from posse.adapters.spaces import box
-from posse.adapters.world_env import WorldEnv
+from posse.adapters.actions import ActionReader, agent_names, box, single_action_space
+from posse.adapters.world import WorldEnv, with_horizon
 from posse.engine.arguments import options_of
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario
-from posse.shown import shown
+from posse.scenarios import Scenario, get_scenario
 
 _Infos = dict[str, dict[str, Any]]
 
@@ -43,9 +38,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     ``scenario.target_reward_weights``, by default the negative of the team's score.
 
     **Info**, for each agent, with the same keys at every reset and step: ``"score"`` of the team in
-    [0, 1]; ``"reward_terms"``, each term by name, unscaled; ``"working"``, if trackers may
-    break; ``"metrics"``, each metric of the episode by name (``posse.METRICS``): 0 before the step
-    that ends the episode.
+    [0, 1]; ``"reward/<term>"``, each term, unscaled; ``"metrics/<metric>"``, each metric of the
+    episode (``posse.METRICS``), 0 before the step that ends it; ``"working"``, if trackers may break.
 
     **Start**: drawn from (seed, split, world, episode). ``reset(seed=s)`` starts the first
     world of ``posse.batch(..., seed=s)``; ``reset()`` its next episode.
@@ -59,7 +53,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         scenario: Name of a scenario, or a scenario.
         target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
         discrete_actions: Whether actions are ``Discrete``.
-        max_cycles: Length of an episode in steps; alias of ``horizon``.
+        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
+        max_cycles: PettingZoo's name for ``horizon``.
         render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
         seed: Seed of all random draws; ``None``: an arbitrary one.
         split: ``"train"``, ``"validation"`` or ``"test"``.
@@ -79,6 +74,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         *,
         target: str | None = None,
         discrete_actions: bool = False,
+        clip_actions: bool = False,
         max_cycles: int | None = None,
         render_mode: str | None = None,
         seed: int | None = None,
@@ -87,22 +83,21 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         **overrides: Any,
     ) -> None:
         self._open(
-            shortened(scenario, max_cycles, {**overrides, "target": target}),
+            get_scenario(scenario, target=target, **with_horizon(overrides, max_cycles=max_cycles)),
             render_mode=render_mode,
-            discrete_actions=discrete_actions,
             seed=seed,
             split=split,
             first_world=first_world,
         )
         self.possible_agents = agent_names(self.scenario)
         self.agents: list[str] = []
-        bounds = self.layout.bounds()
-        self.observation_spaces = {agent: box(bounds) for agent in self.possible_agents}
+        self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
         self.action_spaces = {
             agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
         }
+        single = self.action_spaces[self.possible_agents[0]]
+        self._reader = ActionReader(self.possible_agents, single, clip_actions)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self._state_space: spaces.Box | None = None
         self._wrapper_seed = seed
         self._np_random: np.random.Generator | None = None
 
@@ -121,155 +116,58 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         """Return the action space of an agent; the same object at each call."""
         return self.action_spaces[agent]
 
-    @property
+    @functools.cached_property
     def state_space(self) -> spaces.Box:
         """Space of :meth:`state`."""
-        if self._state_space is None:
-            self._state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
-        return self._state_space
+        return spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, FloatArray], _Infos]:
-        """Start an episode; see the class for seeds and options.
-
-        Returns:
-            Observations and infos by agent.
-
-        Raises:
-            ValueError: A bad seed or option; nothing is changed.
-        """
+        """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         if options is not None:
             # PettingZoo's own tests send {"options": 1}, to see that options are taken.
             options = {key: value for key, value in options_of(options).items() if key != "options"}
-        observations = self._world.reset(seed, options)
+        observations = self._start(seed, options)
         self.agents = self.possible_agents.copy()
         if seed is not None:
             self._wrapper_seed, self._np_random = int(seed), None
-        if self.render_mode == "human":
-            self.render()
-        infos: _Infos = {
-            agent: {"score": 0.0, "reward_terms": self._world.no_terms, "metrics": self._world.no_metrics.copy()}
-            for agent in self.agents
-        }
-        if self._breakable:
-            self._report_working(infos)
-        return dict(zip(self.agents, observations, strict=True)), infos
+        self._terms[...] = 0
+        return dict(zip(self.agents, observations, strict=True)), self._infos_of(self.agents)
 
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos]:
-        """Advance the world by one control step.
-
-        Args:
-            actions: One for every agent, by name.
-
-        Returns:
-            Observations, rewards, terminations, truncations and infos, each by agent.
+        """Advance the world by one control step, given an action for every agent.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
-            ValueError: An agent is missing or unknown, or its action is of a wrong type or shape,
-                not finite, or out of its space; nothing is changed.
+            ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
-        world, agents = self._world, self.agents
-        if not world.running:
-            world.check_running()
-        world.actions.by_agent(actions)
-        over = world.advance()
-        score, name_terms, metrics = world.score(), world.name_terms, world.no_metrics.copy()
-        infos: _Infos = {
-            agent: {"score": score, "reward_terms": name_terms(*values), "metrics": metrics}
-            # No strict=True: equal lengths, in the hot path.
-            for agent, values in zip(agents, world.terms.tolist())  # noqa: B905
-        }
-        if self._breakable:
-            self._report_working(infos)
-        terminated, truncated = self._none_ended.copy(), self._none_ended.copy()
-        if over:
-            was_terminated, metrics = world.end()
-            ended = terminated if was_terminated else truncated
-            ended.update(dict.fromkeys(agents, True))
-            for info in infos.values():
-                info["metrics"] = metrics.copy()
+        agents = self.agents
+        self._check_running()
+        self._reader.by_agent(actions)
+        terminated, truncated = self._advance(self._reader.read)
+        terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
+        if terminated or truncated:
+            (terminations if terminated else truncations).update(dict.fromkeys(agents, True))
             self.agents = []
-        if self.render_mode == "human":
-            self.render()
+        # No strict=True below: equal lengths, in the hot path.
         return (
-            dict(zip(agents, world.observations.copy())),  # noqa: B905
-            dict(zip(agents, world.rewards.tolist())),  # noqa: B905
-            terminated,
-            truncated,
-            infos,
+            dict(zip(agents, self._observations.copy())),  # noqa: B905
+            dict(zip(agents, self._rewards.tolist())),  # noqa: B905
+            terminations,
+            truncations,
+            self._infos_of(agents),
         )
 
-    def _report_working(self, infos: _Infos) -> None:
-        working = [*self._world.working().tolist(), True]  # a target never breaks
-        for info, works in zip(infos.values(), working, strict=False):
-            info["working"] = works
-
-    def check_action(self, agent: str, action: npt.ArrayLike) -> None:
-        """Raise if an agent's action is invalid.
-
-        Raises:
-            ValueError: Of a wrong type or shape, not finite, or out of its space.
-        """
-        self._world.actions.one(agent, action)
-
-
-class _InTurns(parallel_to_aec_wrapper[str, Any, Any]):
-    """AEC wrapper that checks an action in its agent's turn, not in that of the last agent."""
-
-    def step(self, action: Any) -> None:
-        agent = self.agent_selection
-        if not (self.terminations[agent] or self.truncations[agent]):
-            self.env.check_action(agent, action)
-        elif action is not None:
-            raise ValueError(
-                f"action of {agent} must be None, as its episode is over, got {shown(action)}: "
-                "call step(None) for each agent that is left, or reset()"
-            )
-        super().step(action)
-
-
-class TeamAECEnv(OrderEnforcingWrapper[str, Any, Any]):
-    """:class:`TeamParallelEnv` as AEC: the world advances once the last agent has acted."""
-
-    def __init__(self, env: TeamParallelEnv) -> None:
-        self._has_reset = self._has_updated = False
-        super().__init__(_InTurns(env))
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "env":  # copy and pickle look it up before initialisation
-            raise AttributeError(name)
-        return super().__getattr__(name)
-
-    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Start an episode.
-
-        Raises:
-            ValueError: A bad seed or option; nothing is changed.
-        """
-        before = self._has_reset, self._has_updated
-        try:
-            super().reset(seed=seed, options=options)
-        except BaseException:
-            self._has_reset, self._has_updated = before
-            raise
-
-    def step(self, action: Any) -> None:
-        """Take the action of the agent whose turn it is.
-
-        Raises:
-            ResetNeeded: Before the first reset, or after the end.
-            ValueError: A bad action, or one that is not None for an agent whose episode is over;
-                nothing is changed, and it is still that agent's turn.
-        """
-        if not self._has_reset:
-            raise ResetNeeded("step before reset: call reset() first")
-        if not self.agents:
-            raise ResetNeeded("step after the end of the episode: call reset() first")
-        super().step(action)
+    def _infos_of(self, agents: list[str]) -> _Infos:
+        terms = self._terms.tolist()
+        working = [None] * len(agents)
+        if self._breakable:
+            working = [*self.batch.working[0].tolist(), True][: len(agents)]  # a target never breaks
+        score, metrics, build = self._score(), self._last_metrics(), self._infos.build
+        return {a: build(score, t, works, metrics) for a, t, works in zip(agents, terms, working)}  # noqa: B905
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:
@@ -277,6 +175,9 @@ def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> Team
     return TeamParallelEnv(scenario, **settings)
 
 
-def env(scenario: str | Scenario = "constant", **settings: Any) -> TeamAECEnv:
-    """Return a PettingZoo AEC environment: :class:`TeamAECEnv`."""
-    return TeamAECEnv(TeamParallelEnv(scenario, **settings))
+def env(scenario: str | Scenario = "constant", **settings: Any) -> AECEnv[str, Any, Any]:
+    """Return :class:`TeamParallelEnv` as a PettingZoo AEC environment.
+
+    Once the last agent has acted, all actions are checked and the world advances.
+    """
+    return parallel_to_aec(TeamParallelEnv(scenario, **settings))

@@ -17,6 +17,7 @@ def register() -> None:
     for name, (entry_point, vector_entry_point) in _GYMNASIUM.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point=entry_point, vector_entry_point=vector_entry_point)
-    if _PETTINGZOO not in pettingzoo.parallel_registry:
+    registry = getattr(pettingzoo, "parallel_registry", None)  # since PettingZoo 1.27
+    if registry is not None and _PETTINGZOO not in registry:
         pettingzoo.register("parallel", _PETTINGZOO, "posse.adapters.pettingzoo_env:parallel_env")
         pettingzoo.register("aec", _PETTINGZOO, "posse.adapters.pettingzoo_env:env")

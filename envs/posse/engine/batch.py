@@ -6,28 +6,48 @@ The environments, training and evaluation are built on :class:`Batch`.
 from __future__ import annotations
 
 import os
+import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.engine.arguments import check_array, check_count, check_mask, check_seed, check_settings, options_of
-from posse.engine.copies import check_fit, write_copies
-from posse.engine.kernels import LOOK, START, START_FROM_POSES, Results, first_over
-from posse.engine.start_poses import check_overlap, check_room_to_turn, poses_of, write_poses
-from posse.engine.stepping import Stepping
-from posse.numeric import BoolArray, FloatArray, divide
+from posse.engine.arguments import check_choice, check_count, checked_actions, options_of
+from posse.engine.copies import write_copies
+from posse.engine.infos import Infos
+from posse.engine.kernels import LOOK, START, START_FROM_POSES, STEP, Results, first_over, kernel_of, tables_of
+from posse.engine.recycler import Recycler
+from posse.engine.scratch import SCRATCH
+from posse.engine.start_poses import check_poses, poses_of, write_poses
+from posse.numeric import Blocks, BoolArray, FloatArray, Records, direct, divide, over_worlds, threads_for
+from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
-from posse.rules.state import SPLITS, WorldArrays
+from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
-from posse.shown import shown
+from posse.signals.generate import declarations_for
+from posse.signals.metrics import episode_metrics
 from posse.signals.observation.layout import ObservationLayout
-from posse.signals.reward import TermsByName
 
+AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
+_DERIVED: Final = (
+    "_declared",
+    "_tables",
+    "_kernel",
+    "_untyped",
+    "_scratch",
+    "_orders",
+    "_whole",
+    "_score",
+    "_recyclers",
+    "_infos",
+)
+"""Attributes that are not pickled but prepared again."""
+
+Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -36,9 +56,11 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
+    fingerprints: Mapping[str, str] = field(default_factory=dict)
+    """Hashes of the declarations of users' modules that the scenario names."""
 
 
-class Batch(Stepping):
+class Batch:
     """A batch of E worlds of one scenario, N trackers each.
 
     Args:
@@ -52,9 +74,10 @@ class Batch(Stepping):
             ``first_world=17, num_worlds=1`` replays world 17 alone.
         autoreset: Behaviour at the end of an episode. ``"next_step"``: the following step starts
             the next episode and ignores its action; ``"same_step"``: the next episode starts at
-            once and the last observation is ``infos["final_obs"]``; ``"disabled"``: the caller
+            once, and the last observation is in ``infos["final_obs"]``; ``"disabled"``: the caller
             resets, with ``options={"reset_mask": mask}``.
         num_threads: Threads that step the worlds; default: one per core. Never changes a result.
+        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
 
     Attributes:
         layout: Position of each field in an observation.
@@ -76,21 +99,23 @@ class Batch(Stepping):
         first_world: int = 0,
         autoreset: str = "next_step",
         num_threads: int | None = None,
+        clip_actions: bool = False,
     ) -> None:
-        check_settings(num_worlds, first_world, split, autoreset, num_threads)
         self.scenario = scenario
-        self.num_worlds = int(num_worlds)
-        self.seed = check_seed(seed)
-        self.split = split
-        self.first_world = int(first_world)
-        self.autoreset = autoreset
-        self.num_threads = num_threads or os.cpu_count() or 1
+        self.num_worlds = check_count("num_worlds", num_worlds, 1)
+        self.first_world = check_count("first_world", first_world, 0)
+        check_count("first_world + num_worlds - 1", self.first_world + self.num_worlds - 1, 0)
+        self.seed = check_count("seed", seed, 0)
+        self.split = check_choice("split", split, SPLITS)
+        self.autoreset = check_choice("autoreset mode", autoreset, AUTORESET_MODES)
+        self.num_threads = (os.cpu_count() or 1) if num_threads is None else check_count("num_threads", num_threads, 1)
+        self.clip_actions = clip_actions
         self.layout = ObservationLayout(scenario)
-        rows = scenario.num_agents
-        self.observation_shape = (num_worlds, rows, self.layout.size)
-        self.action_shape = (num_worlds, rows, 2 + scenario.message_size)
+        self.term_names = declarations_for(scenario).term_names
+        self.observation_shape = (self.num_worlds, scenario.num_agents, self.layout.size)
+        self.action_shape = (self.num_worlds, scenario.num_agents, 2 + scenario.message_size)
         try:
-            self._arrays = WorldArrays.allocate(scenario, num_worlds)
+            self._arrays = WorldArrays.allocate(scenario, self.num_worlds)
         except (MemoryError, ValueError, OverflowError):
             each = WorldArrays.allocate(scenario, 1).bytes_per_world
             raise ScenarioError(
@@ -100,6 +125,84 @@ class Batch(Stepping):
         self._restarts = True  # whether the next step may start episodes
         self._prepare()
 
+    def _prepare(self) -> None:
+        """Set the attributes that are not pickled."""
+        worlds, rows, size = self.observation_shape
+        self._declared = declarations_for(self.scenario)
+        self._tables = tables_of(self.scenario)
+        self._untyped: Callable[..., int] = kernel_of(self._declared)
+        self._kernel: Callable[..., int] = direct(self._untyped)
+        self._orders, self._whole = np.full(worlds, STEP, np.uint8), divide(worlds, 1)
+        self._scratch = [new_scratch(SCRATCH) for _ in range(threads_for(worlds, rows, self.num_threads))]
+        self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
+        shapes = (worlds, rows, size), (worlds, rows), (worlds, rows, len(self.term_names))
+        self._recyclers = tuple(Recycler(shape) for shape in shapes)
+        zeros = np.zeros(worlds)
+        zeros.flags.writeable = False
+        self._infos = Infos(self.scenario, zeros)
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
+        return {**state, "fingerprints": self._declared.fingerprints()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        declarations_for(state["scenario"]).check_fingerprints(state.pop("fingerprints"))
+        self.__dict__.update(state)
+        self._prepare()
+
+    # The state of the worlds.
+
+    @property
+    def state(self) -> dict[str, npt.NDArray[Any]]:
+        """Every state array by name, as read-only views that follow the worlds.
+
+        Names are ``<array>_<field>``, e.g. ``"tracker_x"`` (E, N) or ``"world_step"`` (E,);
+        :mod:`posse.rules.state` documents every field.
+        """
+        names = self._arrays.by_name()
+        for view in names.values():
+            view.flags.writeable = False
+        return names
+
+    @property
+    def worlds(self) -> Records:
+        """The worlds' records, (E,) :func:`posse.rules.state.world_record`."""
+        return self._arrays.world
+
+    @property
+    def arrays(self) -> WorldArrays:
+        """The arrays themselves, not copies: writing to them changes the worlds."""
+        return self._arrays
+
+    @property
+    def bytes_per_world(self) -> int:
+        """Size of the state of one world, bytes."""
+        return self._arrays.bytes_per_world
+
+    @property
+    def score(self) -> FloatArray:
+        """(E,) the score of the current step; 0 at the start."""
+        return self._score.copy()
+
+    @property
+    def terminated(self) -> BoolArray:
+        """(E,) whether the last step or reset left the world's episode terminated."""
+        return np.asarray(self._arrays.world["terminated"] != 0)
+
+    @property
+    def truncated(self) -> BoolArray:
+        """(E,) whether the last step or reset left the world's episode truncated."""
+        return np.asarray(self._arrays.world["over"] != 0) & ~self.terminated
+
+    @property
+    def working(self) -> BoolArray:
+        """(E, N) whether each tracker works."""
+        return np.asarray(self._arrays.tracker["broken_at"] == NEVER)
+
+    def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
+        """Return the metrics of the current episodes by name, (E,) each."""
+        return episode_metrics(self._declared.metrics, self.scenario, self._arrays.world)
+
     def save(self) -> Snapshot:
         """Return the current state of the worlds, for :meth:`restore`.
 
@@ -107,7 +210,7 @@ class Batch(Stepping):
             ResetNeeded: Before the first :meth:`reset`.
         """
         self._check_started("save")
-        return Snapshot(self.scenario, self._arrays.copy())
+        return Snapshot(self.scenario, self._arrays.copy(), self._declared.fingerprints())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Restore a snapshot and return its observations.
@@ -115,18 +218,15 @@ class Batch(Stepping):
         Raises:
             ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
                 changed.
+            DeclarationError: A declaration that the scenario names has changed.
         """
         if not isinstance(snapshot, Snapshot):
-            raise ValueError(f"restore takes what save() returned, got {shown(snapshot)}")
-        if snapshot.scenario != self.scenario or len(snapshot.arrays.world) != self.num_worlds:
-            raise ValueError(
-                f"a snapshot of {len(snapshot.arrays.world)} worlds of "
-                f"{snapshot.scenario.name!r} does not fit a batch of {self.num_worlds} worlds of "
-                f"{self.scenario.name!r}: scenario and number of worlds must be equal"
-            )
+            raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
+        self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
+        self._declared.check_fingerprints(snapshot.fingerprints)
         self._arrays.write(snapshot.arrays)
         self._started = self._restarts = True
-        return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
+        return self.observe()
 
     def observe(self) -> FloatArray:
         """Return the current observations of the worlds, (E, rows, F).
@@ -157,20 +257,28 @@ class Batch(Stepping):
             ScenarioError: ``count`` below 1, or a negative seed.
             ValueError: ``into`` is this batch, or one of another scenario or number of worlds.
         """
-        check_count("count", count, 1)
-        seed = check_seed(seed)
+        count, seed = check_count("count", count, 1), check_count("seed", seed, 0)
         self._check_started("copies")
         if into is None:
             into = Batch(
                 self.scenario, self.num_worlds * count, seed=self.seed, split=self.split, num_threads=self.num_threads
             )
         elif type(into) is not Batch or into is self:
-            raise ValueError(f"copies go into another Batch, got {shown(into)}")
-        else:
-            check_fit(self.scenario, self.num_worlds, count, into.scenario, into.num_worlds)
+            raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
+        self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
+        into._declared.check_fingerprints(self._declared.fingerprints())
         write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
         into._started = True
         return into
+
+    def _check_fit(self, what: str, worlds: int, scenario: Scenario, wanted: int) -> None:
+        if scenario != self.scenario or worlds != wanted:
+            raise ValueError(
+                f"{what} of {worlds} worlds of {scenario.name!r} does not fit {wanted} worlds of "
+                f"{self.scenario.name!r}: scenario and number of worlds must be equal"
+            )
+
+    # The start of episodes.
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
         """Start an episode in every world and return the observations (E, rows, F).
@@ -182,16 +290,20 @@ class Batch(Stepping):
                 start from these (x, y, θ).
 
         Raises:
+            ResetNeeded: A mask at the first reset.
             ValueError: An unknown option, or one of a wrong shape or not finite; start poses in
                 which robots overlap each other, an obstacle or a wall, or a scripted target has no
                 room to turn. Nothing is changed.
             ScenarioError: The scenario is too tight for a start to be drawn. Nothing is changed.
         """
-        options = options_of(options)
-        chosen = self.check_reset(seed, options)
-        poses = poses_of(options, self.scenario, self.num_worlds)
+        given = options_of(options)
+        for key in given:
+            if key not in _OPTIONS:
+                raise ValueError(f"unknown option {reprlib.repr(key)}; options are: {', '.join(_OPTIONS)}")
+        new_seed = self.seed if seed is None else check_count("seed", seed, 0)
+        chosen = self._chosen(given.get("reset_mask"))
+        poses = poses_of(given, self.scenario, self.num_worlds)
         before, world = self._arrays.copy(), self._arrays.world
-        new_seed = self.seed if seed is None else int(seed)
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
             world["split"] = SPLITS.index(self.split)
@@ -205,9 +317,7 @@ class Batch(Stepping):
             for name, pose in poses.items():
                 write_poses(self._arrays.tracker if name == "tracker_pose" else world, pose, chosen)
             if poses:
-                check_overlap(self.scenario, self._arrays, chosen)
-                if "target_pose" in poses:
-                    check_room_to_turn(self.scenario, self._arrays, chosen)
+                check_poses(self._tables.config, self._arrays, chosen, "target_pose" in poses)
                 observations = self._start(chosen, START_FROM_POSES)
         except BaseException:
             self._arrays.write(before)
@@ -215,22 +325,34 @@ class Batch(Stepping):
         self.seed, self._started = new_seed, True
         return observations
 
-    def check_reset(self, seed: int | None, options: Mapping[str, Any]) -> BoolArray:
-        """Return which worlds a reset starts, (E,); raise if its arguments are invalid.
-
-        Start poses are checked later.
-        """
-        for key in options:
-            if key not in _OPTIONS:
-                raise ValueError(f"unknown option {shown(key)}; options are: {', '.join(_OPTIONS)}")
-        if seed is not None:
-            check_seed(seed)
-        chosen = check_mask(options.get("reset_mask"), self.num_worlds)
+    def _chosen(self, mask: npt.ArrayLike | None) -> BoolArray:
+        """Return which worlds a reset starts, (E,)."""
+        if mask is None:
+            return np.ones(self.num_worlds, np.bool_)
+        chosen = np.asarray(mask)
+        if chosen.dtype != np.bool_ or chosen.shape != (self.num_worlds,):
+            raise ValueError(
+                f"reset_mask must be a bool array of shape ({self.num_worlds},), "
+                f"got {chosen.dtype} of shape {chosen.shape}"
+            )
         if not self._started and not chosen.all():
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         return chosen
 
-    def step(self, actions: npt.ArrayLike) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+    def _start(self, chosen: BoolArray, order: int) -> FloatArray:
+        """Start an episode in the chosen worlds; return every world's observations."""
+        results = self._new_results()
+        orders = np.where(chosen, order, LOOK).astype(np.uint8)
+        actions = np.empty((self.num_worlds, *self.action_shape[1:]), np.float32)  # not read
+        self._run(orders, actions, results)
+        self._kernel = direct(self._untyped)  # now compiled
+        if not self._started:
+            self.layout.check_added(results.observations)
+        return results.observations
+
+    # The step.
+
+    def step(self, actions: npt.ArrayLike) -> Step:
         """Advance every world by one control step.
 
         Args:
@@ -240,106 +362,65 @@ class Batch(Stepping):
 
         Returns:
             observations (E, rows, F), rewards (E, rows), terminated (E,), truncated (E,), infos.
-            ``infos["score"]`` (E,) is the score of the step; ``infos["reward_terms"]`` maps each
-            term to (E, rows); when episodes end, ``infos["metrics"]`` maps each metric to (E,),
-            valid where ``infos["_metrics"]`` (E,) is true. Arrays are never overwritten later.
+            Infos have the keys of :class:`posse.engine.infos.Infos` at every step: ``"score"`` (E,);
+            ``"reward/<term>"`` (E, rows); ``"metrics/<metric>"`` (E,), 0 where the episode goes on;
+            ``"working"`` (E, N). With autoreset ``"same_step"`` also ``"final_obs"`` (E, rows, F),
+            the observations before new episodes start. Arrays are never overwritten later.
 
         Raises:
             ResetNeeded: Before the first :meth:`reset`, or after an end with autoreset disabled.
             ValueError: Actions of a wrong type or shape, not finite, or outside [-1, 1]. Nothing is
                 changed.
         """
-        self._check_running()
-        return self._step_checked(self.check_actions(actions))
+        self.check_running()
+        return self._step(self.check_actions(actions))
 
-    def _step_checked(self, checked: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
-        """Advance every world by the actions of all agents (E, num_agents, 2 + m)."""
+    def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
+        """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
+        return checked_actions(actions, self.action_shape, self.clip_actions)
+
+    def _step(self, actions: FloatArray) -> Step:
+        """Advance every world by valid actions."""
         results = self._new_results()
-        over = self._run(self._orders, checked, results)
+        over = self._advance(actions, results)
         if self._restarts:
             self._check_started_worlds(self._arrays.world["step"] == 0)
         self._restarts = over > 0 and self.autoreset == "next_step"
         observations, rewards, terms, (terminated, truncated) = results
-        infos: dict[str, Any] = {"score": self._score.copy(), "reward_terms": TermsByName(self.term_names, terms)}
+        working = self.working if self.scenario.breaks > 0 else None
+        metrics = None
         if over:
-            observations = self._end(observations, terminated | truncated, infos)
+            ended = terminated | truncated
+            metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
+        infos = self._infos.build(self._score.copy(), terms.transpose(2, 0, 1), working, metrics)
+        if self.autoreset == "same_step":
+            infos["final_obs"] = observations
+            if over:
+                self._arrays.world["episode"][ended] += 1
+                observations = self._start(ended, START)
+                self._check_started_worlds(ended)
         return observations, rewards, terminated, truncated, infos
 
-    def stepper(
-        self, actions: FloatArray, observations: FloatArray, rewards: FloatArray, terms: FloatArray
-    ) -> Callable[[], int]:
-        """Return a function that advances every world by one control step, without other overhead.
+    def _advance(self, actions: FloatArray, results: Results) -> int:
+        """Advance every world by valid actions; return how many episodes are over, none of which starts anew."""
+        return self._run(self._orders, actions, results)
 
-        This is for environments of one world, where :meth:`step` spends more time on arguments and
-        results than on the simulation. Each call reads the actions, writes to the other arrays and
-        returns the number of worlds whose episodes are over. It runs on the calling thread, starts
-        no episode in the mode "same_step", and checks nothing: the worlds must have been reset, and
-        the actions must be valid as for :meth:`check_actions`. A stepper created before the first
-        :meth:`reset` is slower. The arrays are float32, contiguous, writable and do not overlap.
+    def _run(self, orders: npt.NDArray[np.uint8], actions: FloatArray, results: Results) -> int:
+        """Execute the order of each world in several threads; return how many episodes are over."""
+        kernel, scratch = self._kernel, self._scratch
+        if len(scratch) == 1:
+            return kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self._whole)
+        arguments = (self._tables, self._arrays, actions, results, orders)
 
-        Args:
-            actions: Input array of the actions, (E, rows, 2 + message_size).
-            observations: Output array of the observations, (E, rows, F).
-            rewards: Output array of the rewards, (E, rows).
-            terms: Output array of the reward terms, (E, rows, K) in the order of ``term_names``.
+        def work(thread: int, blocks: Blocks) -> int:
+            return kernel(*arguments, scratch[thread], thread, blocks)
 
-        Raises:
-            ValueError: An array of another type, shape or layout.
-        """
-        rows = self.observation_shape[:2]
-        for name, array, shape in (
-            ("actions", actions, self.action_shape),
-            ("observations", observations, self.observation_shape),
-            ("rewards", rewards, rows),
-            ("terms", terms, (*rows, len(self.term_names))),
-        ):
-            check_array(name, array, shape)
-        return self._stepper(actions, observations, rewards, terms)
+        return sum(over_worlds(work, (), self.num_worlds, self.scenario.num_agents, len(scratch)))
 
-    def _stepper(
-        self, actions: FloatArray, observations: FloatArray, rewards: FloatArray, terms: FloatArray
-    ) -> Callable[[], int]:
-        """Return the function of :meth:`stepper`; the arrays have a row for every agent."""
-        arguments = (
-            self._tables,
-            self._arrays,
-            actions,
-            Results(observations, rewards, terms, self._new_flags()),
-            self._orders,
-            self._scratch[0],
-            0,
-            divide(self.num_worlds, 1),
-        )
-        kernel = self._kernel
-        return lambda: kernel(*arguments)
-
-    def _check_started(self, what: str) -> None:
-        if not self._started:
-            raise ResetNeeded(f"{what} before reset: call reset() first")
-
-    def _check_running(self) -> None:
-        """Raise if a step is not possible now."""
-        self._check_started("step")
-        if self.autoreset == "disabled" and first_over(self._arrays.world) >= 0:
-            over = np.flatnonzero(self._arrays.world["over"])
-            raise ResetNeeded(
-                f"step after the end of world {over[0]}"
-                + (f" and {len(over) - 1} more" if len(over) > 1 else "")
-                + ': call reset(options={"reset_mask": mask}) first'
-            )
-
-    def _end(self, observations: FloatArray, ended: BoolArray, infos: dict[str, Any]) -> FloatArray:
-        """Report the episodes that ended; in the mode "same_step", start the next ones."""
-        infos["metrics"], infos["_metrics"] = self.metrics(), ended
-        if self.autoreset != "same_step":
-            return observations
-        infos["final_obs"], infos["_final_obs"] = observations, ended
-        infos["final_info"] = {k: infos[k] for k in ("score", "metrics", "_metrics")}
-        infos["_final_info"] = ended
-        self._arrays.world["episode"][ended] += 1
-        observations = self._start(ended, START)
-        self._check_started_worlds(ended)
-        return observations
+    def _new_results(self) -> Results:
+        """Return output arrays for a pass over the worlds."""
+        observations, rewards, terms = (recycler.take() for recycler in self._recyclers)
+        return Results(observations, rewards, terms, np.empty((2, self.num_worlds), np.bool_))
 
     def _check_started_worlds(self, started: BoolArray) -> None:
         """Raise ScenarioError if the start of a world could not be drawn; then only a reset helps."""
@@ -348,3 +429,18 @@ class Batch(Stepping):
         except ScenarioError:
             self._started = False
             raise
+
+    def _check_started(self, what: str) -> None:
+        if not self._started:
+            raise ResetNeeded(f"{what} before reset: call reset() first")
+
+    def check_running(self) -> None:
+        """Raise ResetNeeded if a step is not possible now."""
+        self._check_started("step")
+        if self.autoreset == "disabled" and first_over(self._arrays.world) >= 0:
+            over = np.flatnonzero(self._arrays.world["over"])
+            raise ResetNeeded(
+                f"step after the end of world {over[0]}"
+                + (f" and {len(over) - 1} more" if len(over) > 1 else "")
+                + ': call reset(options={"reset_mask": mask}) first'
+            )

@@ -16,7 +16,6 @@ from posse.numeric import Records, kernel
 from posse.rules.faults import draw_coming_faults
 from posse.rules.randomness import mix
 from posse.rules.state import WorldArrays
-from posse.scenarios import Scenario
 
 _COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes
 _SEED: Final = np.uint64(1)
@@ -45,15 +44,6 @@ def write_copies(
         if theirs.size:
             _rows(mine, len(theirs))[...] = _rows(theirs, len(theirs))
     draw_anew(config, copies.world, copies.tracker, count, seed, alike)
-
-
-def check_fit(scenario: Scenario, num_worlds: int, count: int, other: Scenario, other_worlds: int) -> None:
-    """Raise ValueError if another batch does not fit the copies."""
-    if other != scenario or other_worlds != num_worlds * count:
-        raise ValueError(
-            f"{count} copies of {num_worlds} worlds of {scenario.name!r} do not fit "
-            f"{other_worlds} worlds of {other.name!r}: scenario and number of worlds must be equal"
-        )
 
 
 def _rows(array: npt.NDArray[Any], num_worlds: int) -> npt.NDArray[np.uint8]:

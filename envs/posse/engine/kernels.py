@@ -16,15 +16,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from posse.engine.scratch import SCRATCH
 from posse.numeric import (
+    ONE,
     WIDTH,
+    ZERO,
     Blocks,
     BoolArray,
     FloatArray,
     Lanes,
     Record,
     Records,
-    blocks_of,
     choose,
     compiled,
     eight,
@@ -33,9 +35,9 @@ from posse.numeric import (
     least,
     lesser,
     load,
+    stamp,
 )
 from posse.rules.contact import meet
-from posse.rules.declared import Rules
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, natural
 from posse.rules.faults import apply_faults
 from posse.rules.motion import motion
@@ -45,13 +47,10 @@ from posse.rules.senses.sensing import look
 from posse.rules.start import draw_start, rest
 from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
-from posse.signals.observation.observing import TOGETHER, lay_out_fixed, observe_sonar, observe_target, observe_together
-from posse.signals.parts import Parts, Sums, Writers, rules_for, sums_for, writers_for
+from posse.signals.generate import Declarations, Generated, generated_for
+from posse.signals.observation.observing import TOGETHER, observe_sonar, observe_together
 from posse.signals.reward import target_weights_for, weights_for
-from posse.signals.scratch import MOST_IN_TEAM
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
+from posse.signals.user_functions import check_functions
 
 
 class Tables(NamedTuple):
@@ -83,10 +82,10 @@ class Results(NamedTuple):
 
 
 @compiled
-def sense(c: Record, worlds: WorldArrays, e: int, rules: Rules, scratch: Record) -> None:
+def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Record) -> None:
     """Target sensors and radio of every tracker of world e."""
     w, trackers = worlds.world[e], worlds.tracker[e]
-    seeing = look(c, w, trackers, rules.sees, rules.measure, scratch)
+    seeing = look(c, w, trackers, made.sees, made.measure, scratch)
     if c.perfect_radio:
         if seeing < c.num_trackers:  # otherwise all have a fix of this step
             share_fixes(c, trackers)
@@ -105,47 +104,47 @@ def begin(
     broadcast: Records,
     heard_message: FloatArray,
     message: FloatArray,
-    clear_sums: Any,
+    made: Generated,
 ) -> None:
     """Initialise an episode of a world whose poses are set, except for sensing."""
     rest(c, w, trackers)
-    clear_sums(w)
+    made.clear_sums(w)
     heard["step"][:] = -1
-    heard_message[:] = _ZERO
-    message[:] = _ZERO
+    heard_message[:] = ZERO
+    message[:] = ZERO
     broadcast["sent"][:] = 0
 
 
 @compiled
 def reward(
-    c: Record, w: Record, trackers: Records, tables: Tables, writers: Writers, rewards: FloatArray, terms: FloatArray
+    c: Record, w: Record, trackers: Records, tables: Tables, made: Generated, rewards: FloatArray, terms: FloatArray
 ) -> None:
     """Write the reward of every agent (rows,) and its terms (rows, K)."""
     for i in range(c.num_trackers):
-        rewards[i] = writers.reward(c, w, trackers[i], tables.weights, terms[i])
+        rewards[i] = made.reward(c, w, trackers[i], tables.weights, terms[i])
     if c.target_agent != 0:
         n = c.num_trackers
-        rewards[n] = writers.target_reward(c, w, tables.target_weights, terms[n])
+        rewards[n] = made.target_reward(c, w, tables.target_weights, terms[n])
 
 
 @compiled
-def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, rules: Rules, scratch: Record) -> None:
+def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, made: Generated, scratch: Record) -> None:
     """Move all robots of world e by a control step, and store the messages."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
-    motion(c, w, trackers, worlds.obstacle[e], actions, rules.set_goal, scratch)
+    motion(c, w, trackers, worlds.obstacle[e], actions, made.set_goal, scratch)
     w.step += 1
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
         works = trackers[i].broken_at == NEVER
         for k in range(c.message_size):
-            message[slot, i, k] = actions[i, 2 + k] if works else _ZERO
+            message[slot, i, k] = actions[i, 2 + k] if works else ZERO
 
 
 @compiled
-def end_step(c: Record, w: Record, trackers: Records, slots: Records, add_to_sums: Any) -> None:
+def end_step(c: Record, w: Record, trackers: Records, slots: Records, made: Generated) -> None:
     """Add the step to the episode's sums, and determine whether the episode is over."""
-    add_to_sums(c, w, trackers, slots)
+    made.add_to_sums(c, w, trackers, slots)
     settle(c, w)
     if c.terminate_on_contact:
         for i in range(c.num_trackers):
@@ -168,7 +167,7 @@ LOOK: Final = 3
 
 LINE: Final = 64
 """Bytes of a cache line."""
-FETCHED: Final = MOST_IN_TEAM
+FETCHED: Final = 16
 """Greatest team size whose prefetched data fit in the first-level cache."""
 
 
@@ -181,9 +180,7 @@ def advance_worlds(
     actions: FloatArray,
     results: Results,
     orders: npt.NDArray[np.uint8],
-    rules: Rules,
-    sums: Sums,
-    writers: Writers,
+    made: Generated,
     scratch: Record,
 ) -> int:
     """Execute the orders of ``count`` worlds from ``first`` on; return how many are over.
@@ -195,7 +192,8 @@ def advance_worlds(
     LOOK               observations only
     ================== =============================================================================
 
-    ``count`` is at most TOGETHER. The scratch memory must be initialised by :func:`prepare`.
+    ``count`` is at most TOGETHER. The scratch memory must be initialised by
+    :func:`posse.rules.discs.lay_out_constants`.
     """
     c, over = tables.config[0], 0
     for e in range(first, first + count):
@@ -209,49 +207,33 @@ def advance_worlds(
             w.episode += 1
             order = START
         if order == STEP:
-            act(c, worlds, e, actions[e], rules, scratch)
+            act(c, worlds, e, actions[e], made, scratch)
         elif order != LOOK:
             if order == START:
-                draw_start(c, w, trackers, obstacles, rules.draw_motion)
+                draw_start(c, w, trackers, obstacles, made.draw_motion)
             begin(
-                c,
-                w,
-                trackers,
-                worlds.heard[e],
-                worlds.broadcast[e],
-                worlds.heard_message[e],
-                worlds.message[e],
-                sums.clear,
+                c, w, trackers, worlds.heard[e], worlds.broadcast[e], worlds.heard_message[e], worlds.message[e], made
             )
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
         if order != LOOK:
             meet(c, w, trackers, obstacles, scratch)
-            sense(c, worlds, e, rules, scratch)
+            sense(c, worlds, e, made, scratch)
             occupy(c, w, trackers, tables.slots, scratch)
         if order == STEP:
-            end_step(c, w, trackers, tables.slots, sums.add)
-            reward(c, w, trackers, tables, writers, rewards, terms)
+            end_step(c, w, trackers, tables.slots, made)
+            reward(c, w, trackers, tables, made, rewards, terms)
         else:
             if order != LOOK:
-                w.held, w.score = 0, _ZERO
-            rewards[:] = _ZERO
-            terms[:, :] = _ZERO
+                w.held, w.score = 0, ZERO
+            rewards[:] = ZERO
+            terms[:, :] = ZERO
         flags[0, e] = w.terminated != 0
         flags[1, e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
-        observe_sonar(c, trackers, scratch, observations, writers.width)
-        if c.target_agent != 0:
-            observe_target(c, worlds, e, writers, scratch, results.observations)
-    observe_together(c, worlds, first, count, writers, scratch, results.observations)
+        observe_sonar(c, w, trackers, scratch, observations, made.width)
+    observe_together(c, worlds, first, count, made, scratch, results.observations)
     return over
-
-
-@compiled
-def prepare(tables: Tables, worlds: WorldArrays, writers: Writers, scratch: Record) -> None:
-    """Write the values common to all worlds to a thread's scratch memory."""
-    lay_out_constants(tables.config[0], tables.beams, scratch)
-    lay_out_fixed(tables.config[0], worlds, writers, scratch)
 
 
 def tables_of(scenario: Scenario) -> Tables:
@@ -265,16 +247,22 @@ def tables_of(scenario: Scenario) -> Tables:
     )
 
 
-@functools.cache
-def kernel_of(parts: Parts) -> Callable[..., int]:
-    """Return the kernel that steps worlds of any scenario with these parts.
+def kernel_of(declarations: Declarations) -> Callable[..., int]:
+    """Return the kernel that steps worlds of any scenario with these declarations.
 
-    It executes the orders of the worlds that a thread claims (:func:`advance_worlds`), and returns
-    the number of those whose episodes are over.
+    It executes the orders of a thread's worlds (:func:`advance_worlds`), and returns the number of those whose
+    episodes are over. It is compiled again when a value that a user's function reaches has changed.
+
+    Raises:
+        DeclarationError: A user's function cannot be compiled.
     """
-    own_fields, fixed, mate, terms, target_terms, empty, width, mate_width = writers_for(parts)
-    draw_motion, set_goal, sees, measure = rules_for(parts)
-    clear_sums, add_to_sums = sums_for(parts)
+    check_functions(declarations, SCRATCH)
+    return _kernel_of(declarations, stamp(*filter(callable, generated_for(declarations))))
+
+
+@functools.cache
+def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
+    made = generated_for(declarations)
 
     @kernel
     def advance(
@@ -288,17 +276,14 @@ def kernel_of(parts: Parts) -> Callable[..., int]:
         blocks: Blocks,
     ) -> int:
         s = scratch[0]
-        writers = Writers(own_fields, fixed, mate, terms, target_terms, empty, width, mate_width)
-        rules = Rules(draw_motion, set_goal, sees, measure)
-        sums = Sums(clear_sums, add_to_sums)
-        if s.prepared[0] == _ZERO:
-            prepare(tables, worlds, writers, s)
-            s.prepared[0] = _ONE
+        if s.prepared[0] == ZERO:
+            lay_out_constants(tables.config[0], tables.beams, s)
+            s.prepared[0] = ONE
         over = 0
-        for first, end in blocks_of(thread, blocks):
-            for e in range(natural(first), end, TOGETHER):
-                count = min(TOGETHER, end - e)
-                over += advance_worlds(e, count, tables, worlds, actions, results, orders, rules, sums, writers, s)
+        end = blocks[thread + 1]
+        for e in range(natural(blocks[thread]), end, TOGETHER):
+            count = min(TOGETHER, end - e)
+            over += advance_worlds(e, count, tables, worlds, actions, results, orders, made, s)
         return over
 
     return advance
@@ -322,7 +307,7 @@ _AT_ONCE: Final = 4 * WIDTH
 
 @compiled
 def _in_box(action: Lanes) -> Lanes:
-    return (action >= -_ONE) & (action <= _ONE)
+    return (action >= -ONE) & (action <= ONE)
 
 
 @kernel
@@ -332,13 +317,13 @@ def bad_action(actions: FloatArray) -> int:
     :data:`IN_BOX` if there is none; :data:`TO_CLIP` if some lie outside by rounding.
     """
     flat = actions.reshape(-1)
-    whole, worst = len(flat) // _AT_ONCE * _AT_ONCE, eight(_ZERO)
+    whole, worst = len(flat) // _AT_ONCE * _AT_ONCE, eight(ZERO)
     for at in range(0, whole, _AT_ONCE):
         k = natural(at)
         first = _in_box(load(flat, k)) & _in_box(load(flat, k + WIDTH))
         last = _in_box(load(flat, k + 2 * WIDTH)) & _in_box(load(flat, k + 3 * WIDTH))
-        worst = lesser(worst, choose(first & last, _ZERO, -_ONE))
-    outside = least(worst) < _ZERO
+        worst = lesser(worst, choose(first & last, ZERO, -ONE))
+    outside = least(worst) < ZERO
     for k in range(whole, len(flat)):
         outside |= not _in_box(flat[k])
     if not outside:

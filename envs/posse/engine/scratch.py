@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 from posse.rules.scratch import MOVING, SENSING, WORLD_FIELDS, scratch_record
-from posse.signals.scratch import KEPT, observing
+from posse.signals.scratch import OBSERVING
 
 _KEPT: Final = (
     ("prepared", 8),  # not 0 once the values common to all worlds are written
     *WORLD_FIELDS,
-    *KEPT,
 )
 
-SCRATCH: Final = scratch_record(_KEPT, MOVING, SENSING, observing(worlds=8))
+SCRATCH: Final = scratch_record(_KEPT, MOVING, SENSING, OBSERVING)

@@ -1,24 +1,21 @@
-"""Start poses given to a reset, and their validation."""
+"""Start poses given to a reset, and their validation by the rules of a drawn start."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from posse.engine.arguments import real_numbers
-from posse.numeric import BoolArray, Records
+from posse.numeric import BoolArray, Records, kernel
+from posse.rules.start import is_clear, target_can_turn
 from posse.rules.state import WorldArrays
 from posse.scenarios import Scenario
-from posse.scenarios.limits import SAFE_MARGIN
 
 Poses = dict[str, npt.NDArray[np.float64]]
-
-_ROUNDING: Final = 1e-3
-"""Tolerance of the room for a turning circle, m, since the pose is rounded to float32."""
 
 
 def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) -> Poses:
@@ -33,12 +30,14 @@ def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) ->
             continue
         full = (num_worlds, *shape)
         array = real_numbers(name, options[name]).astype(np.float64)
+        if name == "tracker_pose" and array.shape == (3,) and scenario.num_trackers == 1:
+            array = array[None]
         if array.shape not in (shape, full):
             raise ValueError(f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each")
         if not np.isfinite(array).all():
             raise ValueError(f"{name} must be finite, got {array[~np.isfinite(array)][0]}")
         most = scenario.start_extent
-        if np.abs(array[..., :2]).max(initial=0) > most:
+        if np.abs(array[..., :2]).max() > most:
             raise ValueError(
                 f"{name} lies up to {np.abs(array[..., :2]).max():.4g} m from the origin, "
                 f"starts of {scenario.name!r} lie within ±{most:g} m along each axis"
@@ -47,63 +46,58 @@ def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) ->
     return poses
 
 
-def check_overlap(s: Scenario, arrays: WorldArrays, chosen: BoolArray) -> None:
-    """Raise ValueError if robots overlap each other, an obstacle or a wall."""
-    world, tracker = arrays.world, arrays.tracker
-    robots = np.stack(
-        [np.concatenate([tracker[k], world[k][:, None]], axis=1)[chosen] for k in ("x", "y")], axis=-1
-    ).astype(np.float64)
-    names = [*(f"tracker_{i}" for i in range(s.num_trackers)), "the target"]
-    apart = np.linalg.norm(robots[:, :, None] - robots[:, None], axis=-1)
-    apart[:, np.arange(len(names)), np.arange(len(names))] = np.inf
-    if apart.size and apart.min() <= 2 * s.robot_radius:
-        _, i, j = np.unravel_index(apart.argmin(), apart.shape)
-        raise ValueError(
-            f"{names[i]} and {names[j]} would start {apart.min():.3g} m apart, discs of "
-            f"robot_radius={s.robot_radius:g} overlap: move one"
-        )
-    if math.isfinite(s.arena) and chosen.any():
-        room = s.arena / 2 - s.robot_radius - np.abs(robots).max(axis=(0, 2))
-        if room.min() <= 0:
-            raise ValueError(f"{names[int(room.argmin())]} would start in a wall: move it")
-    obstacle = arrays.obstacle[chosen]
-    for i, name in enumerate(names):
-        dx = obstacle["x"] - robots[:, i, :1]
-        dy = obstacle["y"] - robots[:, i, 1:]
-        if (np.hypot(dx, dy) <= obstacle["radius"] + s.robot_radius).any():
-            raise ValueError(f"{name} would start in an obstacle: move it")
-
-
-def check_room_to_turn(s: Scenario, arrays: WorldArrays, chosen: BoolArray) -> None:
-    """Raise ValueError if neither turning circle of a scripted target is free."""
-    world, obstacle = arrays.world[chosen], arrays.obstacle
-    if math.isinf(s.arena) or s.target_motion == "agent" or s.target_speed == 0 or not len(world):
-        return
-    radius = s.target_speed / s.target_turn_rate
-    needed = radius + s.robot_radius + SAFE_MARGIN
-    x, y = world["x"].astype(np.float64), world["y"].astype(np.float64)
-    room = np.full(len(world), -np.inf)
-    for side in (radius, -radius):
-        centre_x, centre_y = x - side * world["heading_sin"], y + side * world["heading_cos"]
-        free = s.arena / 2 - np.maximum(np.abs(centre_x), np.abs(centre_y))
-        for o in obstacle[chosen].T:
-            away = np.hypot(o["x"] - centre_x, o["y"] - centre_y) - o["radius"]
-            free = np.minimum(free, away)
-        room = np.maximum(room, free)
-    if (room < needed - _ROUNDING).any():
-        e = int(room.argmin())
-        heading = math.atan2(world["heading_sin"][e], world["heading_cos"][e])
-        raise ValueError(
-            f"target_pose ({x[e]:.4g}, {y[e]:.4g}, {heading:.4g}) leaves the target no room to "
-            f"turn: a disc of {needed:.3g} m about the centre of its left or right turning "
-            f"circle must be clear of obstacles and walls, {max(0.0, room[e]):.3g} m are: move "
-            "it or turn it"
-        )
-
-
 def write_poses(records: Records, poses: npt.NDArray[np.float64], chosen: BoolArray) -> None:
     """Set the poses of robots in the chosen worlds."""
-    records["x"][chosen] = poses[chosen][..., 0]
-    records["y"][chosen] = poses[chosen][..., 1]
-    records["heading_cos"][chosen] = np.cos(poses[chosen][..., 2])
-    records["heading_sin"][chosen] = np.sin(poses[chosen][..., 2])
+    x, y, heading = np.moveaxis(poses[chosen], -1, 0)
+    records["x"][chosen], records["y"][chosen] = x, y
+    records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
+
+
+@kernel
+def first_overlap(config: Records, world: Records, tracker: Records, obstacle: Records) -> int:
+    """Return ``e * (N + 1) + i`` of the first robot i that overlaps one before it, an obstacle or a wall; -1: none.
+
+    The target is robot N.
+    """
+    c, n = config[0], tracker.shape[1]
+    for e in range(len(world)):
+        w, zero = world[e], np.float32(0)
+        for i in range(n):
+            t = tracker[e, i]
+            if not is_clear(c, tracker[e], i, obstacle[e], t.x, t.y, zero):
+                return int(e * (n + 1) + i)
+        if not is_clear(c, tracker[e], n, obstacle[e], w.x, w.y, zero):
+            return int(e * (n + 1) + n)
+    return -1
+
+
+@kernel
+def first_stuck_target(config: Records, world: Records, obstacle: Records) -> int:
+    """Return the first world whose scripted target has no room to turn; -1: none."""
+    c = config[0]
+    for e in range(len(world)):
+        if c.target_speed > 0 and not target_can_turn(c, world[e], obstacle[e]):
+            return e
+    return -1
+
+
+def check_poses(config: Records, arrays: WorldArrays, chosen: BoolArray, target_is_given: bool) -> None:
+    """Raise ValueError if robots overlap each other, an obstacle or a wall, or the given target cannot turn."""
+    world, tracker, obstacle = arrays.world[chosen], arrays.tracker[chosen], arrays.obstacle[chosen]
+    found = first_overlap(config, world, tracker, obstacle)
+    if found >= 0:
+        e, i = divmod(found, tracker.shape[1] + 1)
+        robot = "the target" if i == tracker.shape[1] else f"tracker_{i}"
+        raise ValueError(
+            f"{robot} of world {np.flatnonzero(chosen)[e]} would start in a wall, an obstacle or another robot: move it"
+        )
+    stuck = first_stuck_target(config, world, obstacle) if target_is_given else -1
+    if stuck >= 0:
+        x, y, turned = (float(world[name][stuck]) for name in ("x", "y", "heading_sin"))
+        heading = math.atan2(turned, world["heading_cos"][stuck])
+        radius = config["target_speed"][0] / config["target_turn_rate"][0] + config["safe_distance"][0]
+        raise ValueError(
+            f"target_pose ({x:.4g}, {y:.4g}, {heading:.4g}) leaves the target no room to turn: a disc of "
+            f"{radius:.3g} m about the centre of its left or right turning circle must be clear of obstacles "
+            "and walls: move it or turn it"
+        )

@@ -1,13 +1,12 @@
 """Numerical building blocks for rules, policies and users' own functions.
 
-Arrays and records, lanes (blocks of eight numbers), the decorators that compile functions, and
+Arrays and records, constants, lanes (blocks of eight numbers), the decorators that compile functions, and
 distribution of work over threads. It depends on no other room, and every room may import it.
 """
 
 from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records
-from posse.numeric.blocks import Blocks, blocks_of, divide, worlds_of
-from posse.numeric.compiling import UNCOMPILED, checked_before_compiling, compiled, direct, kernel
-from posse.numeric.simd.lanes import (
+from posse.numeric.compile import UNCOMPILED, compiled, direct, kernel
+from posse.numeric.lanes import (
     WIDTH,
     Lanes,
     Mask,
@@ -29,8 +28,8 @@ from posse.numeric.simd.lanes import (
     tagged,
     transpose,
 )
-from posse.numeric.threads import MOST_THREADS, over_worlds, run_threads, threads_for
-from posse.numeric.written import written
+from posse.numeric.stamp import stamp
+from posse.numeric.threads import MOST_THREADS, Blocks, divide, over_worlds, threads_for, worlds_of
 
 __all__ = [
     "HALF",
@@ -49,8 +48,6 @@ __all__ = [
     "Record",
     "Records",
     "bits",
-    "blocks_of",
-    "checked_before_compiling",
     "choose",
     "compiled",
     "counts",
@@ -67,7 +64,7 @@ __all__ = [
     "lowest_bit",
     "over_worlds",
     "root",
-    "run_threads",
+    "stamp",
     "store",
     "store_fields",
     "tag",
@@ -75,5 +72,4 @@ __all__ = [
     "threads_for",
     "transpose",
     "worlds_of",
-    "written",
 ]

@@ -1,4 +1,4 @@
-"""Array types shared by kernels and their callers."""
+"""Array types and constants shared by kernels and their callers."""
 
 from __future__ import annotations
 

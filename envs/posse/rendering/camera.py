@@ -1,8 +1,7 @@
 """The view of a frame: world metres to pixels.
 
-An arena is shown whole, unless the camera is told to follow the action there as well. On the open
-plane the view follows the robots: it contains all of them, changes its scale rarely, and moves
-smoothly in *simulated* time, so that it depends only on the states drawn.
+The view contains all working robots, changes its scale rarely, and moves smoothly in *simulated*
+time, so that it depends only on the states drawn. In an arena it stays on the arena.
 """
 
 from __future__ import annotations
@@ -28,49 +27,38 @@ class Camera:
     Args:
         viewport: Left, top, width and height of the rectangle, px.
         arena: Side of the walled square, m; ``inf``: the open plane.
-        whole: Whether an arena is always shown whole.
 
     Attributes:
         centre: Centre of the view, (2,) m.
         scale: Pixels per metre.
     """
 
-    def __init__(self, viewport: tuple[int, int, int, int], arena: float, whole: bool = True) -> None:
+    def __init__(self, viewport: tuple[int, int, int, int], arena: float) -> None:
         self.viewport = viewport
         self._arena = arena
-        self._fixed = whole and math.isfinite(arena)
-        self.reset()
-
-    def reset(self) -> None:
-        """Reset the view: the next :meth:`follow` does not smooth."""
         self.centre: Points = np.zeros(2)
-        self._level: int | None = None
         self.scale = 1.0
-        if self._fixed:
-            self.scale = self._whole()
+        self._level: int | None = None
 
-    def follow(self, points: Points, time: float) -> None:
-        """Move towards a view that contains all points (K, 2) m, ``time`` s after the last call."""
-        if self._fixed:
-            return
+    def follow(self, points: Points, time: float | None) -> None:
+        """Move towards a view that contains all points (K, 2) m.
+
+        ``time``: since the last call, s; ``None``: move at once.
+        """
+        pixels = np.array(self.viewport[2:], np.float64)
         lowest, highest = points.min(axis=0), points.max(axis=0)
         middle = (lowest + highest) / 2
-        pixels = np.array(self.viewport[2:], np.float64)
         least = _LEAST_SPAN / min(pixels)  # m per pixel
         needed = max(least, float(((highest - lowest + 2 * _MARGIN) / pixels).max()))
-        if math.isfinite(self._arena):
-            needed = max(least, min(needed, 1 / self._whole()))
         level = math.ceil(math.log(needed / least, _LEVEL) - 1e-9)
         # Zoom out at once when necessary; zoom in only by a full level.
-        first = self._level is None
-        if self._level is None or level > self._level or level < self._level - 1:
+        if time is None or self._level is None or level > self._level or level < self._level - 1:
             self._level = level
         wanted = least * _LEVEL**self._level
-        if math.isfinite(self._arena):  # not more than the arena, and nothing outside it
-            wanted = min(wanted, 1 / self._whole())
+        if math.isfinite(self._arena):  # nothing outside the arena
             slack = np.maximum(self._arena / 2 + _MARGIN - pixels * wanted / 2, 0)
             middle = np.clip(middle, -slack, slack)
-        if first:
+        if time is None:
             self.centre, self.scale = middle, 1 / wanted
             return
         self.centre = self.centre + (1 - math.exp(-time / _FOLLOW_TIME)) * (middle - self.centre)
@@ -79,30 +67,15 @@ class Camera:
         held = float((2 * reach / pixels).max())
         self.scale = min(self.scale / math.exp(zoom), 1 / held)
 
-    def _whole(self) -> float:
-        """Return the scale at which the arena fits, px per metre."""
-        return float(min(self.viewport[2:]) / (self._arena + 2 * _MARGIN))
-
-    def look(self, centre: npt.ArrayLike, scale: float) -> None:
-        """Set the view: its centre (2,) m, and pixels per metre."""
-        self.centre = np.array(centre, np.float64)
-        self.scale = float(scale)
-
     def project(self, points: Points) -> Points:
         """Return the pixel coordinates (..., 2) of points (..., 2) m."""
         left, top, width, height = self.viewport
-        x = left + width / 2 + (points[..., 0] - self.centre[0]) * self.scale
-        y = top + height / 2 - (points[..., 1] - self.centre[1]) * self.scale
-        return np.stack([x, y], axis=-1)
+        middle = np.array([left + width / 2, top + height / 2])
+        return middle + (points - self.centre) * (self.scale, -self.scale)
 
-    def unproject(self, pixels: Points) -> Points:
-        """Return the points (..., 2) m of pixel coordinates (..., 2)."""
-        left, top, width, height = self.viewport
-        x = (pixels[..., 0] - left - width / 2) / self.scale + self.centre[0]
-        y = (top + height / 2 - pixels[..., 1]) / self.scale + self.centre[1]
-        return np.stack([x, y], axis=-1)
-
-    def bounds(self) -> tuple[Points, Points]:
-        """Return the lower left and the upper right corner of the view, (2,) m each."""
+    def floor(self) -> Points:
+        """Return the lower left and the upper right corner (2, 2) m of the arena, or of the plane in view."""
+        if math.isfinite(self._arena):
+            return np.array([[-1.0, -1.0], [1.0, 1.0]]) * self._arena / 2
         half = np.array(self.viewport[2:], np.float64) / (2 * self.scale)
-        return self.centre - half, self.centre + half
+        return np.stack([self.centre - half, self.centre + half])

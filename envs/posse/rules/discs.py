@@ -2,7 +2,7 @@
 
 Discs (trackers, the target, obstacles) are stored in rows of a thread's scratch memory. Contact,
 score, target sensor and sonar read these rows in blocks of eight
-(:mod:`posse.numeric.simd.lanes`); the padding of the last block is far away.
+(:mod:`posse.numeric.lanes`); the padding of the last block is far away.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.scratch import DISCS, ROBOTS
-from posse.rules.state import BIT, NO_BITS, POSE
+from posse.rules.state import BIT, NO_BITS, POSE, Pose
 
 BLOCK: Final = WIDTH
 
@@ -93,10 +93,10 @@ def sonar_reach2(c: Record, radius: np.float32) -> np.float32:
 
 @compiled
 def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lanes, ...]:
-    """Return eight consecutive fields of eight of ``count`` records, field by field.
+    """Return a block of eight fields of eight of ``count`` records, field by field.
 
-    From record ``first`` on, starting ``offset`` bytes into each; beyond the end, the last record
-    is repeated.
+    From record ``first`` on; beyond the end, the last record is repeated. ``offset`` is where the
+    block begins (:func:`posse.rules.state.block_at`), whose named tuple is made of the result.
     """
     last = count - 1
     return transpose(
@@ -112,10 +112,9 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 
 
 @compiled
-def store_rows(
-    a: Lanes, b: Lanes, c: Lanes, d: Lanes, e: Lanes, f: Lanes, g: Lanes, h: Lanes, row: FloatArray, at: int
-) -> None:
+def store_rows(block: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
     """Inverse of :func:`columns`: write eight numbers per record."""
+    a, b, c, d, e, f, g, h = block
     store_each(transpose(a, b, c, d, e, f, g, h), row, at)
 
 
@@ -139,11 +138,11 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
     n = natural(c.num_trackers)
     for block in range(blocks(n + 1)):
         j = BLOCK * block
-        x, y, _, _, _, _, _, _ = columns(trackers, j, n, POSE)
+        pose = Pose(*columns(trackers, j, n, POSE))
         number = load(s.index, j)
         tracker, target = number < np.float32(n), number == np.float32(n)
-        store(s.x, j, choose(tracker, x, choose(target, w.x, FAR)))
-        store(s.y, j, choose(tracker, y, choose(target, w.y, FAR)))
+        store(s.x, j, choose(tracker, pose.x, choose(target, w.x, FAR)))
+        store(s.y, j, choose(tracker, pose.y, choose(target, w.y, FAR)))
     count = num_discs(c)
     if count > n + 1:
         for k in range(natural(c.num_obstacles)):

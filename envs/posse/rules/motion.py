@@ -28,7 +28,7 @@ from posse.numeric import (
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
 from posse.rules.kinematics import approach, arc, follow_heading
-from posse.rules.state import NEVER, POSE
+from posse.rules.state import NEVER, POSE, Pose
 from posse.rules.targets.steering import target_turn_rate
 
 
@@ -121,14 +121,26 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
         i = BLOCK * block
-        x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate = columns(trackers, i, n, POSE)
+        pose = Pose(*columns(trackers, i, n, POSE))
+        x, y, cosine, sine = pose.x, pose.y, pose.heading_cos, pose.heading_sin
+        speed, turn_rate = pose.speed, pose.turn_rate
         for _ in range(parts):
             speed, turn_rate = command(
-                c, speed, turn_rate, max_speed, max_turn_rate, load(s.wanted_speed, i), load(s.wanted_turn, i)
+                c, speed, turn_rate, pose.max_speed, pose.max_turn_rate, load(s.wanted_speed, i), load(s.wanted_turn, i)
             )
             dx, dy, cosine, sine = arc(cosine, sine, speed, turn_rate, time)
             x, y = x + dx, y + dy
-        store_rows(x, y, cosine, sine, speed, turn_rate, max_speed, max_turn_rate, s.new_pose, BLOCK * i)
+        moved = Pose(
+            x=x,
+            y=y,
+            heading_cos=cosine,
+            heading_sin=sine,
+            speed=speed,
+            turn_rate=turn_rate,
+            max_speed=pose.max_speed,
+            max_turn_rate=pose.max_turn_rate,
+        )
+        store_rows(moved, s.new_pose, BLOCK * i)
     others = False
     for i in range(n):
         t = trackers[i]

@@ -22,6 +22,7 @@ from posse.scenarios.limits import START_CLEARANCE
 
 _TRIES: Final = 2000
 _CLEARANCE: Final = np.float32(START_CLEARANCE)
+_ROUNDING: Final = np.float32(1e-3)  # m; a given pose is rounded to float32
 _OBSTACLES: Final = 1
 _TARGET: Final = 2
 _TRACKERS: Final = 4
@@ -31,19 +32,35 @@ _TRACKER_DRAWS: Final = 3 * _TRIES  # of the stream START; the target's come fir
 
 @compiled
 def is_clear(
-    c: Record, w: Record, trackers: Records, placed: int, obstacles: Records, x: np.float32, y: np.float32
+    c: Record,
+    trackers: Records,
+    placed: int,
+    obstacles: Records,
+    x: np.float32,
+    y: np.float32,
+    clearance: np.float32 = _CLEARANCE,
 ) -> bool:
-    """Return whether a tracker at (x, y) is clear of walls, obstacles and ``placed`` trackers."""
-    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.radius - _CLEARANCE:
+    """Return whether a robot at (x, y) is clear of walls, obstacles and the first ``placed`` trackers."""
+    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.radius - clearance:
         return False
-    if obstacle_within(obstacles, c.num_obstacles, x, y, c.radius + _CLEARANCE):
+    if obstacle_within(obstacles, c.num_obstacles, x, y, c.radius + clearance):
         return False
-    reach = c.radius + c.radius + _CLEARANCE
+    reach = c.radius + c.radius + clearance
     for j in range(placed):
         t = trackers[j]
         if (t.x - x) * (t.x - x) + (t.y - y) * (t.y - y) < reach * reach:
             return False
     return True
+
+
+@compiled
+def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.float32 = _ROUNDING) -> bool:
+    """Return whether a turning circle of a scripted target in an arena is free, but for an allowance, m."""
+    if not c.walled or c.target_agent != 0:
+        return True
+    left = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, ONE, allowance)
+    right = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -ONE, allowance)
+    return bool(left or right)
 
 
 @compiled
@@ -75,11 +92,7 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
         w.heading_cos = np.float32(math.cos(heading))
         w.heading_sin = np.float32(math.sin(heading))
         clear = not obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.radius + _CLEARANCE)
-        if clear and c.walled and c.target_agent == 0:
-            clear = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, ONE) or has_free_circle(
-                c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -ONE
-            )
-        if clear:
+        if clear and target_can_turn(c, w, obstacles, ZERO):
             return
     w.undrawn |= _TARGET
 
@@ -96,7 +109,7 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
             index += 2
             t.x = w.x + distance * np.float32(math.cos(bearing))
             t.y = w.y + distance * np.float32(math.sin(bearing))
-            clear = is_clear(c, w, trackers, i, obstacles, t.x, t.y)
+            clear = is_clear(c, trackers, i, obstacles, t.x, t.y)
             if clear:
                 break
         heading = TWO_PI * uniform(w.key, 0, START, index)

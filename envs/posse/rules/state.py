@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, Records
+from posse.numeric import FloatArray, Lanes, Records
 from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS, slot_offsets
@@ -28,20 +28,39 @@ NEVER: Final = np.int32(2**30)
 """A control step later than any."""
 
 
-def _record(*fields: tuple[str, Any], size: int | None = None) -> np.dtype[Any]:
-    """Return a record of fields, at least ``size`` bytes long."""
-    layout = np.dtype(list(fields), align=True)
-    if size is not None:
-        names, formats = zip(*fields, strict=True)
-        offsets = [at for _, at, *_ in (layout.fields or {}).values()]
-        given = {"names": names, "formats": formats, "offsets": offsets, "itemsize": size}
-        layout = np.dtype(given, align=True)  # type: ignore[call-overload]
-    return np.dtype((np.record, layout))
+def _record(*fields: tuple[str, Any]) -> np.dtype[Any]:
+    return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
-def _offset(record: np.dtype[Any], name: str) -> int:
-    """Return the offset of a field in a record, in bytes."""
-    return next(at for field, (_, at, *_) in (record.fields or {}).items() if field == name)
+def _place(record: np.dtype[Any], name: str) -> tuple[int, int]:
+    """Return where a field lies in a record and its size, bytes; ``"fix_x"`` may be the field x of a record ``fix``."""
+    fields: Any = record.fields or {}
+    if name in fields:
+        return fields[name][1], fields[name][0].itemsize
+    outer, _, inner = name.partition("_")
+    if outer in fields and inner:
+        at, size = _place(fields[outer][0], inner)
+        return fields[outer][1] + at, size
+    return -1, 0
+
+
+def block_at(record: np.dtype[Any], block: type[tuple[Any, ...]]) -> int:
+    """Return where a block of eight fields begins in a record, bytes.
+
+    Kernels read and write such a block at once, as eight consecutive numbers of 4 bytes.
+
+    Args:
+        record: The record.
+        block: A named tuple with the names of the fields, in order; those of a record within it follow its name.
+
+    Raises:
+        TypeError: The record does not have these fields one after the other.
+    """
+    names: tuple[str, ...] = block._fields  # type: ignore[attr-defined]
+    places = [_place(record, name) for name in names]
+    if len(names) != 8 or places != [(places[0][0] + 4 * k, 4) for k in range(8)]:
+        raise TypeError(f"{block.__name__}: a record must have {', '.join(names)} one after the other, 4 bytes each")
+    return int(places[0][0])
 
 
 _F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
@@ -178,7 +197,6 @@ _WORLD: Final = (
     ("contacts_target", _I),
     ("least_gap", _F),
 )
-STEP: Final = _offset(_record(*_WORLD), "step")
 WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
 """Fields of every world, without those of declared metrics and motions."""
 
@@ -189,16 +207,16 @@ def world_record(scenario: Scenario) -> np.dtype[Any]:
     It includes the memories of the target motions and the sums of the metrics, both of the built-in
     ones and of those that the scenario names.
     """
-    return _world_record(scenario.target_motion, scenario.metrics)
+    return world_record_of(TARGET_MOTIONS.with_added(scenario.target_motion), METRICS.with_added(*scenario.metrics))
 
 
 @functools.cache
-def _world_record(motion: str, metrics: tuple[str, ...]) -> np.dtype[Any]:
-    motions = TARGET_MOTIONS.with_added(motion)
+def world_record_of(motions: tuple[Any, ...], metrics: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return the record of one world for declared motions and metrics."""
     return _record(
         *_WORLD,
-        *(field for metric in METRICS.with_added(*metrics) for field in metric.fields),
-        *((memory.name, _F) for each in motions for memory in each.memory),
+        *(field for metric in metrics for field in metric.fields),
+        *((memory.name, _F) for motion in motions for memory in motion.memory),
     )
 
 
@@ -249,11 +267,62 @@ TRACKER: Final = _record(
 )
 """One tracker."""
 
-# Kernels read and write these fields of a tracker in blocks of eight; unchanged fields are written
-# as they were read. From x on: pose, speed, turn rate, their limits. From fix on: the fix.
-POSE: Final = _offset(TRACKER, "x")
-FIX: Final = _offset(TRACKER, "fix")
-CONDITION: Final = _offset(TRACKER, "broken_at")  # eight whole numbers
+
+class Pose(NamedTuple):
+    """Pose, motion and limits of eight trackers."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    max_speed: Lanes
+    max_turn_rate: Lanes
+
+
+class Condition(NamedTuple):
+    """Whole numbers of eight trackers."""
+
+    broken_at: Lanes
+    sensor_dead_from: Lanes
+    radio_dead_from: Lanes
+    sees: Lanes
+    near: Lanes
+    touching: Lanes
+    onsets: Lanes
+    fix_step: Lanes
+
+
+class Fix(NamedTuple):
+    """The fixes of eight trackers."""
+
+    fix_x: Lanes
+    fix_y: Lanes
+    fix_cos: Lanes
+    fix_sin: Lanes
+    fix_frame_cos: Lanes
+    fix_frame_sin: Lanes
+    fix_vx: Lanes
+    fix_vy: Lanes
+
+
+class Heard(NamedTuple):
+    """The last messages that eight trackers received from a team-mate."""
+
+    x: Lanes
+    y: Lanes
+    heading_cos: Lanes
+    heading_sin: Lanes
+    speed: Lanes
+    turn_rate: Lanes
+    step: Lanes
+    unused: Lanes
+
+
+POSE: Final = block_at(TRACKER, Pose)
+FIX: Final = block_at(TRACKER, Fix)
+CONDITION: Final = block_at(TRACKER, Condition)
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 
@@ -268,9 +337,10 @@ HEARD: Final = _record(
     ("speed", _F),
     ("turn_rate", _F),
     ("step", _I),  # when it was sent; -1: never heard
-    size=32,  # so that it can be read as a block of eight, like TRACKER from x on
+    ("unused", _I),  # makes a block of eight
 )
 """The last message that a tracker received from a team-mate: (E, receiver, sender)."""
+MESSAGE: Final = block_at(HEARD, Heard)
 
 BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent

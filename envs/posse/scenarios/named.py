@@ -32,6 +32,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="accelerating",
+            version=2,
             meaning="The target weaves: its turn rate is a sine, drawn for each world.",
             target_motion="accelerating",
         ),
@@ -45,7 +46,7 @@ def _named() -> dict[str, Scenario]:
         Scenario(
             name="search",
             meaning="Sight is short: the team has to spread out in an arena, find the target, and tell the others.",
-            version=2,
+            version=3,
             target_motion="accelerating",
             tracker_turn_rate=1.2,
             target_turn_rate=1.2,
@@ -65,6 +66,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="radio",
+            version=2,
             meaning="Sight is too short without communication; messages are late, three in ten are lost.",
             target_motion="smart",
             tracker_turn_rate=1.5,
@@ -77,6 +79,7 @@ def _named() -> dict[str, Scenario]:
         ),
         Scenario(
             name="leader-loss",
+            version=2,
             meaning="Only the first tracker sees the target from its slot; it breaks, and another must lead.",
             target_motion="accelerating",
             tracker_turn_rate=1.1,
@@ -91,7 +94,7 @@ def _named() -> dict[str, Scenario]:
         Scenario(
             name="field",
             meaning="Search, obstacles, noise, a lossy radio, a broken robot, outages, and a smart target.",
-            version=2,
+            version=3,
             target_motion="smart",
             tracker_turn_rate=1.5,
             target_turn_rate=1.5,

@@ -1,12 +1,25 @@
 """The metrics of an episode: the score, and further quantities in physical units.
 
-To add a metric, declare it here or in a module of your own (:mod:`posse.signals.measuring`).
-``info`` reports it at the end of every episode, one of your own if the scenario names it. ``nan``
-stands for "never happened".
+A metric is declared, here or in a module of your own, on the function whose value is added to a
+running sum in each control step. The sum is the field ``<name>_sum`` of the world's record, and is
+divided at the end of the episode. The parameters of the function determine what is summed:
+
+========================= ========================================================================
+(c, w)                    a value of the world
+(c, w, t)                 a value of each working tracker
+(c, w, trackers)          a value of the team
+(c, w, trackers, slots)   a value of the team, with the slots
+========================= ========================================================================
+
+A metric without a sum is a *figure*, declared on a function of the worlds' records. ``info``
+reports the built-in metrics at the end of every episode, and others if the scenario names them.
+``nan`` stands for "never happened".
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -14,14 +27,93 @@ import numpy.typing as npt
 
 from posse import registry
 from posse.numeric import Record, Records
+from posse.registry import TARGET_MOTIONS, Declaration, Function, check_memory_name
 from posse.rules.score import could_arrive
 from posse.rules.senses.radio import connected
-from posse.rules.state import NEVER
+from posse.rules.state import NEVER, WORLD_NAMES
 from posse.scenarios import Scenario
-from posse.signals.measuring import Column, Metric, figure, metric
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
+
+Column = npt.NDArray[np.float64]
+Figure = Callable[[Scenario, Records], Column]
+
+_STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Metric(Declaration):
+    """One metric of an episode.
+
+    Its function returns what a control step adds to the sum; that of a figure, which has no sum,
+    takes the scenario and the worlds' records and returns (E,).
+
+    Attributes:
+        per: Divisor of the sum: ``"step"``, ``"tracker_step"`` or ``"episode"``; ``None``: a figure.
+    """
+
+    per: str | None
+
+    @property
+    def sum_name(self) -> str:
+        """Name of the field of the world's record that holds the sum."""
+        return f"{self.name}_sum"
+
+    @property
+    def fields(self) -> tuple[tuple[str, type], ...]:
+        """Fields that the metric adds to the world's record."""
+        return () if self.per is None else ((self.sum_name, np.float64),)
+
+    @property
+    def functions(self) -> tuple[tuple[Function, str], ...]:
+        """Its function, unless it is a figure, and what it returns."""
+        return () if self.per is None else ((self.function, "a number"),)
+
+    def of(self, scenario: Scenario, worlds: Records) -> Column:
+        """Return the metric of the current episodes, (E,)."""
+        if self.per is None:
+            column: Column = self.function(scenario, worlds)
+            return column
+        total: Column = np.asarray(worlds[self.sum_name], np.float64)
+        steps = _STEPS[self.per]
+        return total if steps is None else total / np.maximum(worlds[steps], 1)
+
+
+def metric(unit: str, *, per: str = "step") -> Callable[[Function], Function]:
+    """Declare a metric with the function's name; the function's docstring is the meaning.
+
+    Args:
+        unit: Unit of the metric.
+        per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
+            control steps of all working trackers; ``"episode"``: 1.
+
+    Raises:
+        DeclarationError: The name is taken, the docstring is missing, the parameters are not among
+            those above, or ``per`` is unknown.
+    """
+    registry.METRICS.check_argument(unit, '@posse.metric("1")')
+
+    def declare(function: Function) -> Function:
+        if per not in tuple(_STEPS):
+            raise registry.METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
+        registry.METRICS.check_function(function, *registry.METRICS.allowed)
+        memory = (each.name for motion in TARGET_MOTIONS.values() for each in motion.memory)
+        check_memory_name(
+            registry.METRICS, function, f"{registry.plain(function).__name__}_sum", (*WORLD_NAMES, *memory)
+        )
+        return registry.METRICS.declare(Metric, function, unit=unit, per=per)
+
+    return declare
+
+
+def figure(unit: str) -> Callable[[Figure], Figure]:
+    """Declare a function (s, w), the scenario and the worlds (E,), -> (E,) as a metric."""
+
+    def declare(function: Figure) -> Figure:
+        return registry.METRICS.declare(Metric, function, unit=unit, per=None, parameters=("s", "w"))
+
+    return declare
 
 
 def _time(steps: npt.NDArray[Any], scenario: Scenario) -> Column:
@@ -41,7 +133,7 @@ def safe_score(c: Record, w: Record) -> np.float32:
     return np.float32(w.score) if contacts == 0 else _ZERO
 
 
-@metric("1", sum_type=np.float32)
+@metric("1")
 def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32:
     """Upper bound of the score: every tracker drives straight to a slot and then stays in it."""
     count = 0
@@ -138,10 +230,6 @@ METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
 """Every built-in metric, in the order in which they are reported."""
 
 
-def episode_metrics(scenario: Scenario, worlds: Records) -> dict[str, Column]:
-    """Return the metrics of the current episodes by name, (E,) float64.
-
-    These are the built-in ones and those that the scenario names.
-    """
-    metrics = registry.METRICS.with_added(*scenario.metrics)
-    return {m.name: m.function(scenario, worlds) for m in metrics}
+def episode_metrics(metrics: Sequence[Metric], scenario: Scenario, worlds: Records) -> dict[str, Column]:
+    """Return the metrics of the current episodes by name, (E,) float64."""
+    return {metric.name: metric.of(scenario, worlds) for metric in metrics}

@@ -6,48 +6,38 @@ and reported in every scenario, others in scenarios that give them a weight.
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, compiled, written
+from posse.numeric import FloatArray, Record, compiled
 from posse.registry import REWARD_TERMS as TERMS
-from posse.registry import Function
+from posse.registry import Declaration, Function, plain
 from posse.scenarios import Scenario
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
 
 
-@dataclass(frozen=True)
-class RewardTerm:
-    """One term: name, unit, meaning and formulas.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RewardTerm(Declaration):
+    """One term of the reward.
+
+    Its function gives the value for a tracker, ``(c, w, t)``, or one of the world, ``(c, w)``.
 
     Attributes:
-        name: Its name.
-        unit: Its unit.
-        meaning: What it measures.
-        function: Its value for a tracker, of ``parameters``.
-        of_target: Its value for a target that is an agent, ``(c, w)``; ``None``: it has none.
-        parameters: ``("c", "w", "t")``, or ``("c", "w")`` for a value of the world.
+        of_target: The value for a target that is an agent, ``(c, w)``; ``None``: it has none.
     """
 
-    name: str
-    unit: str
-    meaning: str
-    function: Function
     of_target: Function | None = None
-    parameters: tuple[str, ...] = ("c", "w", "t")
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The compiled functions of the term, and what each returns."""
+        """The functions of the term, and what each returns."""
         both = (self.function, self.of_target)
-        return tuple((function, "number") for function in dict.fromkeys(both) if function)
+        return tuple((function, "a number") for function in dict.fromkeys(both) if function)
 
 
 def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Function], Function]:
@@ -65,18 +55,16 @@ def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Funct
     Raises:
         DeclarationError: The name is taken, the docstring is missing, or the parameters differ.
     """
+    TERMS.check_argument(unit, '@posse.reward_term("1")')
 
     def declare(function: Function) -> Function:
-        TERMS.check_parameters(function, ("c", "w", "t"), 2)
-        parameters = tuple(inspect.signature(function).parameters)
-        name, working = function.__name__, compiled(function)
-        of_target = working if len(parameters) == 2 else None
+        of_target = None
         if target is not None:
-            TERMS.check_parameters(target, ("c", "w"))
-            of_target = compiled(target)
-        meaning = inspect.getdoc(function) or ""
-        TERMS.add(name, RewardTerm(name, unit, meaning, working, of_target, parameters), working)
-        return working
+            TERMS.check_function(target, ("c", "w"))
+            of_target = compiled(plain(target))
+        elif TERMS.check_function(function, *TERMS.allowed) == ("c", "w"):
+            of_target = compiled(plain(function))
+        return TERMS.declare(RewardTerm, function, unit=unit, of_target=of_target)
 
     return declare
 
@@ -154,67 +142,3 @@ def target_weights_for(scenario: Scenario) -> FloatArray:
 
 def _in_order(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
     return np.array([weights.get(term.name, 0.0) for term in terms_for(scenario)], np.float32)
-
-
-def reward_writer(terms: Sequence[RewardTerm]) -> Any:
-    """Return (c, w, t, weights (K,), values (K,)) -> reward, compiled; it fills ``values``."""
-    lines = [f"values[{k}] = term_{k}({', '.join(term.parameters)})" for k, term in enumerate(terms)]
-    functions = {f"term_{k}": term.function for k, term in enumerate(terms)}
-    return _summing("reward", ("c", "w", "t", "weights", "values"), lines, functions)
-
-
-def target_reward_writer(terms: Sequence[RewardTerm]) -> Any:
-    """Return (c, w, weights (K,), values (K,)) -> reward of the target, as :func:`reward_writer`.
-
-    The value of a term that is for trackers only is 0.
-    """
-    functions = {f"term_{k}": term.of_target for k, term in enumerate(terms) if term.of_target}
-    lines = [f"values[{k}] = " + (f"term_{k}(c, w)" if f"term_{k}" in functions else "ZERO") for k in range(len(terms))]
-    return _summing("target_reward", ("c", "w", "weights", "values"), lines, functions)
-
-
-def _summing(name: str, parameters: tuple[str, ...], lines: list[str], functions: Mapping[str, Function]) -> Any:
-    """Return a function that runs lines, which fill ``values``, and returns their weighted sum."""
-    # From last to first: another order would round differently and change results.
-    sums = [f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in range(len(lines) - 1, -1, -1)]
-    names = {"ZERO": _ZERO, "float32": np.float32, **functions}
-    return written(name, parameters, [*lines, "reward = ZERO", *sums, "return reward"], names)
-
-
-@functools.cache
-def namer(names: tuple[str, ...]) -> Callable[..., dict[str, float]]:
-    """Return a function from a tracker's terms, in order, to a dictionary by name.
-
-    The dictionary is a literal, created in half the time of ``dict(zip(...))``; this is a third of
-    the time of a step of one world.
-    """
-    literal = ", ".join(f"{name!r}: {name}" for name in names)
-    naming: Callable[..., dict[str, float]] = eval(f"lambda {', '.join(names)}: {{{literal}}}")
-    return naming
-
-
-class TermsByName(Mapping[str, FloatArray]):
-    """The terms (E, rows, K) of a step by name, (E, rows) each.
-
-    Views are created on access: creating all of them takes a third of the time of a world's step.
-    """
-
-    __slots__ = ("_names", "_terms")
-
-    def __init__(self, names: tuple[str, ...], terms: FloatArray) -> None:
-        self._names, self._terms = names, terms
-
-    def __getitem__(self, name: str) -> FloatArray:
-        if name not in self._names:
-            raise KeyError(name)
-        term: FloatArray = self._terms[..., self._names.index(name)]
-        return term
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return repr(dict(self))

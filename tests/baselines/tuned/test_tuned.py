@@ -99,7 +99,7 @@ def test_one_object_plays_several_scenarios() -> None:
             actions, memories[k] = policy.act(seen[k], memories[k])
             seen[k], _, _, ended, infos = batch.step(actions)
             if ended.all():
-                np.testing.assert_array_equal(infos["metrics"]["score"], apart[k])
+                np.testing.assert_array_equal(infos["metrics/score"], apart[k])
 
 
 @pytest.mark.parametrize("name", TUNED)

@@ -13,8 +13,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 from tests.support.adapters import out_of_band, same
 
-import posse
-from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
+from posse.adapters.vector_env import TeamVectorEnv
 
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 # Terminations (on contact) and truncations, at different times in different worlds, and breaks.
@@ -56,7 +55,7 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
         settings.update(breaks=1, break_window=(0.2, 0.4))
     else:  # one alone runs into something only if it is fast
         settings.update(tracker_speed=3.0)
-    ours = vector(name, autoreset_mode=mode, **settings)
+    ours = vector(name, autoreset=mode, **settings)
     theirs = SyncVectorEnv(
         [
             lambda i=i: gymnasium.make(name, first_world=i, **settings)  # type: ignore[misc]
@@ -88,26 +87,9 @@ def test_it_agrees_with_gymnasiums_own(name: str, mode: AutoresetMode, discrete:
 
 
 @modes
-def test_it_agrees_where_all_episodes_end_at_once(mode: AutoresetMode) -> None:
-    settings: dict[str, Any] = {"horizon": 3, "settle_time": 0.1}
-    ours = vector(autoreset_mode=mode, **settings)
-    theirs = SyncVectorEnv(
-        [lambda i=i: gymnasium.make(TEAM, first_world=i, **settings) for i in range(E)],  # type: ignore[misc]
-        autoreset_mode=mode,
-    )
-    ours.reset(seed=6)
-    theirs.reset(seed=[6] * E)
-    for _ in range(3):
-        actions = ours.action_space.sample()
-        *_, truncated, infos = ours.step(actions)
-        assert same(infos, theirs.step(actions)[4])
-    assert truncated.all()
-
-
-@modes
 def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
-    for chosen in (mode, mode.value):
-        env = vector(autoreset_mode=chosen)
+    for chosen in (mode, mode.name.lower()):
+        env = vector(autoreset=chosen)
         assert env.autoreset_mode is mode
         assert env.metadata["autoreset_mode"] is mode
     assert TeamVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -116,7 +98,7 @@ def test_it_says_its_autoreset_mode(mode: AutoresetMode) -> None:
 @modes
 def test_what_is_returned_is_never_overwritten(mode: AutoresetMode) -> None:
     # Large enough that the memory of unreferenced arrays is reused.
-    env = vector(autoreset_mode=mode, num_envs=80, horizon=6, settle_time=0.3)
+    env = vector(autoreset=mode, num_envs=80, horizon=6, settle_time=0.3)
     returned: list[Any] = [env.reset(seed=0)]
     kept = copy.deepcopy(returned)
     for _ in range(15):
@@ -129,40 +111,10 @@ def test_what_is_returned_is_never_overwritten(mode: AutoresetMode) -> None:
     assert same(returned, kept)
 
 
-def test_a_mask_resets_only_its_worlds_and_is_left_alone() -> None:
-    env = vector(autoreset_mode=AutoresetMode.DISABLED)
-    env.reset(seed=0)
-    before, *_ = env.step(env.action_space.sample())
-    mask = np.array([False, True, False, True])
-    options = {"reset_mask": mask}
-    after, _ = env.reset(options=options)
-    assert options["reset_mask"] is mask
-    assert mask.tolist() == [False, True, False, True]
-    unchanged = [np.array_equal(a, b) for a, b in zip(before, after, strict=True)]
-    assert unchanged == [True, False, True, False]
-
-
-def test_the_same_seed_gives_the_same_worlds_whatever_their_number() -> None:
-    few, many = vector(num_envs=2), vector(num_envs=6, num_threads=2)
-    ours, theirs = few.reset(seed=1)[0], many.reset(seed=1)[0]
-    many.action_space.seed(0)
-    for _ in range(20):
-        assert np.array_equal(ours, theirs[:2])
-        actions = many.action_space.sample()
-        ours, theirs = few.step(actions[:2])[0], many.step(actions)[0]
-    assert not np.array_equal(theirs[0], theirs[1])
-
-
-def test_without_a_seed_environments_differ() -> None:
-    first, second = vector(), vector()
-    assert not np.array_equal(first.reset()[0], second.reset()[0])
-    assert np.array_equal(vector(seed=4).reset()[0], second.reset(seed=4)[0])
-
-
 @modes
 @pytest.mark.parametrize("replica", [lambda e: pickle.loads(pickle.dumps(e)), out_of_band])  # noqa: S301
 def test_a_copy_made_in_mid_episode_goes_on_alike(mode: AutoresetMode, replica: Any) -> None:
-    env = vector(autoreset_mode=mode, horizon=8, settle_time=0.5)
+    env = vector(autoreset=mode, horizon=8, settle_time=0.5)
     env.reset(seed=0)
     env.step(env.action_space.sample())
     twin = replica(env)
@@ -170,13 +122,6 @@ def test_a_copy_made_in_mid_episode_goes_on_alike(mode: AutoresetMode, replica: 
         actions = env.action_space.sample()
         assert same(env.step(actions), twin.step(actions))
     assert same(env.reset(seed=1), twin.reset(seed=1))
-
-
-def test_max_episode_steps_is_the_length_of_an_episode() -> None:
-    env = vector(max_episode_steps=3)
-    env.reset(seed=0)
-    truncated = [env.step(env.action_space.sample())[3].all() for _ in range(3)]
-    assert truncated == [False, False, True]
 
 
 @names
@@ -205,10 +150,3 @@ def test_every_world_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     assert vector().render() is None
     env.close()
     env.close()
-
-
-def test_many_worlds_by_default_are_the_engines() -> None:
-    assert type(gymnasium.make_vec(TEAM, 3)) is TeamVectorEnv
-    assert type(gymnasium.make_vec(SOLO, 3)) is SoloVectorEnv
-    assert gymnasium.make_vec(TEAM, 3).num_envs == 3
-    assert posse.scenario_names()

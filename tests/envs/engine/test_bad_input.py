@@ -3,116 +3,98 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import gymnasium
-import hypothesis
 import numpy as np
-import pettingzoo
 import pytest
 from gymnasium.error import ResetNeeded
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.support.adapters import f32
+from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, LONG_NAME, MAKERS, Subject, unchanged
 
 import posse
 
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
+WHOLE = r"must be a whole number in"
 
-MAKERS: dict[str, Any] = {
+ENVIRONMENTS: dict[str, Any] = {
+    "batch": posse.batch,
     "parallel": posse.parallel_env,
     "turns": posse.env,
-    "registry": lambda *a, **k: pettingzoo.make(
-        "parallel", "posse/track-v0", **dict(zip(["scenario"], a, strict=False)), **k
-    ),
-    "team": lambda *a, **k: gymnasium.make(TEAM, **dict(zip(["scenario"], a, strict=False)), **k),
-    "solo": lambda *a, **k: gymnasium.make(SOLO, **dict(zip(["scenario"], a, strict=False)), **k),
-    "team vector": lambda *a, **k: gymnasium.make_vec(TEAM, 2, **dict(zip(["scenario"], a, strict=False)), **k),
-    "solo vector": lambda *a, **k: gymnasium.make_vec(SOLO, 2, **dict(zip(["scenario"], a, strict=False)), **k),
+    "team": lambda scenario="constant", **k: gymnasium.make(TEAM, scenario=scenario, **k),
+    "solo": lambda scenario="constant", **k: gymnasium.make(SOLO, scenario=scenario, **k),
+    "team vector": lambda scenario="constant", **k: gymnasium.make_vec(TEAM, 2, scenario=scenario, **k),
+    "solo vector": lambda scenario="constant", **k: gymnasium.make_vec(SOLO, 2, scenario=scenario, **k),
 }
-makers = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
-GOOD = {f"tracker_{i}": f32([0.5, 0.1 * i]) for i in range(5)}
 
 
-@makers
+@pytest.mark.parametrize("kind", ENVIRONMENTS)
 @pytest.mark.parametrize(
-    ("arguments", "settings", "message"),
+    ("arguments", "message"),
     [
-        (["smrt"], {}, r"unknown scenario 'smrt' \(did you mean .*'smart'"),
-        ([], {"num_tracker": 1}, r"unknown setting 'num_tracker'.*did you mean 'num_trackers'"),
-        ([], {"num_trackers": 0}, r"num_trackers=0 .*\[1, 64\]|num_trackers=0 does not fit"),
-        ([], {"target_speed": 1.0}, r"target_speed=1 must be below tracker_speed=1"),
-        ([], {"formation_spacing": 0.1, "num_trackers": 5}, r"slots .* apart|does not fit"),
-        ([], {"sensing_range": -1.0}, r"sensing_range=-1\.0 .*\(0, 10000\], or be inf"),
-        ([], {"split": "tests"}, r"unknown split 'tests'; splits are: train"),
-        ([], {"seed": -1}, r"seed=-1 must be a whole number"),
-        ([], {"first_world": -1}, r"first_world=-1 must be a whole number"),
-        ([], {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
-        ([], {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
+        ({"scenario": "smrt"}, r"unknown scenario 'smrt' \(did you mean .*'smart'"),
+        ({"num_tracker": 1}, r"unknown setting 'num_tracker'.*did you mean 'num_trackers'"),
+        ({"num_trackers": 0}, r"num_trackers=0"),
+        ({"sensing_range": -1.0}, r"sensing_range=-1\.0 .*\(0, 10000\], or be inf"),
+        ({"split": "tests"}, r"unknown split 'tests'; known: train"),
+        ({"split": np.zeros(2)}, r"unknown split array"),
+        ({"seed": -1}, rf"seed=-1 {WHOLE} \[0, "),
+        ({"seed": True}, rf"seed=True {WHOLE}"),
+        ({"first_world": -1}, rf"first_world=-1 {WHOLE}"),
+        ({"first_world": 2**63}, rf"first_world=9223372036854775808 {WHOLE}"),
     ],
+    ids=str,
 )
-def test_impossible_settings(make: Any, arguments: list[str], settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make(*arguments, **settings)
+def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(posse.ScenarioError, match=message):
+        ENVIRONMENTS[kind](**arguments)
 
 
-@pytest.mark.parametrize("make", [MAKERS["parallel"], MAKERS["turns"]])
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("kind", "arguments", "message"),
     [
-        ({"target": "smart"}, r"target='smart' .*'agent'"),
-        ({"target": "agent", "target_motion": "smart"}, r"exclude each other"),
-        ({"max_cycles": 0}, r"horizon=0"),
-        ({"render_mode": "ansi"}, r"unknown render_mode 'ansi'; modes are: human, rgb_array"),
+        ("batch", {"num_worlds": 0}, rf"num_worlds=0 {WHOLE} \[1, "),
+        ("batch", {"num_worlds": 1.5}, r"num_worlds=1\.5"),
+        ("batch", {"num_worlds": 2**50}, r"num_worlds=1125899906842624 of \d+ bytes each .*: lower it"),
+        ("batch", {"first_world": 2**63 - 1, "num_worlds": 2}, rf"first_world \+ num_worlds - 1=.* {WHOLE}"),
+        ("batch", {"num_threads": 0}, rf"num_threads=0 {WHOLE} \[1, "),
+        ("batch", {"autoreset": "always"}, "unknown autoreset mode 'always'; known: next_step"),
+        ("parallel", {"target": "smart"}, r"target='smart' .*'agent'"),
+        ("parallel", {"max_cycles": 0}, r"horizon=0"),
+        ("parallel", {"max_cycles": 5, "horizon": 6}, "max_cycles and horizon mean the same"),
+        ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
+        ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
+        ("team", {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
+        ("team", {"target": "agent"}, r"'agent' is not possible.*parallel_env"),
+        ("solo vector", {"target_motion": "agent"}, r"'agent' is not possible.*parallel_env"),
+        ("solo", {"num_trackers": 3}, r"num_trackers=3 .*posse/Team-v0"),
+        ("solo vector", {"scenario": "leader-loss"}, "breaks=1"),
+        ("team vector", {"autoreset": "never"}, r"unknown autoreset mode 'never'; known: next_step"),
+        ("team vector", {"max_episode_steps": 0}, r"horizon=0"),
     ],
+    ids=str,
 )
-def test_impossible_settings_of_pettingzoo(make: Any, settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make(**settings)
+def test_impossible_settings_of_some(kind: str, arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(posse.ScenarioError, match=message):
+        ENVIRONMENTS[kind](**arguments)
 
 
-@pytest.mark.parametrize("kind", ["team", "solo", "team vector", "solo vector"])
-def test_a_target_that_is_an_agent_needs_pettingzoo(kind: str) -> None:
-    for settings in ({"target": "agent"}, {"target_motion": "agent"}):
-        with pytest.raises(posse.ScenarioError, match=r"'agent' is not possible.*parallel_env"):
-            MAKERS[kind](**settings)
+@pytest.mark.parametrize("whole", [np.uint8, np.int16, np.int64, np.uint64])
+def test_whole_numbers_of_numpy_are_whole_numbers(whole: Any) -> None:
+    batch = posse.batch("constant", whole(2), seed=whole(3), first_world=whole(1), num_threads=whole(1))
+    plain = posse.batch("constant", 2, seed=3, first_world=1, num_threads=1)
+    np.testing.assert_array_equal(batch.reset(), plain.reset())
+    assert batch.copies(whole(100), seed=whole(5)).num_worlds == 200
+    np.testing.assert_array_equal(batch.reset(seed=whole(4)), plain.reset(seed=4))
+    assert posse.batch("constant", whole(2), first_world=2**63 - 2).num_worlds == 2
+    with pytest.raises(posse.ScenarioError, match=r"num_worlds=.*True"):
+        posse.batch("constant", np.True_)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("kind", ["solo", "solo vector"])
-def test_a_solo_is_for_one_tracker(kind: str) -> None:
-    with pytest.raises(posse.ScenarioError, match=r"num_trackers=3 .*posse/Team-v0"):
-        MAKERS[kind](num_trackers=3)
-    with pytest.raises(posse.ScenarioError, match="breaks=1"):
-        MAKERS[kind]("leader-loss")
-
-
-def test_impossible_settings_of_vector_environments() -> None:
-    with pytest.raises(ValueError, match=r"unknown autoreset_mode 'Never'.*'NextStep'"):
-        gymnasium.make_vec(TEAM, 2, autoreset_mode="Never")
-    with pytest.raises(ValueError, match=r"num_worlds=0"):
-        gymnasium.make_vec(TEAM, 0)
-    with pytest.raises(ValueError, match=r"unknown render_mode 'ansi'"):
-        gymnasium.make_vec(TEAM, 2, render_mode="ansi")
-    with pytest.raises(ValueError, match=r"horizon=0"):
-        gymnasium.make_vec(TEAM, 2, max_episode_steps=0)
-
-
-BAD_ACTIONS: list[tuple[Any, str]] = [
-    (f32([0, np.nan]), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
-    (f32([np.inf, 0]), r"tracker_3: speed = inf"),
-    (f32([0, -1.5]), r"tracker_3: turn rate = -1\.5"),
-    ([0.0, 1.0001], r"tracker_3: turn rate = 1\.0001"),
-    (f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
-    (np.float32(0), r"tracker_3 has shape \(\), wanted \(2,\)"),
-    (f32([[0, 0]]), r"tracker_3 has shape \(1, 2\), wanted \(2,\)"),
-    (["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
-    (np.array([1j, 0]), r"tracker_3 must be real numbers"),
-    (None, r"tracker_3 must be real numbers, got None"),
-    ([[0], [0, 1]], r"tracker_3 is not an array"),
-]
-
-
-@hypothesis.settings(deadline=None)
+@settings(deadline=None)
 @given(
     number=st.integers(0, 37 * 5 * 2 - 1),
     value=st.sampled_from([math.nan, math.inf, -math.inf, 1.00001, -1.00001, 3.0]),
@@ -127,221 +109,167 @@ def test_the_first_bad_action_is_named_wherever_it_stands(number: int, value: fl
     e, i, k = np.unravel_index(number, actions.shape)
     with pytest.raises(ValueError, match=rf"actions\[{e}, {i}, {k}\] = "):
         batch.step(actions)
-    actions.reshape(-1)[[max(number, later), number]] = 0.5, math.copysign(1 + 5e-7, value)
-    twin = posse.batch("constant", 37)
-    twin.reset(seed=8)
-    mine = batch.step(actions)[0]
-    np.testing.assert_array_equal(mine, twin.step(actions.clip(-1, 1))[0])
+
+
+BAD_ACTIONS: list[tuple[Any, str]] = [
+    (f32([0, np.nan]), r"tracker_3: turn rate = nan is not a number in \[-1, 1\]"),
+    (f32([np.inf, 0]), r"tracker_3: speed = inf"),
+    ([0.0, 1.0001], r"tracker_3: turn rate = 1\.0001"),
+    (f32([0, 0, 0]), r"tracker_3 has shape \(3,\), wanted \(2,\)"),
+    (f32([[0, 0]]), r"tracker_3 has shape \(1, 2\), wanted \(2,\)"),
+    (["left", "right"], r"tracker_3 must be real numbers, got \['left', 'right'\]"),
+    (None, r"tracker_3 must be real numbers, got None"),
+    ([[0], [0, 1]], r"tracker_3 is not an array"),
+]
 
 
 @pytest.mark.parametrize(("action", "message"), BAD_ACTIONS)
 def test_a_bad_action_names_its_agent(action: Any, message: str) -> None:
     env = posse.parallel_env()
     env.reset(seed=0)
-    before = env.state()
+    before, good = env.state(), dict.fromkeys(env.agents, f32([0, 0]))
     with pytest.raises(ValueError, match=message):
-        env.step({**GOOD, "tracker_3": action})
+        env.step({**good, "tracker_3": action})
     assert np.array_equal(env.state(), before)
-    env.step(GOOD)
-
-
-def test_all_agents_must_act_and_no_others() -> None:
-    env = posse.parallel_env()
-    env.reset(seed=0)
-    before = env.state()
-    without = {agent: action for agent, action in GOOD.items() if agent != "tracker_2"}
+    without = {agent: good[agent] for agent in good if agent != "tracker_2"}
     with pytest.raises(ValueError, match=r"no action for tracker_2.*agents are: tracker_0,"):
         env.step(without)
-    with pytest.raises(ValueError, match=r"unknown agent 'target_0'; agents are: tracker_0,"):
-        env.step({**GOOD, "target_0": np.zeros(2, np.float32)})
     with pytest.raises(ValueError, match=r"unknown agent 'tracker_9'"):
-        env.step({**without, "tracker_9": np.zeros(2, np.float32)})
-    for actions in (np.zeros((5, 2), np.float32), None, [0.0] * 5):
-        with pytest.raises(ValueError, match="dictionary by agent"):
-            env.step(actions)  # type: ignore[arg-type]
-    assert np.array_equal(env.state(), before)
+        env.step({**without, "tracker_9": f32([0, 0])})
+    env.step(good)
 
 
 @pytest.mark.parametrize(
     ("action", "message"),
     [
         (15, r"tracker_3 is 15, outside 0 to 14"),
-        (-1, r"tracker_3 is -1, outside 0 to 14"),
-        (1.0, r"tracker_3 must be a whole number, got 1\.0"),
-        (f32([0, 0]), r"tracker_3 must be a whole number"),
+        (1.0, r"tracker_3 must be whole numbers, got 1\.0"),
         ([3], r"tracker_3 has shape \(1,\), wanted \(\)"),
     ],
 )
 def test_a_bad_discrete_action_names_its_agent(action: Any, message: str) -> None:
     env = posse.parallel_env(discrete_actions=True)
     env.reset(seed=0)
-    before = env.state()
     with pytest.raises(ValueError, match=message):
-        env.step({**dict.fromkeys(GOOD, 2), "tracker_3": action})
-    assert np.array_equal(env.state(), before)
+        env.step({**dict.fromkeys(env.agents, 2), "tracker_3": action})
+    vector = gymnasium.make_vec(TEAM, 3, discrete_actions=True)
+    vector.reset(seed=0)
+    with pytest.raises(ValueError, match=r"actions\[1, 2\] is 15, outside 0 to 14"):
+        vector.step(np.where(np.arange(15).reshape(3, 5) == 7, 15, 0))
 
 
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (np.zeros((4, 2), np.float32), r"shape \(4, 2\), wanted \(5, 2\)"),
-        (np.zeros(10, np.float32), r"shape \(10,\), wanted \(5, 2\)"),
-        (np.full((5, 2), np.nan, np.float32), r"tracker_0: speed = nan"),
-        (np.eye(5, 2) * 1.5, r"tracker_0: speed = 1\.5"),
-        (np.zeros((5, 2), np.complex64), r"tracker_0 must be real numbers"),
-        ("rest", r"shape \(\), wanted"),
-        ([[0, 0]] * 4 + [[0]], r"action is not an array"),
-    ],
-)
-def test_a_bad_action_of_a_team(action: Any, message: str) -> None:
-    env = gymnasium.make(TEAM).unwrapped
-    env.reset(seed=0)
-    before = env.state()  # type: ignore[attr-defined]
-    with pytest.raises(ValueError, match=message):
-        env.step(action)
-    assert np.array_equal(env.state(), before)  # type: ignore[attr-defined]
-    env.step(np.zeros((5, 2), np.float32))
+kinds = pytest.mark.parametrize("kind", MAKERS)
 
 
-def test_a_bad_action_of_a_solo() -> None:
-    env = gymnasium.make(SOLO).unwrapped
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"tracker_0: speed = -2\.0"):
-        env.step(f32([-2, 0]))
-    with pytest.raises(ValueError, match=r"shape \(1, 2\), wanted \(2,\)"):
-        env.step(f32([[0, 0]]))
+def refused(subject: Subject, call: Any, *errors: type[Exception]) -> str:
+    """Return the message of a refused call, after checking that it changed nothing."""
+    before = subject.held()
+    with pytest.raises(errors or ValueError) as caught:
+        call()
+    assert unchanged(before, subject.held())
+    assert 0 < len(str(caught.value)) <= 1000
+    return str(caught.value)
 
 
-def test_bad_actions_of_vector_environments() -> None:
-    env = gymnasium.make_vec(TEAM, 3)
-    env.reset(seed=0)
-    state = env.batch.save()  # type: ignore[attr-defined]
-    good = np.zeros((3, 5, 2), np.float32)
-    bad = good.copy()
-    bad[2, 4, 1] = np.nan
-    for actions, message in (
-        (bad, r"actions\[2, 4, 1\] = nan is not a number in \[-1, 1\]"),
-        (good[:2], r"shape \(2, 5, 2\), wanted \(3, 5, 2\)"),
-        (good.astype(str), r"real numbers"),
-        (None, r"shape \(\), wanted"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            env.step(actions)
-    for mine, other in zip(
-        env.batch.arrays,  # type: ignore[attr-defined]
-        state.arrays,
-        strict=True,
-    ):
-        assert np.array_equal(mine, other)
-    discrete = gymnasium.make_vec(TEAM, 3, discrete_actions=True)
-    discrete.reset(seed=0)
-    numbers = np.zeros((3, 5), np.int64)
-    numbers[1, 2] = 15
-    with pytest.raises(ValueError, match=r"actions\[1, 2\] = 15 lies outside 0 to 14"):
-        discrete.step(numbers)
-    with pytest.raises(ValueError, match=r"whole numbers, got an array of float64"):
-        discrete.step(np.zeros((3, 5)))
+@kinds
+def test_what_is_refused_changes_nothing(kind: str) -> None:
+    subject = Subject(kind)
+    good = subject.good_action(np.random.default_rng(1))
+    refused(subject, lambda: subject.reset(seed=-1))
+    assert "step before reset" in refused(subject, lambda: subject.step(good), ResetNeeded)
+    subject.reset(seed=1)
+    for seed in BAD_SEEDS:
+        refused(subject, lambda seed=seed: subject.reset(seed=seed))
+    for options in BAD_OPTIONS:
+        refused(subject, lambda options=options: subject.reset(options=options))
+    for action in subject.bad_actions():
+        refused(subject, lambda action=action: subject.step(action))
+    subject.step(good)
 
 
-def test_a_step_needs_an_episode() -> None:
-    parallel = posse.parallel_env(max_cycles=1)
-    team = gymnasium.make(TEAM, horizon=1, settle_time=0.1).unwrapped
-    solo = gymnasium.make(SOLO, horizon=1, settle_time=0.1).unwrapped
-    rest = np.zeros((5, 2), np.float32)
-    cases: list[tuple[Any, Any]] = [(parallel, GOOD), (team, rest), (solo, rest[0])]
-    for env, action in cases:
-        with pytest.raises(ResetNeeded, match="step before reset"):
-            env.step(action)
-        env.reset()
-        env.step(action)
-        with pytest.raises(ResetNeeded, match="step after the end of the episode"):
-            env.step(action)
-        env.reset()
-        env.step(action)
-
-
-def test_a_vector_step_needs_an_episode() -> None:
-    env = gymnasium.make_vec(TEAM, 2, max_episode_steps=1, autoreset_mode="Disabled")
-    rest = np.zeros((2, 5, 2), np.float32)
-    with pytest.raises(ResetNeeded, match="before reset"):
-        env.step(rest)
-    env.reset()
-    env.step(rest)
-    with pytest.raises(ResetNeeded, match="after the end of world 0 and 1 more"):
-        env.step(rest)
-
-
-def test_state_and_pictures_need_a_reset() -> None:
-    for env in (posse.parallel_env(), gymnasium.make(TEAM).unwrapped):
-        with pytest.raises(ResetNeeded, match="state before reset"):
-            env.state()  # type: ignore[union-attr]
-        with pytest.raises(ResetNeeded, match="render before reset"):
-            env.render()
+@kinds
+@pytest.mark.parametrize("seed", [2**63 - 1, np.int64(2**40)])
+def test_seeds_of_63_bits_are_seeds(kind: str, seed: Any) -> None:
+    one, other, nearby = Subject(kind), Subject(kind), Subject(kind)
+    one.reset(seed=seed)
+    other.reset(seed=int(seed))
+    nearby.reset(seed=int(seed) % 2**32)
+    drawn = [subject.batch.state["tracker_x"] for subject in (one, other, nearby)]
+    assert np.array_equal(drawn[0], drawn[1])
+    assert not np.array_equal(drawn[0], drawn[2])
 
 
 @pytest.mark.parametrize("kind", ["parallel", "team", "solo"])
+def test_a_step_needs_an_episode(kind: str) -> None:
+    subject = Subject(kind)
+    good = subject.good_action(np.random.default_rng(1))
+    for call in (subject.env.state, subject.env.render):
+        with pytest.raises(ResetNeeded, match="before reset"):
+            call()
+    subject.reset()
+    for _ in range(subject.env.scenario.horizon):
+        subject.step(good)
+    assert "after the end of the episode" in refused(subject, lambda: subject.step(good), ResetNeeded)
+    subject.reset()
+    subject.step(good)
+
+
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("options", "word"),
     [
-        ({"seed": -1}, r"seed=-1"),
-        ({"seed": 1.5}, r"seed=1\.5"),
-        ({"options": {"tracker_poses": 1}}, r"unknown option 'tracker_poses'; options are"),
-        ({"options": {"reset_mask": np.array([True])}}, r"unknown option 'reset_mask'"),
-        ({"options": {"target_pose": [0, 0]}}, r"target_pose has shape \(2,\)"),
-        ({"options": {"target_pose": [0, 0, np.nan]}}, r"target_pose must be finite"),
-        ({"options": {"target_pose": [1e6, 0, 0]}}, r"target_pose lies up to"),
-    ],
-)
-def test_a_bad_reset_changes_nothing(kind: str, arguments: dict[str, Any], message: str) -> None:
-    env = MAKERS[kind]()
-    env = env if kind == "parallel" else env.unwrapped
-    env.reset(seed=0)
-    before = env.state()
-    with pytest.raises(ValueError, match=message):
-        env.reset(**arguments)
-    assert np.array_equal(env.state(), before)
-    # Nor what comes next.
-    twin = MAKERS[kind]()
-    twin.reset(seed=0)
-    env.reset()
-    twin.reset()
-    other = twin if kind == "parallel" else twin.unwrapped
-    assert np.array_equal(env.state(), other.state())
-
-
-@pytest.mark.parametrize("kind", ["parallel", "turns", "team", "solo", "team vector"])
-def test_a_target_without_room_to_turn_is_refused_and_changes_nothing(kind: str) -> None:
-    made = [MAKERS[kind]("search", num_trackers=1, start_distance=(2.0, 4.0)) for _ in range(2)]
-    env, twin = ((e if kind in ("parallel", "turns") else e.unwrapped) for e in made)
-    env.reset(seed=0)
-    twin.reset(seed=0)
-    facing_the_wall = {"target_pose": [9.5, 1.0, 0.0], "tracker_pose": [[0.0, 0.0, 0.0]]}
-    with pytest.raises(
-        ValueError,
-        match=r"target_pose \(9\.5, 1, 0\) leaves the target no room to turn: a disc of 0\.75 m .*"
-        r"0\.5 m are: move it or turn it",
-    ):
-        env.reset(options=facing_the_wall)
-    for one in (env, twin):
-        one.reset()
-    if kind == "team vector":
-        assert np.array_equal(env.batch.worlds["x"], twin.batch.worlds["x"])
-    else:
-        assert np.array_equal(env.state(), twin.state())
-    along_the_wall = {**facing_the_wall, "target_pose": [9.5, 1.0, np.pi / 2]}
-    env.reset(options=along_the_wall)
-
-
-def test_a_bad_vector_reset() -> None:
-    env = gymnasium.make_vec(TEAM, 2)
-    with pytest.raises(ResetNeeded, match="without reset_mask"):
-        env.reset(options={"reset_mask": np.array([True, False])})
-    env.reset(seed=0)
-    for options, message in (
+        ({"poses": 1}, "unknown option 'poses'; options are: reset_mask, tracker_pose, target_pose"),
+        ({"target_pose": [0.0, 0.0]}, r"target_pose has shape \(2,\)"),
+        ({"target_pose": [0.0, math.nan, 0.0]}, "target_pose must be finite"),
+        ({"target_pose": [1e6, 0.0, 0.0]}, "from the origin"),
+        ({"tracker_pose": np.zeros((5, 3))}, "tracker_1 of world 0 would start in a wall, an obstacle or another"),
+        ({"tracker_pose": [[11.95, k, 0] for k in range(5)]}, "tracker_0 of world 0 would start in a wall"),
+        ({"target_pose": [11.5, 0.0, 0.0]}, r"\(11.5, 0, 0\) leaves the target no room to turn: a disc of .* m"),
         ({"reset_mask": [True]}, r"reset_mask must be a bool array of shape \(2,\)"),
-        ({"mask": 1}, "unknown option 'mask'"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            env.reset(options=options)
-    with pytest.raises(ValueError, match="seed must be one number"):
-        env.reset(seed=[1, 2])  # type: ignore[arg-type]
+        ({"reset_mask": np.array([1, 0])}, "reset_mask must be a bool"),
+    ],
+    ids=str,
+)
+def test_bad_options_change_nothing(options: dict[str, Any], word: str) -> None:
+    subject = Subject("batch")
+    subject.env = subject.batch = posse.batch("field", 2, num_obstacles=0, seed=9)
+    subject.reset()
+    assert re.search(word, refused(subject, lambda: subject.reset(seed=1, options=options)))
+    assert subject.batch.seed == 9
+
+
+def test_a_robot_starts_outside_obstacles_and_may_start_beside_a_wall() -> None:
+    batch = posse.batch("obstacles", 1, seed=3)
+    batch.reset()
+    obstacle = batch.arrays.obstacle[0, 0]
+    poses = np.stack([batch.state["tracker_x"][0], batch.state["tracker_y"][0], np.zeros(5)], -1)
+    poses[2, :2] = obstacle["x"], obstacle["y"]
+    with pytest.raises(ValueError, match=r"tracker_2 of world 0 would start in"):
+        batch.reset(seed=3, options={"tracker_pose": poses})
+    along = {"tracker_pose": [[0.0, 0.0, 0.0]], "target_pose": [9.5, 1.0, np.pi / 2]}
+    posse.batch("search", 1, num_trackers=1, start_distance=(2.0, 4.0)).reset(options=along)
+
+
+def test_a_mask_that_chooses_no_world_starts_none() -> None:
+    batch = posse.batch("obstacles", 2, seed=1)
+    with pytest.raises(ResetNeeded, match="without reset_mask"):
+        batch.reset(options={"reset_mask": np.array([True, False])})
+    batch.reset()
+    before = {name: array.copy() for name, array in batch.state.items()}
+    batch.reset(options={"reset_mask": np.zeros(2, np.bool_), "target_pose": [0.0, 0.0, 0.0]})
+    for name, array in batch.state.items():
+        np.testing.assert_array_equal(array, before[name], err_msg=name)
+
+
+def test_bad_snapshots_and_copies() -> None:
+    subject = Subject("batch")
+    batch, other = subject.env, posse.batch("constant", 3)
+    for call in (batch.save, batch.observe, lambda: batch.copies(1)):
+        assert "before reset: call reset() first" in refused(subject, call, ResetNeeded)
+    batch.reset()
+    for bad in (None, 5, LONG_NAME, batch.state):
+        assert "what save() returned" in refused(subject, lambda bad=bad: batch.restore(bad))
+    for count in (0, 2**63, 1.0, None):
+        refused(subject, lambda count=count: batch.copies(count))
+    for into in (5, LONG_NAME, batch, other):
+        refused(subject, lambda into=into: batch.copies(1, into=into))
+    assert not other._started

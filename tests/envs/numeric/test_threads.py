@@ -1,300 +1,145 @@
-"""Threads: every world is processed once, and errors leave no unfinished work."""
+"""Threads: every world is done once, results do not depend on them, and an error leaves no work behind."""
 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
+import signal
 import threading
 import time
-from collections.abc import Callable
-from pathlib import Path
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 import posse
-from posse.numeric import Blocks, divide, kernel, run_threads, threads, worlds_of
-from posse.numeric.blocks import END, NEXT, SIZE
+from posse.numeric import UNCOMPILED, Blocks, divide, kernel, over_worlds, worlds_of
+
+threaded = pytest.mark.skipif(UNCOMPILED, reason="plain Python runs in one thread")
 
 
 @kernel
 def count(times: npt.NDArray[np.int64], thread: int, blocks: Blocks) -> int:
-    """Count how often each world is processed; return the number processed by this thread."""
-    worlds = 0
+    """Count how often each world is done; return the thread."""
     for e in worlds_of(thread, blocks):
         times[e] += 1
-        worlds += 1
-    return worlds
+    return thread
 
 
-class Ledger:
-    """Counts how often each world is processed, and by which thread; some threads start late."""
-
-    def __init__(self, worlds: int, late: tuple[int, ...] = ()) -> None:
-        self.times = np.zeros(worlds, np.int64)
-        self.late = late
-        self.shares: dict[int, int] = {}
-
-    def work(self, thread: int, blocks: Blocks) -> int:
-        if thread in self.late:
-            time.sleep(0.03)
-        self.shares[thread] = count(self.times, thread, blocks)
-        return self.shares[thread]
+def check(worlds: int = 3000, threads: int = 3) -> None:
+    times = np.zeros(worlds, np.int64)
+    assert over_worlds(count, (times,), worlds, 100, threads) == list(range(1 if UNCOMPILED else threads))
+    assert (times == 1).all()
 
 
-def workers() -> list[threading.Thread]:
-    return [thread for thread in threading.enumerate() if thread.name == "posse"]
+@pytest.mark.parametrize("threads", [1, 2, 3, 9])
+@pytest.mark.parametrize("worlds", [72, 1000, 1024])
+def test_every_world_is_done_once(worlds: int, threads: int) -> None:
+    check(worlds, threads)
+    assert (divide(worlds, threads)[:-1] % 8 == 0).all(), "eight worlds are observed together"
 
 
-def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.005)
-    return condition()
+@threaded
+def test_few_worlds_are_done_by_the_caller() -> None:
+    assert over_worlds(lambda thread, blocks: threading.current_thread(), (), 100, 4) == [threading.current_thread()]
 
 
-@pytest.fixture
-def no_workers() -> None:
-    """Begin without workers, as a new process does."""
-    threads._end(threads._idle)
-    assert wait_for(lambda: not workers())
+def test_results_do_not_depend_on_the_number_of_threads() -> None:
+    batches = [posse.batch("smart", 700, num_threads=threads) for threads in (1, 2, 5)]
+    results: list[list[npt.NDArray[Any]]] = [[batch.reset(seed=1)] for batch in batches]
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        actions = rng.uniform(-1, 1, batches[0].action_shape).astype(np.float32)
+        for batch, result in zip(batches, results, strict=True):
+            result += batch.step(actions)[:4]
+    for result in results[1:]:
+        for mine, theirs in zip(results[0], result, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
 
 
-@pytest.mark.usefixtures("no_workers")
-@pytest.mark.parametrize("looks", [0, threads._LOOKS])
-@pytest.mark.parametrize("wanted", [1, 2, 3, 9])
-def test_every_world_is_done_once(wanted: int, looks: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "_LOOKS", looks)  # spinning, or blocked
-    monkeypatch.setattr(threads, "MOST_THREADS", 10)
-    for worlds in (1, 2, 7, 1000):
-        for pause in (0.0, 0.02):  # workers still spin, or are blocked
-            time.sleep(pause)
-            ledger = Ledger(worlds)
-            assert sum(run_threads(ledger.work, worlds, wanted)) == worlds
-            assert (ledger.times == 1).all()
-            assert set(ledger.shares) == set(range(wanted))
-    assert len(workers()) == wanted - 1
-
-
-@pytest.mark.parametrize("late", [(0,), (1,), (0, 2), (1, 2)])
-def test_nobody_waits_for_a_slow_thread(late: tuple[int, ...]) -> None:
-    ledger = Ledger(1000, late)
-    assert sum(run_threads(ledger.work, 1000, 3)) == 1000
-    assert (ledger.times == 1).all()
-    assert all(ledger.shares[thread] == 0 for thread in late)
-
-
-def test_a_thread_begins_with_worlds_of_its_own() -> None:
-    """Its core has cached them in the previous step."""
-    begun = {}
-
-    @kernel
-    def first(thread: int, blocks: Blocks) -> int:
-        for e in worlds_of(thread, blocks):
-            return e
-        return -1
+@threaded
+@pytest.mark.parametrize("failing", [0, 1])
+def test_an_error_propagates_when_no_thread_is_at_work(failing: int) -> None:
+    ended = []
 
     def work(thread: int, blocks: Blocks) -> None:
-        begun[thread] = first(thread, blocks)
-
-    run_threads(work, 90, 3)
-    assert begun == {0: 0, 1: 30, 2: 60}
-
-
-@pytest.mark.parametrize(("worlds", "wanted"), [(1024, 2), (1000, 3), (8192, 8), (513, 4)])
-def test_blocks_of_many_worlds_are_eights(worlds: int, wanted: int) -> None:
-    """Eight are observed together; only the end of all may be less."""
-    blocks = divide(worlds, wanted)
-    assert (blocks[:, NEXT] % 8 == 0).all()
-    assert (blocks[:, SIZE] % 8 == 0).all()
-    np.testing.assert_array_equal(blocks[1:, NEXT], blocks[:-1, END])
-    assert blocks[-1, END] == worlds
-
-
-def test_no_block_is_taken_twice_however_many_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posse.numeric.blocks._BLOCKS_EACH", 20_000)
-    divide.cache_clear()
-    worlds = 100_003
-    try:
-        for _ in range(30):
-            ledger = Ledger(worlds)
-            assert sum(run_threads(ledger.work, worlds, 4)) == worlds
-            assert (ledger.times == 1).all()
-    finally:
-        divide.cache_clear()
-
-
-@pytest.mark.parametrize("thread_that_fails", [0, 1])
-def test_an_error_reaches_the_caller_and_the_next_work_is_done(thread_that_fails: int) -> None:
-    def fail(thread: int, blocks: Blocks) -> int:
-        if thread == thread_that_fails:
+        if thread == failing:
             raise ArithmeticError(f"thread {thread}")
-        return 0
-
-    with pytest.raises(ArithmeticError, match=f"thread {thread_that_fails}"):
-        run_threads(fail, 100, 2)
-    ledger = Ledger(100)
-    assert sum(run_threads(ledger.work, 100, 2)) == 100
-    assert (ledger.times == 1).all()
-    assert set(ledger.shares) == {0, 1}
-
-
-def test_an_error_goes_on_when_the_workers_have_done_all_worlds() -> None:
-    begun, times = threading.Event(), np.zeros(100, np.int64)
-
-    def work(thread: int, blocks: Blocks) -> int:
-        if thread == 0:
-            begun.wait(5)
-            raise KeyboardInterrupt
-        begun.set()
         time.sleep(0.05)
-        return count(times, thread, blocks)
-
-    with pytest.raises(KeyboardInterrupt):
-        run_threads(work, 100, 2)
-    assert (times == 1).all()
-
-
-def test_a_second_interrupt_does_not_cut_the_wait_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also for a third exception, raised by ``time.sleep`` while a worker is busy."""
-    ended, interrupts, sleep = [], 0, time.sleep
-
-    def interrupted(seconds: float) -> None:
-        nonlocal interrupts
-        sleep(seconds)
-        if threading.current_thread() is threading.main_thread():
-            interrupts += 1
-            raise KeyboardInterrupt
-
-    def work(thread: int, blocks: Blocks) -> int:
-        if thread == 0:
-            raise ArithmeticError
-        sleep(0.05)
         ended.append(thread)
+
+    with pytest.raises(ArithmeticError, match=f"thread {failing}"):
+        over_worlds(work, (), 3000, 4, 2)
+    before = list(ended)
+    time.sleep(0.1)
+    assert ended == before
+    check()
+
+
+@threaded
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals of POSIX")
+def test_an_interrupt_waits_for_the_threads_wherever_it_comes() -> None:
+    """Nothing is written afterwards, and all shares are done, but for an interrupt at a share's very beginning."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    @kernel
+    def slow(times: npt.NDArray[np.int64], thread: int, blocks: Blocks) -> int:
+        for _ in range(300):
+            for e in worlds_of(thread, blocks):
+                times[e] += 1
         return 0
 
-    monkeypatch.setattr(time, "sleep", interrupted)
-    with pytest.raises(ArithmeticError):
-        run_threads(work, 100, 2)
-    assert ended == [1]
-    assert interrupts > 1
+    interrupted, whole, rng = 0, 0, np.random.default_rng(0)
+    slow(np.zeros(8, np.int64), 0, divide(8, 1))
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        for _ in range(100):
+            times = np.zeros(3000, np.int64)
+            try:
+                signal.setitimer(signal.ITIMER_REAL, rng.uniform(1e-5, 1e-3))
+                over_worlds(slow, (times,), 3000, 4, 3)
+                time.sleep(2e-3)
+            except KeyboardInterrupt:
+                interrupted += 1
+            then = times.copy()
+            time.sleep(1e-4)
+            np.testing.assert_array_equal(times, then)
+            assert set(times) <= {0, 300}
+            whole += len(set(times)) == 1
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert interrupted == 100
+    assert whole > 90
 
 
-def test_without_a_compiler_the_caller_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads, "UNCOMPILED", True)
-    ledger = Ledger(100)
-    assert run_threads(ledger.work, 100, 3) == [100]
-    assert ledger.shares == {0: 100}
-
-
-@pytest.mark.usefixtures("no_workers")
-def test_workers_that_an_error_left_behind_end_and_new_ones_come() -> None:
-    def fail(thread: int, blocks: Blocks) -> int:
-        raise ArithmeticError
-
-    for _ in range(20):
-        with pytest.raises(ArithmeticError) as kept:  # its traceback knows the workers
-            run_threads(fail, 10, 2)
-        assert kept.value.__traceback__ is not None
-        ledger = Ledger(10)
-        run_threads(ledger.work, 10, 2)
-        assert set(ledger.shares) == {0, 1}
-        assert wait_for(lambda: len(workers()) == 1)
-
-
-def test_many_callers_at_once_are_all_served_by_few_workers() -> None:
-    ledgers = [Ledger(500, late=(0,)) for _ in range(8)]
-    callers = [threading.Thread(target=run_threads, args=(ledger.work, 500, 2)) for ledger in ledgers]
-    for caller in callers:
-        caller.start()
-    most = len(workers())
-    for caller in callers:
-        caller.join()
-    assert all((ledger.times == 1).all() for ledger in ledgers)
-    assert most <= max(threads.MOST_THREADS - 1, 8)
-
-
-PROLOGUE = """
-import atexit, os, threading, time
-
-workers = []
-
-@atexit.register  # before posse, so called after it
-def report():
-    if workers:
-        time.sleep(0.05)  # from the end of its work to the end of a thread
-        os.write(1, str([t.is_alive() for t in workers]).encode())
-
-import numpy as np
-from posse.numeric import kernel, run_threads, worlds_of
-
-@kernel
-def count(times, thread, blocks):
-    for e in worlds_of(thread, blocks):
-        times[e] += 1
-    return 0
-
-def done(worlds=100):
-    times = np.zeros(worlds, np.int64)
-    served = set()
-    def work(thread, blocks):
-        served.add(thread)
-        return count(times, thread, blocks)
-    run_threads(work, worlds, 3)
-    assert (times == 1).all()
-    return len(served)
-"""
-
-
-def run_python(code: str, tmp_path: Path) -> str:
-    script = tmp_path / "script.py"
-    script.write_text(PROLOGUE + code)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)], capture_output=True, text=True, check=False, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def test_callers_at_once_and_in_daemon_threads_are_served() -> None:
+    with ThreadPoolExecutor(8) as callers:
+        for call in [callers.submit(check) for _ in range(50)]:
+            call.result()
+    failed: list[BaseException] = []
+    daemon = threading.Thread(target=check, daemon=True)
+    threading.excepthook, hook = (lambda args: failed.append(args.exc_value or SystemExit())), threading.excepthook
+    daemon.start()
+    daemon.join()
+    threading.excepthook = hook
+    assert not failed
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_forked_process_has_workers_of_its_own(tmp_path: Path) -> None:
-    said = run_python(
-        """
-assert done() == 3
-child = os.fork()
-if child == 0:
-    alone = threading.active_count()
-    served = done()
-    os.write(1, f"{alone} {served} {threading.active_count()}".encode())
-    os._exit(0)
-assert os.waitpid(child, 0)[1] == 0
-assert done() == 3
-""",
-        tmp_path,
-    )
-    assert said == "1 3 3"
-
-
-@pytest.mark.parametrize("pause", [0.0, 0.2])
-def test_a_process_ends_after_its_workers(pause: float, tmp_path: Path) -> None:
-    """They spin still, or are blocked."""
-    said = run_python(
-        f"""
-done()
-workers.extend(t for t in threading.enumerate() if t.name == "posse")
-time.sleep({pause})
-""",
-        tmp_path,
-    )
-    assert said == "[False, False]"
-
-
-def test_memory_of_observations_is_used_again_with_threads_too() -> None:
-    """Workers keep no references to a finished step."""
-    batch = posse.batch("smart", 600, num_threads=2)
-    batch.reset(seed=0)
-    actions = np.zeros(batch.action_shape, np.float32)
-    places = {batch.step(actions)[0].ctypes.data for _ in range(20)}
-    assert len(places) == 1
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    check()
+    child = os.fork()
+    if child == 0:
+        try:
+            signal.alarm(20)
+            check()
+            os._exit(0)
+        finally:
+            os._exit(1)
+    assert os.waitpid(child, 0)[1] == 0
+    check()

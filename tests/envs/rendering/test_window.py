@@ -1,109 +1,111 @@
-"""Windows, displays and what cannot be drawn."""
+"""The window of the mode "human": pause, one step, speed, close; in anybody's loop."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from typing import Any
+import threading
+import time
+from collections.abc import Mapping
 
 import numpy as np
+import pygame
 import pytest
-from gymnasium.error import ResetNeeded
-from tests.support.drawing import SIZE, worlds
 
 import posse
+from posse.rendering.canvas import Window
 from posse.rendering.renderer import Renderer
 
 
-def test_importing_the_package_does_not_load_pygame() -> None:
-    code = "import sys, posse, posse.rendering.renderer; print('pygame' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False"]
-
-
-def test_frames_need_no_display() -> None:
-    code = (
-        "import posse, pygame; from posse.rendering.renderer import Renderer;"
-        "b = posse.batch('smart'); b.reset();"
-        "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "(640, 640, 3) False"
-
-
-def test_a_window_shows_the_frame_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
-    import pygame
-
+@pytest.fixture(autouse=True)
+def _no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    batch = worlds()
-    window, array = Renderer(batch.scenario, "human", SIZE), Renderer(batch.scenario, size=SIZE)
-    try:
-        assert window.draw(batch) is None
-        surface = pygame.display.get_surface()
-        assert surface is not None
-        shown = pygame.surfarray.array3d(surface).swapaxes(0, 1)
-        np.testing.assert_array_equal(shown, array.draw(batch))
-    finally:
-        window.close()
-    assert not pygame.display.get_init()
-    assert window.closed
-    window.close()
 
 
-@pytest.mark.parametrize("event", ["QUIT", "KEYDOWN"])
-def test_a_window_that_the_user_closes_stays_closed(event: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    import pygame
+def press(*keys: int) -> None:
+    for key in keys:
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key))
 
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    batch = worlds()
-    renderer = Renderer(batch.scenario, "human", SIZE)
-    renderer.draw(batch)
-    assert not renderer.closed
-    settings = {"key": pygame.K_ESCAPE} if event == "KEYDOWN" else {}
-    pygame.event.post(pygame.event.Event(getattr(pygame, event), settings))
-    renderer.draw(batch)
+
+def opened(keys: Mapping[str, str] | None = None) -> tuple[Renderer, Window, posse.Batch]:
+    batch = posse.batch("constant", 1, seed=3)
+    batch.reset()
+    renderer = Renderer(batch.scenario, "human", (400, 300), keys=keys)
+    assert renderer.window is not None
+    return renderer, renderer.window, batch
+
+
+def test_a_window_shows_the_frame_above_a_line_with_its_keys() -> None:
+    renderer, _, batch = opened()
+    assert renderer.draw(batch) is None
+    surface = pygame.display.get_surface()
+    assert surface is not None
+    shown = pygame.surfarray.array3d(surface).swapaxes(0, 1)
+    frame = Renderer(batch.scenario, size=(400, 300)).draw(batch)
+    assert frame is not None
+    np.testing.assert_array_equal(shown[:300], frame)
+    assert (shown[300:] < 200).any()
+    renderer.close()
     assert renderer.closed
     assert not pygame.display.get_init()
-    assert renderer.draw(batch) is None
-    assert not pygame.display.get_init()
-
-
-def test_without_a_display_the_error_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "no such driver")
-    batch = worlds()
-    with pytest.raises(RuntimeError, match=r"no window can be opened.*render_mode='rgb_array'"):
-        Renderer(batch.scenario, "human").draw(batch)
-
-
-def test_a_closed_renderer_says_so() -> None:
-    batch = worlds()
-    renderer = Renderer(batch.scenario)
     renderer.close()
-    with pytest.raises(ValueError, match="closed: make a new one"):
+
+
+def test_the_window_of_an_environment_can_be_paused_stepped_and_closed() -> None:
+    env = posse.parallel_env("constant", render_mode="human")
+    env.reset(seed=0)
+    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+    press(pygame.K_SPACE, pygame.K_s, pygame.K_s)
+    env.step(actions)  # paused, and one step
+    env.step(actions)  # one more
+    for key in (pygame.K_s, pygame.K_SPACE):  # pressed after 0.3 s, until when the window stays
+        timer, began = threading.Timer(0.3, press, (key,)), time.monotonic()
+        timer.start()
+        env.step(actions)
+        assert time.monotonic() - began > 0.25
+        timer.join()
+    env.step(actions)  # goes on by itself
+    press(pygame.K_SPACE, pygame.K_ESCAPE)
+    env.step(actions)
+    assert not pygame.display.get_init()
+    env.step(actions)  # without a window
+    assert env.render() is None
+    assert not pygame.display.get_init()
+    env.close()
+
+
+def test_speed_is_that_of_the_world_and_can_be_changed() -> None:
+    renderer, window, batch = opened()
+    for keys, speed in (((pygame.K_MINUS,), 0.5), ((pygame.K_EQUALS,) * 6, 8.0), ((pygame.K_MINUS,) * 3, 1.0)):
+        press(*keys)
+        for _ in range(6):  # at the highest speed, one in six is shown
+            renderer.draw(batch)
+        assert window.speed == speed
+    began = time.monotonic()
+    for _ in range(6):  # of 0.1 s each; the first may be shorter
         renderer.draw(batch)
+    assert time.monotonic() - began > 0.4
+    renderer.close()
 
 
-@pytest.mark.parametrize("mode", ["ansi", "", None])
-def test_an_unknown_mode_is_named(mode: Any) -> None:
-    with pytest.raises(ValueError, match=f"unknown render mode {mode!r}.*human, rgb_array"):
-        Renderer(posse.get_scenario("smart"), mode)
+def test_the_callers_keys_end_a_pause_and_are_told() -> None:
+    renderer, window, batch = opened({"n": "next"})
+    press(pygame.K_x, pygame.K_SPACE, pygame.K_n)
+    renderer.draw(batch)
+    assert window.paused
+    assert window.pressed == {"x", "n"}
+    assert window.held("x", "y") == {"x"}
+    press(pygame.K_s)
+    renderer.draw(batch)
+    assert not window.pressed
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    renderer.draw(batch)
+    assert renderer.closed
 
 
-@pytest.mark.parametrize("size", [(100, 400), (400,), (400.0, 400)])
-def test_an_impossible_size_is_named(size: Any) -> None:
-    with pytest.raises(ValueError, match=r"size=.*at least 200 px"):
-        Renderer(posse.get_scenario("smart"), size=size)
-
-
-def test_what_cannot_be_drawn_is_named() -> None:
-    batch = posse.batch("smart", 2)
-    renderer = Renderer(batch.scenario)
-    with pytest.raises(ResetNeeded, match="call reset"):
-        renderer.draw(batch)
-    batch.reset()
-    for world in (2, -1):
-        with pytest.raises(ValueError, match=f"world={world} is not in the batch.*0 to 1"):
-            renderer.draw(batch, world)
-    other = worlds("constant")
-    with pytest.raises(ValueError, match="'constant' does not fit a renderer of 'smart'"):
-        renderer.draw(other)
+@pytest.mark.parametrize("driver", [None, "no such driver"])
+def test_without_a_display_the_error_says_what_to_do(driver: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    if driver is not None:
+        monkeypatch.setenv("SDL_VIDEODRIVER", driver)
+    with pytest.raises(RuntimeError, match=r"no window can be opened.*render_mode='rgb_array'"):
+        opened()

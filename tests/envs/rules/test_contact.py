@@ -76,7 +76,7 @@ def test_walls_hold(speed: float) -> None:
     np.testing.assert_allclose(reached, 10 / 2 - 0.15, atol=0.001)
     assert (reached < 4.85).all()
     assert state["world_contacts_obstacle"] == 4, "once each, though all kept pushing"
-    assert (infos["reward_terms"]["contact"] == 0).all()
+    assert (infos["reward/contact"] == 0).all()
 
 
 def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
@@ -98,7 +98,7 @@ def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
         infos = act(batch, *actions)
         w = batch.worlds[0]
         counts.append((int(w.contacts_tracker), int(w.contacts_target), int(w.contacts_obstacle)))
-        assert infos["reward_terms"]["contact"].shape == (1, 3)
+        assert infos["reward/contact"].shape == (1, 3)
     assert counts == [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 0), (1, 1, 0), (2, 1, 0), (2, 1, 0)]
 
 
@@ -128,7 +128,7 @@ def test_a_robot_that_is_far_from_all_is_swept_as_soon_as_it_matters() -> None:
                 episode.follow(one_world(state, e))  # what touched at the start is not of interest
                 continue
             episode.follow(one_world(state, e))
-            np.testing.assert_array_equal(infos["reward_terms"]["contact"][e], episode.onsets)
+            np.testing.assert_array_equal(infos["reward/contact"][e], episode.onsets)
 
 
 def test_the_least_gap_is_to_anything_however_slow_the_robots() -> None:

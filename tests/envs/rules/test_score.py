@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.adapters import part
 from tests.support.reference.recordings import CASES, case_name, record
 from tests.support.reference.score import Episode, slots
 from tests.support.reference.state import one_world, positions, snapshot
@@ -83,7 +84,7 @@ def test_the_safe_score_counts_no_step_from_the_first_contact_on() -> None:
     assert scores[first] == pytest.approx(0.8)
     assert scores[-1] == 1.0
     assert not touches[-1]
-    metrics = infos["metrics"]
+    metrics = part(infos, "metrics/")
     assert metrics["score"][0] == pytest.approx(sum(scores) / 80)
     assert metrics["safe_score"][0] == pytest.approx(sum(scores[:first]) / 80)
     assert metrics["contact_free"][0] == 0.0
@@ -96,7 +97,7 @@ def test_the_broken_one_is_not_counted_and_the_others_recover() -> None:
     for step in range(100):
         infos = batch.step(follow)[-1]
         assert infos["score"][0] == 1.0, step
-    metrics = infos["metrics"]
+    metrics = part(infos, "metrics/")
     assert metrics["settling_time"][0] == pytest.approx(0.1)
     assert metrics["recovery_time"][0] == pytest.approx(0.1), "held anew from the next step on"
     assert batch.worlds["lost_at"][0] == 50
@@ -116,7 +117,7 @@ def test_the_bound_is_the_soonest_straight_arrival() -> None:
         away = np.abs(p[:5, None] - p[5] - slots(batch.scenario) * frame).min(axis=1)
         first = np.ceil((away - 0.3) / 1.0 / 0.1 - 1e-3)
         bound = np.mean((200 - first + 1) / 200)
-        assert infos["metrics"]["bound"][e] == pytest.approx(bound, abs=2e-3)
+        assert infos["metrics/bound"][e] == pytest.approx(bound, abs=2e-3)
 
 
 def test_no_score_is_above_the_bound() -> None:

@@ -53,6 +53,7 @@ def test_constant_goes_straight_at_its_speed() -> None:
 def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     batch = posse.batch("accelerating", 200, target_turn_rate=limit, **FAR_AWAY)
     batch.reset(seed=2)
+    first = snapshot(batch)
     places, courses, turns = follow(batch, 400)
     assert np.abs(turns).max() <= limit
     np.testing.assert_allclose(np.abs(courses), 1.0, rtol=1e-5)
@@ -62,13 +63,20 @@ def test_accelerating_turns_to_and_fro_within_its_limit(limit: float) -> None:
     chord = 0.06 * np.sinc(swing / (2 * math.pi))
     np.testing.assert_allclose(moves, chord * middle / np.abs(middle), rtol=1e-4, atol=3e-5)
     np.testing.assert_allclose(swing, turns * 0.1, rtol=1e-4, atol=3e-5)
-    # The turn rate is a sine of a drawn amplitude, rate and phase.
-    state = snapshot(batch)
-    time = 0.1 * np.arange(400)[:, None]
-    wave = state["world_weave_amplitude"] * np.sin(state["world_weave_rate"] * time + state["world_weave_phase"])
-    np.testing.assert_allclose(turns, wave, rtol=1e-4, atol=2e-4 * max(1.0, limit))
-    assert state["world_weave_amplitude"].min() >= 0.4 * limit
-    assert state["world_weave_amplitude"].max() <= 0.9 * limit
+    # The turn rate begins as a sine of the drawn amplitude, rate and phase, which then walk within their ranges.
+    last = snapshot(batch)
+    wave = first["world_weave_amplitude"] * np.sin(first["world_weave_phase"])
+    np.testing.assert_allclose(turns[0], wave, rtol=1e-4, atol=2e-4 * max(1.0, limit))
+    for name, low, high, deviation in (
+        ("world_weave_amplitude", 0.4 * limit, 0.9 * limit, 0.1 * limit),
+        ("world_weave_rate", 0.2, 0.8, 0.1),
+    ):
+        for state in (first, last):
+            assert low * (1 - 1e-6) <= state[name].min()
+            assert state[name].max() <= high * (1 + 1e-6)
+        # After 40 s of a walk of this deviation a second, reflected in so narrow a range, nothing of the start is left.
+        left = float(np.corrcoef(first[name], last[name])[0, 1])
+        assert abs(left) < math.exp(-0.5 * 40 * (math.pi * deviation / (high - low)) ** 2) + 3 / math.sqrt(200)
     assert (np.abs(turns).max(axis=0) > 0.3 * limit).all(), "every one of them turns"
     assert (turns.max(axis=0) > 0).all()
     assert (turns.min(axis=0) < 0).all()

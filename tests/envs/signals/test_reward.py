@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.support.adapters import part
 from tests.support.reference.recordings import CASES, case_name, record
 from tests.support.reference.score import Episode
 from tests.support.reference.state import working
@@ -35,7 +36,7 @@ def test_every_term_and_the_sum_equal_an_independent_working(case: Any) -> None:
             "effort": (v**2 + turn**2) * working(state),
             "team": np.full(n, episode.score),
         }
-        terms = infos["reward_terms"]
+        terms = part(infos, "reward/")
         for name, value in expected.items():
             np.testing.assert_allclose(terms[name][0], value, rtol=1e-4, atol=2e-4, err_msg=name)
         weights = dict(s.reward_weights)
@@ -51,8 +52,8 @@ def test_terms_are_those_declared_and_weights_are_used() -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
         _, rewards, _, _, infos = batch.step(rng.uniform(-1, 1, batch.action_shape))
-        assert list(infos["reward_terms"]) == names
-        total = sum(weights[name] * infos["reward_terms"][name].astype(float) for name in names)
+        assert list(part(infos, "reward/")) == names
+        total = sum(weights[name] * infos[f"reward/{name}"].astype(float) for name in names)
         np.testing.assert_allclose(rewards, total, rtol=1e-5, atol=1e-5)
 
 
@@ -75,7 +76,7 @@ def test_a_target_that_is_an_agent_gets_the_opposite_of_the_score() -> None:
         _, rewards, _, _, infos = batch.step(np.full(batch.action_shape, -0.5))
         assert rewards.shape == (1, 3)
         assert rewards[0, 2] == -infos["score"][0]
-        terms = {name: values[0, 2] for name, values in infos["reward_terms"].items()}
+        terms = {name: values[0, 2] for name, values in part(infos, "reward/").items()}
         assert terms["team"] == infos["score"][0]
         assert all(terms[name] == 0 for name in ("slot", "progress", "distance", "sight"))
 
@@ -90,4 +91,4 @@ def test_the_start_of_an_episode_rewards_nothing() -> None:
     assert (rewards == 0).all()
     assert not terminated.any()
     assert not truncated.any()
-    assert all((term == 0).all() for term in infos["reward_terms"].values())
+    assert all((term == 0).all() for term in part(infos, "reward/").values())

@@ -12,7 +12,7 @@ import pytest
 from tests.support.learned import target_for
 
 import posse
-from posse_baselines import PolicyError, load, load_target
+from posse_baselines import PolicyError, load
 from posse_training import evaluate
 from posse_training.commands import watch
 from posse_training.compare.compare import SUMMARY, Settings, compare
@@ -21,7 +21,6 @@ from posse_training.compare.contenders import Contender
 from posse_training.compare.playing import replay as play_again
 from posse_training.errors import TrainedSplitError
 from posse_training.replay import record
-from posse_training.viewer.viewer import Viewer
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 
@@ -98,13 +97,3 @@ def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None
     asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--num-trackers", "3"]
     watch.main([*asked, "--film", str(film), "--seconds", "0.3"])
     assert film.is_file()
-
-
-def test_the_viewer_plays_against_the_target(file: Path) -> None:
-    target = load_target(str(file))
-    viewer = Viewer(["pursuit", load("idle")], target.fit(SHORT), target, size=(400, 300))
-    viewer.tick(0.5)
-    moment = viewer.moment
-    assert moment.observations.shape[0] == SHORT.num_trackers + 1
-    with pytest.raises(PolicyError, match="give a target too"):
-        Viewer(["pursuit"], target.fit(SHORT), size=(400, 300))

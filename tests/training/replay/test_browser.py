@@ -13,8 +13,9 @@ from PIL import Image
 from tests.support.browser import chromium, opened, until
 from tests.support.replays import ATTACK, hostile, short
 
-from posse.rendering.style import DARK, PAPER, TARGET
+from posse.rendering.style import PAPER, TARGET
 from posse_training.replay import Replay, read_replay, record, write_replay
+from posse_training.replay.colours import DARK
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -20,6 +20,7 @@ from tests.support.replays import ATTACK, hostile, short
 from posse.rendering import style
 from posse_training.cli import main
 from posse_training.errors import SettingsError
+from posse_training.replay import colours as colours_of
 from posse_training.replay import read_replay, record, write_replay
 from posse_training.replay.page import MODULES, colours, page
 
@@ -135,10 +136,10 @@ def test_the_colours_are_those_of_figures_and_films() -> None:
 
     light, dark = colours()["light"], colours()["dark"]
     assert light["TARGET"] == css(style.TARGET)
-    assert light["TASKS"] == [css(colour) for colour in style.TASK_COLOURS]
-    assert light["PLAYERS"] == [css(colour) for colour in style.PLAYERS]
+    assert light["TASKS"] == [css(colour) for colour in colours_of.TASK_COLOURS]
+    assert light["PLAYERS"] == [css(colour) for colour in colours_of.PLAYERS]
     assert set(light) == set(dark)
-    assert set(style.DARK) <= set(light)
+    assert set(colours_of.DARK) <= set(light)
 
 
 def test_a_path_or_file_that_is_no_page_is_named(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def test_decoded_data_are_the_episode_step_by_step(policy: str, scenario: str) -
             close(column[f"belief/{name}"], frame, value[0])
         observations, _, _, _, infos = batch.step(actions)
         for name in dict(settings.reward_weights):
-            close(column[f"reward/{name}"], frame + 1, infos["reward_terms"][name][0])
+            close(column[f"reward/{name}"], frame + 1, infos[f"reward/{name}"][0])
     for name, value in batch.metrics().items():
         assert player.metrics[name] == pytest.approx(float(value[0]), nan_ok=True)
 

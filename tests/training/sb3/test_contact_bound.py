@@ -32,7 +32,7 @@ def test_contacts_are_counted_once_an_episode_and_cost_whom_makes_them() -> None
         actions[:, 0] = 1.0
         _, rewards, dones, _ = env.step(actions)
         _, wanted, _, _, told = twin.step(actions.reshape(12, 5, 2))
-        contacts = told["reward_terms"]["contact"]
+        contacts = told["reward/contact"]
         np.testing.assert_allclose(rewards.reshape(12, 5), wanted - 3.0 * contacts, rtol=1e-5, atol=1e-5)
         touching = contacts.any(axis=1)
         first += int((touching & ~touched).sum())

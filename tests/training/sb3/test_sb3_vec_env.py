@@ -56,9 +56,9 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
                 assert told["TimeLimit.truncated"] is True
                 assert told["episode"]["l"] == HORIZON
                 assert told["episode"]["r"] == pytest.approx(total[e, i])
-                assert told["episode"]["score"] == info["metrics"]["score"][e]
-                assert told["metrics"]["score"] == info["metrics"]["score"][e]
-                assert told["is_success"] == np.isfinite(info["metrics"]["settling_time"][e])
+                assert told["episode"]["score"] == info["metrics/score"][e]
+                assert told["metrics"]["score"] == info["metrics/score"][e]
+                assert told["is_success"] == np.isfinite(info["metrics/settling_time"][e])
             total[:] = 0
         else:
             assert all(told == {} for told in infos)

@@ -1,27 +1,40 @@
-"""``posse watch``: one world in a window, or as a film."""
+"""``posse watch``: one world in a window, as a replay page, or as a film."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import webbrowser
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import tyro
 
 from posse_training.errors import SettingsError
 
-_SIZE: Final = (1280, 720)
+if TYPE_CHECKING:
+    from posse import Scenario
+    from posse.rendering.canvas import Window
+    from posse.rendering.renderer import Renderer
+    from posse_baselines import Policy
+    from posse_training.film import Team
+
+_SIZE: Final = (960, 720)
 _LEAST, _MOST = 200, 4096
+_PAGE: Final = Path("runs/watch/replay.html")
 
 
 @dataclass(frozen=True)
 class _Watch:
-    """Show policies in one world, in a window or as a film. Press H in the window for its keys."""
+    """Show policies in one world: live in a window, as a replay page, or as a film.
+
+    Keys of the window: Space pauses and goes on, S steps, - and + change the speed, N goes to the next world, P to
+    the next policy, Q or Esc closes it.
+    """
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Policies: names, files, or package.module:Class. The window shows the first and
-    switches to the others (P); a film shows all side by side."""
+    """Policies: names, files, or package.module:Class. The window shows one at a time; a page or a film all side by
+    side."""
     scenario: str = "smart"
     """Scenario to play."""
     target: str | None = None
@@ -35,14 +48,16 @@ class _Watch:
     """Split of the world: train, validation or test."""
     num_trackers: int | None = None
     """Trackers in the team; default: the scenario's."""
-    size: tuple[int, int] | None = None
-    """Width and height of window or film, px; default: 1280 720 for a window."""
+    page: bool = False
+    """Record the world and open its replay page (runs/watch/replay.html) in the browser, instead of a window."""
     film: Path | None = None
     """Write a film to this file (.gif or .mp4) instead of opening a window."""
-    start: Annotated[float, tyro.conf.arg(name="from")] = 0.0
-    """Simulated time at which a film begins, s."""
+    size: tuple[int, int] | None = None
+    """Width and height of window or film, px; default: 960 720 for a window."""
+    start: Annotated[float | None, tyro.conf.arg(name="from")] = None
+    """Simulated time at which a film begins, s; default: 0."""
     seconds: float | None = None
-    """Simulated time that a film shows, s; default: to the end of the episode."""
+    """Simulated time that a film or page shows, s; default: to the end of the episode."""
     speed: float | None = None
     """Simulated seconds per second of a film; default: 1.5."""
 
@@ -50,57 +65,103 @@ class _Watch:
 def main(arguments: Sequence[str]) -> None:
     """Show policies in one world."""
     which = tyro.cli(_Watch, prog="posse watch", args=arguments)
-    from posse import get_scenario
-
     if not which.policies:
         raise SettingsError("No policies given. Pass at least one, such as ddcs-distributed.")
+    if which.page and which.film is not None:
+        raise SettingsError(f"--page and --film {which.film} exclude each other: leave one out")
+    unused = {"--from": which.start, "--speed": which.speed} if which.film is None else {}
+    if not which.page and which.film is None:
+        unused["--seconds"] = which.seconds
+    for option, value in unused.items():
+        if value is not None:
+            raise SettingsError(f"{option} {value:g} is for films: add --film film.gif, or leave it out")
+    if which.page and which.size is not None:
+        raise SettingsError(f"--size {which.size[0]} {which.size[1]} is for a window or film: leave it out")
+    size = which.size or _SIZE
+    if which.film is None and not all(_LEAST <= side <= _MOST for side in size):
+        raise SettingsError(f"--size {size[0]} {size[1]} must be {_LEAST} to {_MOST} px each")
+
+    from posse import get_scenario
+    from posse_baselines import against, load, load_target
+
     scenario = get_scenario(which.scenario)
     if which.num_trackers is not None:
         scenario = scenario.replace(num_trackers=which.num_trackers)
-    from posse_baselines import against, load, load_target
-
     target = None if which.target is None else load_target(which.target)
     if target is not None:
         scenario = target.fit(scenario)
+    policies = [load(name) for name in which.policies]
+    world: dict[str, Any] = {"seed": which.seed, "world": which.world, "split": which.split}
     if which.film is not None:
-        from posse_training.reports.pictures.film import film
+        from posse_training.film import film
 
-        policies = [load(name) for name in which.policies]
         print(
             film(
                 [(p.name, against(p, target)) for p in policies],
                 scenario,
                 path=which.film,
-                seed=which.seed,
-                world=which.world,
-                split=which.split,
-                start=which.start,
+                start=0.0 if which.start is None else which.start,
                 seconds=scenario.duration if which.seconds is None else which.seconds,
                 speed=1.5 if which.speed is None else which.speed,
                 size=which.size,
+                **world,
             )
         )
-        return
-    given = {"--from": which.start or None, "--seconds": which.seconds, "--speed": which.speed}
-    for option, value in given.items():
-        if value is not None:
-            raise SettingsError(f"{option} {value:g} is for films: add --film film.gif, or leave it out")
-    size = which.size or _SIZE
-    if not all(_LEAST <= side <= _MOST for side in size):
-        raise SettingsError(f"--size {size[0]} {size[1]} must be {_LEAST} to {_MOST} px each")
-    from posse_baselines import policy_names
-    from posse_training.viewer.viewer import Viewer
-    from posse_training.viewer.window import open_window, run, show
+    elif which.page:
+        from posse_training.replay import record, write_replay
 
-    others = [name for name in policy_names() if name not in which.policies]
-    names = [*which.policies, *(others if len(which.policies) == 1 else [])]
-    viewer = Viewer(
-        names, scenario, target, seed=which.seed, world=which.world, split=which.split, size=size, show=show
-    )
-    command = f"posse watch {' '.join(which.policies)} --scenario {which.scenario}"
-    if which.target is not None:
-        command += f" --target {which.target}"
-    open_window(size, f"posse: {scenario.name}", f"write a film: {command} --film film.gif")
-    run(viewer)
-    moment = viewer.moment
-    print(f"{viewer.tape.name}: score {moment.scene.score:.3f} after {moment.scene.time:.1f} s")
+        _PAGE.parent.mkdir(parents=True, exist_ok=True)
+        path = write_replay(record(policies, scenario, target=target, seconds=which.seconds, **world), _PAGE)
+        print(f"{path}: open it in a browser")
+        webbrowser.open(path.resolve().as_uri())
+    else:
+        watch([against(p, target) for p in policies], scenario, which.seed, which.world, which.split, size)
+
+
+def watch(
+    policies: Sequence[Policy], scenario: Scenario, seed: int, world: int, split: str, size: tuple[int, int]
+) -> None:
+    """Play one policy at a time in a window, until the user closes it; each ended episode prints its score.
+
+    Raises:
+        SettingsError: No display is available.
+        PolicyError: A policy that does not fit the scenario.
+    """
+    from posse.rendering.renderer import Renderer
+    from posse_training.film import Team
+
+    shown, keys = 0, {"n": "next world"} | ({"p": "next policy"} if len(policies) > 1 else {})
+    longest = max(scenario.message_size, *(policy.message_size for policy in policies))
+    scenario = scenario.replace(message_size=longest)  # a window shows batches of one scenario
+    Team(policies[0], scenario, seed, world, split).step()  # compiles what is needed before the window opens
+    try:
+        renderer = Renderer(scenario, "human", size, keys=keys)
+    except RuntimeError as error:
+        raise SettingsError(
+            f"no window can be opened ({error.__cause__}): --page records a replay page, --film film.gif writes a film"
+        ) from error
+    window = renderer.window
+    assert window is not None
+    try:
+        while not renderer.closed:
+            team = Team(policies[shown], scenario, seed, world, split)
+            renderer.title = f"{team.policy.name}, world {world}"
+            renderer.draw(team.batch)
+            _play(team, renderer, window, keys)
+            if steps := len(team.scores):
+                time, score = steps * scenario.control_step, sum(team.scores) / steps
+                print(f"world {world}, {team.policy.name}: score {score:.3f} after {time:.1f} s", flush=True)
+            if "p" in window.pressed & keys.keys():
+                shown = (shown + 1) % len(policies)
+            else:
+                world += 1
+    finally:
+        renderer.close()
+
+
+def _play(team: Team, renderer: Renderer, window: Window, keys: Collection[str]) -> None:
+    """Play a team until its episode ends, or the user closes the window or presses one of some keys."""
+    while not (renderer.closed or team.over or window.pressed & set(keys)):
+        team.step()
+        window.paused |= team.over  # the last moment stays until a key is pressed
+        renderer.draw(team.batch, colours=team.colours)

@@ -71,9 +71,9 @@ def play_episode(
         exchanges.count(leaders_of(policy, step.memory), running)
         ended = running & (step.terminated | step.truncated)
         if ended.any():
-            for name, values in step.infos["metrics"].items():
+            for name in batch.metrics():
                 column = columns.setdefault(name, np.full(batch.num_worlds, np.nan))
-                column[ended] = values[ended]
+                column[ended] = step.infos[f"metrics/{name}"][ended]
             running &= ~ended
         advance(1)
         if not running.any():

@@ -21,6 +21,7 @@ from typing import Any, Final
 from posse.rendering import style
 from posse_baselines.files import write_atomically
 from posse_training.errors import SettingsError
+from posse_training.replay.colours import DARK, DARK_PLAYERS, DARK_TASK_COLOURS, PLAYERS, TASK_COLOURS
 from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
 
@@ -201,17 +202,17 @@ def colours() -> dict[str, Any]:
         return "#" + "".join(f"{part:02x}" for part in colour)
 
     light = {name: css(getattr(style, name)) for name in _COLOURS}
-    dark = light | {name: css(colour) for name, colour in style.DARK.items()}
+    dark = light | {name: css(colour) for name, colour in DARK.items()}
     return {
         "light": {
             **light,
-            "TASKS": [css(colour) for colour in style.TASK_COLOURS],
-            "PLAYERS": [css(colour) for colour in style.PLAYERS],
+            "TASKS": [css(colour) for colour in TASK_COLOURS],
+            "PLAYERS": [css(colour) for colour in PLAYERS],
         },
         "dark": {
             **dark,
-            "TASKS": [css(colour) for colour in style.DARK_TASK_COLOURS],
-            "PLAYERS": [css(colour) for colour in style.DARK_PLAYERS],
+            "TASKS": [css(colour) for colour in DARK_TASK_COLOURS],
+            "PLAYERS": [css(colour) for colour in DARK_PLAYERS],
         },
     }
 

@@ -115,7 +115,7 @@ class Recorder:
         observations, *_, infos = done
         self._actions.append(np.array(actions, np.float32)[self._world])
         for name in self._described["weights"]:
-            self._terms.setdefault(name, []).append(infos["reward_terms"][name][self._world])
+            self._terms.setdefault(name, []).append(infos[f"reward/{name}"][self._world])
         for name, value in told.items():
             self._beliefs.setdefault(name, []).append(value)
         self._note(observations)

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import posse
 from posse import REWARD_TERMS, Batch, Field, Scenario, ScenarioError, get_scenario
-from posse.rendering.style import TASKS
 from posse.scenarios.formation import slot_offsets
+from posse_baselines.ddcs import TASKS
 from posse_training.provenance import commit
 
 _OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")

@@ -13,7 +13,7 @@ def arrays_inside(batch: Batch) -> dict[str, npt.NDArray[Any]]:
     """Return the memory of the policy inside as arrays by name; views, not copies."""
     if not isinstance(batch, PairedBatch):
         return {}
-    memory: dict[str, npt.NDArray[Any]] = batch.inside.arrays(batch.memory_inside)  # type: ignore[attr-defined]
+    memory: dict[str, npt.NDArray[Any]] = batch.inside.arrays(batch.memory)  # type: ignore[attr-defined]
     return {f"opponent.{name}": array for name, array in memory.items()}
 
 

@@ -87,10 +87,10 @@ class SlotGroup:
             actions = self._advice.actions(actions)
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
-        contacts = told["reward_terms"]["contact"]
+        contacts = told["reward/contact"]
         rewards[:] = (reward - np.float32(self.contact_cost) * contacts).reshape(-1)
         self._count(contacts)
-        self._terms += [float(term.mean()) for term in told["reward_terms"].values()]
+        self._terms += [float(told[f"reward/{name}"].mean()) for name in batch.term_names]
         over = terminated | truncated
         ended = over | (batch.worlds["step"] == self._cut_at)
         if self._advice is not None:

@@ -24,7 +24,6 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 import posse
-from posse.adapters import check_seed, options_of
 from posse.adapters.actions import MOTIONS, agent_names, single_action_space
 from posse.signals.global_state import StateLayout
 
@@ -122,7 +121,7 @@ class PosseEnv(EnvBase):
 
     def _set_seed(self, seed: int | None) -> None:
         """Make the next reset of all worlds restart from episode 0 of a seed."""
-        self._seed = None if seed is None else check_seed(seed)
+        self._seed = seed
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDictBase:
         """Start an episode in every world, or in those that ``"_reset"`` (E, 1) marks.
@@ -130,11 +129,11 @@ class PosseEnv(EnvBase):
         ``seed`` and ``options`` (start poses) of :meth:`reset` are those of
         :meth:`posse.Batch.reset`.
         """
-        options = options_of(kwargs.get("options"))
+        options = kwargs.get("options")
         all_worlds = False
         marks = None if tensordict is None else tensordict.get("_reset", None)
         if marks is not None and not bool(marks.all()):
-            options["reset_mask"] = self._array(marks.reshape(self.batch.num_worlds))
+            options = {**(options or {}), "reset_mask": self._array(marks.reshape(self.batch.num_worlds))}
             seed = kwargs.get("seed")
         else:
             seed, all_worlds = kwargs.get("seed", self._seed), True

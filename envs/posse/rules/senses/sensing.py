@@ -27,7 +27,7 @@ from posse.numeric import (
 from posse.rules.discs import BLOCK, blocks, columns, natural, store_rows
 from posse.rules.randomness import SENSOR_NOISE, normal_pair
 from posse.rules.senses.declaring import sensor
-from posse.rules.state import FIX, NEVER
+from posse.rules.state import FIX, NEVER, Fix
 
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; older fixes give no velocity
 
@@ -129,22 +129,21 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
         if measured:
             dx, dy = load(s.seen_dx, i), load(s.seen_dy, i)
         x, y = own_x + dx, own_y + dy
-        old_x, old_y, _, _, _, _, old_vx, old_vy = columns(trackers, i, n, FIX)
+        old = Fix(*columns(trackers, i, n, FIX))
         since = greater(np.float32(w.step) - before, ONE)
-        vx, vy = fix_velocity(c, since, x - old_x, y - old_y, old_vx, old_vy)
+        vx, vy = fix_velocity(c, since, x - old.fix_x, y - old.fix_y, old.fix_vx, old.fix_vy)
         fresh = (before >= ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
-        store_rows(
-            x,
-            y,
-            eight(w.heading_cos),
-            eight(w.heading_sin),
-            eight(w.frame_cos),
-            eight(w.frame_sin),
-            choose(fresh, vx, ZERO),
-            choose(fresh, vy, ZERO),
-            s.new_fix,
-            BLOCK * i,
+        new = Fix(
+            fix_x=x,
+            fix_y=y,
+            fix_cos=eight(w.heading_cos),
+            fix_sin=eight(w.heading_sin),
+            fix_frame_cos=eight(w.frame_cos),
+            fix_frame_sin=eight(w.frame_sin),
+            fix_vx=choose(fresh, vx, ZERO),
+            fix_vy=choose(fresh, vy, ZERO),
         )
+        store_rows(new, s.new_fix, BLOCK * i)
     for i in range(n):
         t = trackers[i]
         if t.sees:

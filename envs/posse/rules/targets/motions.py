@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import ZERO, Record
+from posse.numeric import ZERO, Record, compiled
 from posse.rules.kinematics import arc
 from posse.rules.randomness import TARGET, TWO_PI, between, uniform
 from posse.rules.targets.declaring import Memory, target_motion
@@ -17,6 +17,11 @@ _LEAST_RATE: Final = 0.2  # rad/s
 _MOST_RATE: Final = 0.8
 _LEAST: Final = 0.4  # least and greatest turn rate, as shares of the limit
 _MOST: Final = 0.9
+
+# How fast amplitude and rate walk: standard deviations after a second, as a share of the limit and in rad/s. A sine of
+# constant amplitude and rate could be predicted for ever from a few fixes.
+_AMPLITUDE_WALK: Final = 0.1
+_RATE_WALK: Final = 0.1
 
 _MEMORY: Final = (
     Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK, "of an accelerating target"),
@@ -38,15 +43,33 @@ def draw_weave(c: Record, w: Record) -> None:
     w.weave_phase = TWO_PI * uniform(w.key, 0, TARGET, 102)
 
 
+@compiled
+def walked(value: float, step: float, low: float, high: float) -> np.float32:
+    """Return a value moved by a step, reflected at the ends of its range."""
+    moved = value + step
+    if moved > high:
+        moved = high + high - moved
+    elif moved < low:
+        moved = low + low - moved
+    return np.float32(min(max(moved, low), high))
+
+
 @target_motion("accelerating", draw=draw_weave, memory=_MEMORY)
 def accelerating(c: Record, w: Record) -> None:
-    """Turn rate is a sine of random amplitude, rate and phase (paper, section 2)."""
-    time = np.float32(w.step) * c.dt
-    turn = w.weave_amplitude * np.float32(math.sin(w.weave_rate * time + w.weave_phase))
+    """Turn rate is a sine whose random amplitude and rate walk slowly, within the turn limit (paper, section 2)."""
+    limit, spread = c.target_turn_rate, np.float32(math.sqrt(3.0 * c.dt))  # of a uniform step of deviation sqrt(dt)
+    turn = w.weave_amplitude * np.float32(math.sin(w.weave_phase))
+    w.weave_phase += w.weave_rate * c.dt
+    if w.weave_phase >= TWO_PI:
+        w.weave_phase -= TWO_PI
+    wider = _AMPLITUDE_WALK * limit * spread * between(-1.0, 1.0, w.key, w.step, TARGET, 103)
+    w.weave_amplitude = walked(w.weave_amplitude, wider, _LEAST * limit, _MOST * limit)
+    faster = _RATE_WALK * spread * between(-1.0, 1.0, w.key, w.step, TARGET, 104)
+    w.weave_rate = walked(w.weave_rate, faster, _LEAST_RATE, _MOST_RATE)
     for _ in range(c.physics_steps):  # an arc turns by 1 rad at most
         _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, ZERO, turn, c.physics_dt)
 
 
-@target_motion("agent", agent=True)
+@target_motion("agent")
 def agent(c: Record, w: Record) -> None:
     """A policy controls the target."""

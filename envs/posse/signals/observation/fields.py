@@ -15,20 +15,21 @@ eight observers, so a formula is written for a block of eight numbers like for o
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse.numeric import compiled
-from posse.registry import FIELDS, Function
+from posse.registry import FIELDS, Declaration, Function, is_number, parameters_of
 from posse.scenarios import Scenario
 
 Bound = float | Callable[[Scenario], float]
 
 SLACK: Final = 1.001
 """Factor by which bounds are widened to allow for float32 rounding."""
+
+MOST_NUMBERS: Final = 256
+"""Most values of one field."""
 
 _SUBJECTS: Final = {1: "setting", 2: "self", 3: "mate"}
 
@@ -49,57 +50,56 @@ class Field:
     """Whether it is repeated for each place of a team-mate."""
 
 
-@dataclass(frozen=True)
-class FieldDeclaration:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FieldDeclaration(Declaration):
     """A field of any scenario, and the function that computes it."""
 
-    name: str
-    subject: str
-    """Its subject: ``"setting"``, ``"self"`` or ``"mate"``."""
     size: int
-    unit: str
     low: Bound
     high: Bound
     unknown: float | None
-    meaning: str
-    function: Function
-    fixed: bool = False
-    """Whether its value for a robot never changes."""
+
+    @property
+    def subject(self) -> str:
+        """``"setting"``, ``"self"`` or ``"mate"``."""
+        return _SUBJECTS[len(parameters_of(self.function))]
+
+    @property
+    def functions(self) -> tuple[tuple[Function, str], ...]:
+        """Its function, and what it returns."""
+        return ((self.function, f"{self.size} numbers" if self.size > 1 else "a number"),)
 
     def of(self, scenario: Scenario) -> Field:
         """Return the field in a scenario.
 
         Raises:
-            DeclarationError: Its bounds are not finite, or low is above high.
+            DeclarationError: Its bounds are not finite, low is above high, or the value for
+                "unknown" is not between them.
         """
         low, high = (self._bound(name, scenario) for name in ("low", "high"))
         if not low <= high:
-            raise self._error(f"low={low:g} is above high={high:g} in {scenario.name!r}")
-        return Field(
-            self.name, self.size, self.unit, low, high, self.meaning, self.unknown, of_neighbour=self.subject == "mate"
-        )
-
-    @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions that it consists of, and what each returns."""
-        return ((self.function, f"{self.size} numbers" if self.size > 1 else "number"),)
+            raise FIELDS.error(self.function, f"low={low:g} is above high={high:g} in {scenario.name!r}")
+        mate = self.subject == "mate"
+        empty = 0.0 if self.unknown is None and mate else self.unknown
+        if empty is not None and not low <= empty <= high:
+            raise FIELDS.error(
+                self.function, f"unknown={empty:g} is not between low={low:g} and high={high:g} in {scenario.name!r}"
+            )
+        return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, of_neighbour=mate)
 
     def _bound(self, name: str, scenario: Scenario) -> float:
         bound: Any = getattr(self, name)
         try:
             value = bound(scenario) if callable(bound) else bound
         except Exception as error:  # a user's function
-            raise self._error(f"{name} of {scenario.name!r}: {error!r}") from error
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise self._error(f"{name}={value!r} in {scenario.name!r} is not a finite number")
+            raise FIELDS.error(self.function, f"{name} of {scenario.name!r}: {error!r}") from error
+        if not is_number(value):
+            raise FIELDS.error(self.function, f"{name}={value!r} in {scenario.name!r} is not a finite number")
         return float(value)
-
-    def _error(self, reason: str) -> Exception:
-        return FIELDS.error(self.function, reason)
 
 
 def field(
-    unit: str, low: Bound, high: Bound, unknown: float | None = None, *, size: int = 1, fixed: bool = False
+    unit: str, low: Bound, high: Bound, unknown: float | None = None, *, size: int = 1
 ) -> Callable[[Function], Function]:
     """Declare a function as an observation field of its name; its docstring is the meaning.
 
@@ -108,29 +108,22 @@ def field(
         low: The least value, or a function (scenario) -> least value.
         high: The greatest, likewise.
         unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
-        size: Number of values that the function returns, as a tuple if more than one.
-        fixed: Its value for a robot never changes, as that of a setting.
+        size: Number of values that the function returns, at most 256; as a tuple if more than one.
 
     Raises:
-        DeclarationError: The name is taken, the docstring is missing, or the parameters are not
-            (c), (c, v) or (c, v, m).
+        DeclarationError: The name is taken, the docstring is missing, an argument is wrong, or the
+            parameters are not (c), (c, v) or (c, v, m).
     """
 
     def declare(function: Function) -> Function:
-        FIELDS.check_parameters(function, ("c", "v", "m"), least=1)
-        if size < 1:
-            raise FIELDS.error(function, f"size={size} must be at least 1")
-        count = len(inspect.signature(function).parameters)
-        name, meaning = function.__name__, inspect.getdoc(function) or ""
-        working = compiled(function)
-        FIELDS.add(
-            name,
-            FieldDeclaration(
-                name, _SUBJECTS[count], size, unit, low, high, unknown, meaning, working, fixed or count == 1
-            ),
-            working,
-        )
-        return working
+        if type(size) is not int or not 1 <= size <= MOST_NUMBERS:
+            raise FIELDS.error(function, f"size={size!r} must be a whole number from 1 to {MOST_NUMBERS}")
+        if unknown is not None and not is_number(unknown):
+            raise FIELDS.error(function, f"unknown={unknown!r} is not a finite number")
+        for name, bound in (("low", low), ("high", high)):
+            if not callable(bound) and not is_number(bound):
+                raise FIELDS.error(function, f"{name}={bound!r} is neither a finite number nor a function")
+        return FIELDS.declare(FieldDeclaration, function, unit=unit, low=low, high=high, unknown=unknown, size=size)
 
     return declare
 

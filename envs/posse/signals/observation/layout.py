@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray
+from posse.registry import FIELDS
 from posse.scenarios import Scenario
+from posse.signals.generate import declarations_for
 from posse.signals.observation.fields import SLACK, Field
-from posse.signals.parts import parts_for
 
 
 def _sonar_fields(s: Scenario) -> list[Field]:
@@ -54,9 +55,9 @@ class ObservationLayout:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        parts = parts_for(scenario)
-        single = [*(field.of(scenario) for field in parts.fields), *_sonar_fields(scenario)]
-        repeated = [*(field.of(scenario) for field in parts.mate_fields), *_message_fields(scenario)]
+        declared = declarations_for(scenario)
+        single = [*(field.of(scenario) for field in declared.fields), *_sonar_fields(scenario)]
+        repeated = [*(field.of(scenario) for field in declared.mate_fields), *_message_fields(scenario)]
         self.fields: tuple[Field, ...] = (*single, *repeated)
         self.neighbours = scenario.neighbours
         self._repeated_from = sum(field.size for field in single)
@@ -84,6 +85,24 @@ class ObservationLayout:
         low = stack([(field, field.low) for field in self.fields])
         high = stack([(field, field.high) for field in self.fields])
         return np.array(low, np.float32), np.array(high, np.float32)
+
+    def check_added(self, observations: FloatArray) -> None:
+        """Check the fields that the scenario adds in observations (..., F).
+
+        Raises:
+            DeclarationError: One has a value that is not finite or not between its bounds.
+        """
+        names = self.scenario.extra_fields
+        views = self.views(observations) if names else {}
+        for field in self.fields:
+            if field.name in names:
+                values = views[field.name]
+                wrong = values[~((values >= np.float32(field.low)) & (values <= np.float32(field.high)))]
+                if wrong.size:
+                    raise FIELDS.error(
+                        FIELDS[field.name].function,
+                        f"it returned {wrong.flat[0]:g}, which is not from low={field.low:g} to high={field.high:g}",
+                    )
 
     def views(self, observations: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
         """Return named views of flat observations (..., F), sharing their memory.

@@ -1,9 +1,8 @@
-"""Observations of team-mates, nearest first, for eight robots at once, one per lane.
+"""Observations of team-mates, nearest first, for the same robot of eight worlds, one per lane.
 
-With a perfect radio the current state of team-mates is observed. In a small team observed as a
-whole, each mate is computed once and written to its place. With fewer places than team-mates or a
-large team, the nearest are listed first (:mod:`~.nearest`) and then written place by
-place. The same applies to received messages, and to the observations of a target agent.
+The nearest that each observer knows are listed, place by place; then the mate of each place is
+written for all lanes at once. With a perfect radio, and for a target agent, mates are as they are
+now, otherwise as last heard.
 """
 
 from __future__ import annotations
@@ -16,28 +15,31 @@ from posse.numeric import (
     WIDTH,
     FloatArray,
     Lanes,
+    Mask,
     Record,
+    bits,
     choose,
     compiled,
     counts,
     eight,
+    greater,
+    lesser,
     load,
     load_fields,
     root,
     store,
     transpose,
 )
-from posse.rules.discs import natural
-from posse.rules.state import POSE, WorldArrays
-from posse.signals.observation.columns import Observers, Rows, robot_of, world_of
-from posse.signals.observation.nearest import keep_nearest, list_nearest
-from posse.signals.observation.team import number_behind, seen_at, stride_of, way_behind
-from posse.signals.observation.views import View, ego, mate_heard, mate_now
-from posse.signals.parts import Writers
-from posse.signals.scratch import MOST_IN_TEAM
+from posse.rules.discs import FAR, natural
+from posse.rules.state import MESSAGE, POSE, Heard, Pose, WorldArrays
+from posse.signals.generate import Generated
+from posse.signals.observation.rows import Observers, Rows, world_of
+from posse.signals.observation.views import Mate, View, ego
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
+_MINUS_ONE: Final = np.float32(-1.0)
+_TINY: Final = np.float32(1e-9)
 
 
 @compiled
@@ -46,221 +48,166 @@ def observe_mates(
     worlds: WorldArrays,
     observers: Observers,
     v: View,
-    writers: Writers,
+    now: bool,
+    made: Generated,
     s: Record,
     observations: FloatArray,
-    k: int,
 ) -> None:
-    """Write the nearest team-mates of trackers from k on.
+    """Write the nearest team-mates, as they are ``now`` or as last heard.
 
-    With a perfect radio, requires the team's rows (:func:`~.team.lay_out_team`).
+    Requires :func:`~.views.lay_out_observers`.
     """
-    mates, places = natural(c.num_trackers - 1), natural(c.neighbours)
+    places = natural(c.neighbours)
     if places == 0:
         return
-    if c.perfect_radio == 0:
-        _observe_heard(c, worlds, observers, v, writers, s, observations, k)
-        return
-    if mates <= places and mates < MOST_IN_TEAM:
-        _observe_whole_team(c, observers, v, writers, s, observations, k)
-    else:
-        most = min(mates, places)
-        list_nearest(mates + 1, most, observers.i, observers.number, observers.across, s)
-        _observe_listed(c, worlds, observers, False, most, v, writers, s, observations, k)
-    if c.message_size > 0 or mates < places:
-        for lane in range(observers.number):
-            to, who = world_of(observers, lane), robot_of(observers, lane)
-            _write_the_rest(c, mates, worlds.message[to, 0], writers, observations[to, who], k)
+    _list_nearest(c, worlds, observers, v, now, s)
+    start, size = natural(made.width + c.sonar_beams), natural(made.mate_width + c.message_size)
+    for p in range(places):
+        number = load(s.placed, WIDTH * p)
+        if bits(number >= _ZERO) == 0:
+            break
+        mate = _mate_in_place(c, worlds, observers, v, p, now, s)
+        made.write_mate(c, v, mate, s, Rows(observers, observations, natural(start + p * size)))
+    if c.message_size > 0 or bits(load(s.placed, WIDTH * (places - 1)) < _ZERO) != 0:
+        _write_the_rest(c, worlds, observers, made, s, observations)
 
 
 @compiled
-def _observe_whole_team(
-    c: Record, observers: Observers, v: View, writers: Writers, s: Record, observations: FloatArray, k: int
-) -> None:
-    """Write every team-mate."""
-    n, size = natural(c.num_trackers), np.float32(writers.mate_width + c.message_size)
-    _, i, _, across = observers
-    rows = Rows(observers, observations, k, s.start, True)
-    _find_places(n, i, across, s)
-    for m in range(n - 1):
-        at = natural(stride_of(across) * (i + m + 1))
-        dx, dy = way_behind(i, m, across, s)
-        ahead, left = seen_at(i, m, across, s)
-        mate = mate_now(
-            number_behind(n, i, m, across, s),
-            dx,
-            dy,
-            load(s.distance, WIDTH * m),
-            ahead,
-            left,
-            load(s.team_cos, at),
-            load(s.team_sin, at),
-            load(s.team_speed, at),
-            load(s.team_turn_rate, at),
-        )
-        store(s.start, 0, load(s.place, WIDTH * m) * size)
-        writers.mate(c, v, mate, s, rows)
-
-
-@compiled
-def _find_places(n: int, i: int, across: int, s: Record) -> None:
-    """Write the rank by distance of each team-mate, m + 1 places behind its observers.
-
-    Ties are broken by number.
-    """
-    for m in range(n - 1):
-        ahead, left = seen_at(i, m, across, s)
-        distance = root(ahead * ahead + left * left)
-        number, place = number_behind(n, i, m, across, s), eight(_ZERO)
-        for q in range(m):
-            other, whose = load(s.distance, WIDTH * q), number_behind(n, i, q, across, s)
-            nearer = (other < distance) | ((other == distance) & (whose < number))
-            place = place + choose(nearer, _ONE, _ZERO)
-            store(s.place, WIDTH * q, load(s.place, WIDTH * q) + choose(nearer, _ZERO, _ONE))
-        store(s.distance, WIDTH * m, distance)
-        store(s.place, WIDTH * m, place)
-
-
-@compiled
-def _observe_listed(
-    c: Record,
-    worlds: WorldArrays,
-    observers: Observers,
-    heard: bool,
-    most: int,
-    v: View,
-    writers: Writers,
-    s: Record,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write ``most`` team-mates of each list: current or as received."""
-    size = natural(writers.mate_width + c.message_size)
-    for place in range(natural(most)):
-        x, y, cosine, sine, speed, turn_rate, step, _ = transpose(
-            _pose(worlds, heard, place, 0, observers, s),
-            _pose(worlds, heard, place, 1, observers, s),
-            _pose(worlds, heard, place, 2, observers, s),
-            _pose(worlds, heard, place, 3, observers, s),
-            _pose(worlds, heard, place, 4, observers, s),
-            _pose(worlds, heard, place, 5, observers, s),
-            _pose(worlds, heard, place, 6, observers, s),
-            _pose(worlds, heard, place, 7, observers, s),
-        )
-        number, dx, dy = load(s.listed, WIDTH * place), x - v.x, y - v.y
-        if heard:
-            age = (v.step - counts(step)) * c.dt
-            mate = mate_heard(v, number, age, dx, dy, cosine, sine, speed, turn_rate)
+def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, now: bool, s: Record) -> None:
+    """List the nearest mates that the observers know; of equally near ones the lower number is first."""
+    n, places = natural(c.num_trackers), natural(c.neighbours)
+    for p in range(places):
+        store(s.placed, WIDTH * p, eight(_MINUS_ONE))
+        store(s.placed_at, WIDTH * p, eight(FAR))
+    for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
+        if j == observers.i:
+            continue
+        if now:
+            x, y, known = load(s.team_x, WIDTH * j), load(s.team_y, WIDTH * j), v.step >= _ZERO
         else:
-            ahead, left = ego(v, dx, dy)
-            distance = root(ahead * ahead + left * left)
-            mate = mate_now(number, dx, dy, distance, ahead, left, cosine, sine, speed, turn_rate)
-        rows = Rows(observers, observations, natural(k + place * size), s.start, False)
-        writers.mate(c, v, mate, s, rows)
+            x, y, known = _heard(c, worlds, observers, v, j)
+        number, distance = (
+            choose(known, np.float32(j), _MINUS_ONE),
+            choose(known, _length(ego(v, x - v.x, y - v.y)), FAR),
+        )
+        if bits(distance <= load(s.placed_at, WIDTH * (places - 1))) == 0:
+            continue
+        for p in range(min(n - j, places)):
+            other, whose = load(s.placed_at, WIDTH * p), load(s.placed, WIDTH * p)
+            nearer = distance <= other
+            store(s.placed, WIDTH * p, choose(nearer, number, whose))
+            store(s.placed_at, WIDTH * p, lesser(other, distance))
+            number, distance = choose(nearer, whose, number), greater(other, distance)
 
 
 @compiled
-def _pose(worlds: WorldArrays, heard: bool, place: int, lane: int, observers: Observers, s: Record) -> Lanes:
-    """Return the pose, and the fields after it, of a lane's listed mate.
-
-    Lanes beyond ``count`` repeat the last one.
-    """
-    there = min(lane, observers.number - 1)
-    number = natural(int(s.listed[WIDTH * place + there]))
-    to, who = world_of(observers, there), robot_of(observers, there)
-    if heard:
-        return load_fields(worlds.heard[to, who, number], POSE)
-    return load_fields(worlds.tracker[to, number], POSE)
+def _length(vector: tuple[Lanes, Lanes]) -> Lanes:
+    x, y = vector
+    return root(x * x + y * y)
 
 
 @compiled
-def _observe_heard(
-    c: Record,
-    worlds: WorldArrays,
-    observers: Observers,
+def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int) -> tuple[Lanes, Lanes, Mask]:
+    """Return where mate j was when last heard, and whether that is not forgotten."""
+    heard = Heard(
+        *transpose(
+            _message(worlds, observers, j, 0),
+            _message(worlds, observers, j, 1),
+            _message(worlds, observers, j, 2),
+            _message(worlds, observers, j, 3),
+            _message(worlds, observers, j, 4),
+            _message(worlds, observers, j, 5),
+            _message(worlds, observers, j, 6),
+            _message(worlds, observers, j, 7),
+        )
+    )
+    sent = counts(heard.step)
+    return heard.x, heard.y, (sent >= _ZERO) & (v.step - sent <= np.float32(c.forget_steps))
+
+
+@compiled
+def _message(worlds: WorldArrays, observers: Observers, j: int, lane: int) -> Lanes:
+    return load_fields(worlds.heard[world_of(observers, lane), natural(observers.i), natural(j)], MESSAGE)
+
+
+@compiled
+def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View, p: int, now: bool, s: Record) -> Mate:
+    """Return the mate in a place of each observer; of one without, the first tracker."""
+    fields = transpose(
+        _fields_of(worlds, observers, p, now, 0, s),
+        _fields_of(worlds, observers, p, now, 1, s),
+        _fields_of(worlds, observers, p, now, 2, s),
+        _fields_of(worlds, observers, p, now, 3, s),
+        _fields_of(worlds, observers, p, now, 4, s),
+        _fields_of(worlds, observers, p, now, 5, s),
+        _fields_of(worlds, observers, p, now, 6, s),
+        _fields_of(worlds, observers, p, now, 7, s),
+    )
+    number, distance = load(s.placed, WIDTH * p), load(s.placed_at, WIDTH * p)
+    if now:
+        t = Pose(*fields)
+        return _mate(v, number, distance, eight(_ZERO), t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate)
+    h = Heard(*fields)
+    age = (v.step - counts(h.step)) * c.dt
+    return _mate(v, number, distance, age, h.x, h.y, h.heading_cos, h.heading_sin, h.speed, h.turn_rate)
+
+
+@compiled
+def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lane: int, s: Record) -> Lanes:
+    """Return eight fields of a lane's mate in a place: now, or as last heard."""
+    number = natural(max(int(s.placed[WIDTH * p + lane]), 0))
+    if now:
+        return load_fields(worlds.tracker[world_of(observers, lane), number], POSE)
+    return _message(worlds, observers, number, lane)
+
+
+@compiled
+def _mate(
     v: View,
-    writers: Writers,
-    s: Record,
-    observations: FloatArray,
-    k: int,
-) -> None:
-    """Write the nearest team-mates and their messages, as last received."""
-    most = 0
-    for lane in range(observers.number):
-        to, who = world_of(observers, lane), robot_of(observers, lane)
-        filled = _list_heard(c, worlds, to, who, lane, s)
-        s.filled[lane] = np.float32(filled)
-        most = max(most, filled)
-    _observe_listed(c, worlds, observers, True, most, v, writers, s, observations, k)
-    for lane in range(observers.number):
-        to, who = world_of(observers, lane), robot_of(observers, lane)
-        filled, o = natural(int(s.filled[lane])), observations[to, who]
-        if c.message_size > 0 or filled < c.neighbours:
-            _write_the_rest(c, filled, worlds.heard_message[to, who], writers, o, k)
-
-
-@compiled
-def _list_heard(c: Record, worlds: WorldArrays, e: int, i: int, lane: int, s: Record) -> int:
-    """List the team-mates heard by tracker i of world e, nearest first; return their number."""
-    t, step, filled = worlds.tracker[e, i], worlds.world[e].step, 0
-    for j in range(natural(c.num_trackers)):
-        h = worlds.heard[e, i, j]
-        if j != i and h.step >= 0 and step - h.step <= c.forget_steps:
-            dx, dy = h.x - t.x, h.y - t.y
-            filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
-    for place in range(natural(c.neighbours)):
-        s.listed[WIDTH * place + lane] = s.who[place] if place < filled else _ZERO
-    return filled
-
-
-@compiled
-def observe_trackers(
-    c: Record, worlds: WorldArrays, e: int, v: View, writers: Writers, s: Record, observations: FloatArray, k: int
-) -> None:
-    """Write the nearest trackers of a target agent, without messages, from k on."""
-    w, n, filled = worlds.world[e], natural(c.num_trackers), 0
-    for j in range(n):
-        t = worlds.tracker[e, j]
-        dx, dy = t.x - w.x, t.y - w.y
-        if c.neighbours > 0:
-            filled = keep_nearest(c.neighbours, filled, j, dx * dx + dy * dy, s)
-    size, o = natural(writers.mate_width + c.message_size), observations[e, n]
-    for place in range(natural(c.neighbours)):
-        start = natural(k + place * size)
-        if place < filled:
-            number = natural(int(s.who[place]))
-            t = worlds.tracker[e, number]
-            mate = mate_heard(
-                v,
-                eight(np.float32(number)),
-                eight(_ZERO),
-                t.x - v.x,
-                t.y - v.y,
-                eight(t.heading_cos),
-                eight(t.heading_sin),
-                eight(t.speed),
-                eight(t.turn_rate),
-            )
-            rows = Rows(Observers(e, n, 1, 0), observations, start, s.start, False)
-            writers.mate(c, v, mate, s, rows)
-        else:
-            writers.empty(o, start)
-        for q in range(c.message_size):
-            o[start + writers.mate_width + q] = _ZERO
+    number: Lanes,
+    distance: Lanes,
+    age: Lanes,
+    x: Lanes,
+    y: Lanes,
+    heading_cos: Lanes,
+    heading_sin: Lanes,
+    speed: Lanes,
+    turn_rate: Lanes,
+) -> Mate:
+    dx, dy = x - v.x, y - v.y
+    ahead, left = ego(v, dx, dy)
+    apart, per_metre = distance > _ZERO, _ONE / greater(distance, _TINY)
+    return Mate(
+        number=number,
+        age=age,
+        dx=dx,
+        dy=dy,
+        distance=distance,
+        ahead=choose(apart, ahead * per_metre, _ONE),
+        left=choose(apart, left * per_metre, _ZERO),
+        heading_cos=heading_cos,
+        heading_sin=heading_sin,
+        speed=speed,
+        turn_rate=turn_rate,
+    )
 
 
 @compiled(seldom=True)
-def _write_the_rest(c: Record, filled: int, said: FloatArray, writers: Writers, o: FloatArray, k: int) -> None:
-    """Write the messages (N, m) of the first ``filled`` team-mates, and the empty places."""
-    size = natural(writers.mate_width + c.message_size)
-    for place in range(natural(c.neighbours)):
-        start = natural(k + place * size)
-        message = start + writers.mate_width
-        if place < filled:
-            number = natural(int(o[start]))  # the first field of a team-mate
-            for q in range(c.message_size):
-                o[message + q] = said[number, q]
-        else:
-            writers.empty(o, start)
-            for q in range(c.message_size):
-                o[message + q] = _ZERO
+def _write_the_rest(
+    c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
+) -> None:
+    """Write the messages of the listed mates, none to a target, and the empty places."""
+    size = natural(made.mate_width + c.message_size)
+    for lane in range(observers.number):
+        e, i = natural(observers.e + lane), natural(observers.i)
+        o = observations[e, i]
+        for p in range(natural(c.neighbours)):
+            start, number = natural(made.width + c.sonar_beams + p * size), int(s.placed[WIDTH * p + lane])
+            if number < 0:
+                made.write_empty(o, start)
+            for q in range(natural(c.message_size)):
+                said = _ZERO
+                if number >= 0 and i < c.num_trackers:
+                    j = natural(number)
+                    said = worlds.message[e, 0, j, q] if c.perfect_radio != 0 else worlds.heard_message[e, i, j, q]
+                o[start + made.mate_width + q] = said

@@ -1,9 +1,4 @@
-"""Writes the observations.
-
-Eight trackers at once, one per lane (:mod:`~.views`): one tracker of eight worlds
-(``across`` is 1) or, with fewer worlds or a large team, eight trackers of one world (0). The sonar
-and the target agent are processed world by world.
-"""
+"""Writes the observations: one robot of eight worlds at once, one world per lane (:mod:`~.views`)."""
 
 from __future__ import annotations
 
@@ -15,11 +10,10 @@ from posse.numeric import WIDTH, FloatArray, Record, Records, compiled
 from posse.rules.discs import natural
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
-from posse.signals.observation.columns import Observers, Rows
-from posse.signals.observation.mates import observe_mates, observe_trackers
-from posse.signals.observation.views import lay_out_observers, view_of_target, view_of_trackers
-from posse.signals.parts import Writers
-from posse.signals.scratch import MOST_IN_TEAM
+from posse.signals.generate import Generated
+from posse.signals.observation.mates import observe_mates
+from posse.signals.observation.rows import Observers, Rows
+from posse.signals.observation.views import lay_out_observers, view_of_targets, view_of_trackers
 
 TOGETHER: Final = WIDTH
 """Worlds processed together."""
@@ -27,76 +21,41 @@ TOGETHER: Final = WIDTH
 _ZERO: Final = np.float32(0.0)
 
 
-@compiled(seldom=True)
-def lay_out_fixed(c: Record, worlds: WorldArrays, writers: Writers, s: Record) -> None:
-    """Write what never changes of each robot's observation, from world 0."""
-    n = natural(c.num_trackers)
-    lay_out_observers(worlds, 0, 0, s)
-    for i in range(0, n, WIDTH):
-        observers = Observers(0, i, min(WIDTH, n - i), 0)
-        writers.fixed(c, view_of_trackers(c, worlds, observers, s), s, observers)
-    view = view_of_target(c, worlds.world[0], worlds.obstacle[0])
-    writers.fixed(c, view, s, Observers(0, n, 1, 0))
-
-
-@compiled
-def _observe_some(
-    c: Record,
-    worlds: WorldArrays,
-    e: int,
-    i: int,
-    count: int,
-    across: int,
-    writers: Writers,
-    s: Record,
-    observations: FloatArray,
-) -> None:
-    """Write what ``count`` trackers, the first of them i of world e, observe, the sonar apart."""
-    observers = Observers(e, i, count, across)
-    view = view_of_trackers(c, worlds, observers, s)
-    writers.own(c, view, s, Rows(observers, observations, 0, s.start, False))
-    k = writers.width + natural(c.sonar_beams)
-    observe_mates(c, worlds, observers, view, writers, s, observations, k)
-
-
 @compiled
 def observe_together(
-    c: Record, worlds: WorldArrays, first: int, count: int, writers: Writers, s: Record, observations: FloatArray
+    c: Record, worlds: WorldArrays, first: int, count: int, made: Generated, s: Record, observations: FloatArray
 ) -> None:
-    """Write the observations of ``count`` worlds, at most eight, without the sonar."""
-    n = natural(c.num_trackers)
-    if count == TOGETHER and n <= MOST_IN_TEAM:
-        lay_out_observers(worlds, first, 1, s)
-        for i in range(n):
-            _observe_some(c, worlds, first, i, WIDTH, 1, writers, s, observations)
-        return
-    for e in range(first, first + count):
-        lay_out_observers(worlds, e, 0, s)
-        for i in range(0, n, WIDTH):
-            _observe_some(c, worlds, e, i, min(WIDTH, n - i), 0, writers, s, observations)
+    """Write the observations of all agents of ``count`` worlds, at most eight, without the sonar."""
+    lay_out_observers(c, worlds, first, count, s)
+    for i in range(natural(c.num_trackers)):
+        observers = Observers(first, i, count)
+        view = view_of_trackers(c, worlds, observers, s)
+        made.write_own(c, view, s, Rows(observers, observations, 0))
+        observe_mates(c, worlds, observers, view, c.perfect_radio != 0, made, s, observations)
+    if c.target_agent != 0:
+        _observe_targets(c, worlds, Observers(first, c.num_trackers, count), made, s, observations)
+
+
+@compiled(seldom=True)
+def _observe_targets(
+    c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
+) -> None:
+    """Write what target agents observe: the trackers in the places of team-mates, without error."""
+    view = view_of_targets(c, s)
+    made.write_own(c, view, s, Rows(observers, observations, 0))
+    observe_mates(c, worlds, observers, view, True, made, s, observations)
 
 
 @compiled
-def observe_sonar(c: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
-    """Write the sonar of every tracker of a world to (rows, F), from ``first`` on.
+def observe_sonar(c: Record, w: Record, trackers: Records, s: Record, observations: FloatArray, first: int) -> None:
+    """Write the sonar of every agent of a world to (rows, F), from ``first`` on.
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
-    for i in range(natural(c.num_trackers)):
+    n = natural(c.num_trackers)
+    for i in range(n):
         t = trackers[i]
         pose = (t.x, t.y, t.heading_cos, t.heading_sin)
         ping(c, pose, i, s.gap[i], s, observations[i], first)
-
-
-@compiled(seldom=True)
-def observe_target(
-    c: Record, worlds: WorldArrays, e: int, writers: Writers, s: Record, observations: FloatArray
-) -> None:
-    """Write the observation of a target agent, which observes the trackers without error."""
-    w, n = worlds.world[e], natural(c.num_trackers)
-    view = view_of_target(c, w, worlds.obstacle[e])
-    writers.own(c, view, s, Rows(Observers(e, n, 1, 0), observations, 0, s.start, False))
-    pose = (w.x, w.y, w.heading_cos, w.heading_sin)
-    ping(c, pose, n, _ZERO, s, observations[e, n], writers.width)
-    k = writers.width + natural(c.sonar_beams)
-    observe_trackers(c, worlds, e, view, writers, s, observations, k)
+    if c.target_agent != 0:
+        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, _ZERO, s, observations[n], first)

@@ -93,7 +93,7 @@ def formation(c: Record) -> tuple[np.float32, np.float32, np.float32]:
     return _one_if(c.formation == 0), _one_if(c.formation == 1), _one_if(c.formation == 2)
 
 
-@field("1", -1, lambda s: s.num_trackers - 1, unknown=-1, fixed=True)
+@field("1", -1, lambda s: s.num_trackers - 1, unknown=-1)
 def number(c: Record, v: View) -> Lanes:
     """Own number, 0 to N - 1."""
     return v.number
@@ -117,25 +117,25 @@ def formation_spacing(c: Record) -> np.float32:
     return np.float32(c.formation_spacing)
 
 
-@field("m/s", 0, _fast, fixed=True)
+@field("m/s", 0, _fast)
 def max_speed(c: Record, v: View) -> Lanes:
     """Own greatest speed."""
     return v.max_speed
 
 
-@field("rad/s", 0, most_turn, fixed=True)
+@field("rad/s", 0, most_turn)
 def max_turn_rate(c: Record, v: View) -> Lanes:
     """Own greatest turn rate."""
     return v.max_turn_rate
 
 
-@field("s", 0, lambda s: max(1, max(s.tracker_speeds) / s.tracker_acceleration * SLACK), fixed=True)
+@field("s", 0, lambda s: max(1, max(s.tracker_speeds) / s.tracker_acceleration * SLACK))
 def acceleration_time(c: Record, v: View) -> Lanes:
     """Time from rest to full speed; 0: no acceleration limit."""
     return v.acceleration_time
 
 
-@field("s", 0, lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK), fixed=True)
+@field("s", 0, lambda s: max(1, max(s.tracker_turn_rates) / s.tracker_turn_acceleration * SLACK))
 def turn_acceleration_time(c: Record, v: View) -> Lanes:
     """Time from turn rate 0 to the greatest turn rate; 0: no acceleration limit."""
     return v.turn_acceleration_time

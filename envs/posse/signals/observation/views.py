@@ -1,8 +1,6 @@
-"""Inputs of observation fields: views of eight observers, one per lane.
+"""Inputs of observation fields: views of the same robot of eight worlds, one per lane.
 
-The eight are one tracker of eight worlds (``across`` is 1) or, with fewer worlds or large teams,
-eight trackers of one world (0). A target agent uses the first lane. Unused parts of a view are
-removed by the compiler.
+Unused parts of a view are removed by the compiler.
 """
 
 from __future__ import annotations
@@ -12,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posse.numeric import (
+    WIDTH,
     Lanes,
     Mask,
     Record,
@@ -20,7 +19,6 @@ from posse.numeric import (
     compiled,
     counts,
     eight,
-    greater,
     load,
     load_fields,
     root,
@@ -29,9 +27,8 @@ from posse.numeric import (
 )
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural
-from posse.rules.state import CONDITION, FIX, NEVER, POSE, STEP, WorldArrays
-from posse.signals.observation.columns import Observers
-from posse.signals.observation.team import lay_out_team, own_numbers, stride_of, team_columns
+from posse.rules.state import CONDITION, FIX, NEVER, POSE, Condition, Fix, Pose, WorldArrays
+from posse.signals.observation.rows import Observers, world_of
 
 _ZERO: Final = np.float32(0.0)
 _ONE: Final = np.float32(1.0)
@@ -121,163 +118,112 @@ class Mate(NamedTuple):
 
 
 @compiled
-def mate_now(
-    number: Lanes,
-    dx: Lanes,
-    dy: Lanes,
-    distance: Lanes,
-    ahead: Lanes,
-    left: Lanes,
-    heading_cos: Lanes,
-    heading_sin: Lanes,
-    speed: Lanes,
-    turn_rate: Lanes,
-) -> Mate:
-    """Return a team-mate as it is now, (dx, dy) away: ``ahead`` and to the ``left``, all in m."""
-    per_metre = _ONE / greater(distance, _TINY)
-    return Mate(
-        number,
-        eight(_ZERO),
-        dx,
-        dy,
-        distance,
-        ahead * per_metre,
-        left * per_metre,
-        heading_cos,
-        heading_sin,
-        speed,
-        turn_rate,
-    )
+def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s: Record) -> None:
+    """Write the rows of ``count`` worlds, at most eight: positions, control steps, target agents."""
+    n = natural(c.num_trackers)
+    for i in range(n):
+        pose = Pose(*_columns(worlds.tracker, Observers(first, i, count), POSE))
+        store(s.team_x, WIDTH * i, pose.x)
+        store(s.team_y, WIDTH * i, pose.y)
+    for lane in range(WIDTH):
+        e = world_of(Observers(first, n, count), lane)
+        w = worlds.world[e]
+        s.steps[lane] = np.float32(w.step)
+        if c.target_agent != 0:
+            s.target_x[lane], s.target_y[lane] = w.x, w.y
+            s.target_cos[lane], s.target_sin[lane] = w.heading_cos, w.heading_sin
+            s.target_speed[lane], s.target_turn_rate[lane] = w.speed, w.turn_rate
+            touching = w.touching != _NOBODY or touches_surroundings(c, w, worlds.obstacle[e])
+            s.target_touching[lane] = np.float32(touching)
 
 
 @compiled
-def mate_heard(
-    v: View,
-    number: Lanes,
-    age: Lanes,
-    dx: Lanes,
-    dy: Lanes,
-    heading_cos: Lanes,
-    heading_sin: Lanes,
-    speed: Lanes,
-    turn_rate: Lanes,
-) -> Mate:
-    """Return a team-mate as last received.
-
-    Its rounding differs from :func:`mate_now`; changing either would change results.
-    """
-    distance = root(dx * dx + dy * dy)
-    apart = distance > _ZERO
-    per_metre = _ONE / choose(apart, distance, _ONE)
-    ahead, left = ego(v, dx * per_metre, dy * per_metre)
-    return Mate(
-        number,
-        age,
-        dx,
-        dy,
-        distance,
-        choose(apart, ahead, _ONE),
-        choose(apart, left, _ZERO),
-        heading_cos,
-        heading_sin,
-        speed,
-        turn_rate,
+def _columns(tracker: Records, observers: Observers, offset: int) -> tuple[Lanes, ...]:
+    """Return a block of fields of eight trackers, field by field; see :func:`posse.rules.discs.columns`."""
+    i = natural(observers.i)
+    return transpose(
+        load_fields(tracker[world_of(observers, 0), i], offset),
+        load_fields(tracker[world_of(observers, 1), i], offset),
+        load_fields(tracker[world_of(observers, 2), i], offset),
+        load_fields(tracker[world_of(observers, 3), i], offset),
+        load_fields(tracker[world_of(observers, 4), i], offset),
+        load_fields(tracker[world_of(observers, 5), i], offset),
+        load_fields(tracker[world_of(observers, 6), i], offset),
+        load_fields(tracker[world_of(observers, 7), i], offset),
     )
-
-
-@compiled
-def lay_out_observers(worlds: WorldArrays, e: int, across: int, s: Record) -> None:
-    """Write the team's rows of world e, or of eight worlds, and their control steps."""
-    lay_out_team(worlds.tracker, e, across, s)
-    if across:
-        steps, _, _, _, _, _, _, _ = transpose(
-            load_fields(worlds.world[e], STEP),
-            load_fields(worlds.world[e + 1], STEP),
-            load_fields(worlds.world[e + 2], STEP),
-            load_fields(worlds.world[e + 3], STEP),
-            load_fields(worlds.world[e + 4], STEP),
-            load_fields(worlds.world[e + 5], STEP),
-            load_fields(worlds.world[e + 6], STEP),
-            load_fields(worlds.world[e + 7], STEP),
-        )
-        store(s.steps, 0, counts(steps))
-    else:
-        store(s.steps, 0, eight(np.float32(worlds.world[e].step)))
 
 
 @compiled
 def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
-    """Return the view of eight trackers; requires :func:`lay_out_observers`."""
-    e, i, _, across = observers
-    at = natural(stride_of(across) * i)
-    own_x, own_y = load(s.team_x, at), load(s.team_y, at)
-    _, _, _, _, _, _, max_speed, max_turn_rate = team_columns(worlds.tracker, e, i, across, POSE)
-    x, y, cosine, sine, frame_cos, frame_sin, vx, vy = team_columns(worlds.tracker, e, i, across, FIX)
-    broken_at, _, _, sees, _, touching, _, fix_step = team_columns(worlds.tracker, e, i, across, CONDITION)
-    working = choose(counts(broken_at) == np.float32(NEVER), _ONE, _ZERO)
-    dx, dy, fixed_at = x, y, counts(fix_step)
+    """Return the view of a tracker of eight worlds; requires :func:`lay_out_observers`."""
+    own = Pose(*_columns(worlds.tracker, observers, POSE))
+    fix = Fix(*_columns(worlds.tracker, observers, FIX))
+    condition = Condition(*_columns(worlds.tracker, observers, CONDITION))
+    dx, dy, fixed_at = fix.fix_x, fix.fix_y, counts(condition.fix_step)
     if c.fix_bearing == 0:
-        dx, dy = x - own_x, y - own_y
+        dx, dy = dx - own.x, dy - own.y
     return View(
-        own_numbers(i, across, s),
-        own_x,
-        own_y,
-        load(s.team_cos, at),
-        load(s.team_sin, at),
-        load(s.team_speed, at),
-        load(s.team_turn_rate, at),
-        counts(touching),
-        working,
-        load(s.steps, 0),
-        max_speed,
-        max_turn_rate,
-        max_speed * c.per_acceleration,
-        max_turn_rate * c.per_turn_acceleration,
-        fixed_at >= _ZERO,
-        counts(sees),
-        fixed_at,
-        dx,
-        dy,
-        root(dx * dx + dy * dy),
-        cosine,
-        sine,
-        frame_cos,
-        frame_sin,
-        vx,
-        vy,
+        number=eight(np.float32(observers.i)),
+        x=own.x,
+        y=own.y,
+        heading_cos=own.heading_cos,
+        heading_sin=own.heading_sin,
+        speed=own.speed,
+        turn_rate=own.turn_rate,
+        touching=counts(condition.touching),
+        working=choose(counts(condition.broken_at) == np.float32(NEVER), _ONE, _ZERO),
+        step=load(s.steps, 0),
+        max_speed=own.max_speed,
+        max_turn_rate=own.max_turn_rate,
+        acceleration_time=own.max_speed * c.per_acceleration,
+        turn_acceleration_time=own.max_turn_rate * c.per_turn_acceleration,
+        target_known=fixed_at >= _ZERO,
+        target_seen=counts(condition.sees),
+        target_step=fixed_at,
+        target_dx=dx,
+        target_dy=dy,
+        target_distance=root(dx * dx + dy * dy),
+        target_cos=fix.fix_cos,
+        target_sin=fix.fix_sin,
+        target_frame_cos=fix.fix_frame_cos,
+        target_frame_sin=fix.fix_frame_sin,
+        target_vx=fix.fix_vx,
+        target_vy=fix.fix_vy,
     )
 
 
 @compiled
-def view_of_target(c: Record, w: Record, obstacles: Records) -> View:
-    """Return the view of a target agent, which has no acceleration limits."""
-    touching = w.touching != _NOBODY or touches_surroundings(c, w, obstacles)
+def view_of_targets(c: Record, s: Record) -> View:
+    """Return the view of the target agents of eight worlds, which have no acceleration own.
+
+    Requires :func:`lay_out_observers`.
+    """
     zero, never = eight(_ZERO), eight(_MINUS_ONE)
     return View(
-        eight(_MINUS_ONE),
-        eight(w.x),
-        eight(w.y),
-        eight(w.heading_cos),
-        eight(w.heading_sin),
-        eight(w.speed),
-        eight(w.turn_rate),
-        eight(np.float32(touching)),
-        eight(_ONE),
-        eight(np.float32(w.step)),
-        eight(c.target_speed),
-        eight(c.target_turn_rate),
-        zero,
-        zero,
-        never >= _ZERO,
-        zero,
-        never,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
-        zero,
+        number=eight(_MINUS_ONE),
+        x=load(s.target_x, 0),
+        y=load(s.target_y, 0),
+        heading_cos=load(s.target_cos, 0),
+        heading_sin=load(s.target_sin, 0),
+        speed=load(s.target_speed, 0),
+        turn_rate=load(s.target_turn_rate, 0),
+        touching=load(s.target_touching, 0),
+        working=eight(_ONE),
+        step=load(s.steps, 0),
+        max_speed=eight(c.target_speed),
+        max_turn_rate=eight(c.target_turn_rate),
+        acceleration_time=zero,
+        turn_acceleration_time=zero,
+        target_known=never >= _ZERO,
+        target_seen=zero,
+        target_step=never,
+        target_dx=zero,
+        target_dy=zero,
+        target_distance=zero,
+        target_cos=zero,
+        target_sin=zero,
+        target_frame_cos=zero,
+        target_frame_sin=zero,
+        target_vx=zero,
+        target_vy=zero,
     )

@@ -1,1 +1,0 @@
-"""numba's compiler passes and the kernel cache; not needed to change a rule."""

@@ -1,1 +1,0 @@
-"""Blocks of eight numbers, and their compilation to vector instructions."""

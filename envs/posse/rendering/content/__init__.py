@@ -1,1 +1,0 @@
-"""What a frame shows, read from a batch; nothing is drawn here."""

@@ -1,0 +1,120 @@
+"""The contents of a frame, read from a batch, and their recent past; drawing reads no records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+
+from posse.rendering.style import TRACKER, Colour
+from posse.rules.state import NEVER
+from posse.scenarios.formation import slot_offsets
+
+if TYPE_CHECKING:
+    from posse.engine.batch import Batch
+
+Floats = npt.NDArray[np.float64]
+
+_LINK_SHOWN: Final = 3  # control steps after a message
+_TRAIL_TIME: Final = 6.0  # s
+_MARK_TIME: Final = 0.2  # s, between two marks of a trail
+_FLASH_TIME: Final = 0.8  # s
+
+
+class Scene:
+    """One world at one time. N trackers, M obstacles; metres, seconds, radians.
+
+    Args:
+        batch: A batch that has been reset.
+        world: Its index in the batch.
+        colours: Red, green, blue of each tracker, 0 to 255; default: grey.
+
+    Raises:
+        ValueError: No such world, or another number of colours.
+        ResetNeeded: The batch has not been reset.
+    """
+
+    def __init__(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> None:
+        if not 0 <= world < batch.num_worlds:
+            raise ValueError(f"world={world} is not in the batch: it holds worlds 0 to {batch.num_worlds - 1}")
+        of = {name: array[world] for name, array in batch.state.items()}
+        if of["world_heading_cos"] == 0 and of["world_heading_sin"] == 0:
+            raise ResetNeeded("nothing to draw before reset: call reset() first")
+        s, n = batch.scenario, batch.scenario.num_trackers
+        if colours is not None and len(colours) != n:
+            raise ValueError(f"{len(colours)} colours do not fit {n} trackers: give one for each")
+
+        def points(*names: str) -> Floats:
+            return np.stack([of[name] for name in names], axis=-1).astype(np.float64)
+
+        self.scenario = s
+        self.episode = tuple(int(of[f"world_{k}"]) for k in ("seed", "split", "index", "episode", "key"))
+        self.step = int(of["world_step"])
+        self.time = self.step * s.control_step
+        self.score = float(of["world_score_sum"]) / max(self.step, 1)  # mean over the steps so far
+
+        self.target = points("world_x", "world_y")  # (2,)
+        self.target_heading = points("world_heading_cos", "world_heading_sin")
+        self.frame = points("world_frame_cos", "world_frame_sin")  # of the slots
+        cosine, sine = self.frame
+        self.slots = self.target + np.array(slot_offsets(s)) @ np.array([[cosine, sine], [-sine, cosine]])  # (N, 2)
+        self.occupied = np.isin(np.arange(n), of["tracker_slot"])  # (N,) by slot
+
+        self.position = points("tracker_x", "tracker_y")  # (N, 2)
+        self.heading = points("tracker_heading_cos", "tracker_heading_sin")  # (N, 2)
+        self.broken = of["tracker_broken_at"] != NEVER  # (N,)
+        self.sees = of["tracker_sees"] != 0  # (N,) its own sensor sees the target
+        since = self.step - of["tracker_sensor_dead_from"].astype(np.int64)
+        outage = max(1, round(s.outage_time / s.control_step))
+        self.senses = ~self.broken & ((since < 0) | (since >= outage))  # (N,) its sensor works
+        self.struck = of["tracker_onsets"] > 0  # (N,) a contact began in this step
+        self.colours = (TRACKER,) * n if colours is None else tuple(colours)
+        heard = np.zeros((n, n), np.bool_)  # just now; nobody where the radio is perfect
+        if of["heard_step"].size:
+            heard = of["heard_step"] > max(self.step - s.radio_delay - _LINK_SHOWN, -1)
+        self.links = heard | heard.T  # (N, N)
+        self.obstacles = points("obstacle_x", "obstacle_y", "obstacle_radius")  # (M, 3)
+
+    @property
+    def action(self) -> Floats:
+        """Points (K, 2) that a camera keeps in view.
+
+        Broken trackers stay behind: a view that included them would grow without bound.
+        """
+        return np.vstack([self.position[~self.broken], self.target, self.target + self.frame])
+
+
+class History:
+    """The scenes of the last seconds of an episode, for trails and contacts. Cleared when another one starts."""
+
+    def __init__(self) -> None:
+        self._scenes: list[Scene] = []
+
+    def note(self, scene: Scene) -> float | None:
+        """Record a state; return the time since the last one, s, or ``None`` in a new episode.
+
+        A state recorded twice counts once; an earlier one (a restored batch) clears the history.
+        """
+        last = self._scenes[-1] if self._scenes else None
+        if last is None or scene.episode != last.episode or scene.step < last.step:
+            self._scenes = [scene]
+            return None
+        kept = [s for s in self._scenes if s.step < scene.step and scene.time - s.time <= _TRAIL_TIME]
+        self._scenes = [*kept, scene]
+        return scene.time - last.time
+
+    def trail(self) -> list[tuple[Floats, float]]:
+        """Return past places (N + 1, 2) m, the target last, and freshness: 1 now, 0 at the end. Oldest first."""
+        now = self._scenes[-1]
+        every = max(1, round(_MARK_TIME / now.scenario.control_step))
+        marks = [s for s in self._scenes if s.step % every == 0 or s is now]
+        return [(np.vstack([s.position, s.target]), 1 - (now.time - s.time) / _TRAIL_TIME) for s in marks]
+
+    def flashes(self) -> list[tuple[Floats, float]]:
+        """Return place (2,) m and age, 0 now, 1 at the end, of the contacts that have just begun."""
+        now = self._scenes[-1].time
+        recent = [s for s in self._scenes if now - s.time < _FLASH_TIME]
+        return [(place, (now - s.time) / _FLASH_TIME) for s in recent for place in s.position[s.struck]]

@@ -1,0 +1,110 @@
+"""Errors in functions that users' modules declare, reported by function and line."""
+
+from __future__ import annotations
+
+import difflib
+import dis
+import re
+from pathlib import Path
+from typing import Any, Final
+
+import numba
+import numpy as np
+from numba.core import types
+
+from posse.numeric import UNCOMPILED
+from posse.numeric.lane_code import LanesType, tuple_of_lanes
+from posse.registry import Function, parameters_of, plain
+from posse.rules.state import CONFIG, OBSTACLE, SLOT, TRACKER, world_record_of
+from posse.signals.generate import Declarations
+from posse.signals.observation.views import Mate, View
+
+_njit: Final[Any] = numba.njit  # Any: its types lack _nrt
+_typeof: Final[Any] = numba.typeof
+_COLOURS: Final = re.compile(r"\x1b\[[0-9;]*m")
+_RECORD: Final = re.compile(r"Record\(.*?;\d+;(?:True|False)\)", re.DOTALL)
+_VIEW: Final = re.compile(r"\b(View|Mate)\((?:Lanes|Mask)[^)]*\)")
+_UNKNOWN: Final = re.compile(r"Unknown attribute '(\w+)' of type")
+_HEADING: Final = "Failed in nopython mode"
+_LONGEST: Final = 200
+
+
+def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
+    """Raise if a user's function cannot be compiled. Takes some tenths of a second for each.
+
+    Raises:
+        DeclarationError: Names the function, the line and the reason.
+    """
+    added = list(declarations.added())
+    if UNCOMPILED or not added:
+        return
+    world = world_record_of(declarations.motions, declarations.metrics)
+    records = {"c": CONFIG, "w": world, "t": TRACKER, "s": scratch}
+    arrays = {"trackers": TRACKER, "obstacles": OBSTACLE, "slots": SLOT}
+    known: dict[str, Any] = {
+        **{name: _typeof(np.zeros(1, dtype)[0]) for name, dtype in records.items()},
+        **{name: _typeof(np.zeros(1, dtype)) for name, dtype in arrays.items()},
+        "v": tuple_of_lanes(View),
+        "m": tuple_of_lanes(Mate),
+        "number": types.int64,
+        "dx": types.float32,
+        "dy": types.float32,
+    }
+    for registry, declaration in added:
+        for function, returns in declaration.functions:
+            line, reason = _why_not(function, [known[name] for name in parameters_of(function)], returns)
+            if reason:
+                raise registry.error(function, f"line {line}: {reason}") from None
+
+
+def _why_not(function: Function, arguments: list[Any], returns: str) -> tuple[int, str]:
+    """Compile a function alone; return the line and the reason of its error, or no reason."""
+    alone: Any = _njit(error_model="numpy", _nrt=False)(plain(function))
+    first = int(plain(function).__code__.co_firstlineno)
+    try:
+        alone.compile(tuple(arguments))
+    except Exception as error:  # the compiler may raise anything
+        text = _COLOURS.sub("", str(error))
+        unknown = _UNKNOWN.search(text)
+        if unknown or isinstance(error, KeyError):  # of a view, or of a record
+            return _unknown(function, unknown[1] if unknown else str(error.args[0]), arguments)
+        file = re.escape(Path(plain(function).__code__.co_filename).name)
+        lines = re.findall(rf'{file}(?:" *, line | \()(\d+)', text)
+        return int(lines[-1]) if lines else first, _short(_first_line(text))
+    found: Any = alone.overloads[tuple(arguments)].signature.return_type
+    return first, "" if _fits(found, returns) else f"it returns {_short(str(found))}, not {returns}"
+
+
+def _unknown(function: Function, name: str, arguments: list[Any]) -> tuple[int, str]:
+    """Return the line and the reason of an attribute that none of the arguments has."""
+    places = (each.positions for each in dis.get_instructions(plain(function)) if each.argval == name)
+    line = next((place.lineno for place in places if place), None) or plain(function).__code__.co_firstlineno
+    fields = {name for kind in arguments for name in getattr(kind, "fields", ())}  # of records, views and mates
+    near = difflib.get_close_matches(name, fields)
+    return line, f"there is no field {name!r}" + (f" (did you mean {' or '.join(map(repr, near))}?)" if near else "")
+
+
+def _fits(found: Any, returns: str) -> bool:
+    if returns == "nothing":
+        return isinstance(found, types.NoneType)
+    if returns == "True or False":
+        return isinstance(found, (types.Integer, types.Boolean))
+    if returns == "a number":
+        return isinstance(found, (types.Number, types.Boolean, LanesType))
+    numbers = [_fits(each, "a number") for each in found] if isinstance(found, types.BaseTuple) else []  # type: ignore[attr-defined]
+    return all(numbers) and returns == f"{len(numbers)} numbers"
+
+
+def _first_line(text: str) -> str:
+    """Return the first line of the compiler's message that says something."""
+    if "NRT required" in text:
+        return "it creates an array, a list or a text, which compiled functions may not"
+    lines = [line.strip() for line in text.splitlines()]
+    said = [line for line in lines if line and not line.startswith(_HEADING)] or ["it cannot be compiled"]
+    call = next((line[3:].strip() for line in said if line.startswith(">>>")), None)
+    return said[0] if call is None else f"{call}: no such function of these types"
+
+
+def _short(text: str) -> str:
+    text = _VIEW.sub(r"\1", _RECORD.sub("a record", text))
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"

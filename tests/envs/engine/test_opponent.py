@@ -1,0 +1,219 @@
+"""A batch in which a policy moves the target."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import posse
+
+WORLDS, HORIZON = 3, 12
+SHORT = posse.get_scenario("constant", num_trackers=2, horizon=HORIZON, settle_time=1.0)
+
+
+class Weaver:
+    """Turns by the time since the start of the episode, which its memory counts."""
+
+    def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
+        return np.zeros(num_worlds)
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        assert observations.shape == (len(memory), 1, observations.shape[2])
+        away = observations[:, 0, :1]  # its own heading
+        turn = np.sin(memory)[:, None]
+        return np.stack([0.5 * away, turn], axis=2).astype(np.float32), memory + 1
+
+    def restart(self, memory: Any, mask: Any) -> Any:
+        return np.where(mask, 0, memory)
+
+
+def actions_of(step: int, shape: tuple[int, ...] = (WORLDS, 2, 2)) -> Any:
+    return np.random.default_rng(step).uniform(-1, 1, shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+def test_it_plays_as_a_batch_whose_target_is_driven_from_outside(autoreset: str) -> None:
+    inside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target_policy=Weaver())
+    outside = posse.batch(SHORT, WORLDS, seed=4, autoreset=autoreset, target="agent")
+    mine, theirs = inside.reset(), outside.reset()
+    assert mine.shape == inside.observation_shape == (WORLDS, 2, inside.layout.size)
+    weaver, age = Weaver(), np.zeros(WORLDS)
+    for step in range(2 * HORIZON + 3):
+        np.testing.assert_array_equal(mine, theirs[:, :2])
+        over = outside.worlds["over"] != 0
+        if autoreset == "disabled" and over.any():
+            options = {"reset_mask": over}
+            mine, theirs = inside.reset(options=options), outside.reset(options=options)
+            age[over] = 0
+            continue
+        target, age = weaver.act(theirs[:, 2:], age)
+        if autoreset == "next_step":
+            age[over] = 0
+        whole = np.concatenate([actions_of(step), target], axis=1)
+        mine, rewards, _, truncated, infos = inside.step(actions_of(step))
+        theirs, *others, told = outside.step(whole)
+        np.testing.assert_array_equal(rewards, others[0][:, :2])
+        np.testing.assert_array_equal(truncated, others[2])
+        np.testing.assert_array_equal(infos["reward/slot"], told["reward/slot"][:, :2])
+        if autoreset == "same_step" and truncated.any():
+            age[truncated] = 0
+            np.testing.assert_array_equal(infos["final_obs"], told["final_obs"][:, :2])
+
+
+def test_a_pickled_copy_and_a_snapshot_go_on_as_the_batch_does() -> None:
+    batch = posse.batch(SHORT, WORLDS, target_policy=Weaver())
+    batch.reset()
+    batch.step(actions_of(0))
+    copy = deepcopy(batch)  # by way of pickling
+    for step in range(1, 5):
+        np.testing.assert_array_equal(copy.step(actions_of(step))[0], batch.step(actions_of(step))[0])
+    np.testing.assert_array_equal(batch.restore(batch.save()), batch.observe())
+
+
+@pytest.mark.parametrize("vector", [False, True])
+def test_team_v0_plays_against_a_target_policy(vector: bool) -> None:
+    batch = posse.batch(SHORT, 1, seed=5, target_policy=Weaver())
+    expected = batch.reset()
+    if vector:
+        env: Any = gym.make_vec(
+            "posse/Team-v0", 1, vectorization_mode="vector_entry_point", scenario=SHORT, target_policy=Weaver()
+        )
+    else:
+        env = gym.make("posse/Team-v0", scenario=SHORT, target_policy=Weaver())
+    assert env.action_space.shape[-2:] == (2, 2)
+    observation, _ = env.reset(seed=5)
+    for step in range(HORIZON):
+        np.testing.assert_array_equal(np.reshape(observation, expected.shape), expected)
+        action = actions_of(step, (1, 2, 2))
+        expected, rewards, *_ = batch.step(action)
+        observation, reward, *_ = env.step(action if vector else action[0])
+        assert np.asarray(reward).item() == pytest.approx(rewards.mean())
+    env.close()
+
+
+class Wrong(Weaver):
+    """Returns what it is told to from its third step on."""
+
+    def __init__(self, returned: Any) -> None:
+        self.returned = returned
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        actions, after = super().act(observations, memory)
+        return (actions if memory[0] < 2 else self.returned), after
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (None, "must be real numbers, got None"),
+        ("left", "must be real numbers, got 'left'"),
+        (np.full((WORLDS, 1, 2), 1j), "must be real numbers"),
+        ([[0], [0, 1]], "is not an array"),
+        (np.zeros((WORLDS, 2)), r"actions of shape \(3, 2\), wanted \(3, 1, 2\)"),
+        (np.full((WORLDS, 1, 2), np.nan), r"\[0, 0, 0\] = nan is not a number in \[-1, 1\]"),
+        (np.full((WORLDS, 1, 2), 1.5), r"= 1\.5 is not"),
+    ],
+    ids=str,
+)
+def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) -> None:
+    """Whether it is the caller's action that is refused, or that of the policy inside."""
+    policy = Wrong(returned)
+    made: dict[str, Any] = {
+        "batch": posse.batch(SHORT, WORLDS, seed=1, target_policy=policy),
+        "environment": gym.make("posse/Team-v0", scenario=SHORT, seed=1, target_policy=policy).unwrapped,
+        "vector": gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy),
+    }
+    for kind, env in made.items():
+        batch = env if kind == "batch" else env.batch
+        action = actions_of(0, batch.action_shape)
+        action = action[0] if kind == "environment" else action
+        for refused in (action * 2, None, action * 1j):
+            env.reset(seed=1)
+            policy.returned = np.zeros((batch.num_worlds, 1, 2))
+            env.step(action)
+            before, memory = {k: v.copy() for k, v in batch.state.items()}, batch.memory
+            with pytest.raises(ValueError, match="action"):
+                env.step(refused)
+            assert batch.memory is memory
+        env.step(action)
+        policy.returned, memory = returned, batch.memory
+        before = {name: array.copy() for name, array in batch.state.items()}
+        if kind == "environment" and isinstance(returned, np.ndarray):
+            continue  # of another number of worlds
+        with pytest.raises(ValueError, match=f"target's policy.*{message}"):
+            env.step(action)
+        assert batch.memory is memory
+        for name, array in batch.state.items():
+            np.testing.assert_array_equal(array, before[name])
+
+
+def test_clipping_is_for_both_sides() -> None:
+    policy = Wrong(np.full((WORLDS, 1, 2), 30.0))
+    clipping, clipped = (posse.batch(SHORT, WORLDS, clip_actions=True, target_policy=policy) for _ in range(2))
+    clipping.reset()
+    clipped.reset()
+    for step in range(5):
+        seen = clipping.step(9 * actions_of(step))[0]
+        np.testing.assert_array_equal(seen, clipped.step((9 * actions_of(step)).clip(-1, 1))[0])
+
+
+def test_what_is_no_target_policy_is_refused() -> None:
+    with pytest.raises(TypeError, match="begin, act, restart"):
+        posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
+    with pytest.raises(AttributeError, match=r"policy inside has no 'copies'; its worlds are .batch"):
+        posse.batch(SHORT, 1, target_policy=Weaver()).copies(2)
+    with pytest.raises(posse.ScenarioError, match="target_policy="):
+        gym.make("posse/Team-v0", scenario=SHORT, target="agent")
+
+
+def test_the_targets_reward_is_the_weighted_sum_of_named_terms() -> None:
+    """The target drives into a tracker that stands before it."""
+    weights = {"team": -1.0, "contact": -0.5, "effort": -0.25}
+    scenario = SHORT.replace(target_reward_weights=weights, target_motion="agent")
+    batch = posse.batch(scenario, 1, autoreset="disabled")
+    poses = {"tracker_pose": [[0.5, 0, 0], [-5, 0, 0]], "target_pose": [0, 0, 0]}
+    batch.reset(options=poses)
+    contacts = 0.0
+    for _ in range(HORIZON):
+        actions = np.array([[[-1, 0], [-1, 0], [1, 0]]], np.float32)
+        _, rewards, _, _, infos = batch.step(actions)
+        terms = {name: float(infos[f"reward/{name}"][0, 2]) for name in batch.term_names}
+        expected = sum(weights.get(name, 0) * value for name, value in terms.items())
+        assert rewards[0, 2] == pytest.approx(expected)
+        assert terms["slot"] == terms["distance"] == 0, "terms of trackers"
+        contacts += terms["contact"]
+    assert contacts == 1 == batch.metrics()["target_contacts"][0]
+    assert scenario.to_dict()["target_reward_weights"] == weights
+
+
+class Crossing(Weaver):
+    """Moves two trackers, and says its age."""
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        assert observations.shape[1] == 2
+        said = np.tile(np.sin(memory)[:, None, None], (1, 2, 1))
+        moves = np.concatenate([observations[..., :2], said], axis=2)
+        return moves.astype(np.float32), memory + 1
+
+
+def test_trackers_inside_play_as_ones_driven_from_outside() -> None:
+    speaking = SHORT.replace(message_size=1)
+    inside = posse.batch(speaking, WORLDS, autoreset="disabled", team_policy=Crossing())
+    outside = posse.batch(speaking, WORLDS, autoreset="disabled", target="agent")
+    mine, theirs = inside.reset(), outside.reset()
+    crossing, age = Crossing(), np.zeros(WORLDS)
+    assert inside.action_shape == (WORLDS, 1, 2)
+    for step in range(HORIZON):
+        np.testing.assert_array_equal(mine, theirs[:, 2:])
+        action = actions_of(step, (WORLDS, 1, 2))
+        moves, age = crossing.act(theirs[:, :2], age)
+        whole = np.concatenate([moves, np.pad(action, ((0, 0), (0, 0), (0, 1)))], axis=1)
+        mine, rewards, *_ = inside.step(action)
+        theirs, gained, *_ = outside.step(whole)
+        np.testing.assert_array_equal(rewards, gained[:, 2:])
+    with pytest.raises(ValueError, match="exclude each other"):
+        posse.batch(SHORT, team_policy=Crossing(), target_policy=Weaver())

@@ -1,0 +1,285 @@
+"""Compiled functions: what they calculate, and that a kernel kept on disk is never stale or damaged."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from tests.support.forks import forks_of
+
+from posse.numeric import UNCOMPILED, compiled, kernel
+
+pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
+
+PARTS = {
+    "numba.core.registry.CPUDispatcher": ("get_call_template", "recompile", "_numba_type_"),
+    "numba.core.caching.NullCache": ("load_overload", "save_overload"),
+    "numba.core.codegen.JITCodeLibrary": (
+        "add_ir_module",
+        "_optimize_functions",
+        "_optimize_final_module",
+        "_finalize_final_module",
+        "enable_object_caching",
+        "has_dynamic_globals",
+    ),
+    "numba.core.codegen.JITCPUCodegen": ("_module_pass_manager", "magic_tuple", "set_env"),
+    "numba.core.compiler.CompilerBase": ("define_pipelines",),
+    "numba.core.compiler.DefaultPassBuilder": ("define_nopython_pipeline",),
+    "numba.core.compiler.CompileResult": ("_reduce", "_rebuild"),
+    "numba.core.compiler.Flags": ("noalias", "forceinline"),
+    "numba.core.types.Dispatcher": (),
+    "numba.core.extending.models.OpaqueModel": (),
+    "numba.core.extending.register_model": (),
+    "numba.core.imputils.lower_constant": (),
+    "numba.core.serialize.dumps": (),
+}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_numba_has_the_inner_parts_that_are_used(name: str) -> None:
+    module, _, last = name.rpartition(".")
+    inside = importlib.import_module(module.removesuffix(".models"))
+    part = getattr(getattr(inside, "models", inside) if module.endswith("models") else inside, last, None)
+    lacking = [each for each in PARTS[name] if not hasattr(part, each)]
+    assert part is not None and not lacking, (  # noqa: PT018
+        f"numba {numba.__version__} lacks {name} {', '.join(lacking)}, which posse/numeric/compile.py uses"
+    )
+
+
+@compiled(seldom=True)
+def apart(x: float) -> float:
+    """A function that is not inlined."""
+    return x + 12345.5
+
+
+@compiled
+def twice(x: float) -> float:
+    """A function that is inlined."""
+    return x + x
+
+
+@pytest.mark.parametrize("decorate", [kernel, compiled, numba.njit], ids=["kernel", "compiled", "njit"])
+def test_a_function_is_linked_with_all_that_it_calls(decorate: Any) -> None:
+    """Also where numba itself links, in functions of a user and those called from Python."""
+
+    @compiled
+    def both(x: float) -> float:
+        return twice(x) + apart(twice(x))
+
+    def outer(x: float) -> float:
+        return both(x) - twice(x) + max(x, 2.0)
+
+    assert decorate(outer)(1.0) == 12349.5
+    assert both(1.0) == 12349.5, "Python can call it, too"
+
+
+def test_only_what_is_marked_is_inlined_and_arrays_do_not_overlap(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("POSSE_CACHE_DIR", str(tmp_path))
+
+    @kernel
+    def fill(out: Any, source: Any) -> None:
+        for i in range(len(out)):
+            out[i] = apart(source[0]) if source[0] > 0.0 else twice(source[0])
+
+    fill(np.zeros(3), np.ones(1))
+    (code,) = fill.inspect_llvm().values()  # type: ignore[attr-defined]
+    calls = [line for line in code.splitlines() if " call " in line]
+    assert any("apart" in line for line in calls)
+    assert not any("twice" in line for line in calls)
+    assert "noalias" in code
+    assert "x double>" not in code, "no loop is vectorised"
+
+
+MODULES = {
+    "gains": "A = 1.0\nB = 2.0\n",
+    "deep/__init__": "",
+    "deep/gains": "from posse.numeric import compiled\n\nC = 1.0\n\n@compiled\ndef helper(x):\n    return x + 4.0\n",
+    "pairs": "from typing import NamedTuple\n\nclass Pair(NamedTuple):\n    a: float\n    b: float\n",
+    "lists": "LIMITS = ((1.0, (2.0, 3.0)), 4.0)\n",
+    "plain": "import numba\n\nSHIFT = 1.0\n\n@numba.njit\ndef shift(x):\n    return x + SHIFT\n",
+}
+MAIN = """
+import deep.gains, gains, plain
+from lists import LIMITS
+from pairs import Pair
+from posse.numeric import compiled, kernel
+
+@compiled
+def first(x):
+    return x * gains.A * deep.gains.C
+
+@compiled
+def second(x, step=0.5):
+    return x * gains.B + LIMITS[0][1][1] + step
+
+@kernel
+def total(x, pair):
+    made = Pair(x, 2 * x)
+    return first(x) + second(x) + deep.gains.helper(x) + 100 * made.a + 1000 * pair.a + plain.shift(x)
+
+answer = total(1.0, Pair(1.0, 7.0))
+print(answer, answer == total.py_func(1.0, Pair(1.0, 7.0)), sum(total.stats.cache_hits.values()))
+"""
+EDITS = {
+    "the second of two attributes of a module": ("gains", "B = 2.0", "B = 20.0"),
+    "a helper of a module that was named before": ("deep/gains", "x + 4.0", "x + 5.0"),
+    "the order of a named tuple's fields": ("pairs", "    a: float\n    b: float", "    b: float\n    a: float"),
+    "a constant in nested tuples": ("lists", "(2.0, 3.0)", "(2.0, 30.0)"),
+    "a global of a function of numba's own": ("plain", "SHIFT = 1.0", "SHIFT = 11.0"),
+    "a default": ("main", "step=0.5", "step=1.5"),
+}
+
+
+def write(folder: Path) -> None:
+    for name, text in {**MODULES, "main": MAIN}.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / f"{name}.py").write_text(text)
+
+
+def play(folder: Path, cache: Path, code: str | None = None) -> tuple[list[str], str]:
+    """Run a script in a new process, as ``__main__`` without a file; return what it prints, and the errors."""
+    code = (folder / "main.py").read_text() if code is None else code
+    variables = {**os.environ, "POSSE_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = forks_of("posse.numeric", options=("-W", "error")).run(code, folder, variables)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split(), done.stderr
+
+
+@pytest.fixture(scope="module")
+def cached(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a kernel in its cache."""
+    folder = tmp_path_factory.mktemp("cached")
+    write(folder)
+    printed, said = play(folder, folder / "cache")
+    assert printed[1:] == ["True", "0"]
+    assert said.count("\n") == 1
+    assert str(folder / "cache") in said, "one line says where kernels are kept"
+    assert play(folder, folder / "cache") == ([printed[0], "True", "1"], "")
+    return folder
+
+
+@pytest.mark.parametrize("what", EDITS)
+def test_a_kernel_is_compiled_again_when_anything_that_it_reaches_changes(
+    what: str, cached: Path, tmp_path: Path
+) -> None:
+    write(tmp_path)
+    name, old, new = EDITS[what]
+    path = tmp_path / f"{name}.py"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    printed, _ = play(tmp_path, cached / "cache")
+    assert printed[1:] == ["True", "0"]
+
+
+def test_what_a_kernel_does_not_reach_compiles_nothing(cached: Path, tmp_path: Path) -> None:
+    write(tmp_path)
+    (tmp_path / "gains.py").write_text("# A comment, and another number.\nA = 1.0\nB = 2.0\nUNUSED = 3.0\n")
+    assert play(tmp_path, cached / "cache")[0][1:] == ["True", "1"]
+
+
+def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
+    """Also one that holds another kernel."""
+    write(tmp_path)
+    whole = []
+    for gain in ("A = 3.0", "A = 1.0"):
+        (tmp_path / "gains.py").write_text(MODULES["gains"].replace("A = 1.0", gain))
+        play(tmp_path, tmp_path / "cache")
+        (path,) = (each for each in (tmp_path / "cache").iterdir() if each.read_bytes() not in whole)
+        whole.append(path.read_bytes())
+    flipped = bytearray(whole[1])
+    flipped[len(flipped) // 2] ^= 8
+    for damaged in (flipped, whole[1][:-100], whole[0]):
+        path.write_bytes(damaged)
+        assert play(tmp_path, tmp_path / "cache")[0][1:] == ["True", "0"]
+    assert play(tmp_path, tmp_path / "cache")[0][1:] == ["True", "1"]
+
+
+def test_processes_share_a_folder(tmp_path: Path) -> None:
+    write(tmp_path)
+    printed: list[Any] = []
+    command = [sys.executable, "main.py"]
+    variables = {**os.environ, "POSSE_CACHE_DIR": str(tmp_path / "cache")}
+    calls = [
+        threading.Thread(
+            target=lambda: printed.append(subprocess.check_output(command, cwd=tmp_path, env=variables, text=True))
+        )
+        for _ in range(2)
+    ]
+    for call in calls:
+        call.start()
+    for call in calls:
+        call.join()
+    assert [each.split()[1] for each in printed] == ["True", "True"]
+    assert [path.suffix for path in (tmp_path / "cache").iterdir()] == [".kernel"], "nothing unfinished is left"
+
+
+def test_a_folder_that_cannot_be_written_costs_time_only(tmp_path: Path) -> None:
+    write(tmp_path)
+    (tmp_path / "file").write_text("")
+    printed, said = play(tmp_path, tmp_path / "file" / "cache")
+    assert printed[1:] == ["True", "0"]
+    assert "set POSSE_CACHE_DIR" in said
+
+
+GAIN = 1.0
+SHIFT = 0.0
+
+
+@numba.njit
+def shifted(x: Any) -> Any:
+    """A function of numba's own."""
+    return x + SHIFT
+
+
+@compiled
+def gained(x: float) -> float:
+    """A function with a global that changes."""
+    return GAIN * shifted(x)  # type: ignore[no-any-return]
+
+
+def test_a_new_kernel_reads_changed_globals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POSSE_CACHE_DIR", str(tmp_path))
+
+    def once(x: float) -> float:
+        return gained(x)
+
+    for name, value, expected in (("GAIN", 1.0, 2.0), ("GAIN", 3.0, 6.0), ("SHIFT", 4.0, 18.0), ("GAIN", 1.0, 6.0)):
+        monkeypatch.setitem(globals(), name, value)
+        assert kernel(once)(2.0) == expected
+
+
+BATCH = """
+import numpy as np
+import posse
+
+GAIN = 1.0
+
+@posse.reward_term("1")
+def own(c, w, t):
+    '''A gain.'''
+    return GAIN
+
+def term():
+    batch = posse.batch("constant", 1, reward_weights={"own": 1.0})
+    batch.reset(seed=0)
+    return float(batch.step(np.zeros(batch.action_shape, np.float32))[1][0, 0])
+
+print(term())
+GAIN = 3.0
+print(term())
+"""
+
+
+@pytest.mark.long
+def test_a_new_batch_reads_a_changed_global_of_a_cell(tmp_path: Path) -> None:
+    assert play(tmp_path, tmp_path / "cache", BATCH)[0] == ["1.0", "3.0"]

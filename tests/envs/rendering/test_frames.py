@@ -1,0 +1,142 @@
+"""Frames: what is drawn where, and that equal states give equal frames."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from gymnasium.error import ResetNeeded
+
+import posse
+from posse.rendering.renderer import Renderer
+from posse.rendering.style import GROUND, SENSING, SLOT_FILLED, TARGET, TRACKER
+
+Frame = npt.NDArray[np.uint8]
+SIZE = (400, 360)
+
+
+def worlds(scenario: str, num_worlds: int = 1, **settings: Any) -> posse.Batch:
+    batch = posse.batch(scenario, num_worlds, seed=3, **settings)
+    batch.reset()
+    return batch
+
+
+def placed(*trackers: tuple[float, float, float]) -> posse.Batch:
+    """One world with the target in the origin, heading to the right, and trackers at given poses."""
+    batch = posse.batch("constant", 1, seed=3, num_trackers=len(trackers))
+    batch.reset(options={"tracker_pose": trackers, "target_pose": (0, 0, 0)})
+    return batch
+
+
+def frame_of(renderer: Renderer, batch: posse.Batch, world: int = 0) -> Frame:
+    frame = renderer.draw(batch, world)
+    assert frame is not None
+    return frame
+
+
+def assert_colour(renderer: Renderer, frame: Frame, place: npt.ArrayLike, colour: tuple[int, int, int]) -> None:
+    column, row = renderer.project(place).round().astype(int)
+    np.testing.assert_allclose(frame[row, column].astype(int), colour, rtol=0, atol=4)
+
+
+def advance(batch: posse.Batch, steps: int = 1) -> None:
+    for _ in range(steps):
+        batch.step(np.full(batch.action_shape, 0.25, np.float32))
+
+
+@pytest.mark.parametrize("scenario", posse.scenario_names())
+def test_frames_change_when_robots_move_and_never_change_the_world(scenario: str) -> None:
+    batch = worlds(scenario)
+    renderer = Renderer(batch.scenario, size=SIZE)
+    first = frame_of(renderer, batch)
+    kept, before = first.copy(), {name: values.copy() for name, values in batch.state.items()}
+    assert first.shape == (360, 400, 3)
+    np.testing.assert_array_equal(first, frame_of(renderer, batch), "the same moment looks the same")
+    for name, values in batch.state.items():
+        np.testing.assert_array_equal(values, before[name], name)
+    advance(batch, 3)
+    assert (frame_of(renderer, batch) != first).any()
+    np.testing.assert_array_equal(first, kept, "frames are not overwritten")
+
+
+def test_equal_states_give_equal_frames_also_where_some_are_left_out() -> None:
+    batch, other = worlds("smart"), worlds("smart")
+    start = batch.save()
+    drawn, followed = Renderer(batch.scenario, size=SIZE), Renderer(other.scenario, size=SIZE)
+    for _ in range(25):
+        frame_of(drawn, batch)
+        followed.follow(other)
+        advance(batch)
+        advance(other)
+    np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(followed, other))
+    batch.restore(start)  # back in time: a clean picture
+    np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(Renderer(batch.scenario, size=SIZE), batch))
+
+
+def test_robots_slots_and_headings_are_drawn_where_they_are() -> None:
+    batch = placed((5, 0, 1.57), (-1.2, 0, 0))  # the second in the wedge's first slot, 1.2 m behind the target
+    renderer = Renderer(batch.scenario, size=(900, 800))
+    frame = renderer.draw(batch, colours=[TRACKER, (0, 0, 255)])
+    assert frame is not None
+    assert_colour(renderer, frame, (5.07, -0.07), TRACKER)  # beside the line of the heading
+    assert_colour(renderer, frame, (-1.22, 0.06), (0, 0, 255))
+    assert_colour(renderer, frame, (-0.05, 0.05), TARGET)
+    assert_colour(renderer, frame, (-1.2, 0.225), SLOT_FILLED)
+    assert_colour(renderer, frame, (2, 1), GROUND)
+    ahead, beside = (frame[tuple(renderer.project(at).round().astype(int)[::-1])].sum() for at in ((5, 0.2), (5.2, 0)))
+    assert ahead < beside, "the line of the heading is darker than the ground"
+    (right, _), (centre, low), (_, above) = renderer.project([(1, 0), (0, 0), (0, 1)])
+    assert right > centre
+    assert above < low
+
+
+def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
+    batch = worlds("obstacles", 6, num_trackers=1, sensing_range=5.0)
+    looked = 0
+    for world in range(6):
+        renderer = Renderer(batch.scenario)
+        frame = frame_of(renderer, batch, world)
+        me, target = (np.array([batch.state[f"{who}_{k}"][world].item() for k in "xy"]) for who in ("tracker", "world"))
+        rows = [batch.state[f"obstacle_{k}"][world] for k in ("x", "y", "radius")]
+        for x, y, radius in np.stack(rows, -1).astype(float):
+            way = np.array([x, y]) - me
+            distance = float(np.hypot(*way))
+            ends = np.array([me + way * (1 + side * (radius + 0.3) / distance) for side in (-1, 1)])
+            places = renderer.project(ends)
+            clear = np.hypot(*(target - ends).T).min() > 1.5
+            if clear and distance + radius < 4.5 and ((places > 60) & (places < 580)).all():
+                assert_colour(renderer, frame, ends[0], SENSING)
+                assert_colour(renderer, frame, ends[1], GROUND)
+                looked += 1
+    assert looked > 0
+
+
+def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
+    code = (
+        "import sys, posse; print('pygame' in sys.modules);"
+        "from posse.rendering.renderer import Renderer; import pygame;"
+        "b = posse.batch('constant'); b.reset();"
+        "print(Renderer(b.scenario).draw(b).shape, pygame.display.get_init())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "(640,", "640,", "3)", "False"]
+
+
+def test_mistakes_are_named() -> None:
+    batch = posse.batch("smart", 2)
+    with pytest.raises(ValueError, match=r"size=\(100, 400\).*at least 200 px"):
+        Renderer(batch.scenario, size=(100, 400))
+    renderer = Renderer(batch.scenario)
+    with pytest.raises(ResetNeeded, match="call reset"):
+        renderer.draw(batch)
+    batch.reset()
+    with pytest.raises(ValueError, match=r"world=-1 is not in the batch.*0 to 1"):
+        renderer.draw(batch, -1)
+    with pytest.raises(ValueError, match="1 colours do not fit 5 trackers"):
+        renderer.draw(batch, colours=[TRACKER])
+    with pytest.raises(ValueError, match="'constant' does not fit a renderer of 'smart'"):
+        renderer.draw(worlds("constant"))

@@ -1,0 +1,224 @@
+"""Declarations of users' modules: mistakes, declaring again, saved worlds, the generated source."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Final
+
+import pytest
+from tests.support.user_modules import examples, run
+
+FIELD = '@posse.field({})\ndef own({}):\n    """Own."""\n    return {}\nposse.batch(extra_fields=["own"]).reset()'
+TERM = '@posse.reward_term("1")\ndef own({}):\n    """Own."""\n    {}\nposse.batch(reward_weights={{"own": 1}})'
+MOTION = '@posse.target_motion("own"{})\ndef own(c, w{}):\n    """Own."""\n    {}\nposse.batch(target_motion="own")'
+MEASURED = "def m({}):\n    return dx, dy\n"
+METRIC = '@posse.metric({})\ndef own(c, w):\n    """Own."""\n    return w.score\n'
+SENSOR = (
+    'def m({}):\n    return dx, dy\n@posse.sensor({})\ndef own(c, w, t, dx, dy):\n    """Own."""\n    return True\n'
+)
+
+MISTAKES: Final = {
+    # What is declared.
+    "posse.reward_term('1')(int)": "reward term <class 'int'>: declare a function, made by def, not a type",
+    "posse.reward_term('1')(functools.partial(print))": r"functools.partial\(.*: declare a function.*not a partial",
+    "posse.target_motion('own')(lambda c, w: None)": r"<lambda> \(main.py:1\): its docstring.* is missing",
+    "@posse.reward_term\ndef own(c, w, t):\n    return 1": r'own \(main.py:1\): the decorator needs arguments: .*"1"',
+    '@posse.metric("")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): unit='' must be a text",
+    '@posse.reward_term("1")\ndef own(c, w, t):\n    return 1': r"own \(main.py:1\): its docstring.* is missing",
+    '@posse.reward_term("1")\ndef slot(c, w, t):\n    """?"""': r"slot \(main.py:1\): the name 'slot' is taken",
+    '@posse.target_motion("a b")\ndef own(c, w):\n    """?"""': r"own \(main.py:1\): invalid name 'a b'",
+    TERM.format("t", "return 1"): r"own \(main.py:1\): its parameters are \(t\), not \(c, w, t\) or",
+    TERM.format("c, *w", "return 1"): r"its parameters are \(c, \*w\), not",
+    MOTION.format("", ", team", "pass"): r"its parameters are \(c, w, team\), not \(c, w\) or \(c, w, trackers\) or",
+    # Options.
+    **{FIELD.format(f'"1", 0, 1, size={size}', "c, v", "v.x"): rf"size={size} must be a whole number from 1 to 256"
+       for size in ("0", "2.0", "1000000000", "True")},
+    FIELD.format('"1", 0, 1, "no"', "c, v", "v.x"): r"unknown='no' is not a finite number",
+    FIELD.format('"1", 0, 1, float("nan")', "c, v", "v.x"): r"unknown=nan is not a finite number",
+    FIELD.format('"1", 0, 1, 2', "c, v", "v.x"): r"unknown=2 is not between low=0 and high=1 in 'constant'",
+    FIELD.format('"1", 1, 2', "c, v, m", "m.age"): r"unknown=0 is not between low=1 and high=2",
+    FIELD.format('"1", 0, float("inf")', "c, v", "v.x"): r"high=inf is neither a finite number nor a function",
+    FIELD.format('"1", 0, lambda s: s.arena', "c, v", "v.x"): r"high=inf in 'constant' is not a finite number",
+    FIELD.format('"1", 0, lambda s: s.sped', "c, v", "v.x"): r"high of 'constant': .*no attribute 'sped'",
+    FIELD.format('"1", 1, 0', "c, v", "v.x"): r"low=1 is above high=0",
+    FIELD.format('"1", 0, 1', "c, v", "v.x / 0.0"): r"it returned \S+, which is not from low=0 to high=1",
+    MOTION.format(", memory=3", "", "pass"): r"memory=3 must be a list of posse.Memory",
+    MOTION.format(', memory=[posse.Memory("if", "1", 0, 1, "?")]', "", "pass"): r"invalid name 'if' of a memory",
+    MOTION.format(', memory=[posse.Memory("speed", "1", 0, 1, "?")]', "", "pass"): r"a world has a field 'speed'",
+    MOTION.format(', memory=[posse.Memory("m", "1", 0, float("inf"), "?")]', "", "pass"): r"high=inf of memory 'm'",
+    MOTION.format(', memory=[posse.Memory("m", "1", 0, lambda s: s.arena, "?")]', "", "pass"): r"memory 'm' .*high=inf",
+    MOTION.format(', draw=print', "", "pass"): r"built-in function print>: declare a function, made by def",
+    MOTION.format(", mirrored=1", "", "pass"): r"mirrored=1 must be True or False",
+    METRIC.format('"m", per="second"'): r"metric own \(main.py:1\): unknown per='second'; allowed: step, tracker_step",
+    METRIC.format('"m", per=["step"]'): r"unknown per=\['step'\]; allowed",
+    SENSOR.format("c", '"own", fix="range"'): r"sensor own \(main.py:3\): unknown fix='range'; allowed: pos",
+    SENSOR.format("c", '"own", measure=m'): r"sensor m \(main.py:1\): its parameters are \(c\), not \(c, w, number, dx",
+    # What the compiler says.
+    TERM.format("c, w, t", "return t.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did",
+    FIELD.format('"1", 0, 1', "c, v", "v.sped"): r"own \(main.py:1\): line 4: there is no field 'sped' \(did you mean",
+    MOTION.format("", "", "w.goal_cos = w.sped"): r"own \(main.py:1\): line 4: there is no field 'sped'",
+    MOTION.format("", "", 'w.goal_cos = "north"'): r"line 4: .*to float32",
+    MOTION.format("", "", 'w.goal_cos = float(open("x").read())'): r"line 4: Untyped global name 'open'",
+    TERM.format("c, w, t", "return [t.x][0]"): r"line 4: it creates an array, a list or a text",
+    TERM.format("c, w, t", "return np.zeros(3)[0]"): r"line 4: zeros\(",
+    TERM.format("c, w, t", 'return "north"'): r"line 1: it returns .*, not a number",
+    TERM.format("c, w, t", "return t.x, t.y"): r"line 1: it returns .*, not a number",
+    FIELD.format('"1", 0, 1, size=2', "c, v", "v.x"): r"line 1: it returns Lanes, not 2 numbers",
+    FIELD.format('"1", 0, 1', "c, v", "np.linalg.eigvals(v.x)"): r"line 4: eigvals\(Lanes\): no such function",
+}  # fmt: skip
+
+ATTEMPTS = """
+import functools, json, sys
+import numpy as np
+import posse
+
+messages = []
+for code in json.loads(open("mistakes.json").read()):
+    try:
+        exec(compile(code, "main.py", "exec"), {"__name__": "main", "posse": posse, "np": np, "functools": functools})
+        messages.append("nothing")
+    except Exception as error:
+        messages.append(f"{type(error).__name__}: {error}")
+print(json.dumps(messages))
+"""
+
+
+@pytest.fixture(scope="module")
+def messages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("mistakes")
+    (folder / "mistakes.json").write_text(json.dumps(list(MISTAKES)), encoding="utf-8")
+    done = run(folder, ATTEMPTS)
+    assert done.returncode == 0, done.stderr
+    return dict(zip(MISTAKES, json.loads(done.stdout.splitlines()[-1]), strict=True))
+
+
+@pytest.mark.parametrize("code", MISTAKES)
+def test_a_mistake_names_the_function_the_line_and_the_reason(code: str, messages: dict[str, str]) -> None:
+    assert messages[code].startswith("DeclarationError: ")
+    assert re.search(MISTAKES[code], messages[code]), messages[code]
+
+
+NOT_AN_AGENT = """
+import posse
+try:
+    posse.target_motion("stray", agent=True)
+except TypeError as error:
+    print(error)
+try:
+    @posse.target_motion("agent")
+    def own(c, w):
+        '''Another agent.'''
+except posse.DeclarationError as error:
+    print(error)
+"""
+
+
+def test_only_the_built_in_agent_makes_the_target_an_agent(tmp_path: Path) -> None:
+    first, second = run(tmp_path, NOT_AN_AGENT).stdout.splitlines()
+    assert "agent" in first
+    assert "the name 'agent' is taken" in second
+
+
+AGAIN = """
+import importlib, pickle
+import numpy as np
+import posse
+import gains, steady
+
+def value(batch):
+    return float(batch.step(np.zeros(batch.action_shape))[-1]["reward_terms"]["steady"][0, 0])
+
+def made():
+    batch = posse.batch("constant", 1, reward_weights={"steady": 1.0})
+    batch.reset(seed=0)
+    return batch
+
+def refused(call):
+    try:
+        call()
+    except posse.DeclarationError as error:
+        assert "reward term 'steady' is not the one that these worlds were saved with" in str(error), error
+    else:
+        raise AssertionError("taken")
+
+old = made()
+pickled, snapshot = pickle.dumps(old), old.save()
+assert value(old) == 1.0
+assert value(pickle.loads(pickled)) == 1.0
+open("steady.py", "w").write(STEADY.replace("gain(1)", "gain(2)"))
+importlib.reload(steady)
+assert value(made()) == 2.0, "a new batch uses the new declaration"
+assert value(old) == 1.0, "a running one keeps its own"
+refused(lambda: pickle.loads(pickled))
+refused(lambda: made().restore(snapshot))
+refused(lambda: old.copies(2))
+old.restore(snapshot)
+open("steady.py", "w").write(STEADY)
+importlib.reload(steady)
+assert value(pickle.loads(pickled)) == 1.0, "the same code again"
+steady.gains.GAIN = 3.0
+refused(lambda: pickle.loads(pickled))
+print("done")
+"""
+STEADY = '''
+import posse
+import gains
+from posse.numeric import compiled
+
+@compiled
+def gain(scale):
+    return gains.GAIN * scale
+
+@posse.reward_term("1")
+def steady(c, w, t):
+    """A number."""
+    return gain(1)
+'''
+
+
+def test_a_declaration_is_replaced_and_saved_worlds_of_the_old_one_are_refused(tmp_path: Path) -> None:
+    code = f"STEADY = {STEADY!r}\n{AGAIN}"
+    done = run(tmp_path, code, steady=STEADY, gains="GAIN = 1.0\n")
+    assert done.stdout.endswith("done\n"), done.stderr
+
+
+SOURCE = """
+import numpy as np
+import posse
+import bearing, closing, distance, spiral, steady, walls
+
+settings = dict(
+    extra_fields=("wall_distance", "closing_speed"), reward_weights={"steady": 1.0, "slot": 2.0}, arena=20.0,
+    target_motion="spiral", sensor="bearing-only", metrics=("target_distance",), num_trackers=2,
+)
+text = posse.kernel_source("constant", **settings)
+module = {"__name__": "source"}
+exec(compile(text, "source.py", "exec"), module)
+batch = posse.batch("constant", 1, **settings)
+batch.reset(seed=0)
+rewards, infos = [batch.step(np.ones(batch.action_shape))[k] for k in (1, 4)]
+c, world, trackers = batch._tables.config[0], batch.worlds[0], batch.arrays.tracker[0]
+terms = infos["reward_terms"]
+weights, values = batch._tables.weights, np.zeros(len(terms), np.float32)
+reward = getattr(module["reward"], "py_func", module["reward"])
+SLOT, STEADY = list(terms).index("slot"), list(terms).index("steady")
+assert reward(c, world, trackers[1], weights, values) == rewards[0, 1]
+assert values[STEADY] == terms["steady"][0, 1] and values[SLOT] == terms["slot"][0, 1]
+"""
+
+
+def test_the_generated_source_can_be_read_and_run(tmp_path: Path) -> None:
+    modules = {**examples("extend.md"), **examples("extend_targets.md")}
+    done = run(tmp_path, SOURCE + "print(text)", **modules)
+    assert done.returncode == 0, done.stderr
+    for line in (
+        "from walls import (\n    wall_distance as field_wall_distance,\n)",
+        "measure_bearing_only = compiled(measure_bearing_only)",
+        "    wall_distance_0 = field_wall_distance(c, v)",
+        "    closing_speed_0 = field_closing_speed(c, v, m)",
+        "    if c.motion == 4:\n        draw_spiral(c, w)",
+        "    w.target_distance_sum += target_distance_total",
+    ):
+        assert line in done.stdout

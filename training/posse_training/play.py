@@ -1,0 +1,189 @@
+"""``posse play``: drive the target against a team, or one tracker in it, by the arrow keys."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+import tyro
+
+from posse import Batch, Scenario
+from posse.rendering.canvas import Window
+from posse.rendering.renderer import Renderer
+from posse.rendering.style import TRACKER
+from posse_baselines import Policy, PolicyError, begin
+from posse_training.errors import SettingsError
+from posse_training.replay import Recorder, Replay, join, write_replay
+
+_LEAST, _MOST = 200, 4096
+_ARROWS: Final = ("left", "right", "up", "down")
+_CHANGE: Final = 2.0  # of the speed's action per second: from rest to full speed in a second
+_YOU: Final = (0, 114, 178)  # colour of the player's tracker
+
+
+@dataclass(frozen=True)
+class _Play:
+    """Drive the target against a team, or one tracker in it. Writes a replay page at the end.
+
+    Keys of the window: Left and Right turn, Up and Down change the speed, Space starts and pauses, S steps, - and +
+    change the pace, N goes to the next world, Q or Esc ends.
+    """
+
+    scenario: str = "smart"
+    """Scenario to play."""
+    against: str = "ddcs-tuned"
+    """Policy of the trackers: a name, a file, or package.module:Class."""
+    robot: Annotated[str, tyro.conf.arg(name="as")] = "target"
+    """What you drive: target, or one of the trackers, such as tracker_2."""
+    seed: int = 7
+    """Seed of the world."""
+    world: int = 0
+    """Index of the first world."""
+    split: str = "test"
+    """Split of the world: train, validation or test."""
+    num_trackers: int | None = None
+    """Trackers in the team; default: the scenario's."""
+    size: tuple[int, int] = (960, 720)
+    """Width and height of the window, px."""
+    out: Path = Path("play.html")
+    """Replay page of the best and the last round, written at the end."""
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Play, and write the replay page."""
+    which = tyro.cli(_Play, prog="posse play", args=arguments)
+    if which.out.suffix.lower() not in (".html", ".htm"):
+        raise SettingsError(f"--out {which.out} must end in .html or .htm")
+    if not all(_LEAST <= side <= _MOST for side in which.size):
+        raise SettingsError(f"--size {which.size[0]} {which.size[1]} must be {_LEAST} to {_MOST} px each")
+    from posse import get_scenario
+    from posse_baselines import load
+
+    scenario = get_scenario(which.scenario)
+    if which.num_trackers is not None:
+        scenario = scenario.replace(num_trackers=which.num_trackers)
+    robot = robot_of(which.robot, scenario.num_trackers)
+    rounds, page = play(load(which.against), scenario, robot, which.seed, which.world, which.split, which.size)
+    if rounds:
+        print(f"{len(rounds)} rounds, best {max(rounds):.0f} points")
+    if page is None:
+        print("Nothing was played: no replay is written.")
+        return
+    print(f"replay: {write_replay(page, which.out)} (open it in a browser)")
+
+
+def robot_of(name: str, num_trackers: int) -> int:
+    """Return the number of the robot with a name: ``"target"``, or ``"tracker_2"``.
+
+    Raises:
+        SettingsError: There is no such robot.
+    """
+    names = [*(f"tracker_{k}" for k in range(num_trackers)), "target"]
+    if name not in names:
+        raise SettingsError(f"--as {name} is no robot; there are: {', '.join(names)}")
+    return names.index(name)
+
+
+def steer(speed: float, held: Collection[str], seconds: float) -> tuple[float, float]:
+    """Return speed and turn, actions in [-1, 1], after arrow keys were held for some time.
+
+    The speed stays when no key is held; the turn ends with its key.
+    """
+    change = ("up" in held) - ("down" in held)
+    return min(max(speed + change * _CHANGE * seconds, -1.0), 1.0), float(("left" in held) - ("right" in held))
+
+
+def play(
+    policy: Policy, scenario: Scenario, robot: int, seed: int, world: int, split: str, size: tuple[int, int]
+) -> tuple[list[float], Replay | None]:
+    """Play rounds in a window until the user closes it; ``robot`` is the user's, N: the target.
+
+    A round lasts an episode. Its points, 0 to 100, are the team's score for a tracker, and what the team missed for
+    the target.
+
+    Returns:
+        The points of the rounds played to the end, and a replay of the best of them and the last round, beside each
+        other if of one world; ``None``: nothing was played.
+
+    Raises:
+        PolicyError: The policy does not fit the scenario, or cannot play against a person.
+        SettingsError: Nobody drives the target, or no display is available.
+    """
+    n = scenario.num_trackers
+    scenario = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
+    if robot == n:
+        if policy.reads_state:
+            raise PolicyError(
+                f"{policy.name!r} knows the state and plays the target's motion ahead: it cannot "
+                "play against a person. Choose another policy"
+            )
+        scenario = scenario.replace(target_motion="agent")
+    elif scenario.num_agents != n:
+        raise SettingsError(f"the target of {scenario.name!r} is an agent that nobody drives: play as the target")
+    who = "you as the target" if robot == n else f"you as tracker {robot}"
+    Batch(scenario, 1, seed=seed, split=split, first_world=world).reset()  # finds mistakes before the window opens
+    try:
+        renderer = Renderer(scenario, "human", size, keys={"n": "next world"})
+    except RuntimeError as error:
+        raise SettingsError(
+            f"no window can be opened ({error.__cause__}); "
+            f"see the team alone: posse watch {policy.name} --film film.gif"
+        ) from error
+    window = renderer.window
+    assert window is not None
+
+    rounds: list[float] = []
+    best: Replay | None = None
+    last: Replay | None = None
+    window.paused = True
+    try:
+        while not renderer.closed:
+            batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
+            recorder = Recorder(batch, f"{policy.name}, {who}")
+            renderer.title = f"{who}, world {world}"
+            scores = _play_round(policy, recorder, robot, renderer, window)
+            if scores:
+                last = recorder.replay()
+            if recorder.over:
+                points = _points(scores, robot == n)
+                best = last if points > max(rounds, default=-1.0) else best
+                rounds.append(points)
+            if "n" in window.pressed:
+                world += 1
+                window.paused = True
+    finally:
+        renderer.close()
+    if best is None or last is None or best is last:
+        return rounds, best or last
+    return rounds, join([best, last]) if best.world["world"] == last.world["world"] else best
+
+
+def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Renderer, window: Window) -> list[float]:
+    """Play until the episode ends, or the user closes the window or wants another world; return the scores."""
+    batch, scenario = recorder.batch, recorder.batch.scenario
+    n, title = scenario.num_trackers, renderer.title
+    colours = [_YOU if k == robot else TRACKER for k in range(n)]
+    memory, observations = begin(policy, batch), recorder.reset()
+    speed = 1.0
+    scores: list[float] = []
+    renderer.draw(batch, colours=colours)
+    while not (renderer.closed or recorder.over or "n" in window.pressed):
+        speed, turn = steer(speed, window.held(*_ARROWS), scenario.control_step)
+        actions = np.zeros(batch.action_shape, np.float32)
+        actions[:, :n], memory = policy.act(np.ascontiguousarray(observations[:, :n]), memory)
+        actions[0, robot, :2] = speed, turn
+        observations, *_, infos = recorder.step(actions, policy.annotations(memory))
+        scores.append(float(infos["score"][0]))
+        left = scenario.duration - len(scores) * scenario.control_step
+        renderer.title = f"{title}: {_points(scores, robot == n):.0f} points, {left:.0f} s left"
+        window.paused |= recorder.over  # until the user goes on: another round in the same world
+        renderer.draw(batch, colours=colours)
+    return scores
+
+
+def _points(scores: Sequence[float], as_target: bool) -> float:
+    mean = float(np.mean(scores))
+    return 100 * (1 - mean if as_target else mean)
