@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
 import ray
+from numpy.testing import assert_equal
 from ray.cluster_utils import Cluster
 from safetensors.numpy import load_file
 from tests.support.ray_policies import Watched
@@ -57,25 +57,19 @@ def local() -> Results:
     return evaluate("pursuit", "smart", EPISODES, **SHORT)
 
 
-def same(one: Results, other: Results) -> None:
-    assert list(one.columns) == list(other.columns)
-    for name, column in one.columns.items():
-        np.testing.assert_array_equal(column, other[name], err_msg=name)
-
-
 def begun(folder: Path) -> int:
     return len(list(folder.glob("begun-*")))
 
 
 def test_it_is_equal_to_a_local_run(nodes: Cluster, local: Results, folder: Path) -> None:
     learned = evaluate("learned-smart", "smart", 12, **SHORT)
-    same(evaluate(load("learned-smart"), "smart", 12, **THERE), learned)
-    same(evaluate("pursuit", "smart", EPISODES, **THERE), local)
+    assert_equal(evaluate(load("learned-smart"), "smart", 12, **THERE).columns, learned.columns)
+    assert_equal(evaluate("pursuit", "smart", EPISODES, **THERE).columns, local.columns)
     assert list(folder.iterdir()) == []
 
 
 def test_a_worker_that_dies_costs_its_shard(nodes: Cluster, local: Results, folder: Path) -> None:
-    same(evaluate(Watched(folder, "die"), "smart", EPISODES, **THERE), local)
+    assert_equal(evaluate(Watched(folder, "die"), "smart", EPISODES, **THERE).columns, local.columns)
     assert begun(folder) == SHARDS + 1
 
 
@@ -95,7 +89,7 @@ def test_a_killed_driver_resumes(nodes: Cluster, local: Results, folder: Path) -
     driver.wait()
     assert begun(folder) == SHARDS
     (folder / "go").touch()
-    same(evaluate(Watched(folder, "wait"), "smart", EPISODES, **THERE), local)
+    assert_equal(evaluate(Watched(folder, "wait"), "smart", EPISODES, **THERE).columns, local.columns)
     assert begun(folder) == SHARDS + 1
     assert not WORK.exists()
 
@@ -140,8 +134,7 @@ def test_seeds_are_trained_to_the_same_weights(nodes: Cluster, folder: Path) -> 
     for name, *more in (["here"], ["there", "--ray"]):
         assert main([*command.split(), "--folder", name, *more]) == 0
     here, there = (load_file(folder / name / "seed-1" / "last.safetensors") for name in ("here", "there"))
-    assert here.keys() == there.keys()
-    assert all(np.array_equal(array, there[name]) for name, array in here.items())
+    assert_equal(here, there)
 
 
 def test_a_node_that_dies_costs_its_shards(nodes: Cluster, local: Results, folder: Path) -> None:
@@ -156,6 +149,6 @@ def test_a_node_that_dies_costs_its_shards(nodes: Cluster, local: Results, folde
 
     thread = threading.Thread(target=remove)
     thread.start()
-    same(evaluate(Watched(folder, "wait"), "smart", EPISODES, **THERE), local)
+    assert_equal(evaluate(Watched(folder, "wait"), "smart", EPISODES, **THERE).columns, local.columns)
     thread.join()
     assert begun(folder) >= SHARDS + 1

@@ -18,7 +18,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, NamedTuple
@@ -62,39 +61,37 @@ def apart(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
         TimeLimitError: It took longer than the limit, s; the process was ended.
         PlayError: The process died.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        given, found = Path(folder, "given"), Path(folder, "found")
-        given.write_bytes(cloudpickle.dumps((limit, function, arguments)))
-        try:
-            done = subprocess.run(
-                [sys.executable, "-c", f"from {__name__} import _answer; _answer()", str(given), str(found)],
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-                stdout=subprocess.DEVNULL,
-                timeout=limit + _GRACE,
-                check=False,
-            )
-        except subprocess.TimeoutExpired as error:
-            raise TimeLimitError(f"it exceeded the time limit of {limit:g} s and was ended") from error
-        if not found.exists():
-            raise PlayError(f"its process ended with exit code {done.returncode}")
-        value = pickle.loads(found.read_bytes())  # noqa: S301 (our own process wrote it)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", f"from {__name__} import _answer; _answer()"],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            input=cloudpickle.dumps((limit, function, arguments)),
+            stdout=subprocess.PIPE,
+            timeout=limit + _GRACE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise TimeLimitError(f"it exceeded the time limit of {limit:g} s and was ended") from error
+    if not done.stdout:
+        raise PlayError(f"its process ended with exit code {done.returncode}")
+    value = pickle.loads(done.stdout)  # noqa: S301 (our own process wrote it)
     if isinstance(value, Exception):
         raise value
     return value
 
 
 def _answer() -> None:
-    """Compute what a file asks for, and write it, or the error, to another one."""
-    given, found = map(Path, sys.argv[1:])
-    limit, function, arguments = pickle.loads(given.read_bytes())  # noqa: S301 (our parent wrote it)
-    with Path(os.devnull).open("w") as nowhere:
+    """Compute what the standard input asks for, and write it, or the error, to the standard output."""
+    limit, function, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301 (our parent wrote it)
+    with os.fdopen(os.dup(1), "wb") as found, Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)  # what a policy prints is no part of the answer
         # A hanging policy does not outlive a parent that was killed.
         faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
         try:
             value = function(*arguments)
         except Exception as error:
             value = error
-        write_atomically(found, cloudpickle.dumps(value))
+        found.write(cloudpickle.dumps(value))
 
 
 # --- a Ray cluster --------------------------------------------------------------------------------

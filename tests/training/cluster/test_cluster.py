@@ -47,7 +47,7 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
     """Another policy, or other code of it, never resumes from the shards of the first."""
 
     def folder(policy: Any) -> Path:
-        return Job(dict, (policy,), cut(9, 3)).folder  # type: ignore[arg-type]
+        return Job(dict, (policy,), cut(9, 3)).folder
 
     slow, fast = (from_function(lambda o: 1.0 * o[..., :2]), from_function(lambda o: 2.0 * o[..., :2]))
     mine = tmp_path / "team_of_mine.py"

@@ -23,8 +23,6 @@ from posse_training.evaluation.episodes import limited, play_shard, refuse_train
 from posse_training.evaluation.results import Results
 from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
 
-__all__ = ["Evaluation", "Results", "evaluate", "gathered_results", "prepare", "progress_bar"]
-
 WORLDS: Final = 500
 """Worlds that are played at once."""
 
@@ -180,11 +178,7 @@ def _play_here(
 
 @contextmanager
 def played_errors() -> Iterator[None]:
-    """Turn errors of a policy's own code into a ``PlayError`` that says where; all can be pickled.
-
-    Raises:
-        PlayError: The policy failed.
-    """
+    """Turn errors of a policy's own code into a ``PlayError`` that says where; all can be pickled."""
     try:
         yield
     except PolicyError as error:
