@@ -20,8 +20,8 @@ _MOST: Final = 0.9
 
 # How fast amplitude and rate walk: standard deviations after a second, as a share of the limit and in rad/s. A sine of
 # constant amplitude and rate could be predicted for ever from a few fixes.
-_AMPLITUDE_WALK: Final = 0.1
-_RATE_WALK: Final = 0.1
+_AMPLITUDE_WALK: Final = 0.05
+_RATE_WALK: Final = 0.03
 
 _MEMORY: Final = (
     Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK, "of an accelerating target"),
