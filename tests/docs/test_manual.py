@@ -23,7 +23,6 @@ MODULES = (
     "posse",
     "posse_baselines",
     "posse_training",
-    "posse_training.cluster",
     "posse_training.replay",
     "posse_training.leaderboard",
 )

@@ -11,8 +11,8 @@ from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.compare import figures
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
+from posse_training.evaluation.results import Results
 from posse_training.reports.pictures.style import BOUND, looks_of
-from posse_training.reports.results import Results
 
 LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
 
