@@ -409,7 +409,7 @@ def draw_matrix(found: League) -> list[Path]:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from posse_training.reports.pictures.style import RC, WIDTH, note, plain
+    from posse_training.style import RC, WIDTH, note, plain
 
     s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
     scores = [[found.at(a, b).score for b in targets] for a in teams]

@@ -23,10 +23,10 @@ import posse
 from posse import Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, Tunable, load, play
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.fields import tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import TUNED
 from posse_baselines.tuned.files import FORMAT, SHIPPED_TUNED
-from posse_baselines.tuning import tunables
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError, require
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
@@ -117,7 +117,7 @@ class TunablePolicy(Policy, Protocol):
     """A policy whose settings a search can change."""
 
     settings: Any
-    """A dataclass whose fields declare themselves by :func:`posse_baselines.tuning.tuned`."""
+    """A dataclass whose fields declare themselves by :func:`posse_baselines.fields.tuned`."""
 
     def with_settings(self, **values: Any) -> Policy:
         """Return a policy with some settings changed."""

@@ -12,7 +12,7 @@ from posse_training.compare import figures
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
 from posse_training.evaluation.results import Results
-from posse_training.reports.pictures.style import BOUND, looks_of
+from posse_training.style import BOUND, looks_of
 
 LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
 

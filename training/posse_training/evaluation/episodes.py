@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 import posse
 from posse import Scenario
-from posse_baselines import BasePolicy, Policy, Target, rollout
+from posse_baselines import BasePolicy, Played, Policy, Target, rollout
 from posse_baselines.policy import Memory
 from posse_training.errors import TimeLimitError, TrainedSplitError
 from posse_training.evaluation.results import Column
@@ -64,22 +64,13 @@ def play_episode(
     They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority
     changed, ``nan`` for policies without leaders.
     """
-    columns: dict[str, Column] = {}
-    running = np.ones(batch.num_worlds, np.bool_)
     exchanges = ExchangeCounter(batch.num_worlds)
-    for step in rollout(batch, policy):
-        exchanges.count(leaders_of(policy, step.memory), running)
-        ended = running & (step.terminated | step.truncated)
-        if ended.any():
-            for name in batch.metrics():
-                column = columns.setdefault(name, np.full(batch.num_worlds, np.nan))
-                column[ended] = step.infos[f"metrics/{name}"][ended]
-            running &= ~ended
+
+    def note(step: Played) -> None:
+        exchanges.count(leaders_of(policy, step.memory), step.running)
         advance(1)
-        if not running.any():
-            break
-    columns["leader_exchanges"] = exchanges.total
-    return columns
+
+    return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}
 
 
 def leaders_of(policy: Policy, memory: Memory) -> npt.NDArray[Any] | None:

@@ -19,29 +19,17 @@ from matplotlib.figure import Figure
 from rich import box
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 import posse
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.files import replacing, write_atomically
-from posse_training.reports.pictures.style import RC
-from posse_training.reports.reproduce.laws import leader_loss, tracks
-from posse_training.reports.reproduce.motion import curves, frames
-from posse_training.reports.reproduce.recording import (
-    SPLIT,
-    Floats,
-    Recording,
-    draw_starts,
-    median_world,
-    played,
-    record,
-    settling_times,
-)
+from posse_training.reproduce import runs
+from posse_training.reproduce.figures import Shown, curves, frames, leader_loss, tracks
+from posse_training.reproduce.runs import SPLIT, Floats, draw_starts, median_world, settling_times, slot_error
+from posse_training.style import RC
 
 HORIZON: Final = 250
 """Control steps of an episode, enough for the slowest law to settle."""
-
-
 PLAYED: Final = "paper-distributed"
 """Scenario of all runs; that of the centralized model differs only in name."""
 
@@ -51,15 +39,14 @@ class Model:
     """One model of the paper: its policies here, and the paper's figures."""
 
     name: str
-    scenario: str
     paper_policy: str
     our_policy: str
     paper_settling_time: float
 
 
 MODELS: Final = (
-    Model("centralized", "paper-centralized", "pngl-l-phi", "ddcs-centralized", 1.6),
-    Model("distributed", "paper-distributed", "pngl", "ddcs-distributed", 2.0),
+    Model("centralized", "pngl-l-phi", "ddcs-centralized", 1.6),
+    Model("distributed", "pngl", "ddcs-distributed", 2.0),
 )
 MEMBERS: Final = tuple(name for name in FAMILY if name != "ddcs-no-radio")
 """Policies whose settling times are measured."""
@@ -77,14 +64,6 @@ class Settings:
     """Seed of the starts, in the test split."""
     tolerance: float = 0.1
     """Distance of a relative position from its last value at which it counts as settled, m."""
-
-
-def play_member(policy: str, settings: Settings) -> Recording:
-    """Play a policy from the drawn starts."""
-    scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
-    tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
-    options = {"tracker_pose": tracker_pose, "target_pose": target_pose}
-    return record(policy, scenario, settings.starts, settings.seed, options)
 
 
 def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
@@ -106,26 +85,24 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
     """Play every member of the family, write figures and numbers, and return the numbers."""
     mpl.use("Agg")
     settings.out.mkdir(parents=True, exist_ok=True)
-    rows, shown = [], {}
+    scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
+    tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
+    starts = {"tracker_pose": tracker_pose, "target_pose": target_pose}
+    rows, played = [], {}
     for policy in MEMBERS:
-        run = play_member(policy, settings)
-        times = settling_times(run, settings.tolerance)
-        rows.append(summary(policy, times, run.error[-1]))
-        shown[policy] = (run, times)
+        run = runs.run_of(policy, scenario, settings.starts, settings.seed, starts)
+        played[policy] = run, settling_times(run, settings.tolerance)
+        rows.append(summary(policy, played[policy][1], slot_error(run)[-1]))
     with mpl.rc_context(RC):
         for model in MODELS:
-            world = median_world(shown[model.paper_policy][1])
+            world = median_world(played[model.paper_policy][1])
             pair = [
-                (policy, shown[policy][0], world, float(shown[policy][1][world]))
+                Shown(policy, played[policy][0], world, float(played[policy][1][world]))
                 for policy in (model.paper_policy, model.our_policy)
             ]
-            facts = (
-                f"start {world}, the median of {settings.starts:,} starts, "
-                f"{played(posse.get_scenario(PLAYED), settings.seed)}"
-            )
+            facts = f"start {world}, the median of {settings.starts:,} starts, {runs.played(scenario, settings.seed)}"
             _write(settings.out, f"{model.name}-frames", frames(pair, facts))
-            paper = model.paper_settling_time
-            _write(settings.out, f"{model.name}-curves", curves(pair, paper, facts))
+            _write(settings.out, f"{model.name}-curves", curves(pair, model.paper_settling_time, facts))
         _write(settings.out, "tracks", tracks(settings.seed))
         loss = leader_loss("pngl-l-phi", settings.starts, settings.seed)
         _write(settings.out, "leader-loss", loss)
@@ -144,29 +121,18 @@ def _write(folder: Path, name: str, figure: Figure) -> None:
 
 
 def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:
-    """Return the settling times with those of the paper, at most 80 characters wide."""
+    """Return the settling times with those of the paper."""
     shown = Table(
+        *("policy", "model", "paper", "median\n\\[quartiles]", "settled", "in slots"),  # not markup
         title=f"settling time, s: finally within {settings.tolerance:g} m and 0.1 m/s;\n"
-        f"{settings.starts:,} starts of {played(posse.get_scenario(PLAYED), settings.seed)}",
+        f"{settings.starts:,} starts of {runs.played(posse.get_scenario(PLAYED), settings.seed)}",
         box=box.HORIZONTALS,
-        show_edge=False,
-        pad_edge=False,
-        padding=0,
     )
-    shown.add_column("policy", overflow="fold")
-    for column in ("model", "paper", "median\n[quartiles]", "settled", "all in\nslots"):
-        shown.add_column(Text(column), no_wrap=True)  # brackets are not markup
     for row in rows:
         low, middle, high = row["settling_time_quartiles"]
-        paper = row["paper_settling_time"]
-        shown.add_row(
-            row["policy"],
-            row["model"],
-            "-" if paper is None else f"{paper:.1f}",
-            "-" if middle is None else f"{middle:.1f} [{low:.1f}, {high:.1f}]",
-            str(row["settled"]),
-            str(row["in_slots"]),
-        )
+        paper = "-" if row["paper_settling_time"] is None else f"{row['paper_settling_time']:.1f}"
+        median = "-" if middle is None else f"{middle:.1f} \\[{low:.1f}, {high:.1f}]"
+        shown.add_row(row["policy"], row["model"], paper, median, str(row["settled"]), str(row["in_slots"]))
     return shown
 
 

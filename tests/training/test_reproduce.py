@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 
 import posse
-from posse_training.reports.reproduce import MEMBERS, MODELS, Settings, reproduce
-from posse_training.reports.reproduce.recording import Floats, Recording, draw_starts, median_world, settling_times
+from posse_baselines import Trajectory
+from posse_training.reproduce.reproduce import MEMBERS, MODELS, Settings, reproduce
+from posse_training.reproduce.runs import Floats, draw_starts, median_world, settling_times
 
 
-def recording(relative: Floats, speeds: Floats) -> Recording:
-    """Return a recording of one world whose trackers move so relative to a target that runs on."""
-    steps = len(relative)
-    target = np.zeros((steps, 1, 3))
-    target[:, 0, 0] = -0.05 * np.arange(steps)
-    trackers = np.zeros((steps, 1, relative.shape[1], 3))
+def run_with(relative: Floats, speeds: Floats) -> Trajectory:
+    """Return a run of one world whose trackers move so relative to a target that runs on."""
+    frames = len(relative)
+    target = np.zeros((frames, 1, 3))
+    target[:, 0, 0] = -0.05 * np.arange(frames)
+    trackers = np.zeros((frames, 1, relative.shape[1], 3))
     trackers[..., :2] = relative[:, None] + target[:, :, None, :2]
-    none = np.full(trackers.shape[:3], -1)
-    slots = np.zeros((*trackers.shape[:3], 2))
-    return Recording(np.arange(steps) * 0.1, trackers, target, speeds[:, None], slots, none, none, none < 0, 0.15)
+    arrays = {"tracker_pose": trackers, "target_pose": target, "tracker_speed": speeds[:, None]}
+    layout = posse.batch("constant", 1).layout
+    return Trajectory(frames - 1, arrays, layout, "test", np.array([frames - 1]), {})
 
 
 def test_settling_time_of_a_known_approach() -> None:
@@ -28,17 +29,17 @@ def test_settling_time_of_a_known_approach() -> None:
     relative = np.stack([np.stack([gap, 0 * gap], -1), np.zeros((81, 2))], axis=1)
     still = np.full((81, 2), 0.5)
     expected = np.ceil(-np.log(0.1 + np.exp(-8.0)) * 10) / 10
-    assert settling_times(recording(relative, still), 0.1)[0] == pytest.approx(expected)
+    assert settling_times(run_with(relative, still), 0.1)[0] == pytest.approx(expected)
     # A speed that is still off later settles later, however well the places are held.
     fast = still.copy()
     fast[:50, 1] = 0.7
-    assert settling_times(recording(relative, fast), 0.1)[0] == pytest.approx(5.0)
+    assert settling_times(run_with(relative, fast), 0.1)[0] == pytest.approx(5.0)
 
 
 def test_a_team_that_still_moves_at_the_end_has_not_settled() -> None:
     relative = np.zeros((81, 1, 2))
     relative[:, 0, 0] = 0.05 * np.arange(81)
-    assert np.isnan(settling_times(recording(relative, np.ones((81, 1))), 0.1)[0])
+    assert np.isnan(settling_times(run_with(relative, np.ones((81, 1))), 0.1)[0])
 
 
 def test_starts_are_the_figures() -> None:
@@ -73,4 +74,5 @@ def test_figures_and_numbers_are_written(tmp_path: Path) -> None:
     for row in rows:
         if row["policy"] != "velocity-pursuit":  # all pursue to one point behind the target
             assert row["settled"] >= 7
-            assert row["in_slots"] >= 7
+            # With the law as printed, the team settles beside its slots.
+            assert row["in_slots"] >= 7 or row["policy"] == "pngl-l-phi-literal"
