@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def draw_weave(c: Record, w: Record) -> None:
 
 
 @compiled
-def walked(value: float, step: np.float32, low: float, high: float) -> np.float32:
+def walked(value: Any, step: Any, low: Any, high: Any) -> np.float32:
     """Return a value moved by a step, reflected at the ends of its range."""
     moved = value + step
     if moved > high:
