@@ -17,9 +17,9 @@ import tyro
 from rich.console import Console
 
 from posse_baselines import load
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.statistics import mean
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.saved.folder import LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings

@@ -27,9 +27,9 @@ from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import LEARNED, SHIPPED
 from posse_baselines.targets import SHIPPED_TARGETS
 from posse_training.errors import SettingsError
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.statistics import difference, mean
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.statistics import difference, mean
 from posse_training.runs.saved.command import command_of
 from posse_training.runs.saved.folder import BEST, SETTINGS
 from posse_training.runs.settings import TrainSettings, read_settings

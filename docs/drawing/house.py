@@ -25,7 +25,7 @@ LINES = (
     ("posse_training.play", "posse_training.film", "posse_training.league"),
     ("posse_training.datasets", "posse_training.tune", "posse_training.reproduce"),
     ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
-    ("posse_training.sb3", "posse_training.torchrl", "posse_training.cluster"),
+    ("posse_training.sb3", "posse_training.torchrl", "posse_training.evaluation"),
     ("posse_baselines.learned", "posse_baselines.policies"),
     ("posse_baselines.tuned",),
     ("posse_baselines.ddcs",),

@@ -37,7 +37,6 @@ COMMANDS: Final[dict[str, _Command]] = {
     "record": _Command("record episodes as a data set for offline learning", "datasets"),
     "reproduce": _Command("repeat the paper's experiments", "reproduce.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
-    "completion": _Command("print what a shell needs to complete commands", "commands.completion"),
 }
 
 

@@ -22,8 +22,8 @@ import posse
 from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load, rollout
 from posse_training.errors import SettingsError, require
+from posse_training.evaluation.evaluation import progress_bar
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import progress_bar
 
 if TYPE_CHECKING:
     from minari import MinariDataset

@@ -23,10 +23,10 @@ from posse import get_scenario
 from posse_baselines import load, load_target
 from posse_baselines.files import replacing, write_atomically
 from posse_training.errors import RunFolderError, SettingsError, require
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.results import Results
+from posse_training.evaluation.statistics import Estimate
 from posse_training.files import InUseError, locked, read_json
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.results import Results
-from posse_training.reports.statistics import Estimate
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings, read_settings

@@ -15,7 +15,7 @@ from posse_training.compare.compare import Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import ComparisonError
-from posse_training.reports.statistics import difference
+from posse_training.evaluation.statistics import difference
 
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import pytest
 
 import posse
 from posse_baselines import Recorder, load
+from posse_training.evaluation.evaluation import evaluate
 from posse_training.replay import RECORD, Player, record, replay_of
 from posse_training.replay.episode import EVENT_KINDS
 from posse_training.replay.events import find_events
-from posse_training.reports.evaluation import evaluate
 
 
 def contacts_by_hand() -> Player:

@@ -18,7 +18,7 @@ from tests.support.runs import ADVISED, ALGORITHM_CASES, BELIEVING, assert_equal
 from posse_baselines import PolicyError, load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.errors import DivergedError, SettingsError
-from posse_training.reports import evaluate
+from posse_training.evaluation import evaluate
 from posse_training.runs import callback as module
 from posse_training.runs.models import even_minibatch, make_env, make_model
 from posse_training.runs.saved.checkpoint import read_checkpoint

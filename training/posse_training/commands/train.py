@@ -11,9 +11,9 @@ from pathlib import Path
 
 import tyro
 
-from posse_training.cluster.settings import RayOption, how_to_resume, of_option
 from posse_training.errors import require
 from posse_training.files import read_json
+from posse_training.parallel import RayOption, address_of
 from posse_training.runs.defaults import default_settings
 from posse_training.runs.settings import TrainSettings, opponents_of
 
@@ -111,11 +111,14 @@ def _train_all(settings: TrainSettings, several: _Seeds) -> None:
     """Train with every seed, and print the files of the best policies."""
     from posse_training.runs.seeds.in_turn import train_seeds, with_seeds
 
-    cluster = of_option(several.ray, Path())  # the run folders hold the results
+    ray = address_of(several.ray)
     runs = with_seeds(settings, several.seeds or (settings.seed,))
-    with how_to_resume(("--seeds",)):
-        for path in train_seeds(runs, cluster):
+    try:
+        for path in train_seeds(runs, ray):
             print(path)
+    except KeyboardInterrupt:
+        print("\nto resume: run the same command again", file=sys.stderr)
+        raise
 
 
 @contextmanager

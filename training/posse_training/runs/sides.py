@@ -10,8 +10,8 @@ from posse import ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
 from posse_training.errors import SettingsError
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.results import Results
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.results import Results
 from posse_training.runs.settings import TrainSettings, opponents_of
 
 TRACKERS, TARGET = "trackers", "target"

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse_baselines.policy import PolicyError
-from posse_training.reports.statistics import mean
+from posse_training.evaluation.statistics import mean
 from posse_training.runs.display import Display
 from posse_training.runs.models import make_env
 from posse_training.runs.settings import TrainSettings

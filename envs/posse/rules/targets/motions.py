@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,8 +20,8 @@ _MOST: Final = 0.9
 
 # How fast amplitude and rate walk: standard deviations after a second, as a share of the limit and in rad/s. A sine of
 # constant amplitude and rate could be predicted for ever from a few fixes.
-_AMPLITUDE_WALK: Final = 0.1
-_RATE_WALK: Final = 0.1
+_AMPLITUDE_WALK: Final = 0.05
+_RATE_WALK: Final = 0.03
 
 _MEMORY: Final = (
     Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK, "of an accelerating target"),
@@ -44,7 +44,7 @@ def draw_weave(c: Record, w: Record) -> None:
 
 
 @compiled
-def walked(value: float, step: float, low: float, high: float) -> np.float32:
+def walked(value: Any, step: Any, low: Any, high: Any) -> np.float32:
     """Return a value moved by a step, reflected at the ends of its range."""
     moved = value + step
     if moved > high:

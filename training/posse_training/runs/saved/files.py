@@ -8,8 +8,8 @@ import numpy as np
 
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_file
-from posse_training.cluster.shards import Arrays
 from posse_training.files import LOCK
+from posse_training.parallel import Arrays
 from posse_training.runs.saved.checkpoint import CHECKPOINT
 from posse_training.runs.settings import TrainSettings, opponents_of
 

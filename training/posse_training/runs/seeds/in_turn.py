@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from posse_training.cluster.settings import Cluster
 from posse_training.errors import RunFolderError, SettingsError
 from posse_training.files import read_json
+from posse_training.parallel import connected
 from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import check_before, train
@@ -29,7 +29,7 @@ def with_seeds(settings: TrainSettings, seeds: Sequence[int]) -> list[TrainSetti
     ]
 
 
-def train_seeds(runs: Sequence[TrainSettings], cluster: Cluster | None) -> Iterator[Path]:
+def train_seeds(runs: Sequence[TrainSettings], ray: bool | str) -> Iterator[Path]:
     """Train every run, or resume it where its folder holds it; yield the best policies' files.
 
     On a cluster each run is one task.
@@ -42,16 +42,15 @@ def train_seeds(runs: Sequence[TrainSettings], cluster: Cluster | None) -> Itera
     for settings in runs:
         check_before(settings)
         _check_folder(settings)
-    if cluster is None:
+    if ray is False:
         for settings in runs:
             yield train(settings, resume=(settings.run_folder / SETTINGS).exists())
         return
-    from posse_training.cluster.ray_backend import RayBackend
     from posse_training.runs.seeds.on_cluster import train_on_cluster
 
     labelled = {f"seed {settings.seed}": settings for settings in runs}
-    with RayBackend(cluster, log=True) as backend:
-        failed = train_on_cluster(labelled, backend, cluster.attempts)
+    with connected(ray, log=True):
+        failed = train_on_cluster(labelled)
     for label, settings in labelled.items():
         if label in failed:
             raise failed[label]

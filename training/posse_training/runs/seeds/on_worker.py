@@ -12,15 +12,15 @@ from pathlib import Path
 
 from rich.console import Console
 
-from posse_training.cluster.shards import Arrays, Shard
 from posse_training.errors import ClusterError
+from posse_training.parallel import Arrays
 from posse_training.runs.saved.files import read_files, write_files
 from posse_training.runs.saved.folder import SETTINGS
 from posse_training.runs.settings import TrainSettings
 from posse_training.runs.train import train
 
 
-def train_on_worker(label: str, settings: TrainSettings, files: Arrays, named: Arrays, shard: Shard) -> Arrays:
+def train_on_worker(label: str, settings: TrainSettings, files: Arrays, named: Arrays) -> Arrays:
     """Train, or resume what the files of a run folder hold; return its files when finished.
 
     Args:
@@ -29,7 +29,6 @@ def train_on_worker(label: str, settings: TrainSettings, files: Arrays, named: A
         files: Contents of the run folder's files, uint8, by name; none: the run is new.
         named: Contents of the files that the settings name, uint8, by the name that they have
             there.
-        shard: Not used: the run is one shard.
 
     Raises:
         ClusterError: A file with an absolute path is not on this node.

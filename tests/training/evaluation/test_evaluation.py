@@ -10,7 +10,7 @@ import posse
 from posse.numeric import FloatArray
 from posse_baselines import BasePolicy, Memory, load
 from posse_training import evaluate
-from posse_training.reports.exchanges import ExchangeCounter
+from posse_training.evaluation.episodes import ExchangeCounter
 
 FAST: dict[str, Any] = {"progress": False, "horizon": 60}
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from posse_training.reports import statistics
-from posse_training.reports.statistics import difference, improvement, interquartile_mean, mean, over_seeds, share
+from posse_training.evaluation import statistics
+from posse_training.evaluation.statistics import difference, improvement, interquartile_mean, mean, over_seeds, share
 
 
 def test_the_interval_of_a_mean_agrees_with_the_normal_theory() -> None:

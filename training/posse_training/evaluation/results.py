@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from posse import Scenario
 from posse_baselines.files import write_atomically
-from posse_training.reports.statistics import Estimate, mean
+from posse_training.evaluation.statistics import Estimate, mean
 
 Column = npt.NDArray[np.float64]
 
