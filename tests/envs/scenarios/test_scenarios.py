@@ -16,13 +16,13 @@ from posse.scenarios.formation import slot_offsets
 # A version rises when the behaviour of a named scenario changes, and only then.
 VERSIONS = {
     "constant": 1,
-    "accelerating": 1,
+    "accelerating": 2,
     "smart": 1,
-    "search": 2,
+    "search": 3,
     "obstacles": 2,
-    "radio": 1,
-    "leader-loss": 1,
-    "field": 2,
+    "radio": 2,
+    "leader-loss": 2,
+    "field": 3,
     "duel": 2,
     "paper-centralized": 1,
     "paper-distributed": 1,

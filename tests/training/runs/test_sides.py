@@ -145,7 +145,7 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
         ({"message_size": 2}, "message_size=2"),
         ({"side": "neither"}, "side='neither'"),
         ({"overrides": {"target_motion": "agent"}}, "the setting against"),
-        ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "trackers only"),
+        ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "unknown term of a target 'slot'"),
     ],
 )
 def test_settings_that_fit_no_target_are_refused(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
