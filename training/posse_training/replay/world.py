@@ -7,7 +7,6 @@ from typing import Any, Final
 
 import posse
 from posse import REWARD_TERMS, Batch, Field, Scenario, ScenarioError, get_scenario
-from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs import TASKS
 from posse_training.provenance import commit
 
@@ -34,7 +33,7 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
         "world": int(state["world_index"][world]),
         "episode": int(state["world_episode"][world]),
         "agents": scenario.num_agents,
-        "slots": [[float(x), float(y)] for x, y in slot_offsets(scenario)],
+        "slots": [[float(x), float(y)] for x, y in scenario.slot_offsets],
         "obstacles": [
             [float(state[f"obstacle_{name}"][world, k]) for name in ("x", "y", "radius")]
             for k in range(scenario.num_obstacles)

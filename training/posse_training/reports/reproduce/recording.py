@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse.scenarios.formation import slot_offsets
 from posse_baselines import Policy, begin, load
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -97,7 +96,7 @@ def record(
     scenario = scenario.replace(message_size=team.message_size)
     batch = posse.Batch(scenario, worlds, seed=seed, split=SPLIT, autoreset="disabled")
     observations = batch.reset(options=dict(options or {}))
-    memory, offsets = begin(team, batch), np.array(slot_offsets(scenario))
+    memory, offsets = begin(team, batch), np.array(scenario.slot_offsets)
     instants = []
     for step in range(scenario.horizon + 1):
         actions, memory = team.act(observations, memory)
