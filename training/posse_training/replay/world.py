@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 import posse
 from posse import REWARD_TERMS, Field, Scenario, ScenarioError, get_scenario
-from posse.scenarios.formation import slot_offsets
 from posse_baselines import Trajectory
 from posse_baselines.ddcs import TASKS
 from posse_training.provenance import commit
@@ -45,7 +44,7 @@ def describe_world(
         "world": int(start["world_index"]),
         "episode": int(start["world_episode"]),
         "agents": scenario.num_agents,
-        "slots": [[float(x), float(y)] for x, y in slot_offsets(scenario)],
+        "slots": [[float(x), float(y)] for x, y in scenario.slot_offsets],
         "obstacles": [
             [float(start[f"obstacle_{name}"][k]) for name in ("x", "y", "radius")]
             for k in range(scenario.num_obstacles)

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse.scenarios.formation import slot_offsets
 from posse_baselines import Policy, Trajectory, load, rollout
 from posse_baselines.playing import poses_of
 
@@ -75,7 +74,7 @@ def relative(run: Trajectory) -> Floats:
 def slots(run: Trajectory) -> Floats:
     """Return the positions of the slots, (T + 1, E, N, 2) m."""
     c, s = (run[name][..., None] for name in _FRAME)
-    x, y = np.array(slot_offsets(run.scenario)).T
+    x, y = np.array(run.scenario.slot_offsets).T
     return np.stack([x * c - y * s, x * s + y * c], axis=-1) + run["target_pose"][:, :, None, :2]
 
 

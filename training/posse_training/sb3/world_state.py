@@ -37,7 +37,7 @@ def _write(config: Records, world: Records, tracker: Records, obstacle: Records,
             o[2] = w.heading_cos * w.frame_cos + w.heading_sin * w.frame_sin
             o[3] = w.heading_sin * w.frame_cos - w.heading_cos * w.frame_sin
             o[4] = w.score
-            o[5] = np.float32(c.horizon - w.step) * c.dt
+            o[5] = np.float32(c.horizon - w.step) * c.control_step
             for j in range(n):
                 t = tracker[e, (i + j) % n]
                 k = TARGET_SIZE + j * TRACKER_SIZE
