@@ -24,7 +24,7 @@ LINES = (
     ("posse_training.commands", "posse_training.leaderboard"),
     ("posse_training.viewer", "posse_training.play", "posse_training.league"),
     ("posse_training.datasets", "posse_training.tune"),
-    ("posse_training.runs", "posse_training.reports", "posse_training.replay"),
+    ("posse_training.train", "posse_training.reports", "posse_training.replay"),
     ("posse_training.sb3", "posse_training.torchrl", "posse_training.cluster"),
     ("posse_baselines.learned", "posse_baselines.policies"),
     ("posse_baselines.tuned",),

@@ -23,7 +23,7 @@ from posse_training import Results, evaluate
 from posse_training.cli import main
 from posse_training.cluster import Cluster
 from posse_training.reports.failures import PlayError
-from posse_training.runs.saved.folder import LAST
+from posse_training.train.settings import LAST
 
 SHORT: dict[str, Any] = {"horizon": 20, "settle_time": 0.5, "progress": False}
 EPISODES = 45

@@ -16,7 +16,7 @@ from posse_training.files import locked
 from posse_training.replay import record, write_replay
 from posse_training.reports.pictures.gif import write_gif
 from posse_training.reports.pictures.mp4 import write_mp4
-from posse_training.runs.train import resume, train
+from posse_training.train.train import resume, train
 
 PRECIOUS = b"precious"
 
@@ -34,9 +34,7 @@ def untouched(elsewhere: Path) -> bool:
     return elsewhere.read_bytes() == PRECIOUS and list(elsewhere.parent.iterdir()) == [elsewhere]
 
 
-@pytest.mark.parametrize(
-    "name", ["lock", "checkpoint.safetensors", ".checkpoint.safetensors.partial", "curve.csv", "settings.json"]
-)
+@pytest.mark.parametrize("name", ["lock", "checkpoint.pt", ".checkpoint.pt.partial", "curve.csv", "settings.json"])
 def test_a_new_run(tmp_path: Path, elsewhere: Path, name: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()

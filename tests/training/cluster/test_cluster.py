@@ -19,8 +19,8 @@ from posse_training.cluster.identity import policy_identity
 from posse_training.cluster.settings import as_cluster, check_reachable, of_option
 from posse_training.cluster.shards import Shard
 from posse_training.errors import ClusterError, MissingExtraError, SettingsError
-from posse_training.runs.seeds.on_worker import train_on_worker
-from posse_training.runs.settings import TrainSettings
+from posse_training.train.seeds import train_on_worker
+from posse_training.train.settings import TrainSettings
 
 without_ray = pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
 COMMANDS = (
@@ -118,7 +118,7 @@ def test_each_seed_has_a_folder_of_its_own(
         assert cluster is None
         return []
 
-    monkeypatch.setattr("posse_training.runs.seeds.in_turn.train_seeds", train_seeds)
+    monkeypatch.setattr("posse_training.train.seeds.train_seeds", train_seeds)
     assert main(["train", "--seeds", *seeds.split(), *folder]) == 0
     assert found == [(path, seed) for path, seed in zip(expected, (3, 4), strict=True)]
 
