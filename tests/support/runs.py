@@ -28,7 +28,7 @@ def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings
     """Settings of a training that takes about a second."""
     settings = TrainSettings(
         scenario="constant",
-        algorithm=algorithm,  # type: ignore[arg-type]
+        algorithm=algorithm,
         steps=1280,
         seed=3,
         folder=folder,

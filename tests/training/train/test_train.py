@@ -20,7 +20,7 @@ from posse_training.errors import DivergedError, SettingsError
 from posse_training.reports import evaluate
 from posse_training.train import train as module
 from posse_training.train.algorithms import ALGORITHMS, even_minibatch
-from posse_training.train.train import resume, steps_made, train
+from posse_training.train.train import resume, train
 from posse_training.train.worlds import make_env
 
 
@@ -107,8 +107,8 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     assert schedule(0.5) == pytest.approx(5.5e-4)
     assert schedule(0.0) == schedule(-7.0) == pytest.approx(1e-4)
     at_once = env.num_envs * settings.rollout
-    assert steps_made(settings, env.num_envs) == -(-100 // at_once) * at_once
-    assert steps_made(replace(settings, steps=3 * at_once), env.num_envs) == 3 * at_once
+    assert settings.steps_made(env.num_envs) == -(-100 // at_once) * at_once
+    assert replace(settings, steps=3 * at_once).steps_made(env.num_envs) == 3 * at_once
 
 
 @pytest.mark.parametrize(("rows", "wanted", "size"), [(81920, 8192, 8192), (100, 40, 50), (7, 3, 7), (6, 100, 6)])

@@ -16,6 +16,7 @@ import json
 import random
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,6 +40,17 @@ POINT: Final = ("steps", "seconds", "safe_score", "low", "high", "score", "conta
 """Of the curve: agent steps, s, mean safe score and its 95 % interval, mean score, share of episodes."""
 _REPLAY: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 _DIGEST: Final = hashlib.sha256().digest_size
+
+
+@dataclass
+class Progress:
+    """How far a run is, as its checkpoint has it."""
+
+    next_evaluation: int  # steps
+    next_checkpoint: int = 0  # steps
+    rollouts: int = 0
+    seconds: float = 0.0
+    curve: list[Point] = field(default_factory=list)
 
 
 @contextlib.contextmanager

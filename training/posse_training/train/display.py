@@ -1,13 +1,17 @@
-"""Progress of a training run: a bar on a terminal, and a line for each evaluation."""
+"""What a training run shows: a bar on a terminal, a line for each evaluation, and logs."""
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import time
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3.common.logger import Logger, configure
 
 from posse_training.train.contact_bound import ContactBound
 from posse_training.train.settings import Point, TrainSettings
@@ -89,3 +93,19 @@ class Display:
         made = self._steps - self._from_steps
         rate = f", {made / (time.monotonic() - self._started):,.0f} steps/s" if made else ""
         self.note(line + self._bound + rate)
+
+
+def make_logger(folder: Path, settings: TrainSettings) -> Logger:
+    """Return the logger: TensorBoard files if it is installed, which Weights & Biases copies."""
+    if settings.wandb is not None:
+        wandb: Any = importlib.import_module("wandb")
+        wandb.init(
+            project=settings.wandb,
+            name=folder.name,
+            dir=folder,
+            config=settings.to_dict(),
+            sync_tensorboard=True,
+            resume="allow",
+        )
+    wanted = settings.tensorboard and importlib.util.find_spec("tensorboard") is not None
+    return configure(str(folder), ["tensorboard"] if wanted else [])

@@ -180,6 +180,11 @@ class TrainSettings:
         """Whether the algorithm learns from its latest rollout only."""
         return ALGORITHMS[self.algorithm].on_policy
 
+    def steps_made(self, num_envs: int) -> int:
+        """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
+        at_once = num_envs * (self.rollout if self.on_policy else 1)
+        return -(-self.steps // at_once) * at_once
+
     @property
     def run_folder(self) -> Path:
         """The folder that the run is written to."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import importlib.util
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,27 +14,26 @@ import torch
 from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger, configure
 
 from posse_baselines import PolicyError, load
 from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError, DivergedError, SettingsError
 from posse_training.train import checkpoint
 from posse_training.train.algorithms import ALGORITHMS
-from posse_training.train.checkpoint import State, arrays_of, tensors_of
+from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
 from posse_training.train.contact_bound import ContactBound
-from posse_training.train.display import Display
+from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
-from posse_training.train.settings import BEST, CURVE, LAST, SETTINGS, Point, TrainSettings, best_policy, read_settings
+from posse_training.train.settings import BEST, CURVE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
 from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
 from posse_training.train.worlds import check_opponents, load_own, make_adviser, make_env
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
-_NOT_FINITE: Final = (
+_NOT_FINITE: Final = (  # of messages
     "found invalid values",
     "= nan is not a number",
     "must be finite",
@@ -65,26 +62,30 @@ def train(
     """
     check_before(settings)
     folder = settings.run_folder
-    with (
-        checkpoint.locked_run(folder),
-        torch_threads(settings.threads),
-        Display(settings, console or Console()) as display,
-    ):
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(checkpoint.locked_run(folder))
+        stack.callback(torch.set_num_threads, torch.get_num_threads())
+        torch.set_num_threads(settings.threads)
+        display = stack.enter_context(Display(settings, console or Console()))
         saved = checkpoint.open_run(folder, settings, resume)
         env = make_env(settings, num_threads)
         model = ALGORITHMS[settings.algorithm].make(settings, env)
-        model.set_logger(_make_logger(folder, settings))
+        model.set_logger(make_logger(folder, settings))
         display.beside(score_beside(settings, display))
         run = Run(settings, folder, env, model, display)
         if saved is None:
             run.begin()
         else:
             run.restore(saved)
-        display.begin(model.num_timesteps, steps_made(settings, env.num_envs))
-        with _divergence(run):
+        display.begin(model.num_timesteps, settings.steps_made(env.num_envs))
+        try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
             model.learn(settings.steps - model.num_timesteps, callback=run, reset_num_timesteps=saved is None)
             run.finish()
+        except (ValueError, PolicyError) as error:  # also of torch's distributions, and of an export
+            if not any(text in str(error) for text in _NOT_FINITE):
+                raise
+            raise run.divergence() from error
     return best_policy(folder)
 
 
@@ -96,11 +97,6 @@ def resume(folder: Path, *, console: Console | None = None, steps: int | None = 
         console: Where to show progress.
         steps: Total steps to train for, instead of those that the run was started with.
         trust_code: Import policies that the folder's settings name as ``package.module:Class``.
-
-    Raises:
-        SettingsError: Not a run folder, or its settings are damaged or name code to import.
-        RunFolderError: It is in use.
-        CheckpointError: Its checkpoint is damaged.
     """
     settings = replace(read_settings(folder / SETTINGS, trust_code=trust_code), folder=folder)
     if steps is not None:
@@ -121,17 +117,11 @@ def check_before(settings: TrainSettings) -> None:
         checkpoint.read_checkpoint(Path(settings.start))
 
 
-def steps_made(settings: TrainSettings, num_envs: int) -> int:
-    """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
-    at_once = num_envs * (settings.rollout if settings.on_policy else 1)
-    return -(-settings.steps // at_once) * at_once
-
-
 class Run(BaseCallback):
     """A run and what it does, in order: begin or restore; before and after each rollout; finish.
 
     Attributes:
-        curve: One point for each evaluation.
+        at: How far it is.
         bound: The bound on contact, if there is one.
     """
 
@@ -142,13 +132,10 @@ class Run(BaseCallback):
         self.settings, self.folder, self.env, self.model, self.display = settings, folder, env, model, display
         self.statistics = RunningStatistics(env.observation_size)
         self.bound = None if settings.contact_bound is None else ContactBound(settings.contact_bound)
-        self.curve: list[Point] = []
         # A copy or an adviser may already be better than what a short run makes of it.
         warm = settings.imitate is not None or settings.advise is not None
-        self._next_evaluation = 0 if warm else settings.evaluate_every
-        self._next_checkpoint = 0
-        self._rollouts = 0
-        self._seconds_before, self._started = 0.0, time.monotonic()
+        self.at = Progress(next_evaluation=0 if warm else settings.evaluate_every)
+        self._started = time.monotonic()
         self._saved_at: int | None = None  # steps at the last checkpoint
         self._set_contact_cost()
 
@@ -174,9 +161,8 @@ class Run(BaseCallback):
             self.statistics.restore(arrays_of(state["statistics"]))
             checkpoint.restore_model(self.model, state["model"])
             checkpoint.restore_random_state(state["random"])
-            self.curve, self._seconds_before = state["curve"], state["seconds"]
-            self._next_evaluation, self._next_checkpoint = state["next_evaluation"], state["next_checkpoint"]
-            self._rollouts, self._saved_at = state["rollouts"], self.model.num_timesteps
+            self.at, self._saved_at = Progress(**state["progress"]), self.model.num_timesteps
+            self._started -= self.at.seconds
             if self.bound is not None:
                 self.bound.restore(state["contact_bound"])
             self._set_contact_cost()
@@ -194,19 +180,17 @@ class Run(BaseCallback):
             policy: Any = self.model.policy
             with torch.no_grad():
                 policy.log_std.clamp_(max=limit)
-        if self._training_score is not None:
-            self.logger.record("training/score", self._training_score)
-        if s.on_policy or self._rollouts % _APPLY_EVERY == 0:
+        self._show()
+        if s.on_policy or self.at.rollouts % _APPLY_EVERY == 0:
             self.statistics.apply(self.model.policy)
-        if steps >= min(self._next_evaluation, self._next_checkpoint):
+        if steps >= min(self.at.next_evaluation, self.at.next_checkpoint):
             self._check_finite()
-        if steps >= self._next_evaluation:
-            self._next_evaluation = (steps // s.evaluate_every + 1) * s.evaluate_every
+        if steps >= self.at.next_evaluation:
+            self.at.next_evaluation = (steps // s.evaluate_every + 1) * s.evaluate_every
             self._evaluate()
-        if steps >= self._next_checkpoint:
-            self._next_checkpoint = steps + s.checkpoint_every
+        if steps >= self.at.next_checkpoint:
+            self.at.next_checkpoint = steps + s.checkpoint_every
             self._checkpoint()
-        self.display.progress(steps, self._training_score, self.bound)
 
     def _on_step(self) -> bool:
         return True
@@ -216,9 +200,9 @@ class Run(BaseCallback):
         buffer = getattr(self.model, "rollout_buffer", None)
         if buffer is not None:
             self.statistics.add(buffer.observations[::_STATISTICS_EVERY])
-        elif self._rollouts % _STATISTICS_EVERY == 0:
+        elif self.at.rollouts % _STATISTICS_EVERY == 0:
             self.statistics.add(np.asarray(self.model._last_obs))
-        self._rollouts += 1
+        self.at.rollouts += 1
         steps = self.settings.rollout if self.settings.on_policy else 1
         for name, total in self.env.take_terms().items():
             self.logger.record_mean(f"reward/{name}", total / steps)
@@ -231,9 +215,10 @@ class Run(BaseCallback):
 
     def finish(self) -> None:
         """Evaluate once more, and write the last policy and checkpoint."""
+        self._show()
         self.statistics.apply(self.model.policy)
         self._check_finite()
-        if not self.curve or self.curve[-1]["steps"] < self.model.num_timesteps:
+        if not self.at.curve or self.at.curve[-1]["steps"] < self.model.num_timesteps:
             self._evaluate()
         self._write(LAST)
         self._checkpoint()
@@ -242,13 +227,12 @@ class Run(BaseCallback):
         """Evaluate on the validation worlds; keep the policy if it is the best so far."""
         steps, seconds = self.model.num_timesteps, self._seconds
         point = {"steps": float(steps), "seconds": seconds, **validate(self.settings, self._policy())}
-        best = max((earlier["safe_score"] for earlier in self.curve), default=-1.0)
-        self.curve.append(point)
+        best = max((earlier["safe_score"] for earlier in self.at.curve), default=-1.0)
+        self.at.curve.append(point)
         self._write(BEST if point["safe_score"] > best else None)
         for name in ("safe_score", "score", "contact_free"):
             self.logger.record(f"validation/{name}", point[name])
         self.logger.dump(steps)  # now, so that they are logged at the step that they belong to
-        self.display.progress(steps, self._training_score, self.bound)
         self.display.evaluated(point)
 
     def _checkpoint(self) -> None:
@@ -257,11 +241,7 @@ class Run(BaseCallback):
             "statistics": tensors_of(self.statistics.save()),
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
-            "curve": self.curve,
-            "seconds": self._seconds,
-            "next_evaluation": self._next_evaluation,
-            "next_checkpoint": self._next_checkpoint,
-            "rollouts": self._rollouts,
+            "progress": {**vars(self.at), "seconds": self._seconds},
             "contact_bound": None if self.bound is None else self.bound.save(),
         }
         checkpoint.write_checkpoint(self.folder, state)
@@ -270,7 +250,7 @@ class Run(BaseCallback):
     def _write(self, name: str | None) -> None:
         """Write the curve, and the policy under a name if there is one."""
         try:
-            write_atomically(self.folder / CURVE, checkpoint.as_csv(self.curve))
+            write_atomically(self.folder / CURVE, checkpoint.as_csv(self.at.curve))
             if name is not None:
                 self._policy().save(self.folder / name)
         except OSError as error:
@@ -280,21 +260,23 @@ class Run(BaseCallback):
             ) from error
 
     def _policy(self) -> Any:
-        card = make_card(self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.curve)
+        card = make_card(self.settings, self.env.encoding, steps=self.model.num_timesteps, curve=self.at.curve)
         return export(self.model, self.settings, self.env.encoding, card)
 
     def _set_contact_cost(self) -> None:
         if self.bound is not None:
             self.env.set_contact_cost(self.bound.multiplier)
 
-    @property
-    def _training_score(self) -> float | None:
+    def _show(self) -> None:
         episodes = self.model.ep_info_buffer or ()
-        return float(np.mean([e["score"] for e in episodes])) if episodes else None
+        score = float(np.mean([e["score"] for e in episodes])) if episodes else None
+        if score is not None:
+            self.logger.record("training/score", score)
+        self.display.progress(self.model.num_timesteps, score, self.bound)
 
     @property
     def _seconds(self) -> float:
-        return self._seconds_before + time.monotonic() - self._started
+        return time.monotonic() - self._started
 
     def _check_finite(self) -> None:
         """Raise before numbers that are not finite are evaluated or saved."""
@@ -306,49 +288,11 @@ class Run(BaseCallback):
         kept = "nothing was saved before"
         if self._saved_at is not None:
             kept = f"the checkpoint at {self._saved_at:,} steps is kept"
-            if self.curve:
-                best = max(self.curve, key=lambda point: point["safe_score"])
+            if self.at.curve:
+                best = max(self.at.curve, key=lambda point: point["safe_score"])
                 kept += f", and {BEST} of {int(best['steps']):,} steps"
         return DivergedError(
             f"the training diverged at {self.model.num_timesteps:,} steps: its networks give "
             f"numbers that are not finite; {kept}. Lower --learning-rate, or --log-deviation, and "
             "train again in another --folder"
         )
-
-
-def _make_logger(folder: Path, settings: TrainSettings) -> Logger:
-    """Return the logger: TensorBoard files if it is installed, which Weights & Biases copies."""
-    if settings.wandb is not None:
-        wandb: Any = importlib.import_module("wandb")
-        wandb.init(
-            project=settings.wandb,
-            name=folder.name,
-            dir=folder,
-            config=settings.to_dict(),
-            sync_tensorboard=True,
-            resume="allow",
-        )
-    wanted = settings.tensorboard and importlib.util.find_spec("tensorboard") is not None
-    return configure(str(folder), ["tensorboard"] if wanted else [])
-
-
-@contextlib.contextmanager
-def _divergence(run: Run) -> Iterator[None]:
-    """Name what torch's distributions, and policies that are exported, refuse."""
-    try:
-        yield
-    except (ValueError, PolicyError) as error:
-        if not any(text in str(error) for text in _NOT_FINITE):
-            raise
-        raise run.divergence() from error
-
-
-@contextlib.contextmanager
-def torch_threads(count: int) -> Iterator[None]:
-    """Set torch's number of threads in a block."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
