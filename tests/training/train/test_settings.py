@@ -31,33 +31,25 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
     ("changes", "message"),
     [
         ({"steps": 0}, r"steps=0 must lie in \[1, 1000000000000\]"),
-        ({"steps": 10**30}, r"must lie in \[1, 1000000000000\]"),
         ({"steps": 1.5}, "steps=1.5 must be a whole number"),
         ({"steps": True}, "steps=True must be a whole number"),
         ({"steps": "many"}, "steps='many' must be"),
         ({"seed": 2**40}, "seed=1099511627776 must lie in"),
-        ({"seed": -1}, "seed=-1"),
-        ({"minibatch": 1}, "minibatch=1"),
         ({"discount": 1.5}, r"discount=1.5 must lie in \[0, 1\]"),
         ({"discount": "x"}, "discount='x' must be a number"),
         ({"learning_rate": float("nan")}, "learning_rate=nan"),
-        ({"learning_rate": float("inf")}, "learning_rate=inf"),
         ({"log_deviation": 1e9}, "log_deviation="),
         ({"hidden": ()}, "hidden"),
         ({"hidden": (0,)}, "hidden=0 is invalid: it must be a whole number in"),
-        ({"hidden": (10**9,)}, "hidden=1000000000"),
         ({"hidden": 3}, "hidden=3"),
         ({"team_sizes": (1.5,)}, "team_sizes=1.5"),
         ({"num_neighbours": -1}, "num_neighbours=-1"),
         ({"num_worlds": 1, "team_sizes": (2, 3)}, "num_worlds=1"),
-        ({"threads": 10**9}, "threads="),
-        ({"imitate": "pursuit", "algorithm": "sac"}, "imitate"),
         ({"imitate": "pursuit", "algorithm": "sac"}, "needs algorithm ppo or mappo, not sac: leave it out"),
         ({"contact_bound": 0.1, "algorithm": "td3"}, "ppo or mappo, not td3"),
         ({"algorithm": "dqn"}, "algorithm='dqn' is unknown; known: ppo"),
         ({"encoding": ["plain"]}, "encoding="),
         ({"beside": "x" * 5000}, r"beside='x.*1 to 4096 characters"),
-        ({"beside": "a\0b"}, "beside="),
         ({"overrides": [1]}, r"overrides=\[1\]"),
         ({"overrides": {"name": "x"}}, "overrides cannot set 'name'"),
         ({"overrides": {"message_size": 3}}, "use the setting message_size"),
@@ -67,6 +59,14 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
 def test_impossible_settings(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         replace(TrainSettings(), **changes)
+
+
+def test_the_preset_nothing_learns_from_random_weights_on_every_scenario() -> None:
+    for scenario in (*posse.scenario_names(), "smart,radio"):
+        found = default_settings(scenario, preset="nothing")
+        assert (found.advise, found.imitate, found.correction, found.encoding) == (None, None, "motion", "slots")
+        assert replace(found, scenario="smart") == default_settings("smart", preset="nothing")
+    assert default_settings("smart").advise == "ddcs-tuned", "the default is the residual"
 
 
 def test_unknown_settings() -> None:

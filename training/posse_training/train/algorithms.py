@@ -56,8 +56,6 @@ def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, network: dict[str, 
     from stable_baselines3 import PPO
     from torch import nn
 
-    from posse_training.train.networks import FlatRolloutBuffer
-
     model = PPO(
         policy,
         env,
@@ -69,7 +67,6 @@ def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, network: dict[str, 
         ent_coef=s.entropy,
         vf_coef=s.value_weight,
         stats_window_size=500,
-        rollout_buffer_class=FlatRolloutBuffer,
         policy_kwargs=_network(s, log_std_init=s.log_deviation, **network),
         **_common(s),
     )
