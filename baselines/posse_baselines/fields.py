@@ -53,6 +53,12 @@ def choice(default: str, choices: tuple[str, ...]) -> Any:
     return dataclasses.field(default=default, metadata={"choices": choices})
 
 
+def optional(low: float, high: float, *, whole: bool = False) -> Any:
+    """Declare a field that is ``None`` by default, or a number in [low, high]; a whole one if so said."""
+    meta = {"unit": "", "low": low, "high": high, "above": "", "whole": whole}
+    return dataclasses.field(default=None, metadata=meta)
+
+
 def _text(number: float) -> str:
     return str(number) if isinstance(number, int) else f"{number:g}"
 
@@ -68,9 +74,9 @@ def check(settings: Any) -> None:
         name, value, meta = field.name, getattr(settings, field.name), field.metadata
         if "choices" in meta and value not in meta["choices"]:
             raise ValueError(f"{name}={value!r} is unknown; known: {', '.join(meta['choices'])}")
-        if "low" not in meta:
+        if "low" not in meta or (value is None and field.default is None):
             continue
-        whole = isinstance(field.default, int)
+        whole = meta.get("whole", isinstance(field.default, int))
         if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
             raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
         if not meta["low"] <= value <= meta["high"]:

@@ -27,9 +27,7 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import InUseError, locked, read_json
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
-from posse_training.runs.settings import TrainSettings, read_settings
+from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, default_settings, read_settings
 
 FILE: Final = "league.json"
 MATRIX: Final = "matrix.csv"
@@ -297,7 +295,7 @@ class _Run:
 
     def _train(self, side: str, trained: Member, opponents: str, steps: int, own: Sequence[Member]) -> None:
         """Train a member, or go on with that; it begins with the networks of its side's latest."""
-        from posse_training.runs.train import train  # torch
+        from posse_training.train.train import train  # torch
 
         s, run = self.settings, trained.run
         assert run is not None

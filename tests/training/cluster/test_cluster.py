@@ -6,13 +6,16 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from posse_baselines import from_function, load
 from posse_training import evaluate, provenance
 from posse_training.cli import main
-from posse_training.errors import MissingExtraError, SettingsError
+from posse_training.errors import ClusterError, MissingExtraError, SettingsError
 from posse_training.parallel import Job, address_of, cut
+from posse_training.train.seeds import train_on_worker
+from posse_training.train.settings import TrainSettings
 
 COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seeds 1 2 --ray", "tune pngl-l-phi --ray")
 
@@ -60,3 +63,42 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
     provenance.sources.cache_clear()  # as in another process
     mine.write_text("class Team: # other\n    ...\n")
     assert [folder(each) == at for each, at in zip(names, folders, strict=True)] == [True] * 5 + [False]
+
+
+@pytest.mark.parametrize(
+    ("seeds", "folder", "expected"),
+    [
+        ("3 4", [], ["runs/train/smart-ppo-3", "runs/train/smart-ppo-4"]),
+        ("3 4", ["--folder", "f"], ["f/seed-3", "f/seed-4"]),
+    ],
+)
+def test_each_seed_has_a_folder_of_its_own(
+    seeds: str, folder: list[str], expected: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[tuple[str, int]] = []
+
+    def train_seeds(runs: list[TrainSettings], ray: bool | str) -> list[Path]:
+        found.extend((str(run.run_folder), run.seed) for run in runs)
+        assert ray is False
+        return []
+
+    monkeypatch.setattr("posse_training.train.seeds.train_seeds", train_seeds)
+    assert main(["train", "--seeds", *seeds.split(), *folder]) == 0
+    assert found == [(path, seed) for path, seed in zip(expected, (3, 4), strict=True)]
+
+
+def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["train", "--seeds", "1", "1"]) == 2
+    assert "names one twice" in capsys.readouterr().err
+    folder = tmp_path / "seed-1"
+    folder.mkdir()
+    (folder / "settings.json").write_text('{"steps": 5}')
+    assert main(["train", "--seeds", "1", "--folder", str(tmp_path)]) == 2
+    assert "holds a run with another" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["/nowhere/team.safetensors", "../team.safetensors"])
+def test_a_policy_file_is_not_written_outside_of_the_workers_folder(name: str) -> None:
+    named = {name: np.zeros(1, np.uint8)}
+    with pytest.raises(ClusterError, match=f"has no {name}, which the training reads: name it by"):
+        train_on_worker("seed 1", TrainSettings(), {}, named)
