@@ -169,7 +169,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
             arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
             x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, scene.config.dt)
+                time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, scene.config.control_step)
             else:
                 time = time_to_slot(x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, _WEAVE_TIME, speed)
             # Time for turning towards it.
@@ -217,7 +217,7 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
 def wanted_velocity(scene: Scene, i: int, acceleration: float) -> tuple[float, float]:
     """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
     w, t, way = scene.world, scene.trackers[i], scene.ways[i]
-    slot, target, dt = scene.slots[scene.plans[i].slot], scene.plans[0], scene.config.dt
+    slot, target, dt = scene.slots[scene.plans[i].slot], scene.plans[0], scene.config.control_step
     speed = float(t.max_speed)
     arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
     shift_x, shift_y = rotate(way.ahead, way.left, w.heading_cos, w.heading_sin)
