@@ -16,7 +16,7 @@ COMPILE := python -m compileall -qq -j 0 -x '/(tests|testing|_inductor|debugpy|m
 
 # BenchMARL, RLlib and PufferLib need other versions. Their virtual environment holds these alone, and takes
 # everything else, torch above all, from ours. What PufferLib pins no longer installs: it comes alone. AgileRL's pins
-# differ from theirs, too, and it brings 60 packages: an environment and a command of its own.
+# differ from theirs, too: an environment of its own.
 RECIPES := .venv-recipes
 AGILERL := .venv-agilerl
 
@@ -24,7 +24,7 @@ AGILERL := .venv-agilerl
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick-tests test-long recipes recipe-agilerl lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
+.PHONY: help demo test quick-tests test-long recipes lint format docs bench bench-training bench-peers algorithms results reproduce tune train-shipped clean
 
 help: ## List these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,9 +42,7 @@ quick-tests: $(FULL)
 test-long: $(FULL) ## Run the long tests: kills, full trainings, kernels compiled anew
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long
 
-recipes: $(RECIPES)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
-
-recipe-agilerl: $(AGILERL)/recipes.stamp ## Install AgileRL, whose recipe the tests then run too (1 GB)
+recipes: $(RECIPES)/recipes.stamp $(AGILERL)/recipes.stamp ## Install libraries with other pins, whose recipes the tests then run too
 
 lint: $(FULL) ## Check style and types
 	$(BIN)/ruff check

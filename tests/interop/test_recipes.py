@@ -15,7 +15,6 @@ OWN_ENVIRONMENT = dict.fromkeys(
     ("benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared", "skrl_ippo", "skrl_mappo"), "recipes"
 ) | {"agilerl_ippo": "agilerl"}
 """Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
-MADE_BY = {"recipes": "make recipes", "agilerl": "make recipe-agilerl"}
 LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
 """Recipes that train, which takes long."""
 LONGEST = 15
@@ -58,7 +57,7 @@ def test_it_runs_with_versions_of_its_own(name: str, tmp_path: Path) -> None:
     folder = OWN_ENVIRONMENT[name]
     python = ROOT / f".venv-{folder}" / "bin" / "python"
     if not python.exists():
-        pytest.skip(f"needs .venv-{folder}: {MADE_BY[folder]}")
+        pytest.skip(f"needs .venv-{folder}: make recipes")
     run(name, tmp_path, python)
 
 

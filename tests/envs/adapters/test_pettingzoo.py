@@ -188,8 +188,9 @@ def test_the_state_holds_what_decides_how_a_world_goes_on() -> None:
     play(env, 30)
     views = env.state_layout.views(env.state())
     arrays = env.batch.arrays
-    for name in ("x", "y", "heading_cos", "speed", "turn_rate", "fix_x"):
+    for name in ("x", "y", "heading_cos", "speed", "turn_rate"):
         assert np.array_equal(views[f"tracker_{name}"], arrays.tracker[name][0])
+    assert np.array_equal(views["tracker_fix_x"], arrays.tracker["fix"]["x"][0])
     assert np.array_equal(views["obstacle_radius"], arrays.obstacle["radius"][0])
     assert views["target_frame_cos"] == arrays.world["frame_cos"][0]
     assert views["time"] == pytest.approx(3.0)

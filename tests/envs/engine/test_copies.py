@@ -11,8 +11,8 @@ from tests.support.reference.state import snapshot
 
 import posse
 
-NOTHING_DRAWN = ("constant", "accelerating", "smart", "obstacles")
-DRAWS = ("radio", "leader-loss", "field")
+NOTHING_DRAWN = ("constant", "smart", "obstacles")
+DRAWS = ("accelerating", "radio", "leader-loss", "field")
 
 
 def played(name: str, worlds: int = 3, steps: int = 40, **overrides: Any) -> posse.Batch:
