@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import Blocks, FloatArray, Record, Records, compiled, kernel, worlds_of
+from posse.numeric import FloatArray, Record, Records, compiled, kernel
 from posse_baselines.ddcs.belief import write_belief
 from posse_baselines.ddcs.detour import detour
 from posse_baselines.ddcs.leadership import settle_lead
@@ -106,12 +106,13 @@ def propose_all(
     work: Work,
     proposals: FloatArray,
     thread: int,
-    blocks: Blocks,
+    first: int,
+    end: int,
 ) -> None:
-    """Plan in a thread's worlds; write the wanted velocities (E, N, 2), ahead and left, in shares of the top speed."""
+    """Plan in a share of worlds; write the wanted velocities (E, N, 2), ahead and left, in shares of the top speed."""
     team = Team(teams.at[0], teams.world[0], teams.settings[0], teams.slots, teams.outermost, teams.beams)
     mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
-    for e in worlds_of(thread, blocks):
+    for e in range(first, end):
         for i in range(observations.shape[1]):
             me, proposal = minds[e, i], proposals[e, i]
             plan(team, me, mates[e, i], seen[e, i], observations[e, i], mine)
@@ -130,12 +131,13 @@ def carry_out_all(
     corrections: FloatArray,
     actions: FloatArray,
     thread: int,
-    blocks: Blocks,
+    first: int,
+    end: int,
 ) -> None:
-    """Carry out the corrected plans of a thread's worlds."""
+    """Carry out the corrected plans of a share of the worlds."""
     team = Team(teams.at[0], teams.world[0], teams.settings[0], teams.slots, teams.outermost, teams.beams)
     mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
-    for e in worlds_of(thread, blocks):
+    for e in range(first, end):
         for i in range(observations.shape[1]):
             correct(minds[e, i], float(corrections[e, i, 0]), float(corrections[e, i, 1]))
             carry_out(team, minds[e, i], mates[e, i], observations[e, i], mine, actions[e, i])
@@ -149,10 +151,11 @@ def write_beliefs(
     seen: npt.NDArray[np.uint16],
     beliefs: FloatArray,
     thread: int,
-    blocks: Blocks,
+    first: int,
+    end: int,
 ) -> None:
-    """Write the beliefs (E, N, BELIEF_SIZE) of a thread's worlds."""
+    """Write the beliefs (E, N, BELIEF_SIZE) of a share of the worlds."""
     team = Team(teams.at[0], teams.world[0], teams.settings[0], teams.slots, teams.outermost, teams.beams)
-    for e in worlds_of(thread, blocks):
+    for e in range(first, end):
         for i in range(minds.shape[1]):
             write_belief(team, minds[e, i], mates[e, i], seen[e, i], beliefs[e, i])

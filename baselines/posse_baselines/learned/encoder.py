@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import MOST_THREADS, Blocks, FloatArray, OwnArrays, Records, compiled, kernel, over_worlds, worlds_of
+from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, compiled, kernel, over_worlds
 from posse_baselines.learned.encoding import Columns, Encoding
 from posse_baselines.learned.features import NUM_FEATURES, SCRATCH, feature_tables, write_features
 
@@ -42,10 +42,11 @@ def _encode_rows(
     scratch: FloatArray,
     out: FloatArray,
     thread: int,
-    blocks: Blocks,
+    first: int,
+    end: int,
 ) -> None:
     s = scratch[thread]
-    for r in worlds_of(thread, blocks):
+    for r in range(first, end):
         encode_row(rows[r], columns, unknown, fields, slots, with_features, s, out[r])
 
 

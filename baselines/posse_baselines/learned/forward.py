@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import Blocks, FloatArray, Records, compiled, kernel, worlds_of
+from posse.numeric import FloatArray, Records, compiled, kernel
 from posse_baselines.learned.encoder import encode_row
 from posse_baselines.learned.features import SCRATCH
 
@@ -52,16 +52,17 @@ def act(
     scratch: FloatArray,
     actions: FloatArray,
     thread: int,
-    blocks: Blocks,
+    first: int,
+    end: int,
 ) -> None:
-    """Write the actions (E, N, 2 + m) of a thread's worlds.
+    """Write the actions (E, N, 2 + m) of a share of the worlds.
 
     ``further`` (E, N, k) are inputs behind those of the encoding.
     """
     inputs = len(mean)
     widest = (scratch.shape[1] - SCRATCH) // 2
     work = scratch[thread, :SCRATCH]
-    for e in worlds_of(thread, blocks):
+    for e in range(first, end):
         for i in range(observations.shape[1]):
             x = scratch[thread, SCRATCH : SCRATCH + widest]
             y = scratch[thread, SCRATCH + widest :]

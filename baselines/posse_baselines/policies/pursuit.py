@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from posse import ObservationLayout
-from posse.numeric import Blocks, FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds, worlds_of
+from posse.numeric import FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds
 from posse_baselines.laws.offsets import constants_of, offsets_of
 from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
 
@@ -72,10 +72,16 @@ def pursue(at: Record, dt: float, row: FloatArray, action: FloatArray) -> None:
 
 @kernel
 def pursue_all(
-    offsets: Records, constants: Records, observations: FloatArray, actions: FloatArray, thread: int, blocks: Blocks
+    offsets: Records,
+    constants: Records,
+    observations: FloatArray,
+    actions: FloatArray,
+    thread: int,
+    first: int,
+    end: int,
 ) -> None:
-    """Write the actions of a thread's worlds."""
+    """Write the actions of a share of the worlds."""
     at, dt = offsets[0], constants[0].dt
-    for e in worlds_of(thread, blocks):
+    for e in range(first, end):
         for i in range(observations.shape[1]):
             pursue(at, dt, observations[e, i], actions[e, i])

@@ -22,7 +22,7 @@ from posse.engine.kernels import LOOK, START, START_FROM_POSES, STEP, Results, f
 from posse.engine.recycler import Recycler
 from posse.engine.scratch import SCRATCH
 from posse.engine.start_poses import check_poses, poses_of, write_poses
-from posse.numeric import Blocks, BoolArray, FloatArray, Records, direct, divide, over_worlds, threads_for
+from posse.numeric import BoolArray, FloatArray, Records, direct, over_worlds, threads_for
 from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
@@ -40,7 +40,6 @@ _DERIVED: Final = (
     "_untyped",
     "_scratch",
     "_orders",
-    "_whole",
     "_score",
     "_recyclers",
     "_infos",
@@ -132,7 +131,7 @@ class Batch:
         self._tables = tables_of(self.scenario)
         self._untyped: Callable[..., int] = kernel_of(self._declared)
         self._kernel: Callable[..., int] = direct(self._untyped)
-        self._orders, self._whole = np.full(worlds, STEP, np.uint8), divide(worlds, 1)
+        self._orders = np.full(worlds, STEP, np.uint8)
         self._scratch = [new_scratch(SCRATCH) for _ in range(threads_for(worlds, rows, self.num_threads))]
         self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
         shapes = (worlds, rows, size), (worlds, rows), (worlds, rows, len(self.term_names))
@@ -409,11 +408,11 @@ class Batch:
         """Execute the order of each world in several threads; return how many episodes are over."""
         kernel, scratch = self._kernel, self._scratch
         if len(scratch) == 1:
-            return kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self._whole)
+            return kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self.num_worlds)
         arguments = (self._tables, self._arrays, actions, results, orders)
 
-        def work(thread: int, blocks: Blocks) -> int:
-            return kernel(*arguments, scratch[thread], thread, blocks)
+        def work(thread: int, first: int, end: int) -> int:
+            return kernel(*arguments, scratch[thread], first, end)
 
         return sum(over_worlds(work, (), self.num_worlds, self.scenario.num_agents, len(scratch)))
 

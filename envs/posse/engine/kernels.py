@@ -21,7 +21,6 @@ from posse.numeric import (
     ONE,
     WIDTH,
     ZERO,
-    Blocks,
     BoolArray,
     FloatArray,
     Lanes,
@@ -250,8 +249,8 @@ def tables_of(scenario: Scenario) -> Tables:
 def kernel_of(declarations: Declarations) -> Callable[..., int]:
     """Return the kernel that steps worlds of any scenario with these declarations.
 
-    It executes the orders of a thread's worlds (:func:`advance_worlds`), and returns the number of those whose
-    episodes are over. It is compiled again when a value that a user's function reaches has changed.
+    It executes the orders of worlds ``first`` to ``end`` (:func:`advance_worlds`), and returns the number of those
+    whose episodes are over. It is compiled again when a value that a user's function reaches has changed.
 
     Raises:
         DeclarationError: A user's function cannot be compiled.
@@ -272,16 +271,15 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
         results: Results,
         orders: npt.NDArray[np.uint8],
         scratch: Records,
-        thread: int,
-        blocks: Blocks,
+        first: int,
+        end: int,
     ) -> int:
         s = scratch[0]
         if s.prepared[0] == ZERO:
             lay_out_constants(tables.config[0], tables.beams, s)
             s.prepared[0] = ONE
         over = 0
-        end = blocks[thread + 1]
-        for e in range(natural(blocks[thread]), end, TOGETHER):
+        for e in range(natural(first), end, TOGETHER):
             count = min(TOGETHER, end - e)
             over += advance_worlds(e, count, tables, worlds, actions, results, orders, made, s)
         return over

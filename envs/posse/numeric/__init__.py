@@ -26,7 +26,7 @@ from posse.numeric.lanes import (
     store_fields,
     transpose,
 )
-from posse.numeric.threads import MOST_THREADS, Blocks, divide, over_worlds, threads_for, worlds_of
+from posse.numeric.threads import MOST_THREADS, over_worlds, threads_for
 
 __all__ = [
     "HALF",
@@ -36,7 +36,6 @@ __all__ = [
     "UNCOMPILED",
     "WIDTH",
     "ZERO",
-    "Blocks",
     "BoolArray",
     "FloatArray",
     "Lanes",
@@ -49,7 +48,6 @@ __all__ = [
     "compiled",
     "counts",
     "direct",
-    "divide",
     "eight",
     "fetch",
     "greater",
@@ -66,5 +64,4 @@ __all__ = [
     "store_fields",
     "threads_for",
     "transpose",
-    "worlds_of",
 ]

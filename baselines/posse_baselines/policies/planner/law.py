@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import MOST_THREADS, Blocks, BoolArray, FloatArray, Record, Records, compiled, kernel, worlds_of
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.rules import NEVER
 from posse_baselines.laws.assignment import WORK_ROWS, assign
 from posse_baselines.laws.geometry import length, wrap
@@ -309,11 +309,11 @@ class Played(NamedTuple):
 
 @kernel
 def drive_all(
-    played: Played, work: Work, worlds_per_path: int, actions: FloatArray, thread: int, blocks: Blocks
+    played: Played, work: Work, worlds_per_path: int, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
-    """Write the actions (E, rows, 2 + m) of those of a thread's worlds that are going on."""
+    """Write the actions (E, rows, 2 + m) of those of a share of the worlds that are going on."""
     mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.body[thread], work.plays[thread])
-    for e in worlds_of(thread, blocks):
+    for e in range(first, end):
         if played.going[e]:
             c, w, shared = played.config[0], played.world[e], e // worlds_per_path
             begun = played.begun[shared]
