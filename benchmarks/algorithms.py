@@ -17,13 +17,11 @@ import tyro
 from rich.console import Console
 
 from posse_baselines import load
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.statistics import mean
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.saved.folder import LAST, SETTINGS
-from posse_training.runs.settings import TrainSettings
-from posse_training.runs.train import resume, train
+from posse_training.train.settings import LAST, SETTINGS, TrainSettings, default_settings
+from posse_training.train.train import resume, train
 
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
 COLUMNS: Final = (
@@ -61,7 +59,7 @@ class Settings:
 def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainSettings:
     """Return the settings of one run."""
     changes = dict(CHANGES[algorithm])
-    base = default_settings(scenario, changes.pop("algorithm", "ppo"), own=False)
+    base = default_settings(scenario, changes.pop("algorithm", "ppo"), preset="nothing")
     steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
     folder = s.folder / f"{algorithm}-{scenario}-{seed}"
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}

@@ -13,8 +13,8 @@ import tyro
 
 import posse
 from posse_baselines import load, policy_names
+from posse_training.evaluation.evaluation import evaluate
 from posse_training.leaderboard import SEED, WORLDS, read_standings, standing_of, standings_text
-from posse_training.reports.evaluation import evaluate
 
 TABLE: Final = Path(__file__).parent / "standings.csv"
 SCENARIOS: Final = tuple(name for name in posse.scenario_names() if not name.startswith("paper"))

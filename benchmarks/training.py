@@ -12,10 +12,9 @@ import tyro
 from rich.console import Console
 
 from posse_baselines import load
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.settings import TrainSettings
-from posse_training.runs.train import train
-from posse_training.runs.validation import validate
+from posse_training.train.settings import TrainSettings, default_settings
+from posse_training.train.train import train
+from posse_training.train.validation import validate
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import shlex
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,12 +28,10 @@ from posse_baselines.learned import LearnedPolicy
 from posse_baselines.registry import LEARNED, SHIPPED
 from posse_baselines.targets import SHIPPED_TARGETS
 from posse_training.errors import SettingsError
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.statistics import difference, mean
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.statistics import difference, mean
-from posse_training.runs.saved.command import command_of
-from posse_training.runs.saved.folder import BEST, SETTINGS
-from posse_training.runs.settings import TrainSettings, read_settings
+from posse_training.train.settings import BEST, SETTINGS, TrainSettings, default_settings, read_settings
 
 SPLIT: Final = "validation"
 CHOICE_SEED: Final = 1  # seed 0 is evaluated during training
@@ -217,6 +216,37 @@ def _settings_of(scenario: Scenario) -> dict[str, Any]:
     named = get_scenario(scenario.name)
     names = [field.name for field in dataclasses.fields(scenario) if field.name not in _NOT_PLAYED]
     return {name: getattr(scenario, name) for name in names if getattr(scenario, name) != getattr(named, name)}
+
+
+def command_of(settings: TrainSettings) -> str:
+    """Return the command that trains with these settings, in the default folder.
+
+    It also states the values of the scenario's own defaults: these are often recorded only after
+    the training that found them, so the commit of the training may lack them.
+    """
+    which, side = (settings.scenario, settings.algorithm), settings.side
+    default = default_settings(*which, side=side).to_dict()
+    of_all = default_settings(*which, side=side, preset="nothing").to_dict()
+    stated = {"scenario", "algorithm", "steps", "seed"}
+    if side == "target":
+        stated |= {"side", "against"}
+    words = ["posse", "train"]
+    for name, value in settings.to_dict().items():
+        usual = value == default[name] == of_all[name]
+        if name == "folder" or (usual and name not in stated):
+            continue
+        option = name.replace("_", "-")
+        if isinstance(value, bool):
+            words.append(f"--{option}" if value else f"--no-{option}")
+        elif isinstance(value, dict) and default[name]:
+            words += [w for k, v in value.items() for w in (f"--{option}.{k}", str(v))]
+        elif isinstance(value, dict):
+            words += [f"--{option}", *(str(part) for item in value.items() for part in item)]
+        elif isinstance(value, (tuple, list)):
+            words += [f"--{option}", *map(str, value)]
+        else:
+            words += [f"--{option}", str(value)]
+    return shlex.join(words)
 
 
 def main() -> None:

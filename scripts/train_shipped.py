@@ -13,10 +13,8 @@ import tyro
 from rich.console import Console
 
 from posse_training.errors import SettingsError
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.saved.folder import LAST, SETTINGS
-from posse_training.runs.settings import TrainSettings
-from posse_training.runs.train import resume, train
+from posse_training.train.settings import LAST, SETTINGS, TrainSettings, default_settings
+from posse_training.train.train import resume, train
 
 ALGORITHMS: Final = {
     "smart": "ppo",

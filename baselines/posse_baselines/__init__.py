@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from posse_baselines.function_policy import from_function
-from posse_baselines.match import Match, against
-from posse_baselines.playing import Played, play, rollout, split_agents, stack_agents
+from posse_baselines.fields import Tunable
+from posse_baselines.playing import (
+    Match,
+    Played,
+    Recorder,
+    Trajectory,
+    against,
+    play,
+    rollout,
+    split_agents,
+    stack_agents,
+)
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
-from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin
+from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin, from_function
 from posse_baselines.registry import load, policy_names
 from posse_baselines.targets import Target, load_target, target_names
 from posse_baselines.tracker_env import register
-from posse_baselines.tuning import Tunable
 
 register()
 
@@ -21,8 +29,10 @@ __all__ = [
     "Played",
     "Policy",
     "PolicyError",
+    "Recorder",
     "StateReader",
     "Target",
+    "Trajectory",
     "Tunable",
     "against",
     "begin",

@@ -1,34 +1,199 @@
-"""Play a policy in a batch, or beside a PettingZoo environment."""
+"""Play a policy in a batch and record what it did, or play it beside a PettingZoo environment."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch, Scenario
+from posse import Batch, ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray
-from posse_baselines.match import Match
-from posse_baselines.policy import Memory, Policy, PolicyError, begin
+from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, StateReader, begin
+from posse_baselines.targets import Target
+
+Array = npt.NDArray[Any]
+
+_STEPS: Final = ("actions", "rewards", "terms", "score", "terminated", "truncated", "annotations")
+_FRAMES: Final = ("observations", "tracker_pose", "target_pose")
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What E worlds did in T steps, as arrays by name: ``trajectory["tracker_pose"]``.
+
+    A *frame* is the worlds at a control step: frame 0 is the start, step t leads from frame t to frame t + 1.
+
+    ====================== ============================ ====================================================
+    name to record         shape                        what it holds
+    ====================== ============================ ====================================================
+    observations           (T + 1, E, rows, F)
+    tracker_pose           (T + 1, E, N, 3)             x, y in m, heading in rad
+    target_pose            (T + 1, E, 3)
+    any of ``batch.state`` (T + 1, E, ...)              ``tracker_speed``, ``heard_step``, ``world_score``, ...
+    actions                (T, E, rows, 2 + m)
+    rewards                (T, E, rows)
+    terms                  (T, E, rows) each            terms of the reward, as ``reward/NAME``
+    score                  (T, E)
+    terminated, truncated  (T, E)
+    annotations            (T, E, N, ...) each          annotations of the policy on frame t, as ``annotation/NAME``
+    ====================== ============================ ====================================================
+
+    Attributes:
+        steps: T.
+        arrays: The arrays by name.
+        layout: Of the observations.
+        split: Of the worlds.
+        lengths: (E,) steps of each world's first episode, or T if it has not ended. With autoreset, later frames are
+            of the next episode.
+        metrics: Every metric by name, (E,), of the first episode so far.
+    """
+
+    steps: int
+    arrays: dict[str, Array]
+    layout: ObservationLayout
+    split: str
+    lengths: npt.NDArray[np.int64]
+    metrics: dict[str, npt.NDArray[np.float64]]
+
+    @property
+    def scenario(self) -> Scenario:
+        """Settings of the worlds."""
+        return self.layout.scenario
+
+    def __getitem__(self, name: str) -> Array:
+        return self.arrays[name]
+
+    def named(self, prefix: str) -> dict[str, Array]:
+        """Return the arrays whose names begin with ``prefix/``, by the rest of the name."""
+        start = f"{prefix}/"
+        return {name.removeprefix(start): array for name, array in self.arrays.items() if name.startswith(start)}
+
+    def episode(self, world: int) -> Trajectory:
+        """Return the first episode of one world: E = 1."""
+        steps, one = int(self.lengths[world]), slice(world, world + 1)
+        surplus = self.steps - steps  # rows after its end
+        arrays = {name: array[: len(array) - surplus, one] for name, array in self.arrays.items()}
+        metrics = {name: values[one] for name, values in self.metrics.items()}
+        return Trajectory(steps, arrays, self.layout, self.split, self.lengths[one], metrics)
+
+
+class Recorder:
+    """A batch that records what is asked for by name; :class:`Trajectory` lists the names.
+
+    :func:`rollout` records a policy. Where something else drives the robots, a recorder stands for the batch::
+
+        recorder = Recorder(batch, ["tracker_pose", "actions"])
+        observations = recorder.reset()
+        while not recorder.over.all():
+            observations, *_ = recorder.step(actions)
+        recorder.trajectory()
+
+    Attributes:
+        over: (E,) whether the first episode of each world has ended.
+        steps: Number of recorded steps.
+
+    Raises:
+        ValueError: An unknown name, or one of a frame with ``autoreset="same_step"``, which overwrites the last one.
+    """
+
+    def __init__(self, batch: Batch, record: Iterable[str] = ()) -> None:
+        self.batch = batch
+        self._names = tuple(dict.fromkeys(record))
+        known = (*_FRAMES, *_STEPS, *batch.state)
+        for name in self._names:
+            if name not in known:
+                raise ValueError(f"record={name!r} is unknown; names are: {', '.join(known)}")
+            if name not in _STEPS and batch.autoreset == "same_step":
+                raise ValueError(
+                    f"record={name!r} is not possible with autoreset='same_step', which overwrites the last state of "
+                    "an episode: make the batch with autoreset='disabled' or 'next_step'"
+                )
+        self._clear()
+
+    def _clear(self) -> None:
+        self.over = np.zeros(self.batch.num_worlds, np.bool_)
+        self.steps = 0
+        self._lengths = np.zeros(self.batch.num_worlds, np.int64)
+        self._rows: dict[str, list[Array]] = {}
+        self._metrics: dict[str, npt.NDArray[np.float64]] = {}
+
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> FloatArray:
+        """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
+        observations = self.batch.reset(seed=seed, options=options)
+        self._clear()
+        self._keep_frame(observations)
+        return observations
+
+    def step(
+        self, actions: npt.ArrayLike, annotations: Annotations | None = None
+    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+        """Advance the batch (see :meth:`posse.Batch.step`) and record the step, with the annotations of a policy."""
+        noted = {f"annotation/{name}": np.array(value) for name, value in (annotations or {}).items()}
+        done = self.batch.step(actions)
+        observations, rewards, terminated, truncated, infos = done
+        self.steps += 1
+        self._lengths[~self.over] += 1
+        ended = ~self.over & (terminated | truncated)
+        if ended.any():
+            for name in self.batch.metrics():
+                column = self._metrics.setdefault(name, np.full(len(ended), np.nan))
+                column[ended] = infos[f"metrics/{name}"][ended]
+            self.over |= ended
+        if "annotations" in self._names:
+            self._keep(noted)
+        if "terms" in self._names:
+            self._keep({name: infos[name] for name in (f"reward/{term}" for term in self.batch.term_names)})
+        told = {"actions": np.array(actions, np.float32), "rewards": rewards, "score": infos["score"]}
+        told |= {"terminated": terminated, "truncated": truncated}
+        self._keep({name: array for name, array in told.items() if name in self._names})
+        self._keep_frame(observations)
+        return done
+
+    def _keep_frame(self, observations: FloatArray) -> None:
+        state = self.batch.state
+        for name in self._names:
+            if name == "observations":
+                self._keep({name: observations})
+            elif name in ("tracker_pose", "target_pose"):
+                self._keep({name: poses_of(state, "world" if name == "target_pose" else "tracker")})
+            elif name not in _STEPS:
+                self._keep({name: state[name].copy()})
+
+    def _keep(self, rows: Mapping[str, Array]) -> None:
+        for name, row in rows.items():
+            self._rows.setdefault(name, []).append(row)
+
+    def trajectory(self) -> Trajectory:
+        """Return what was recorded since the reset."""
+        now = {name: np.array(values, np.float64) for name, values in self.batch.metrics().items()}
+        for name, values in self._metrics.items():
+            now[name][self.over] = values[self.over]
+        arrays = {name: np.stack(rows) for name, rows in self._rows.items()}
+        return Trajectory(self.steps, arrays, self.batch.layout, self.batch.split, self._lengths.copy(), now)
+
+
+def poses_of(state: Mapping[str, Array], who: str) -> Array:
+    """Return the poses in a state: (..., N, 3) of ``"tracker"``, (..., 3) of ``"world"``, the target; m, rad."""
+    heading = np.arctan2(state[f"{who}_heading_sin"], state[f"{who}_heading_cos"])
+    return np.stack([state[f"{who}_x"], state[f"{who}_y"], heading], axis=-1)
 
 
 @dataclass(frozen=True)
 class Played:
-    """One control step."""
+    """One control step of :func:`rollout`.
 
-    actions: FloatArray
-    """(E, N, 2 + m), of the policy."""
-    observations: FloatArray
-    """(E, N, F), after the step."""
-    rewards: FloatArray
-    terminated: BoolArray
-    truncated: BoolArray
-    infos: dict[str, Any]
+    Attributes:
+        running: (E,) whether the first episode of each world was in play.
+        ended: (E,) whether an episode has ended.
+        memory: The policy's memory, before it acts on the next frame.
+    """
+
+    running: BoolArray
+    ended: BoolArray
     memory: Memory
-    """The policy's memory, before it acts on ``observations``."""
 
 
 def check_moves_all(policy: Policy, scenario: Scenario) -> None:
@@ -44,55 +209,155 @@ def check_moves_all(policy: Policy, scenario: Scenario) -> None:
         )
 
 
-def rollout(batch: Batch, policy: Policy, *, seed: int | None = None) -> Iterator[Played]:
-    """Reset a batch and yield one :class:`Played` for each control step, without end.
+def rollout(
+    batch: Batch,
+    policy: Policy,
+    record: Collection[str] = (),
+    *,
+    steps: int | None = None,
+    seed: int | None = None,
+    options: Mapping[str, Any] | None = None,
+    after_step: Callable[[Played], object] | None = None,
+) -> Trajectory:
+    """Reset a batch, play a policy in it and return what was recorded.
 
-    With autoreset disabled it ends when every world has ended; otherwise the caller stops.
+    Args:
+        batch: The worlds.
+        policy: Moves the trackers; a :class:`Match` moves the target too.
+        record: Names of arrays, listed in :class:`Trajectory`; its metrics are always there.
+        steps: How many to play, through the ends of episodes; default: until the first episode of every world has
+            ended. With autoreset disabled, it ends there in any case.
+        seed: As for :meth:`posse.Batch.reset`.
+        options: As for :meth:`posse.Batch.reset`.
+        after_step: Called after each step.
 
     Raises:
-        PolicyError: The policy does not fit the batch, or the target is an agent that it does not
-            move.
+        PolicyError: The policy does not fit the batch, the target is an agent that it does not move, or episodes end
+            at different steps with autoreset disabled.
+        ValueError: An unknown name to record, or ``steps`` below 1.
     """
+    if steps is not None and steps < 1:
+        raise ValueError(f"steps={steps} must be at least 1")
     if batch.observation_shape[1] == batch.scenario.num_agents:
         check_moves_all(policy, batch.scenario)
+    recorder = Recorder(batch, record)
     memory = begin(policy, batch)
-    observations = batch.reset(seed=seed)
+    observations = recorder.reset(seed=seed, options=options)
     begins = np.zeros(batch.num_worlds, np.bool_)
-    while True:
+    while recorder.steps != steps and not (recorder.over.all() and (steps is None or batch.autoreset == "disabled")):
+        running = ~recorder.over
         actions, memory = policy.act(observations, memory)
-        observations, rewards, terminated, truncated, infos = batch.step(actions)
+        annotations = policy.annotations(memory) if "annotations" in record else None
+        observations, _, terminated, truncated, _ = recorder.step(actions, annotations)
         ended = terminated | truncated
         # In the mode "next_step", the step after the end begins the next episode.
         begins = begins if batch.autoreset == "next_step" else ended
         if begins.any():
             memory = policy.restart(memory, begins)
         begins = ended
-        yield Played(actions, observations, rewards, terminated, truncated, infos, memory)
-        if batch.autoreset == "disabled" and ended.any():
-            if not ended.all():
-                raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
-            return
+        if after_step is not None:
+            after_step(Played(running, ended, memory))
+        if batch.autoreset == "disabled" and ended.any() and not ended.all():
+            raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
+    return recorder.trajectory()
 
 
 def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, npt.NDArray[np.float64]]:
     """Play one episode in every world and return its metrics by name, (E,) each.
 
     Raises:
-        PolicyError: The policy does not fit the batch.
+        PolicyError: As :func:`rollout`.
     """
-    metrics: dict[str, npt.NDArray[np.float64]] = {}
-    waiting = np.ones(batch.num_worlds, np.bool_)
-    for step in rollout(batch, policy, seed=seed):
-        ended = waiting & (step.terminated | step.truncated)
-        if not ended.any():
-            continue
-        for name in batch.metrics():
-            column = metrics.setdefault(name, np.full(batch.num_worlds, np.nan))
-            column[ended] = step.infos[f"metrics/{name}"][ended]
-        waiting &= ~ended
-        if not waiting.any():
-            break
-    return metrics
+    return rollout(batch, policy, seed=seed).metrics
+
+
+class Match(BasePolicy):
+    """Moves the trackers by one policy and the target by another.
+
+    It plays worlds whose target is an agent: observations (E, N + 1, F), actions (E, N + 1, 2 + m),
+    the target's row last. All else is as in the policy of the trackers.
+
+    Args:
+        policy: Moves the trackers.
+        target: Moves the target; one with a policy.
+
+    Attributes:
+        trained_splits: Splits that either was trained on.
+
+    Raises:
+        PolicyError: The target has no policy, or the trackers' one plans ahead in copies of the
+            worlds, which have no target's policy.
+    """
+
+    def __init__(self, policy: Policy, target: Target) -> None:
+        if target.policy is None:
+            raise PolicyError(f"target {target.name!r} is a motion of the scenario, not a policy")
+        if policy.reads_state:
+            raise PolicyError(
+                f"{policy.name!r} reads the state and plays the target's motion ahead: it cannot "
+                f"play against {target.name!r}, which is moved by a policy"
+            )
+        self.name = policy.name
+        self.message_size = policy.message_size
+        splits = (*getattr(policy, "trained_splits", ()), *target.trained_splits)
+        self.trained_splits = tuple(dict.fromkeys(splits))
+        self.policy, self.target = policy, target.policy
+        self.reads_state = isinstance(self.target, StateReader) and self.target.reads_state  # of the team: False
+        self._target_name = target.name
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the memories of both.
+
+        Raises:
+            PolicyError: Either does not fit the layout.
+        """
+        return self.policy.begin(layout, num_worlds), self.target.begin(layout, num_worlds)
+
+    def watch(self, batch: Batch) -> None:
+        """Set the batch of a target that reads the state."""
+        if isinstance(self.target, StateReader):
+            self.target.watch(batch)
+
+    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return actions (E, N + 1, 2 + m) for observations (E, N + 1, F)."""
+        mine, theirs = memory
+        actions, mine = self.policy.act(np.ascontiguousarray(observations[:, :-1]), mine)
+        moves, theirs = self.target.act(np.ascontiguousarray(observations[:, -1:]), theirs)
+        moves = np.asarray(moves)
+        if moves.shape[:2] != (len(actions), 1) or moves.shape[-1] < 2:
+            raise PolicyError(
+                f"target {self._target_name!r} returned actions of shape {moves.shape}, wanted {(len(actions), 1, 2)}"
+            )
+        whole = np.zeros((len(actions), observations.shape[1], actions.shape[2]), np.float32)
+        whole[:, :-1] = actions
+        whole[:, -1, :2] = moves[:, 0, :2]
+        return whole, (mine, theirs)
+
+    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
+        """Return the memories with the worlds of a mask (E,) restarted."""
+        return self.policy.restart(memory[0], mask), self.target.restart(memory[1], mask)
+
+    def annotations(self, memory: Memory) -> Annotations:
+        """Return those of the trackers' policy."""
+        return self.policy.annotations(memory[0])
+
+    def leaders(self, memory: Memory) -> npt.NDArray[Any] | None:
+        """Return the leader of each tracker, as the trackers' policy says."""
+        if isinstance(self.policy, BasePolicy):
+            return self.policy.leaders(memory[0])
+        return super().leaders(memory)
+
+
+def against(policy: Policy, target: Target | None) -> Policy:
+    """Return what plays a policy against a target, in ``target.fit(scenario)``.
+
+    That is the policy itself where the target is a scripted motion, or ``None``, the scenario's
+    own.
+
+    Raises:
+        PolicyError: As :class:`Match`.
+    """
+    return policy if target is None or target.policy is None else Match(policy, target)
 
 
 def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:

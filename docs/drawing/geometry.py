@@ -9,7 +9,7 @@ from typing import Final
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, FancyArrowPatch
 
-from posse_training.reports.pictures import style as palette
+from posse_training import style as palette
 
 Point = tuple[float, float]
 TARGET, TRACKER, OTHER, GREY = palette.INK, palette.BLUE, palette.GREEN, palette.GREY

@@ -22,9 +22,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import posse
-from posse_training.reports.pictures.style import RC, note
-from posse_training.reports.reproduce.motion import TARGET, draw_robots, look_of
-from posse_training.reports.reproduce.recording import Recording, played, record
+from posse_baselines import Trajectory
+from posse_training.reproduce.figures import TARGET, draw_robots, look_of
+from posse_training.reproduce.runs import played, relative, run_of, slot_error, times
+from posse_training.style import RC, note
 
 MEDIA: Final = Path(__file__).parents[1] / "media"
 SEED: Final = 7
@@ -54,7 +55,7 @@ LAWS: Final = (
 def draw(law: Law) -> Figure:
     """Draw a law."""
     scenario = posse.get_scenario("accelerating", horizon=round(SECONDS / 0.1), start_distance=(2.0, 4.0))
-    run = record(law.policy, scenario, 1, SEED)
+    run = run_of(law.policy, scenario, 1, SEED)
     figure, (left, middle, right) = plt.subplots(
         1, 3, figsize=(10, 3.7), layout="constrained", width_ratios=(1.0, 1.15, 1.0)
     )
@@ -62,7 +63,7 @@ def draw(law: Law) -> Figure:
     _tracks(middle, run)
     _kept(right, run, law.keeps)
     middle.set_title(f"{law.policy}, {SECONDS:g} s", loc="left")
-    number = run.trackers.shape[2]
+    number = scenario.num_trackers
     handles = [Line2D([], [], lw=1.3, label=f"tracker {n}", **look_of(n)) for n in range(number)]
     handles.append(Line2D([], [], color=TARGET, lw=1.0, label="target"))
     note(figure, f"world 0 of {played(scenario, SEED)}; starts 2 to 4 m from the target")
@@ -70,9 +71,9 @@ def draw(law: Law) -> Figure:
     return figure
 
 
-def _tracks(axes: Axes, run: Recording) -> None:
-    draw_robots(axes, run, 0, len(run.time) - 1)
-    points = np.vstack([run.trackers[:, 0, :, :2].reshape(-1, 2), run.target[:, 0, :2]])
+def _tracks(axes: Axes, run: Trajectory) -> None:
+    draw_robots(axes, run, 0, run.steps)
+    points = np.vstack([run["tracker_pose"][:, 0, :, :2].reshape(-1, 2), run["target_pose"][:, 0, :2]])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     reach = 0.4 + float(np.abs(points - middle).max())
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
@@ -81,13 +82,13 @@ def _tracks(axes: Axes, run: Recording) -> None:
     axes.set_ylabel("y, m")
 
 
-def _kept(axes: Axes, run: Recording, keeps: str) -> None:
-    for number in range(run.trackers.shape[2]):
+def _kept(axes: Axes, run: Trajectory, keeps: str) -> None:
+    for number in range(run.scenario.num_trackers):
         if keeps == "range":
-            values = np.linalg.norm(run.relative[:, 0, number], axis=-1)
+            values = np.linalg.norm(relative(run)[:, 0, number], axis=-1)
         else:
-            values = run.error[:, 0, number]
-        axes.plot(run.time, values, lw=1.3, **look_of(number))
+            values = slot_error(run)[:, 0, number]
+        axes.plot(times(run), values, lw=1.3, **look_of(number))
     axes.set_ylim(0.0, None)
     axes.set_xlabel("time, s")
     axes.set_ylabel("range r, m" if keeps == "range" else "from the nearest slot, m")

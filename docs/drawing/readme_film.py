@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 
 from posse_baselines import load
+from posse_training.evaluation import evaluate
 from posse_training.film import film
-from posse_training.reports import evaluate
 
 OUT: Final = Path(__file__).parents[1] / "media" / "smart.gif"
 TEAMS: Final = ("ddcs-tuned", "learned-smart")

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 import posse
-from posse_training.runs.defaults import default_settings
+from posse_training.train.settings import default_settings
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from posse_baselines import load
 from posse_training import evaluate
-from posse_training.runs import default_settings
-from posse_training.runs.train import train
+from posse_training.train import default_settings
+from posse_training.train.train import train
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=2_000_000)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from posse import ObservationLayout
-from posse.scenarios.formation import slot_offsets
 from posse_baselines import BasePolicy, load
 from posse_training import evaluate
 
@@ -23,7 +22,7 @@ class OwnSlot(BasePolicy):
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
         """Return the memory: what stays the same for a whole episode."""
         super().begin(layout, num_worlds)  # checks the message size
-        return layout, np.array(slot_offsets(layout.scenario))
+        return layout, np.array(layout.scenario.slot_offsets)
 
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         """Return actions (E, N, 2 + m) for observations (E, N, F), and the memory."""

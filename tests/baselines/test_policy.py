@@ -11,6 +11,7 @@ from tests.support.adapters import out_of_band
 import posse
 from posse_baselines import (
     BasePolicy,
+    Played,
     Policy,
     PolicyError,
     begin,
@@ -156,16 +157,73 @@ def test_rollout_restarts_memories_when_episodes_begin(autoreset: str) -> None:
 
     batch = posse.batch("constant", 3, horizon=30, autoreset=autoreset)
     restarted: list[Any] = []
-    begins = []
-    for count, step in enumerate(rollout(batch, Recorder())):
-        left = batch.layout.views(step.observations)["time_left"][:, 0]
-        if np.allclose(left, 3.0):
+    begins: list[int] = []
+    count = -1
+
+    def note(step: Played) -> None:
+        nonlocal count
+        count += 1
+        if np.allclose(batch.layout.views(batch.observe())["time_left"][:, 0], 3.0):
             begins.append(count)
-        if count == 65:
-            break
+
+    rollout(batch, Recorder(), steps=66, after_step=note)
     assert len(begins) == 2
     assert [at for at, _ in restarted] == begins
     assert all(mask.all() for _, mask in restarted)
+
+
+def test_a_trajectory_holds_what_was_asked_for() -> None:
+    def fresh() -> posse.Batch:
+        return posse.batch("radio", 3, horizon=30, settle_time=0.5, message_size=load("ddcs-tuned").message_size)
+
+    batch, policy = fresh(), load("ddcs-tuned")
+    record = ("observations", "tracker_pose", "target_pose", "heard_step", "actions", "rewards", "terms", "score")
+    found = rollout(fresh(), policy, (*record, "terminated", "truncated", "annotations"), seed=4)
+    memory, observations = begin(policy, batch), batch.reset(seed=4)
+    for t in range(30):
+        state = batch.state
+        np.testing.assert_array_equal(found["observations"][t], observations)
+        np.testing.assert_array_equal(found["tracker_pose"][t, ..., 0], state["tracker_x"])
+        np.testing.assert_array_equal(
+            np.cos(found["target_pose"][t, :, 2]),
+            np.cos(np.arctan2(state["world_heading_sin"], state["world_heading_cos"])),
+        )
+        np.testing.assert_array_equal(found["heard_step"][t], state["heard_step"])
+        actions, memory = policy.act(observations, memory)
+        np.testing.assert_array_equal(found["actions"][t], actions)
+        for name, value in policy.annotations(memory).items():
+            np.testing.assert_array_equal(found[f"annotation/{name}"][t], value)
+        observations, rewards, terminated, truncated, infos = batch.step(actions)
+        for name, value in {"rewards": rewards, "terminated": terminated, "truncated": truncated}.items():
+            np.testing.assert_array_equal(found[name][t], value)
+        np.testing.assert_array_equal(found["score"][t], infos["score"])
+        assert set(found.named("reward")) == set(batch.term_names)
+    assert (found.steps, found["observations"].shape[0], found.lengths.tolist()) == (30, 31, [30] * 3)
+    for name, values in batch.metrics().items():
+        np.testing.assert_array_equal(found.metrics[name], values)
+
+
+def test_an_episode_of_a_trajectory_ends_where_its_world_did() -> None:
+    settings: dict[str, Any] = {"terminate_on_contact": True, "start_distance": (0.6, 1.5), "seed": 3}
+    names = ("tracker_x", "actions", "terminated")
+    found = rollout(posse.batch("constant", 8, **settings), load("random"), names)
+    assert len(set(found.lengths)) > 1
+    for world, length in enumerate(found.lengths):
+        alone = rollout(posse.batch("constant", 1, first_world=world, **settings), load("random"), names)
+        one = found.episode(world)
+        assert one.steps == alone.steps == length
+        for name in names:
+            np.testing.assert_array_equal(one[name], alone[name])
+        assert one.metrics["score"] == alone.metrics["score"]
+
+
+def test_what_cannot_be_recorded_is_named() -> None:
+    with pytest.raises(ValueError, match="record='speed' is unknown; names are: observations, "):
+        rollout(posse.batch("constant", 1), load("idle"), ["speed"])
+    with pytest.raises(ValueError, match="autoreset='same_step'"):
+        rollout(posse.batch("constant", 1, autoreset="same_step"), load("idle"), ["tracker_x"])
+    with pytest.raises(ValueError, match="steps=0 must be"):
+        rollout(posse.batch("constant", 1), load("idle"), steps=0)
 
 
 def test_play_returns_the_metrics_of_one_episode_a_world() -> None:
@@ -234,7 +292,7 @@ def test_observations_of_another_shape_are_refused(name: str) -> None:
 def test_a_team_with_an_agent_for_a_target_is_not_driven_by_rollout() -> None:
     batch = posse.batch("constant", 1, target_motion="agent")
     with pytest.raises(PolicyError, match=r"target .* is an agent"):
-        next(rollout(batch, load("idle")))
+        rollout(batch, load("idle"))
 
 
 # --- PettingZoo ----------------------------------------------------------------------------------

@@ -19,14 +19,7 @@ import pytest
 import posse
 
 ROOT = Path(__file__).parents[2]
-MODULES = (
-    "posse",
-    "posse_baselines",
-    "posse_training",
-    "posse_training.cluster",
-    "posse_training.replay",
-    "posse_training.leaderboard",
-)
+MODULES = ("posse", "posse_baselines", "posse_training", "posse_training.replay", "posse_training.leaderboard")
 LOADED = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src"}
 
 

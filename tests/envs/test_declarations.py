@@ -128,7 +128,7 @@ import posse
 import gains, steady
 
 def value(batch):
-    return float(batch.step(np.zeros(batch.action_shape))[-1]["reward_terms"]["steady"][0, 0])
+    return float(batch.step(np.zeros(batch.action_shape))[-1]["reward/steady"][0, 0])
 
 def made():
     batch = posse.batch("constant", 1, reward_weights={"steady": 1.0})
@@ -200,7 +200,7 @@ batch = posse.batch("constant", 1, **settings)
 batch.reset(seed=0)
 rewards, infos = [batch.step(np.ones(batch.action_shape))[k] for k in (1, 4)]
 c, world, trackers = batch._tables.config[0], batch.worlds[0], batch.arrays.tracker[0]
-terms = infos["reward_terms"]
+terms = {name: infos[f"reward/{name}"] for name in batch.term_names}
 weights, values = batch._tables.weights, np.zeros(len(terms), np.float32)
 reward = getattr(module["reward"], "py_func", module["reward"])
 SLOT, STEADY = list(terms).index("slot"), list(terms).index("steady")

@@ -23,7 +23,7 @@ import bearing
 import distance
 import spiral
 from posse.signals.global_state import StateLayout
-from posse_training.reports.evaluation import evaluate
+from posse_training.evaluation.evaluation import evaluate
 
 batch = posse.batch(
     "constant", 40, target_motion="spiral", sensor="bearing-only", sensing_range=6.0,

@@ -92,13 +92,13 @@ def test_a_world_goes_as_an_independent_computation_says(
 ) -> None:
     try:
         batch = posse.batch(name, 1, seed=seed, num_threads=1, **changes)
+        observations, state = batch.reset(), one_world(snapshot(batch), 0)
     except posse.ScenarioError:
         assume(False)
         raise
     s, rng = batch.scenario, np.random.default_rng(seed)
     senses, episode = Senses(s), Episode(s)
     low, high = batch.layout.bounds()
-    observations, state = batch.reset(), one_world(snapshot(batch), 0)
     senses.follow(state)
     episode.follow(state)
     for step in range(1, STEPS + 1):

@@ -1,4 +1,4 @@
-"""Policies that a test kills, stops and counts, played by the workers of a cluster."""
+"""A policy that a test kills, stops and counts, played by the workers of a cluster."""
 
 from __future__ import annotations
 
@@ -13,31 +13,26 @@ from posse_baselines import BasePolicy, Memory, load
 
 
 class Watched(BasePolicy):
-    """``pursuit``, which in one shard of a folder's choice does what the folder says.
+    """``pursuit``, which in one shard does a deed: it ends the process, waits for the file ``go``, or fails.
 
-    Args:
-        folder: Each shard leaves the node that plays it in ``begun-N``, N from 1 on. The first one
-            from N = ``at`` on does the deed, and leaves its node in ``chosen``.
-        at: Which one.
-        deed: ``"die"`` ends the process, ``"wait"`` waits until the folder holds ``go``, ``"fail"``
-            raises an error.
+    Each shard leaves the node that plays it in ``begun-N``, N from 1 on. The first one from N = 4 on does the deed, and
+    leaves its node in ``chosen``; with ``"die always"`` each ends its process.
     """
 
     name = "watched"
     reads_state = False
 
-    def __init__(self, folder: Path, at: int, deed: str) -> None:
-        self._folder, self._at, self._deed = folder, at, deed
-        self._pursuit = load("pursuit")
+    def __init__(self, folder: Path, deed: str) -> None:
+        self._folder, self._deed, self._pursuit = folder, deed, load("pursuit")
 
     def begin(self, layout: Any, num_worlds: int) -> Memory:
         import ray
 
         node = ray.get_runtime_context().get_node_id()
         number = next(n for n in range(1, 1000) if _claim(self._folder / f"begun-{n}", node))
-        chosen = number >= self._at and _claim(self._folder / "chosen", node)
+        chosen = self._deed == "die always" or (number >= 4 and _claim(self._folder / "chosen", node))
         deed = self._deed if chosen else ""
-        if deed == "die":
+        if deed.startswith("die"):
             os.kill(os.getpid(), signal.SIGKILL)
         if deed == "fail":
             raise ValueError("no idea")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from rich.console import Console
-from safetensors.numpy import load_file
+from safetensors.torch import load_file
 
-from posse_training.runs import TrainSettings
-from posse_training.runs.saved.checkpoint import read_checkpoint
+from posse_training.train import TrainSettings
+from posse_training.train.checkpoint import read_checkpoint
 
 HORIZON = 40
 ALGORITHMS = ("ppo", "mappo", "sac", "td3")
@@ -26,7 +28,7 @@ def small(folder: Path, algorithm: str = "ppo", **changes: Any) -> TrainSettings
     """Settings of a training that takes about a second."""
     settings = TrainSettings(
         scenario="constant",
-        algorithm=algorithm,  # type: ignore[arg-type]
+        algorithm=algorithm,
         steps=1280,
         seed=3,
         folder=folder,
@@ -54,20 +56,28 @@ def quiet() -> Console:
 
 
 def numbers(folder: Path) -> dict[str, Any]:
-    """All results of a finished training, without its duration."""
-    arrays, state = read_checkpoint(folder)
-    state.pop("seconds")
-    for point in state["curve"]:
-        point.pop("seconds")
-    return {"arrays": arrays, "state": state, "last": load_file(folder / "last.safetensors")}
+    """All results of a finished training by name, without its duration: arrays as bytes, and plain values."""
+    state = {"checkpoint": read_checkpoint(folder), "last": load_file(folder / "last.safetensors")}
+    return {name: value for name, value in _flat(state) if not name.endswith("/seconds")}
+
+
+def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, (dict, list, tuple)):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, item in items:
+            yield from _flat(item, f"{name}/{key}")
+    else:
+        yield name, value.numpy().tobytes() if isinstance(value, torch.Tensor) else value
+
+
+def steps_saved(folder: Path) -> int:
+    """The steps that a run's checkpoint was written after."""
+    return int(read_checkpoint(folder)["model"]["num_timesteps"])
 
 
 def assert_equal(mine: dict[str, Any], theirs: dict[str, Any]) -> None:
-    assert mine["state"] == theirs["state"]
-    for part in ("arrays", "last"):
-        assert set(mine[part]) == set(theirs[part])
-        for name, array in mine[part].items():
-            assert array.tobytes() == theirs[part][name].tobytes(), name
+    assert mine.keys() == theirs.keys()
+    assert [name for name, value in mine.items() if value != theirs[name]] == []
 
 
 ADVISED: dict[str, Any] = {

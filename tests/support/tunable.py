@@ -14,7 +14,7 @@ from rich.console import Console
 from posse.numeric import FloatArray
 from posse_baselines import Memory
 from posse_baselines.ddcs import DDCS
-from posse_baselines.tuning import tuned
+from posse_baselines.fields import tuned
 from posse_training.tune import TuneSettings
 
 BEST = 0.35

@@ -86,5 +86,5 @@ def test_recording_says_what_to_install(tmp_path: Path) -> None:
     assert run(MAIN, "record", "--help", cwd=tmp_path).returncode == 0
     done = run(MAIN, "record", "idle", "--scenario", "constant", "--out", "here", cwd=tmp_path)
     assert done.returncode == 2
-    assert "pip install 'posse[datasets]'" in done.stderr
+    assert "pip install '.[datasets]'" in done.stderr
     assert list(tmp_path.iterdir()) == []

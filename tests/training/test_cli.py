@@ -112,8 +112,8 @@ def test_who_stops_a_training_is_told_how_to_go_on(
     def stopped(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("posse_training.runs.train.train", stopped)
-    monkeypatch.setattr("posse_training.runs.train.resume", stopped)
+    monkeypatch.setattr("posse_training.train.train.train", stopped)
+    monkeypatch.setattr("posse_training.train.train.resume", stopped)
     for arguments in (["--folder", str(tmp_path)], ["--resume", str(tmp_path)]):
         assert main(["train", *arguments]) == 130
         assert f"to resume: posse train --resume {tmp_path}" in capsys.readouterr().err

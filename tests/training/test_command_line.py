@@ -1,15 +1,13 @@
-"""The command line starts without the libraries of its commands, suggests, and completes."""
+"""The command line starts without the libraries of its commands, and suggests."""
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from posse_training.cli import COMMANDS, main
+from posse_training.cli import main
 
 HEAVY = ("numpy", "numba", "torch", "tyro", "rich", "matplotlib", "posse")
 
@@ -36,33 +34,3 @@ def test_the_module_is_the_command_line() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("posse 0.")
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh"])
-def test_completion_is_for_a_shell_that_is_named(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", shell]) == 0
-    assert "complete -o default -F _posse posse" in capsys.readouterr().out
-    assert main(["completion", "fish"]) == 2
-    assert "name one of bash, zsh" in capsys.readouterr().err
-
-
-def test_bash_completes_commands_and_options(tmp_path: Path) -> None:
-    posse = tmp_path / "posse"
-    posse.write_text(f"#!/bin/sh\nexec '{sys.executable}' -m posse_training.cli \"$@\"\n")
-    posse.chmod(0o755)
-    script = (
-        'eval "$(posse completion bash)"\n'
-        "COMP_WORDS=(posse '') COMP_CWORD=1; _posse; echo ${COMPREPLY[@]}\n"
-        "COMP_WORDS=(posse scenarios --he) COMP_CWORD=2; _posse; echo ${COMPREPLY[@]}\n"
-    )
-    done = subprocess.run(
-        ["bash", "-c", script],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-        env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"},
-    )
-    commands, options = done.stdout.splitlines()
-    assert set(COMMANDS) <= set(commands.split())
-    assert options == "--help"

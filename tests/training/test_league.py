@@ -26,7 +26,7 @@ from posse_training.league import (
     shares,
     tables,
 )
-from posse_training.runs.callback import TrainingCallback
+from posse_training.train.train import Run
 
 
 def tiny(folder: Path, **changes: Any) -> LeagueSettings:
@@ -56,9 +56,8 @@ def everything(folder: Path) -> dict[str, Any]:
     """All policies and results of a league, without its folder's name."""
     found: dict[str, Any] = {}
     for path in sorted(folder.rglob("*.safetensors")):
-        if path.name != "checkpoint.safetensors":
-            tensors = load_file(path)
-            found[str(path.relative_to(folder))] = {k: a.tobytes() for k, a in tensors.items()}
+        tensors = load_file(path)
+        found[str(path.relative_to(folder))] = {k: a.tobytes() for k, a in tensors.items()}
     for name in (MATRIX, SUMMARY, FILE):
         found[name] = (folder / name).read_text(encoding="utf-8").replace(str(folder), "FOLDER")
     return found
@@ -90,11 +89,7 @@ def test_a_killed_league_ends_as_one_that_was_not(tmp_path: Path, monkeypatch: p
     assert [e.label for e in found.exploited] == ["trackers-2", "target-2"]
     gained = found.exploited[0]
     assert gained.gain == pytest.approx(gained.before.score.value - gained.after.score.value)
-    for owner, name, call in (
-        (TrainingCallback, "_on_rollout_start", 4),
-        (TrainingCallback, "_checkpoint", 7),
-        (league, "evaluate", 9),
-    ):
+    for owner, name, call in ((Run, "_on_rollout_start", 4), (Run, "_checkpoint", 7), (league, "evaluate", 9)):
         with monkeypatch.context() as patched:
             die_at(patched, owner, name, call)
             with pytest.raises(Killed):

@@ -15,7 +15,7 @@ from posse_training.errors import RunFolderError
 from posse_training.files import locked
 from posse_training.film import film
 from posse_training.replay import record, write_replay
-from posse_training.runs.train import resume, train
+from posse_training.train.train import resume, train
 
 PRECIOUS = b"precious"
 
@@ -33,9 +33,7 @@ def untouched(elsewhere: Path) -> bool:
     return elsewhere.read_bytes() == PRECIOUS and list(elsewhere.parent.iterdir()) == [elsewhere]
 
 
-@pytest.mark.parametrize(
-    "name", ["lock", "checkpoint.safetensors", ".checkpoint.safetensors.partial", "curve.csv", "settings.json"]
-)
+@pytest.mark.parametrize("name", ["lock", "checkpoint.pt", ".checkpoint.pt.partial", "curve.csv", "settings.json"])
 def test_a_new_run(tmp_path: Path, elsewhere: Path, name: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()

@@ -8,11 +8,12 @@ import shutil
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import tyro
 from rich.console import Console
-from scripts.ship import CHOICE_SEED, Settings, replay, ship
+from scripts.ship import CHOICE_SEED, Settings, command_of, replay, ship
 from scripts.train_shipped import ALGORITHMS, all_runs
 from scripts.train_shipped import Settings as Runs
 from scripts.tune_shipped import repeat_all
@@ -23,9 +24,9 @@ from posse_baselines import load_target
 from posse_baselines.learned import LearnedPolicy
 from posse_training import evaluate
 from posse_training.errors import SettingsError
-from posse_training.runs import TrainSettings, default_settings
-from posse_training.runs.saved.command import command_of
-from posse_training.runs.train import train
+from posse_training.train import TrainSettings, default_settings
+from posse_training.train.settings import Preset
+from posse_training.train.train import train
 from posse_training.tune import tune
 
 SETTINGS = TrainSettings(
@@ -150,8 +151,8 @@ def test_the_command_on_record_gives_the_settings_again() -> None:
         replace(default_settings("smart"), imitate=None, log_deviation=-0.5),
     ):
         words = shlex.split(command_of(settings))[2:]
-        for own in (True, False):  # with the scenario's own defaults, and before there were any
-            default = default_settings(settings.scenario, settings.algorithm, own=own)
+        for preset in get_args(Preset):  # with the scenario's own defaults, and before there were any
+            default = default_settings(settings.scenario, settings.algorithm, preset=preset)
             assert tyro.cli(TrainSettings, default=default, args=words) == settings
 
 

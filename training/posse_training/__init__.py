@@ -9,14 +9,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from posse_training.reports import Results, evaluate
+    from posse_training.evaluation import Results, evaluate
 
 __all__ = ["Results", "evaluate"]
 
 
 def __getattr__(name: str) -> Any:
     if name in __all__:
-        return getattr(importlib.import_module("posse_training.reports"), name)
+        return getattr(importlib.import_module("posse_training.evaluation"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

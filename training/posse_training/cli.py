@@ -35,9 +35,8 @@ COMMANDS: Final[dict[str, _Command]] = {
     "submit": _Command("play for the leaderboard and write the claim", "leaderboard:submit_command"),
     "verify": _Command("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
     "record": _Command("record episodes as a data set for offline learning", "datasets"),
-    "reproduce": _Command("repeat the paper's experiments", "reports.reproduce"),
+    "reproduce": _Command("repeat the paper's experiments", "reproduce.reproduce"),
     "scenarios": _Command("list the scenarios", "commands.scenarios"),
-    "completion": _Command("print what a shell needs to complete commands", "commands.completion"),
 }
 
 

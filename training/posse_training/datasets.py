@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
 import os
 import re
@@ -16,14 +15,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
 import tyro
 
 import posse
 from posse import Batch, Scenario, get_scenario
-from posse_baselines import Policy, PolicyError, begin, load
+from posse_baselines import Policy, PolicyError, load, rollout
 from posse_training.errors import SettingsError, require
+from posse_training.evaluation.evaluation import progress_bar
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import progress_bar
 
 if TYPE_CHECKING:
     from minari import MinariDataset
@@ -34,6 +34,8 @@ __all__ = ["load_dataset", "record_dataset"]
 AT_ONCE: Final = 20
 """Episodes in memory at a time: some 20 MB for five trackers."""
 _PATH: Final = "MINARI_DATASETS_PATH"
+_RECORD: Final = ("observations", "actions", "rewards", "terms", "score", "terminated", "truncated")
+Metadata = dict[str, Any]
 
 
 def record_dataset(
@@ -73,6 +75,8 @@ def record_dataset(
         ScenarioError: An unknown scenario or split, an invalid setting or seed.
     """
     require("datasets", "minari", "h5py")
+    import minari
+
     given = [policies] if isinstance(policies, str) or not isinstance(policies, Sequence) else policies
     players = [load(each) if isinstance(each, str) else each for each in given]
     if not players:
@@ -96,9 +100,31 @@ def record_dataset(
         "policies": [{"name": each.name, "card": getattr(each, "card", None)} for each in players],
     }
     env = gymnasium.make("posse/Team-v0", scenario=scenario, split=split, **overrides)
+    create = {
+        "env": env,
+        "data_format": "hdf5",
+        "author": "posse",
+        "requirements": [f"posse=={posse.__version__}"],
+        "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
+        "algorithm_name": name,
+        "code_permalink": f"posse {posse.__version__} {about['commit'] or ''}",
+    }
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial:
-        _write(Path(partial), called, env, _played(players, settings, episodes, seed, split), progress, name, about)
+    with tempfile.TemporaryDirectory(prefix=".recording-", dir=folder) as partial, _datasets_in(Path(partial)):
+        storage: Any = None
+        for first in range(0, episodes, AT_ONCE):
+            worlds = range(first, min(first + AT_ONCE, episodes))
+            part = [_episode(players[world % len(players)], settings, world, seed, split) for world in worlds]
+            buffers, metadata = (list(each) for each in zip(*part, strict=True))
+            if storage is None:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", UserWarning)  # that an e-mail address is missing
+                    storage = minari.create_dataset_from_buffers(called, buffers, **create).storage
+                storage.update_metadata({"posse": json.dumps(about)})
+            else:
+                storage.update_episodes(buffers)
+            storage.update_episode_metadata(metadata, worlds)
+            progress(len(worlds))
         (folder / called).parent.mkdir(parents=True, exist_ok=True)
         Path(partial, called).rename(folder / called)
     return load_dataset(folder, called)
@@ -118,84 +144,33 @@ def load_dataset(out: str | Path, name: str) -> MinariDataset:
         return minari.load_dataset(name)
 
 
-def _played(
-    players: Sequence[Policy], settings: Scenario, episodes: int, seed: int, split: str
-) -> Iterator[tuple[EpisodeBuffer, dict[str, Any]]]:
-    """Play world after world; yield each episode's buffer and metadata.
+def _episode(policy: Policy, settings: Scenario, world: int, seed: int, split: str) -> tuple[EpisodeBuffer, Metadata]:
+    """Play a world and return its buffer and metadata.
 
     Observations are (T + 1, N, F), actions (T, N, 2 + m), rewards (T,), the mean of the team's. Infos are ``score``
-    (T + 1,) and ``reward_terms``, each (T + 1, N); those of the reset are 0.
+    (T + 1,) and ``reward``, each term by name (T + 1, N); those of the reset are 0.
     """
     from minari.data_collector import EpisodeBuffer
 
-    for world in range(episodes):
-        policy = players[world % len(players)]
-        batch = Batch(settings, 1, seed=seed, split=split, first_world=world, autoreset="disabled", num_threads=1)
-        memory, seen = begin(policy, batch), batch.reset()
-        observations, actions, rewards, scores = [seen[0]], [], [], [0.0]
-        terms = {name: [np.zeros(settings.num_trackers, np.float32)] for name in batch.term_names}
-        ended = False
-        while not ended:
-            acted, memory = policy.act(seen, memory)
-            seen, gained, terminated, truncated, infos = batch.step(acted)
-            ended = bool(terminated[0] or truncated[0])
-            observations.append(seen[0])
-            actions.append(np.array(acted[0], np.float32))
-            rewards.append(float(gained[0].mean(dtype=np.float64)))
-            scores.append(float(infos["score"][0]))
-            for name, column in terms.items():
-                column.append(np.array(infos[f"reward/{name}"][0]))
-        ends = np.arange(len(actions)) == len(actions) - 1
-        buffer = EpisodeBuffer(
-            id=world,
-            seed=seed,
-            observations=np.stack(observations),
-            actions=np.stack(actions),
-            rewards=rewards,
-            terminations=(ends & terminated[0]).tolist(),
-            truncations=(ends & ~terminated[0]).tolist(),
-            infos={"score": np.array(scores), "reward": {name: np.stack(column) for name, column in terms.items()}},
-        )
-        metrics = {name: float(infos[f"metrics/{name}"][0]) for name in batch.metrics()}
-        yield buffer, {"policy": policy.name, "world": world, **metrics}
+    batch = Batch(settings, 1, seed=seed, split=split, first_world=world, autoreset="disabled", num_threads=1)
+    played = rollout(batch, policy, _RECORD)
+    terms = {name: _after_zero(term[:, 0]) for name, term in played.named("reward").items()}
+    buffer = EpisodeBuffer(
+        id=world,
+        seed=seed,
+        observations=played["observations"][:, 0],
+        actions=played["actions"][:, 0],
+        rewards=played["rewards"][:, 0].mean(axis=1, dtype=np.float64).tolist(),
+        terminations=played["terminated"][:, 0].tolist(),
+        truncations=(played["truncated"] & ~played["terminated"])[:, 0].tolist(),
+        infos={"score": _after_zero(played["score"][:, 0].astype(np.float64)), "reward": terms},
+    )
+    metrics = {name: float(column[0]) for name, column in played.metrics.items()}
+    return buffer, {"policy": policy.name, "world": world, **metrics}
 
 
-def _write(
-    folder: Path,
-    called: str,
-    env: gymnasium.Env[Any, Any],
-    played: Iterator[tuple[EpisodeBuffer, dict[str, Any]]],
-    progress: Callable[[int], object],
-    name: str,
-    about: dict[str, Any],
-) -> None:
-    """Write a data set, ``AT_ONCE`` episodes at a time."""
-    import minari
-
-    dataset: MinariDataset | None = None
-    done = 0
-    with _datasets_in(folder), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # that an e-mail address is missing
-        while part := list(itertools.islice(played, AT_ONCE)):
-            buffers, metadata = (list(each) for each in zip(*part, strict=True))
-            if dataset is None:
-                dataset = minari.create_dataset_from_buffers(
-                    called,
-                    buffers,
-                    env=env,
-                    data_format="hdf5",
-                    author="posse",
-                    requirements=[f"posse=={posse.__version__}"],
-                    description=f"episodes of posse's scenario {about['scenario']['name']!r}, played by {name}",
-                    algorithm_name=name,
-                    code_permalink=f"posse {posse.__version__} {about['commit'] or ''}",
-                )
-                dataset.storage.update_metadata({"posse": json.dumps(about)})
-            else:
-                dataset.storage.update_episodes(buffers)
-            dataset.storage.update_episode_metadata(metadata, range(done, done + len(part)))
-            done += len(part)
-            progress(len(part))
+def _after_zero(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    return np.concatenate([np.zeros_like(rows[:1]), rows])
 
 
 @contextlib.contextmanager

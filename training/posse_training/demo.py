@@ -18,11 +18,11 @@ from rich.table import Table
 
 from posse import ObservationLayout, get_scenario
 from posse_baselines import Policy, load, policy_names
+from posse_training.evaluation import Results, evaluate
+from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.statistics import Estimate, mean, share
 from posse_training.film import film
 from posse_training.replay import record, write_replay
-from posse_training.reports import Results, evaluate
-from posse_training.reports.evaluation import progress_bar
-from posse_training.reports.statistics import Estimate, mean, share
 
 SCENARIOS: Final = ("constant", "accelerating", "smart")
 POLICIES: Final = ("random", "idle", "pursuit", "ddcs-centralized", "ddcs-distributed", "ddcs-tuned")

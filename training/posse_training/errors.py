@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
+import traceback
+from pathlib import Path
 from typing import Final
+
+_LONGEST: Final = 300  # characters of an error in a summary
 
 
 class SettingsError(ValueError):
@@ -34,6 +39,10 @@ class TimeLimitError(RuntimeError):
     """An evaluation that exceeded its time limit."""
 
 
+class PlayError(RuntimeError):
+    """A policy that raised, returned invalid actions, exceeded the time limit or crashed."""
+
+
 class ResultFileError(ValueError):
     """A claim for the leaderboard that is invalid or cannot be checked."""
 
@@ -54,6 +63,7 @@ OWN: Final = (
     ComparisonError,
     TrainedSplitError,
     TimeLimitError,
+    PlayError,
     ResultFileError,
     ClusterError,
     MissingExtraError,
@@ -75,3 +85,17 @@ def require(extra: str, *packages: str) -> None:
                 f"{package} cannot be imported ({error}). Install the extra {extra!r} of posse-rl; from a clone: "
                 f"pip install '.[{extra}]'"
             ) from error
+
+
+def describe(error: BaseException) -> str:
+    """Return an error in one line: its message, and where in the policy's code it was raised."""
+    if isinstance(error, PlayError):
+        return str(error)
+    message = " ".join(str(error).split())
+    if len(message) > _LONGEST:
+        message = f"{message[:_LONGEST]}..."
+    found = [importlib.util.find_spec(name) for name in ("posse", "posse_baselines", "posse_training")]
+    ours = tuple(str(Path(spec.origin).parent) for spec in found if spec is not None and spec.origin)
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(ours)]
+    where = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
+    return f"{type(error).__name__}: {message}{where}"

@@ -22,9 +22,10 @@ from posse_baselines import Policy, load, policy_names
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_code, ships_or_is_file
 from posse_training.errors import ResultFileError
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.results import Results
+from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import Results, evaluate
-from posse_training.reports.statistics import mean
 
 __all__ = ["Standing", "Verdict", "read_standings", "submit", "verify"]
 

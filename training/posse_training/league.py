@@ -23,13 +23,11 @@ from posse import get_scenario
 from posse_baselines import load, load_target
 from posse_baselines.files import replacing, write_atomically
 from posse_training.errors import RunFolderError, SettingsError, require
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.results import Results
+from posse_training.evaluation.statistics import Estimate
 from posse_training.files import InUseError, locked, read_json
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.results import Results
-from posse_training.reports.statistics import Estimate
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.saved.folder import BEST, LAST, SETTINGS
-from posse_training.runs.settings import TrainSettings, read_settings
+from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, default_settings, read_settings
 
 FILE: Final = "league.json"
 MATRIX: Final = "matrix.csv"
@@ -297,7 +295,7 @@ class _Run:
 
     def _train(self, side: str, trained: Member, opponents: str, steps: int, own: Sequence[Member]) -> None:
         """Train a member, or go on with that; it begins with the networks of its side's latest."""
-        from posse_training.runs.train import train  # torch
+        from posse_training.train.train import train  # torch
 
         s, run = self.settings, trained.run
         assert run is not None
@@ -409,7 +407,7 @@ def draw_matrix(found: League) -> list[Path]:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from posse_training.reports.pictures.style import RC, WIDTH, note, plain
+    from posse_training.style import RC, WIDTH, note, plain
 
     s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
     scores = [[found.at(a, b).score for b in targets] for a in teams]

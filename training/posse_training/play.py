@@ -14,9 +14,9 @@ from posse import Batch, Scenario
 from posse.rendering.canvas import Window
 from posse.rendering.renderer import Renderer
 from posse.rendering.style import TRACKER
-from posse_baselines import Policy, PolicyError, begin
+from posse_baselines import Policy, PolicyError, Recorder, begin
 from posse_training.errors import SettingsError
-from posse_training.replay import Recorder, Replay, join, write_replay
+from posse_training.replay import RECORD, Replay, join, replay_of, write_replay
 
 _LEAST, _MOST = 200, 4096
 _ARROWS: Final = ("left", "right", "up", "down")
@@ -142,12 +142,12 @@ def play(
     try:
         while not renderer.closed:
             batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
-            recorder = Recorder(batch, f"{policy.name}, {who}")
+            recorder = Recorder(batch, RECORD)
             renderer.title = f"{who}, world {world}"
             scores = _play_round(policy, recorder, robot, renderer, window)
             if scores:
-                last = recorder.replay()
-            if recorder.over:
+                last = replay_of(recorder.trajectory(), f"{policy.name}, {who}")
+            if recorder.over.all():
                 points = _points(scores, robot == n)
                 best = last if points > max(rounds, default=-1.0) else best
                 rounds.append(points)
@@ -170,7 +170,7 @@ def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Render
     speed = 1.0
     scores: list[float] = []
     renderer.draw(batch, colours=colours)
-    while not (renderer.closed or recorder.over or "n" in window.pressed):
+    while not (renderer.closed or recorder.over.all() or "n" in window.pressed):
         speed, turn = steer(speed, window.held(*_ARROWS), scenario.control_step)
         actions = np.zeros(batch.action_shape, np.float32)
         actions[:, :n], memory = policy.act(np.ascontiguousarray(observations[:, :n]), memory)
@@ -179,7 +179,7 @@ def _play_round(policy: Policy, recorder: Recorder, robot: int, renderer: Render
         scores.append(float(infos["score"][0]))
         left = scenario.duration - len(scores) * scenario.control_step
         renderer.title = f"{title}: {_points(scores, robot == n):.0f} points, {left:.0f} s left"
-        window.paused |= recorder.over  # until the user goes on: another round in the same world
+        window.paused |= bool(recorder.over.all())  # until the user goes on: another round in the same world
         renderer.draw(batch, colours=colours)
     return scores
 

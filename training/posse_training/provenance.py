@@ -1,9 +1,19 @@
-"""The commit of the sources, for figures and policies."""
+"""What results depend on: the commit, the versions and the sources."""
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import importlib.util
+import platform
 import subprocess
+from importlib.metadata import version
 from pathlib import Path
+from typing import Final
+
+import posse
+
+_SUFFIXES: Final = (".py", ".json", ".safetensors", ".toml")
 
 
 def commit() -> str | None:
@@ -21,3 +31,28 @@ def commit() -> str | None:
         return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return None
+
+
+@functools.cache
+def installed() -> str:
+    """Return the versions that the numbers of an episode depend on, and a digest of posse's sources."""
+    ours = "".join(map(sources, ("posse", "posse_baselines", "posse_training")))
+    digest = hashlib.sha256(ours.encode()).hexdigest()[:12]
+    others = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "llvmlite"))
+    return f"posse {posse.__version__} (sources {digest}), Python {platform.python_version()}, {others}"
+
+
+@functools.cache
+def sources(package: str) -> str:
+    """Return a digest of the files of a package, or of a module's file; empty: it has none."""
+    spec = None if package == "__main__" else importlib.util.find_spec(package)
+    if spec is None or spec.origin is None or not Path(spec.origin).is_file():
+        return ""
+    path = Path(spec.origin)
+    root = path.parent
+    files = [file for file in root.rglob("*") if file.suffix in _SUFFIXES] if path.name == "__init__.py" else [path]
+    digest = hashlib.sha256(package.encode())
+    for file in sorted(files):
+        name = file.relative_to(root).as_posix()
+        digest.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()

@@ -23,15 +23,16 @@ import posse
 from posse import Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, Tunable, load, play
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.fields import tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import TUNED
 from posse_baselines.tuned.files import FORMAT, SHIPPED_TUNED
-from posse_baselines.tuning import tunables
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError, require
+from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.statistics import mean
 from posse_training.files import InUseError, locked, read_json
+from posse_training.parallel import RayOption, address_of, connected, on_ray
 from posse_training.provenance import commit
-from posse_training.reports.evaluation import progress_bar
-from posse_training.reports.statistics import mean
 
 if TYPE_CHECKING:
     from cmaes import CMA
@@ -89,6 +90,9 @@ class TuneSettings:
     """Settings to search over; default: all that have an effect on this scenario."""
     threads: int | None = None
     """Threads that step the worlds; default: as many as cores. Never changes the result."""
+    ray: RayOption = None
+    """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of this machine, or
+    else all its cores. Extra: cluster."""
     ship: bool = False
     """Write the result to the package, where the policy's tuned version finds it."""
 
@@ -113,7 +117,7 @@ class TunablePolicy(Policy, Protocol):
     """A policy whose settings a search can change."""
 
     settings: Any
-    """A dataclass whose fields declare themselves by :func:`posse_baselines.tuning.tuned`."""
+    """A dataclass whose fields declare themselves by :func:`posse_baselines.fields.tuned`."""
 
     def with_settings(self, **values: Any) -> Policy:
         """Return a policy with some settings changed."""
@@ -173,13 +177,14 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
             that has an effect.
         RunFolderError: The folder is in use, or holds something else.
         CheckpointError: Its state is damaged.
+        ClusterError: There is no such Ray cluster.
     """
     require("training", "cmaes")
     run = _Run(settings, console or Console())
     shipped = _shipped_path(settings)
     run.resume()  # before anything is made
     try:
-        with locked(settings.folder):
+        with connected(address_of(settings.ray)), locked(settings.folder):
             card = run.play()
             content = (json.dumps(card, indent=2, sort_keys=True) + "\n").encode()
             write_atomically(settings.folder / RESULT, content)
@@ -319,7 +324,8 @@ class _Run:
         s = self.settings
         points = [cma.ask() for _ in range(s.population)]
         first = len(self.generations) * s.worlds
-        scores = [float(self._scores(space.values(p), "train", first, s.worlds).mean()) for p in points]
+        played = self._play_each([space.values(p) for p in points], "train", first, s.worlds)
+        scores = [float(metrics["safe_score"].mean()) for metrics in played]
         cma.tell([(p, -v) for p, v in zip(points, scores, strict=True)])
         return {"points": np.array(points).tolist(), "scores": scores}
 
@@ -345,14 +351,26 @@ class _Run:
             return done >= s.generations
         return done > 0 and bool(self.lines[-1]["seconds"] >= 60.0 * s.minutes)
 
+    def _play_each(
+        self, candidates: Sequence[dict[str, float]], split: str, first: int, count: int, seed: int | None = None
+    ) -> list[dict[str, Point]]:
+        """Return the metrics of each candidate, (count,) each, on worlds ``first`` and following."""
+        s = self.settings
+        here = s.seed if seed is None else seed
+        worlds = (self.scenario, here, split, first, count, s.threads if s.ray is None else 1)
+        calls = [(self.policy.with_settings(**values), *worlds) for values in candidates]
+        if s.ray is None:
+            return [_played(*call) for call in calls]
+        found = dict(on_ray(_played, calls))
+        for result in found.values():
+            if isinstance(result, Exception):
+                raise result
+        return [found[k] for k in range(len(calls))]
+
     def _metrics(
         self, values: dict[str, float], split: str, first: int, count: int, seed: int | None = None
     ) -> dict[str, Point]:
-        """Return the metrics of a candidate, (count,) each, on worlds ``first`` and following."""
-        s = self.settings
-        here = s.seed if seed is None else seed
-        batch = posse.Batch(self.scenario, count, seed=here, split=split, first_world=first, num_threads=s.threads)
-        return play(batch, self.policy.with_settings(**values))
+        return self._play_each([values], split, first, count, seed)[0]
 
     def _scores(self, values: dict[str, float], split: str, first: int, count: int, seed: int | None = None) -> Point:
         return self._metrics(values, split, first, count, seed)["safe_score"]
@@ -360,15 +378,18 @@ class _Run:
     def _effective(self) -> list[str]:
         """Return the settings whose ends of the range change any score in a few training worlds."""
         usual = self._scores({}, "train", 0, SCREENED_ON)
-        names = []
-        for t in self.tunables:
-            for end in (t.low, t.high):
-                values = {o.name: o.default for o in self.tunables} | {t.name: end}
-                allowed = all(values[o.name] > values[o.above] for o in self.tunables if o.above)
-                if allowed and np.any(self._scores({t.name: end}, "train", 0, SCREENED_ON) != usual):
-                    names.append(t.name)
-                    break
-        return names
+        defaults = {t.name: t.default for t in self.tunables}
+        found: set[str] = set()
+        for ends in ({t.name: t.low for t in self.tunables}, {t.name: t.high for t in self.tunables}):
+            tried = []
+            for name in (name for name in ends if name not in found):
+                values = defaults | {name: ends[name]}
+                if all(values[o.name] > values[o.above] for o in self.tunables if o.above):
+                    tried.append(name)
+            played = self._play_each([{name: ends[name]} for name in tried], "train", 0, SCREENED_ON)
+            changed = [np.any(metrics["safe_score"] != usual) for metrics in played]
+            found |= {name for name, is_other in zip(tried, changed, strict=True) if is_other}
+        return [t.name for t in self.tunables if t.name in found]
 
     def _card(self, curve: list[dict[str, Any]]) -> dict[str, Any]:
         """Return what was found, from what, and how well it scores."""
@@ -407,6 +428,14 @@ class _Run:
             },
             "software": {**versions, "python": platform.python_version()},
         }
+
+
+def _played(
+    policy: Policy, scenario: Scenario, seed: int, split: str, first: int, count: int, threads: int | None
+) -> dict[str, Point]:
+    """Return the metrics of a policy, (count,) each, on worlds ``first`` and following."""
+    batch = posse.Batch(scenario, count, seed=seed, split=split, first_world=first, num_threads=threads)
+    return play(batch, policy)
 
 
 def _mean(cma: CMA) -> Point:

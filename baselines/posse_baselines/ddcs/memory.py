@@ -15,7 +15,6 @@ import numpy.typing as npt
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, FloatArray, Record, Records, compiled
 from posse.rules import beam_directions, slot_records
-from posse.scenarios.formation import slot_offsets
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.heading import BODY
@@ -47,7 +46,7 @@ class Team(NamedTuple):
 def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     """Return what a team has in common; ``at``, ``world`` and ``settings`` are arrays of one record."""
     scenario = layout.scenario
-    outermost = max(math.hypot(x, y) for x, y in slot_offsets(scenario))
+    outermost = max(math.hypot(x, y) for x, y in scenario.slot_offsets)
     at, world, played = offsets_of(layout), constants_of(scenario), settings_record(settings)
     return Team(at, world, played, slot_records(scenario), outermost, beam_directions(scenario))
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import Records
-from posse_baselines.tuning import check, choice, number, tuned
+from posse_baselines.fields import check, choice, number, tuned
 
 MODELS: Final = ("distributed", "centralized")
 GUIDANCE_LAWS: Final = ("slot", "pngl")

@@ -17,7 +17,6 @@ import numpy as np
 
 from posse import ObservationLayout
 from posse.numeric import FloatArray, Records, compiled
-from posse.scenarios.formation import slot_offsets
 from posse_baselines.laws.offsets import offsets_of
 from posse_baselines.learned.team import MOST, OLDEST, gather_team, match_slots, sort_by_number
 from posse_baselines.policy import PolicyError
@@ -64,7 +63,7 @@ def feature_tables(layout: ObservationLayout) -> tuple[Records, FloatArray]:
         raise PolicyError(
             f"the observations of scenario {layout.scenario.name!r} lack {missing[0]!r}, which the policy needs"
         )
-    return offsets_of(layout), np.array(slot_offsets(layout.scenario), np.float32)
+    return offsets_of(layout), np.array(layout.scenario.slot_offsets, np.float32)
 
 
 @compiled

@@ -7,12 +7,12 @@ from typing import Any, Final
 
 from posse_baselines.ddcs import DDCS, Settings
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.fields import Tunable, tunables
 from posse_baselines.policies.planner import Planner
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuned import TUNED, TunedDDCS
-from posse_baselines.tuning import Tunable, tunables
 
 SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "random": Random,

@@ -9,9 +9,9 @@ from typing import Any, Final
 
 from posse_baselines.ddcs import Settings
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.fields import tunables
 from posse_baselines.files import read_json
 from posse_baselines.policy import PolicyError
-from posse_baselines.tuning import tunables
 
 SHIPPED_TUNED: Final = Path(__file__).parents[1] / "shipped" / "tuned"
 """The folder of the tuned settings that come with the package: POLICY/SCENARIO.json."""

@@ -36,4 +36,6 @@ class OwnArrays:
 def _own(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.copy()
-    return tuple(map(_own, value)) if type(value) is tuple else value
+    if type(value) is tuple:
+        return tuple(map(_own, value))
+    return type(value)(*map(_own, value)) if isinstance(value, tuple) else value  # a named tuple

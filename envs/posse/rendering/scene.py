@@ -11,7 +11,6 @@ from gymnasium.error import ResetNeeded
 
 from posse.rendering.style import TRACKER, Colour
 from posse.rules.state import NEVER
-from posse.scenarios.formation import slot_offsets
 
 if TYPE_CHECKING:
     from posse.engine.batch import Batch
@@ -60,7 +59,7 @@ class Scene:
         self.target_heading = points("world_heading_cos", "world_heading_sin")
         self.frame = points("world_frame_cos", "world_frame_sin")  # of the slots
         cosine, sine = self.frame
-        self.slots = self.target + np.array(slot_offsets(s)) @ np.array([[cosine, sine], [-sine, cosine]])  # (N, 2)
+        self.slots = self.target + np.array(s.slot_offsets) @ np.array([[cosine, sine], [-sine, cosine]])  # (N, 2)
         self.occupied = np.isin(np.arange(n), of["tracker_slot"])  # (N,) by slot
 
         self.position = points("tracker_x", "tracker_y")  # (N, 2)

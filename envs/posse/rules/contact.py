@@ -13,6 +13,7 @@ import numpy as np
 
 from posse.numeric import (
     ONE,
+    WIDTH,
     ZERO,
     FloatArray,
     Lanes,
@@ -27,7 +28,7 @@ from posse.numeric import (
     load,
     root,
 )
-from posse.rules.discs import A_LITTLE_MORE, BLOCK, FAR, TOUCHING_GAP, blocks, natural, obstacle_within
+from posse.rules.discs import A_LITTLE_MORE, FAR, TOUCHING_GAP, blocks, obstacle_within
 from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -75,11 +76,11 @@ def free_of_robots(
 
     The positions of ``count`` robots are in ``xs`` and ``ys``; the robot itself may be among them.
     """
-    reach = c.radius + c.radius + BLOCKING_GAP
+    reach = c.robot_radius + c.robot_radius + BLOCKING_GAP
     within = (reach + abs(dx) + abs(dy)) * A_LITTLE_MORE
     share = ONE
     for block in range(blocks(count)):
-        other_x, other_y = load(xs, BLOCK * block), load(ys, BLOCK * block)
+        other_x, other_y = load(xs, WIDTH * block), load(ys, WIDTH * block)
         rx, ry = x - other_x, y - other_y
         if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < ZERO)) != 0:
             share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
@@ -94,9 +95,9 @@ def free_of_surroundings(
     share = ONE
     for k in range(c.num_obstacles):
         o = obstacles[k]
-        share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.radius + o.radius + BLOCKING_GAP))
+        share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.robot_radius + o.radius + BLOCKING_GAP))
     if c.walled:
-        bound = c.half_arena - c.radius - BLOCKING_GAP
+        bound = c.half_arena - c.robot_radius - BLOCKING_GAP
         share = min(share, free_share_wall(x, dx, bound), free_share_wall(y, dy, bound))
     return share
 
@@ -104,10 +105,10 @@ def free_of_surroundings(
 @compiled
 def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
     """Return whether a robot touches an obstacle or a wall."""
-    inner = c.half_arena - c.radius - TOUCHING_GAP
+    inner = c.half_arena - c.robot_radius - TOUCHING_GAP
     if c.walled and max(abs(robot.x), abs(robot.y)) >= inner:
         return True
-    return obstacle_within(obstacles, c.num_obstacles, robot.x, robot.y, c.radius + TOUCHING_GAP)
+    return obstacle_within(obstacles, c.num_obstacles, robot.x, robot.y, c.robot_radius + TOUCHING_GAP)
 
 
 @compiled
@@ -117,7 +118,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     ``near`` marks robots that could touch something within the next control step; the others move
     without a sweep. Gaps are read from ``s`` (:func:`posse.rules.discs.find_gaps`).
     """
-    inner = c.half_arena - c.radius
+    inner, touch = c.half_arena - c.robot_radius, c.robot_radius + c.robot_radius + TOUCHING_GAP
     smallest, before = w.least_gap, w.contacts_target
     target_touching, target_near = NO_BITS, False
     for i in range(c.num_trackers):
@@ -126,7 +127,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         if c.walled:
             wall = inner - max(abs(t.x), abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
-        wall_near = wall <= t.max_speed * c.dt + TOUCHING_GAP
+        wall_near = wall <= t.max_speed * c.control_step + TOUCHING_GAP
         near = s.excess[i] <= ZERO or wall_near
         if not near:
             if t.near:
@@ -134,7 +135,8 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
                 t.near, t.touching, t.onsets = 0, 0, 0
             continue
         t.near, t.onsets = 1, 0
-        target_near = target_near or near_target(c, w, t)
+        dx, dy, reach = w.x - t.x, w.y - t.y, touch + (t.max_speed + c.target_speed) * c.control_step
+        target_near = target_near or dx * dx + dy * dy <= reach * reach
         if min(s.gap[i], wall) > _SURELY_APART:
             t.touching_trackers, t.touching_obstacles, t.touching = NO_BITS, NO_BITS, 0
         elif meet_closely(c, w, t, obstacles, i, s):
@@ -143,105 +145,58 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     w.onsets = w.contacts_target - before
     w.near = target_near
     if c.walled and not target_near:
-        w.near = c.target_agent != 0 or target_near_surroundings(c, w, s)
+        # A scripted target rarely comes so near: after trackers blocked it (steering.way_out), or if it
+        # crosses its clearance within a control step.
+        way = TOUCHING_GAP + c.target_speed * c.control_step
+        near_wall = inner - max(abs(w.x), abs(w.y)) <= way
+        near_any = near_wall or obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.robot_radius + way)
+        w.near = c.target_agent != 0 or near_any
     w.least_gap = smallest
 
 
 @compiled(seldom=True)
 def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
-    """Find the contacts of a tracker with something near; return whether it touches the target."""
-    touches_target = meet_target(c, w, t, i)
-    meet_trackers(c, w, t, i, s)
-    meet_surroundings(c, w, t, obstacles)
-    t.touching = touches_target or (t.touching_trackers | t.touching_obstacles) != NO_BITS
-    return bool(touches_target)
-
-
-@compiled
-def near_target(c: Record, w: Record, t: Record) -> bool:
-    """Return whether a tracker and the target could touch within the next control step."""
-    reach = c.radius + c.radius + TOUCHING_GAP + (t.max_speed + c.target_speed) * c.dt
+    """Find the contacts of tracker i with something near; return whether it touches the target."""
+    bit, touch = BIT << np.uint64(i), c.robot_radius + c.robot_radius + TOUCHING_GAP
+    # The target.
     dx, dy = w.x - t.x, w.y - t.y
-    return bool(dx * dx + dy * dy <= reach * reach)
-
-
-@compiled
-def target_near_surroundings(c: Record, w: Record, s: Record) -> bool:
-    """Return whether the target could touch an obstacle or a wall within the next control step.
-
-    Positions of obstacles are read from scratch memory (:func:`posse.rules.discs.lay_out`).
-    """
-    # A scripted target rarely comes so near: after trackers blocked it (walls.way_out), or if it
-    # crosses its clearance within a control step.
-    way = TOUCHING_GAP + c.target_speed * c.dt
-    if c.half_arena - c.radius - max(abs(w.x), abs(w.y)) <= way:
-        return True
-    first = natural(c.num_trackers) + 1
-    for block in range(blocks(c.num_obstacles)):
-        k = first + BLOCK * block
-        dx, dy, reach = load(s.x, k) - w.x, load(s.y, k) - w.y, load(s.radius, k)
-        reach = reach + (c.radius + way)
-        if bits(dx * dx + dy * dy <= reach * reach) != 0:
-            return True
-    return False
-
-
-@compiled
-def meet_target(c: Record, w: Record, t: Record, i: int) -> bool:
-    """Return whether tracker i touches the target, and count the contact if it begins."""
-    touch = c.radius + c.radius + TOUCHING_GAP
-    dx, dy = w.x - t.x, w.y - t.y
-    if dx * dx + dy * dy > touch * touch:
-        return False
-    if w.touching & (BIT << np.uint64(i)) == NO_BITS:
+    touches_target = dx * dx + dy * dy <= touch * touch
+    if touches_target and w.touching & bit == NO_BITS:
         t.onsets += 1
         w.contacts_target += 1
-    return True
-
-
-@compiled
-def meet_trackers(c: Record, w: Record, t: Record, i: int, s: Record) -> None:
-    """Note which other trackers tracker i touches, and count the contacts that begin."""
-    touch = c.radius + c.radius + TOUCHING_GAP
-    touching = 0
+    # Other trackers.
+    found = 0
     for block in range(blocks(c.num_trackers)):
-        j = BLOCK * block
-        dx, dy = load(s.x, j) - t.x, load(s.y, j) - t.y
+        j = WIDTH * block
+        x, y = load(s.x, j) - t.x, load(s.y, j) - t.y
         other = load(s.index, j) < np.float32(c.num_trackers)
-        touching |= bits((dx * dx + dy * dy <= touch * touch) & other) << j
-    now = np.uint64(touching) & ~(BIT << np.uint64(i))
-    begun = now & ~t.touching_trackers
+        found |= bits((x * x + y * y <= touch * touch) & other) << j
+    touching = np.uint64(found) & ~bit
+    begun = touching & ~t.touching_trackers
     while begun != NO_BITS:
         first = begun & (~begun + BIT)
         begun ^= first
         t.onsets += 1
-        if first > BIT << np.uint64(i):
+        if first > bit:
             w.contacts_tracker += 1
-    t.touching_trackers = now
-
-
-@compiled
-def meet_surroundings(c: Record, w: Record, t: Record, obstacles: Records) -> None:
-    """Note which obstacles and walls a tracker touches, and count the contacts that begin."""
+    t.touching_trackers = touching
+    # Obstacles and walls.
     touching = NO_BITS
     for k in range(c.num_obstacles):
         o = obstacles[k]
-        dx, dy, reach = o.x - t.x, o.y - t.y, c.radius + o.radius + TOUCHING_GAP
+        dx, dy, reach = o.x - t.x, o.y - t.y, c.robot_radius + o.radius + TOUCHING_GAP
         if dx * dx + dy * dy <= reach * reach:
             touching |= BIT << np.uint64(k)
     if c.walled:
-        inner = c.half_arena - c.radius - TOUCHING_GAP
-        if t.x >= inner:
-            touching |= BIT << np.uint64(_FIRST_WALL)
-        if t.x <= -inner:
-            touching |= BIT << np.uint64(_FIRST_WALL + 1)
-        if t.y >= inner:
-            touching |= BIT << np.uint64(_FIRST_WALL + 2)
-        if t.y <= -inner:
-            touching |= BIT << np.uint64(_FIRST_WALL + 3)
+        inner = c.half_arena - c.robot_radius - TOUCHING_GAP
+        for k, along in enumerate((t.x, -t.x, t.y, -t.y)):
+            if along >= inner:
+                touching |= BIT << np.uint64(_FIRST_WALL + k)
     begun = touching & ~t.touching_obstacles
     while begun != NO_BITS:
         begun &= begun - BIT
         t.onsets += 1
         w.contacts_obstacle += 1
     t.touching_obstacles = touching
+    t.touching = touches_target or (t.touching_trackers | touching) != NO_BITS
+    return bool(touches_target)

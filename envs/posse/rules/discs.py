@@ -33,8 +33,6 @@ from posse.numeric import (
 from posse.rules.scratch import DISCS, ROBOTS
 from posse.rules.state import BIT, NO_BITS, POSE, Pose
 
-BLOCK: Final = WIDTH
-
 TOUCHING_GAP: Final = np.float32(0.001)
 """Robots nearer than this touch, m."""
 
@@ -52,7 +50,7 @@ def natural(count: int) -> int:
 @compiled
 def blocks(count: int) -> int:
     """Return the number of blocks for ``count`` discs or beams."""
-    return (natural(count) + (BLOCK - 1)) >> 3
+    return (natural(count) + (WIDTH - 1)) >> 3
 
 
 @compiled
@@ -68,18 +66,14 @@ def obstacle_within(obstacles: Records, count: int, x: np.float32, y: np.float32
 
 @compiled
 def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
-    """Write the constants of all worlds.
-
-    The directions of the sonar's beams (2, S), zero in the padding of a block, the indices of a
-    row, and the robots' radius.
-    """
+    """Write what is the same in all worlds; the directions of the sonar's beams are (2, S)."""
     for k in range(ROBOTS):
         s.index[k] = np.float32(k)
     for k in range(DISCS):
-        s.radius[k] = c.radius
-        s.sonar_reach2[k] = sonar_reach2(c, c.radius)
+        s.radius[k] = c.robot_radius
+        s.sonar_reach2[k] = sonar_reach2(c, c.robot_radius)
     count = beams.shape[1]
-    for k in range(BLOCK * blocks(count)):
+    for k in range(WIDTH * blocks(count)):
         s.beam_cos[k] = beams[0, k] if k < count else ZERO
         s.beam_sin[k] = beams[1, k] if k < count else ZERO
 
@@ -87,7 +81,7 @@ def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
 @compiled
 def sonar_reach2(c: Record, radius: np.float32) -> np.float32:
     """Return the squared distance of centres within which the sonar may detect a disc."""
-    within = (c.sonar_range + c.radius + radius) * A_LITTLE_MORE
+    within = (c.sonar_range + c.robot_radius + radius) * A_LITTLE_MORE
     return np.float32(within * within)
 
 
@@ -96,7 +90,7 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
     """Return a block of eight fields of eight of ``count`` records, field by field.
 
     From record ``first`` on; beyond the end, the last record is repeated. ``offset`` is where the
-    block begins (:func:`posse.rules.state.block_at`), whose named tuple is made of the result.
+    block begins, such as :data:`posse.rules.state.POSE`, whose named tuple is made of the result.
     """
     last = count - 1
     return transpose(
@@ -115,13 +109,7 @@ def columns(records: Records, first: int, count: int, offset: int) -> tuple[Lane
 def store_rows(block: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
     """Inverse of :func:`columns`: write eight numbers per record."""
     a, b, c, d, e, f, g, h = block
-    store_each(transpose(a, b, c, d, e, f, g, h), row, at)
-
-
-@compiled
-def store_each(lanes: tuple[Lanes, ...], row: FloatArray, at: int) -> None:
-    """Write eight lanes consecutively."""
-    a, b, c, d, e, f, g, h = lanes
+    a, b, c, d, e, f, g, h = transpose(a, b, c, d, e, f, g, h)
     store(row, at, a)
     store(row, at + WIDTH, b)
     store(row, at + 2 * WIDTH, c)
@@ -137,7 +125,7 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
     """Write the positions of all discs: trackers, then the target, then obstacles."""
     n = natural(c.num_trackers)
     for block in range(blocks(n + 1)):
-        j = BLOCK * block
+        j = WIDTH * block
         pose = Pose(*columns(trackers, j, n, POSE))
         number = load(s.index, j)
         tracker, target = number < np.float32(n), number == np.float32(n)
@@ -173,12 +161,12 @@ def find_gaps(c: Record, s: Record) -> None:
     Near discs could be touched within the next control step.
     """
     n = natural(c.num_trackers)
-    robots = c.radius + c.radius
-    tracker_reach = robots + TOUCHING_GAP + (c.fastest + c.fastest) * c.dt
-    target_reach = robots + TOUCHING_GAP + (c.target_speed + c.fastest) * c.dt
-    margin = TOUCHING_GAP + c.fastest * c.dt
+    robots = c.robot_radius + c.robot_radius
+    tracker_reach = robots + TOUCHING_GAP + (c.fastest + c.fastest) * c.control_step
+    target_reach = robots + TOUCHING_GAP + (c.target_speed + c.fastest) * c.control_step
+    margin = TOUCHING_GAP + c.fastest * c.control_step
     for block in range(blocks(n)):
-        i = BLOCK * block
+        i = WIDTH * block
         x, y, number = load(s.x, i), load(s.y, i), load(s.index, i)
         # All robots have one radius, so the nearest is found without a square root for each.
         nearest2 = eight(FAR)
@@ -193,7 +181,7 @@ def find_gaps(c: Record, s: Record) -> None:
         least = root(lesser(nearest2, d2)) - robots
         for j in range(n + 1, num_discs(c)):
             dx, dy = x - s.x[j], y - s.y[j]
-            gap = root(dx * dx + dy * dy) - (c.radius + s.radius[j])
+            gap = root(dx * dx + dy * dy) - (c.robot_radius + s.radius[j])
             least, excess = lesser(least, gap), lesser(excess, gap - margin)
         store(s.gap, i, least)
         store(s.excess, i, excess)

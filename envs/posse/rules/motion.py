@@ -13,6 +13,7 @@ import numpy as np
 from posse.numeric import (
     HALF,
     ONE,
+    WIDTH,
     ZERO,
     FloatArray,
     Lanes,
@@ -26,20 +27,10 @@ from posse.numeric import (
     store_fields,
 )
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import BLOCK, FAR, blocks, columns, natural, store_rows
+from posse.rules.discs import FAR, blocks, columns, natural, store_rows
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.state import NEVER, POSE, Pose
 from posse.rules.targets.steering import target_turn_rate
-
-
-@compiled
-def move(robot: Record, time: np.float32) -> None:
-    """Move a robot with nothing near on its arc."""
-    dx, dy, robot.heading_cos, robot.heading_sin = arc(
-        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, time
-    )
-    robot.x += dx
-    robot.y += dy
 
 
 @compiled
@@ -50,7 +41,7 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
     memory and updated there.
     """
     dx, dy, robot.heading_cos, robot.heading_sin = arc(
-        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_dt
+        robot.heading_cos, robot.heading_sin, robot.speed, robot.turn_rate, c.physics_step
     )
     x, y = robot.x, robot.y
     share = lesser(
@@ -109,18 +100,13 @@ def command(
 
 
 @compiled
-def lay_out_actions(c: Record, actions: FloatArray, s: Record) -> None:
-    """Write commanded speeds and turn rates of actions (rows, 2 + m) to scratch memory."""
-    for i in range(natural(c.num_trackers)):
-        s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
-
-
-@compiled
-def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
+def move_freely(c: Record, trackers: Records, actions: FloatArray, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers with nothing near on their arcs; return whether there are others."""
     n = natural(c.num_trackers)
+    for i in range(n):
+        s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
     for block in range(blocks(n)):
-        i = BLOCK * block
+        i = WIDTH * block
         pose = Pose(*columns(trackers, i, n, POSE))
         x, y, cosine, sine = pose.x, pose.y, pose.heading_cos, pose.heading_sin
         speed, turn_rate = pose.speed, pose.turn_rate
@@ -140,52 +126,45 @@ def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: R
             max_speed=pose.max_speed,
             max_turn_rate=pose.max_turn_rate,
         )
-        store_rows(moved, s.new_pose, BLOCK * i)
+        store_rows(moved, s.new_pose, WIDTH * i)
     others = False
     for i in range(n):
         t = trackers[i]
         if t.broken_at == NEVER:
             if t.near == 0:
-                store_fields(t, POSE, load(s.new_pose, BLOCK * i))
+                store_fields(t, POSE, load(s.new_pose, WIDTH * i))
             else:
                 others = True
     return others
 
 
 @compiled
-def command_target(
-    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, set_goal: Any, scratch: Record
-) -> None:
-    """Set the target's speed and turn rate for the control step."""
-    if c.target_agent != 0:
-        action = actions[c.num_trackers]
-        share, least = HALF * (action[0] + ONE), c.target_least_speed
-        w.speed = least + share * (c.target_speed - least)
-        w.turn_rate = action[1] * c.target_turn_rate
-    else:
-        w.turn_rate = target_turn_rate(c, w, trackers, obstacles, set_goal, scratch)
-        w.speed = c.target_speed
-
-
-@compiled
 def motion(
-    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, set_goal: Any, scratch: Record
+    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, set_goal: Any, s: Record
 ) -> None:
     """Move the robots by actions (rows, 2 + m) for one control step; -1 is V = 0, 0 is ω = 0.
 
     A robot with nothing near moves on one arc, or with limited acceleration on one per physics
     step; a robot with something near moves in swept physics steps.
     """
-    lay_out_actions(c, actions, scratch)
-    command_target(c, w, trackers, obstacles, actions, set_goal, scratch)
-    parts, time = 1, c.dt
+    if c.target_agent != 0:
+        action = actions[c.num_trackers]
+        share, least = HALF * (action[0] + ONE), c.target_least_speed
+        w.speed = least + share * (c.target_speed - least)
+        w.turn_rate = action[1] * c.target_turn_rate
+    else:
+        w.turn_rate = target_turn_rate(c, w, trackers, obstacles, set_goal, s)
+        w.speed = c.target_speed
+    parts, time = 1, c.control_step
     if c.whole_arcs == 0:
-        parts, time = int(c.physics_steps), c.physics_dt
+        parts, time = int(c.physics_steps), c.physics_step
     if w.near == 0:
         for _ in range(parts):
-            move(w, time)
-    if move_freely(c, trackers, parts, time, scratch) or w.near != 0:
-        move_in_parts(c, w, trackers, obstacles, actions, scratch)
+            dx, dy, w.heading_cos, w.heading_sin = arc(w.heading_cos, w.heading_sin, w.speed, w.turn_rate, time)
+            w.x += dx
+            w.y += dy
+    if move_freely(c, trackers, actions, parts, time, s) or w.near != 0:
+        move_in_parts(c, w, trackers, obstacles, actions, s)
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
     )

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, Record, Records, compiled
-from posse.rules.discs import BLOCK, blocks, find_slots, natural
+from posse.numeric import ONE, WIDTH, ZERO, Record, Records, compiled
+from posse.rules.discs import blocks, find_slots, natural
 from posse.rules.state import BIT, NEVER, NO_BITS
 
 
@@ -29,7 +29,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
     """
     n = natural(c.num_trackers)
     for block in range(blocks(n)):
-        find_slots(c, w, BLOCK * block, slots, NO_BITS, s)
+        find_slots(c, w, WIDTH * block, slots, NO_BITS, s)
     taken = NO_BITS
     occupied = 0
     near2 = c.tolerance * c.tolerance
@@ -46,8 +46,8 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
                 taken |= bit
                 occupied += 1
                 t.slot = best
-    for first in range(0, n if taken != NO_BITS else 0, BLOCK):
-        last = min(first + BLOCK, n)
+    for first in range(0, n if taken != NO_BITS else 0, WIDTH):
+        last = min(first + WIDTH, n)
         looking = False  # whether the nearest slot of any is occupied by another
         for i in range(first, last):
             if trackers[i].slot < 0 and s.slot[i] >= ZERO:
@@ -70,7 +70,7 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
 @compiled
 def could_arrive(c: Record, w: Record, t: Record, slots: Records) -> bool:
     """Return whether a tracker, straight from its start at full speed, could be in a slot."""
-    reach = t.max_speed * np.float32(w.step) * c.dt + c.tolerance
+    reach = t.max_speed * np.float32(w.step) * c.control_step + c.tolerance
     dx, dy = t.start_x - w.x, t.start_y - w.y
     most = reach + c.slots_reach
     if dx * dx + dy * dy > most * most:

@@ -41,11 +41,11 @@ def is_clear(
     clearance: np.float32 = _CLEARANCE,
 ) -> bool:
     """Return whether a robot at (x, y) is clear of walls, obstacles and the first ``placed`` trackers."""
-    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.radius - clearance:
+    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.robot_radius - clearance:
         return False
-    if obstacle_within(obstacles, c.num_obstacles, x, y, c.radius + clearance):
+    if obstacle_within(obstacles, c.num_obstacles, x, y, c.robot_radius + clearance):
         return False
-    reach = c.radius + c.radius + clearance
+    reach = c.robot_radius + c.robot_radius + clearance
     for j in range(placed):
         t = trackers[j]
         if (t.x - x) * (t.x - x) + (t.y - y) * (t.y - y) < reach * reach:
@@ -91,7 +91,7 @@ def draw_target(c: Record, w: Record, obstacles: Records) -> None:
         heading = TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
         w.heading_cos = np.float32(math.cos(heading))
         w.heading_sin = np.float32(math.sin(heading))
-        clear = not obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.radius + _CLEARANCE)
+        clear = not obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.robot_radius + _CLEARANCE)
         if clear and target_can_turn(c, w, obstacles, ZERO):
             return
     w.undrawn |= _TARGET

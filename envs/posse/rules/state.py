@@ -18,7 +18,7 @@ import numpy.typing as npt
 from posse.numeric import FloatArray, Lanes, Records
 from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
-from posse.scenarios.formation import FORMATIONS, slot_offsets
+from posse.scenarios.formation import FORMATIONS
 from posse.scenarios.limits import FAR, SAFE_MARGIN
 
 SPLITS: Final = ("train", "validation", "test")
@@ -32,37 +32,6 @@ def _record(*fields: tuple[str, Any]) -> np.dtype[Any]:
     return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
-def _place(record: np.dtype[Any], name: str) -> tuple[int, int]:
-    """Return where a field lies in a record and its size, bytes; ``"fix_x"`` may be the field x of a record ``fix``."""
-    fields: Any = record.fields or {}
-    if name in fields:
-        return fields[name][1], fields[name][0].itemsize
-    outer, _, inner = name.partition("_")
-    if outer in fields and inner:
-        at, size = _place(fields[outer][0], inner)
-        return fields[outer][1] + at, size
-    return -1, 0
-
-
-def block_at(record: np.dtype[Any], block: type[tuple[Any, ...]]) -> int:
-    """Return where a block of eight fields begins in a record, bytes.
-
-    Kernels read and write such a block at once, as eight consecutive numbers of 4 bytes.
-
-    Args:
-        record: The record.
-        block: A named tuple with the names of the fields, in order; those of a record within it follow its name.
-
-    Raises:
-        TypeError: The record does not have these fields one after the other.
-    """
-    names: tuple[str, ...] = block._fields  # type: ignore[attr-defined]
-    places = [_place(record, name) for name in names]
-    if len(names) != 8 or places != [(places[0][0] + 4 * k, 4) for k in range(8)]:
-        raise TypeError(f"{block.__name__}: a record must have {', '.join(names)} one after the other, 4 bytes each")
-    return int(places[0][0])
-
-
 _F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
 
 _NUMERIC: Final = {"int": _I, "bool": _I, "float": _F}
@@ -74,17 +43,9 @@ def perfect_radio(s: Scenario) -> bool:
     return reliable and math.isinf(s.radio_range)
 
 
-def _slots_reach(s: Scenario) -> float:
-    return max(math.hypot(x, y) for x, y in slot_offsets(s))
-
-
 def _frame_turn(s: Scenario) -> float:
     """Return the greatest turn of the slot frame in a control step, rad."""
     return min(s.slot_turn_rate * s.control_step, math.pi / 2)
-
-
-def _physics_step(s: Scenario) -> np.float32:
-    return np.float32(s.control_step / s.physics_steps)
 
 
 def _whole_arcs(s: Scenario) -> bool:
@@ -97,7 +58,13 @@ def _measured(s: Scenario) -> bool:
     return s.range_noise > 0 or s.bearing_noise > 0 or SENSORS[s.sensor].measure is not None
 
 
-DERIVED: Final[dict[str, tuple[type, Callable[[Scenario], Any]]]] = {
+def _smoothing(s: Scenario) -> float:
+    return 1 - math.exp(-s.control_step / s.velocity_smoothing) if s.velocity_smoothing > 0 else 1.0
+
+
+_Numbers = dict[str, tuple[type, Callable[[Scenario], Any]]]
+
+DERIVED: Final[_Numbers] = {
     "num_agents": (_I, lambda s: s.num_agents),
     "neighbours": (_I, lambda s: s.neighbours),
     "physics_steps": (_I, lambda s: s.physics_steps),
@@ -119,41 +86,46 @@ DERIVED: Final[dict[str, tuple[type, Callable[[Scenario], Any]]]] = {
     "perfect_radio": (_I, perfect_radio),
     "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
     "whole_arcs": (_I, _whole_arcs),
-    "dt": (_F, lambda s: s.control_step),
-    "physics_dt": (_F, _physics_step),
-    "radius": (_F, lambda s: s.robot_radius),
     "fastest": (_F, lambda s: max(s.tracker_speeds)),
-    "speed_change": (_F, lambda s: min(s.tracker_acceleration * _physics_step(s), FAR)),
-    "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * _physics_step(s), FAR)),
+    "speed_change": (_F, lambda s: min(s.tracker_acceleration * np.float32(s.physics_step), FAR)),
+    "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * np.float32(s.physics_step), FAR)),
     "per_acceleration": (_F, lambda s: 1 / s.tracker_acceleration),  # 0: no limit
     "per_turn_acceleration": (_F, lambda s: 1 / s.tracker_turn_acceleration),
     "frame_c": (_F, lambda s: math.cos(_frame_turn(s))),
     "frame_s": (_F, lambda s: math.sin(_frame_turn(s))),
-    "slots_reach": (_F, _slots_reach),
+    "slots_reach": (_F, lambda s: max(math.hypot(*slot) for slot in s.slot_offsets)),
     "half_arena": (_F, lambda s: min(s.arena / 2, FAR)),
     "target_extent": (_F, lambda s: s.target_extent),
     "safe_distance": (_F, lambda s: s.robot_radius + SAFE_MARGIN),
     "view_cosine": (_F, lambda s: math.cos(s.field_of_view / 2)),
     "beam_cosine": (_F, lambda s: math.cos(math.pi / s.sonar_beams) if s.sonar_beams else 1.0),
-    "smoothing": (
-        _F,
-        lambda s: 1 - math.exp(-s.control_step / s.velocity_smoothing) if s.velocity_smoothing > 0 else 1.0,
-    ),
+    "smoothing": (_F, _smoothing),
 }
 """What kernels read of a scenario beside its numbers: type and value."""
 
 
-def _config() -> np.dtype[Any]:
-    fields: list[tuple[str, type]] = []
+def _number(name: str, place: int | None = None) -> Callable[[Scenario], Any]:
+    """Return the function that reads a setting; of a pair, its number at a place."""
+
+    def read(s: Scenario) -> Any:
+        value = getattr(s, name) if place is None else getattr(s, name)[place]
+        return FAR if value == math.inf else value
+
+    return read
+
+
+def _numbers() -> _Numbers:
+    """Return all numbers that kernels read of a scenario: type and value."""
+    numbers: _Numbers = {}
     for name, setting in Scenario.settings().items():
         if setting.kind in _NUMERIC:
-            fields.append((name, _NUMERIC[setting.kind]))
+            numbers[name] = _NUMERIC[setting.kind], _number(name)
         elif setting.kind == "tuple[float, float]":
-            fields += [(f"{name}_least", _F), (f"{name}_most", _F)]
-    return _record(*fields, *((name, kind) for name, (kind, _) in DERIVED.items()))
+            numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _number(name, 0)), (_F, _number(name, 1))
+    return {**numbers, **DERIVED}
 
 
-CONFIG: Final = _config()
+CONFIG: Final = _record(*((name, kind) for name, (kind, _) in _numbers().items()))
 """The scenario, for kernels: its numbers by the names of its settings (``inf`` is ``FAR``; a pair is ``_least`` and
 ``_most``), then :data:`DERIVED`."""
 
@@ -220,52 +192,7 @@ def world_record_of(motions: tuple[Any, ...], metrics: tuple[Any, ...]) -> np.dt
     )
 
 
-FIX_RECORD: Final = _record(
-    ("x", _F),
-    ("y", _F),  # where the target was, m; a bearing: a unit vector
-    ("cos", _F),
-    ("sin", _F),  # its heading; a bearing: 0
-    ("frame_cos", _F),
-    ("frame_sin", _F),  # the slot frame ψ; a bearing: 0
-)
-"""A fix of the target, in the common frame: a position or a bearing, depending on the sensor
-(:mod:`posse.rules.senses.declaring`). Its control step stands beside it (``fix_step``)."""
-
-TRACKER: Final = _record(
-    ("x", _F),
-    ("y", _F),
-    ("heading_cos", _F),
-    ("heading_sin", _F),
-    ("speed", _F),
-    ("turn_rate", _F),
-    ("max_speed", _F),
-    ("max_turn_rate", _F),  # its own limits, from the scenario
-    ("per_speed", _F),
-    ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
-    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
-    ("broken_at", _I),  # control step at which it broke, NEVER while it works
-    ("sensor_dead_from", _I),
-    ("radio_dead_from", _I),  # start of outages of outage_time
-    ("sees", _I),  # 1: its sensor sees the target
-    ("near", _I),  # 1: something may touch it in the next step
-    ("touching", _I),  # 1: it touches anything
-    ("onsets", _I),  # contacts that began in this step
-    ("fix_step", _I),  # when its best fix was taken; -1: none yet
-    ("slot", _S),  # number of the slot that it occupies; -1: none
-    ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
-    ("touching_trackers", _U),
-    ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
-    # its best fix of the target, from its sensor or by radio
-    ("fix", FIX_RECORD),
-    ("fix_vx", _F),
-    ("fix_vy", _F),  # m/s, from successive fixes
-    # inputs of score and rewards, with slot and could_arrive
-    ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
-    ("slot_progress", _F),  # decrease of slot_distance in this step
-    ("start_x", _F),
-    ("start_y", _F),
-)
-"""One tracker."""
+# Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
 
 
 class Pose(NamedTuple):
@@ -277,33 +204,33 @@ class Pose(NamedTuple):
     heading_sin: Lanes
     speed: Lanes
     turn_rate: Lanes
-    max_speed: Lanes
+    max_speed: Lanes  # its own limits, from the scenario
     max_turn_rate: Lanes
 
 
 class Condition(NamedTuple):
     """Whole numbers of eight trackers."""
 
-    broken_at: Lanes
-    sensor_dead_from: Lanes
+    broken_at: Lanes  # control step at which it broke, NEVER while it works
+    sensor_dead_from: Lanes  # start of outages of outage_time
     radio_dead_from: Lanes
-    sees: Lanes
-    near: Lanes
-    touching: Lanes
-    onsets: Lanes
-    fix_step: Lanes
+    sees: Lanes  # 1: its sensor sees the target
+    near: Lanes  # 1: something may touch it in the next step
+    touching: Lanes  # 1: it touches anything
+    onsets: Lanes  # contacts that began in this step
+    fix_step: Lanes  # when its best fix was taken; -1: none yet
 
 
 class Fix(NamedTuple):
-    """The fixes of eight trackers."""
+    """The fixes of eight trackers, in the common frame; a sensor of bearings gives the first two alone."""
 
-    fix_x: Lanes
+    fix_x: Lanes  # where the target was, m; a bearing: a unit vector
     fix_y: Lanes
-    fix_cos: Lanes
+    fix_cos: Lanes  # its heading; a bearing: 0
     fix_sin: Lanes
-    fix_frame_cos: Lanes
+    fix_frame_cos: Lanes  # the slot frame ψ; a bearing: 0
     fix_frame_sin: Lanes
-    fix_vx: Lanes
+    fix_vx: Lanes  # m/s, from successive fixes
     fix_vy: Lanes
 
 
@@ -316,44 +243,60 @@ class Heard(NamedTuple):
     heading_sin: Lanes
     speed: Lanes
     turn_rate: Lanes
-    step: Lanes
-    unused: Lanes
+    step: Lanes  # when it was sent; -1: never heard
+    unused: Lanes  # makes a block of eight
 
 
-POSE: Final = block_at(TRACKER, Pose)
-FIX: Final = block_at(TRACKER, Fix)
-CONDITION: Final = block_at(TRACKER, Condition)
+FIX_RECORD: Final = _record(*((name.removeprefix("fix_"), _F) for name in Fix._fields[:6]))
+"""A fix of the target: a position or a bearing, depending on the sensor (:mod:`posse.rules.senses.declaring`)."""
+
+TRACKER: Final = _record(
+    *((name, _F) for name in Pose._fields),
+    ("per_speed", _F),
+    ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
+    ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
+    *((name, _I) for name in Condition._fields),
+    ("slot", _S),  # number of the slot that it occupies; -1: none
+    ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
+    ("touching_trackers", _U),
+    ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
+    ("fix", FIX_RECORD),  # its best fix of the target, from its sensor or by radio
+    *((name, _F) for name in Fix._fields[6:]),
+    # inputs of score and rewards, with slot and could_arrive
+    ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
+    ("slot_progress", _F),  # decrease of slot_distance in this step
+    ("start_x", _F),
+    ("start_y", _F),
+)
+"""One tracker: :class:`Pose`, :class:`Condition`, :class:`Fix` and more."""
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 
 SLOT: Final = _record(("x", _F), ("y", _F))
 """Position of a slot in the slot frame; one table for all worlds."""
 
-HEARD: Final = _record(
-    ("x", _F),
-    ("y", _F),
-    ("heading_cos", _F),
-    ("heading_sin", _F),
-    ("speed", _F),
-    ("turn_rate", _F),
-    ("step", _I),  # when it was sent; -1: never heard
-    ("unused", _I),  # makes a block of eight
-)
+HEARD: Final = _record(*((name, _I if name == "step" else _F) for name in Heard._fields))
 """The last message that a tracker received from a team-mate: (E, receiver, sender)."""
-MESSAGE: Final = block_at(HEARD, Heard)
 
 BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
-    ("x", _F),
-    ("y", _F),
-    ("heading_cos", _F),
-    ("heading_sin", _F),
-    ("speed", _F),
-    ("turn_rate", _F),
+    *((name, _F) for name in Pose._fields[:6]),
     ("fix_step", _I),
     ("fix", FIX_RECORD),
 )
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
+
+
+def _begin(record: np.dtype[Any], name: str) -> int:
+    """Return where a block of a record begins, bytes."""
+    fields: Any = record.fields
+    return int(fields[name][1])
+
+
+POSE: Final = _begin(TRACKER, Pose._fields[0])
+CONDITION: Final = _begin(TRACKER, Condition._fields[0])
+FIX: Final = _begin(TRACKER, "fix")
+MESSAGE: Final = _begin(HEARD, Heard._fields[0])
 
 
 class WorldArrays(NamedTuple):
@@ -434,7 +377,7 @@ def _copied(*arrays: npt.NDArray[Any]) -> WorldArrays:
 
 def slot_records(scenario: Scenario) -> Records:
     """Return the slots as (N,) :data:`SLOT`."""
-    return np.array(slot_offsets(scenario), np.float32).view(SLOT).reshape(-1)
+    return np.array(scenario.slot_offsets, np.float32).view(SLOT).reshape(-1)
 
 
 def beam_directions(scenario: Scenario) -> FloatArray:
@@ -446,12 +389,6 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
     config = np.zeros(1, CONFIG)
-    for name, setting in Scenario.settings().items():
-        given = getattr(scenario, name)
-        if setting.kind in _NUMERIC:
-            config[name] = min(given, FAR) if setting.infinite else given
-        elif setting.kind == "tuple[float, float]":
-            config[f"{name}_least"], config[f"{name}_most"] = given
-    for name, (_, value) in DERIVED.items():
+    for name, (_, value) in _numbers().items():
         config[name] = value(scenario)
     return config

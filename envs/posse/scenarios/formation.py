@@ -8,17 +8,14 @@ follow every slot (:attr:`posse.scenarios.scenario.Scenario.slot_turn_rate`).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    from posse.scenarios.scenario import Scenario
+from typing import Final
 
 FORMATIONS: Final = ("wedge", "ring", "rows")
 
 _DIAGONAL: Final = math.sqrt(0.5)  # the wings of the wedge are at 45 degrees
 
 
-def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
+def slot_offsets(formation: str, number: int, distance: float, spacing: float) -> list[tuple[float, float]]:
     """Return the (x, y) of each slot in the slot frame, m; x points ahead.
 
     ========== ====================================================================================
@@ -30,18 +27,17 @@ def slot_offsets(scenario: Scenario) -> list[tuple[float, float]]:
     rows       a block behind the target, as wide as deep, ``formation_spacing`` apart
     ========== ====================================================================================
     """
-    n, distance, spacing = scenario.num_trackers, scenario.formation_distance, scenario.formation_spacing
-    if scenario.formation == "ring":
-        radius = max(distance, spacing / (2 * math.sin(math.pi / n))) if n > 1 else distance
-        bearings = [math.pi + 2 * math.pi * i / n for i in range(n)]
+    if formation == "ring":
+        radius = max(distance, spacing / (2 * math.sin(math.pi / number))) if number > 1 else distance
+        bearings = [math.pi + 2 * math.pi * i / number for i in range(number)]
         return [(radius * math.cos(b), radius * math.sin(b)) for b in bearings]
-    if scenario.formation == "rows":
-        width = math.ceil(math.sqrt(n))
-        rows = [range(start, min(start + width, n)) for start in range(0, n, width)]
+    if formation == "rows":
+        width = math.ceil(math.sqrt(number))
+        rows = [range(start, min(start + width, number)) for start in range(0, number, width)]
         return [
             (-distance - spacing * depth, spacing * (column - (len(row) - 1) / 2))
             for depth, row in enumerate(rows)
             for column in range(len(row))
         ]
     wing = spacing * _DIAGONAL
-    return [(-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1)) for i in range(n)]
+    return [(-distance - wing * ((i + 1) // 2), wing * ((i + 1) // 2) * (1 if i % 2 else -1)) for i in range(number)]

@@ -1,137 +1,127 @@
-"""The named scenarios of the benchmark."""
+"""The named scenarios of the benchmark: what each sets differently from the defaults."""
 
 from __future__ import annotations
 
 import functools
-from typing import Any
+import reprlib
+from typing import Any, Final
 
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import ScenarioError, is_one_of
-from posse.shown import shown, unknown
+from posse.scenarios.setting import ScenarioError, unknown
 
+_PAPER: Final[dict[str, Any]] = {
+    "meaning": "Section 4 of the paper: 8 s from near starts, fast trackers, a slow target that runs straight.",
+    "horizon": 80,
+    "start_distance": (0.6, 1.8),
+    "tracker_speed": 1.5,
+    "tracker_turn_rate": 3.0,
+    "target_speed": 0.5,
+    "formation_distance": 0.8,
+    "formation_spacing": 0.8,
+    "tolerance": 0.2,
+}
 
-@functools.cache  # lazily, after all declarations that scenarios may name
-def _named() -> dict[str, Scenario]:
-    # The reasons for these settings are in docs/scenarios.md.
-    paper = Scenario(
-        name="paper",
-        meaning="Section 4 of the paper: 8 s from near starts, fast trackers, a slow target that runs straight.",
-        horizon=80,
-        start_distance=(0.6, 1.8),
-        tracker_speed=1.5,
-        tracker_turn_rate=3.0,
-        target_speed=0.5,
-        formation_distance=0.8,
-        formation_spacing=0.8,
-        tolerance=0.2,
-    )
-    scenarios = (
-        Scenario(
-            name="constant",
-            meaning="The target runs straight on; everybody sees it and hears everybody: a sanity check.",
-        ),
-        Scenario(
-            name="accelerating",
-            version=2,
-            meaning="The target weaves: its turn rate is a sine, drawn for each world.",
-            target_motion="accelerating",
-        ),
-        Scenario(
-            name="smart",
-            meaning="The target turns faster than the trackers, flees through the widest gap, and darts.",
-            target_motion="smart",
-            tracker_turn_rate=1.2,
-            target_turn_rate=2.0,
-        ),
-        Scenario(
-            name="search",
-            meaning="Sight is short: the team has to spread out in an arena, find the target, and tell the others.",
-            version=3,
-            target_motion="accelerating",
-            tracker_turn_rate=1.2,
-            target_turn_rate=1.2,
-            arena=20.0,
-            start_distance=(4.0, 20.0),
-            sensing_range=3.0,
-        ),
-        Scenario(
-            name="obstacles",
-            meaning="Discs block paths and the view in a walled arena, and the target is smart.",
-            version=2,
-            target_motion="smart",
-            tracker_turn_rate=1.8,
-            target_turn_rate=1.8,
-            arena=20.0,
-            num_obstacles=8,
-        ),
-        Scenario(
-            name="radio",
-            version=2,
-            meaning="Sight is too short without communication; messages are late, three in ten are lost.",
-            target_motion="smart",
-            tracker_turn_rate=1.5,
-            target_turn_rate=2.0,
-            start_distance=(2.0, 5.0),
-            sensing_range=4.0,
-            radio_range=6.0,
-            radio_delay=3,
-            radio_loss=0.3,
-        ),
-        Scenario(
-            name="leader-loss",
-            version=2,
-            meaning="Only the first tracker sees the target from its slot; it breaks, and another must lead.",
-            target_motion="accelerating",
-            tracker_turn_rate=1.1,
-            target_turn_rate=0.2,
-            formation_distance=2.4,
-            formation_spacing=2.4,
-            start_distance=(2.0, 3.9),
-            sensing_range=4.0,
-            breaks=1,
-            horizon=300,
-        ),
-        Scenario(
-            name="field",
-            meaning="Search, obstacles, noise, a lossy radio, a broken robot, outages, and a smart target.",
-            version=3,
-            target_motion="smart",
-            tracker_turn_rate=1.5,
-            target_turn_rate=1.5,
-            arena=24.0,
-            num_obstacles=6,
-            start_distance=(4.0, 20.0),
-            sensing_range=6.0,
-            range_noise=0.02,
-            bearing_noise=0.02,
-            velocity_smoothing=0.5,
-            radio_range=8.0,
-            radio_delay=2,
-            radio_loss=0.2,
-            breaks=1,
-            break_choice="drawn",
-            sensor_outages=0.2,
-            radio_outages=0.2,
-        ),
-        Scenario(
-            name="duel",
-            meaning="Two sides that both can learn; by itself the target is smart, and nearly as fast as the trackers.",
-            version=2,
-            target_speed=0.8,
-            target_motion="smart",
-            tracker_turn_rate=1.5,
-            target_turn_rate=1.5,
-            target_reward_weights={"team": -1.0, "contact": -0.2},
-        ),
-        paper.replace(name="paper-centralized"),
-        paper.replace(name="paper-distributed"),
-    )
-    return {scenario.name: scenario for scenario in scenarios}
+# The reasons for these settings are in docs/scenarios.md.
+SCENARIOS: Final[dict[str, dict[str, Any]]] = {
+    "constant": {"meaning": "The target runs straight on; everybody sees it and hears everybody: a sanity check."},
+    "accelerating": {
+        "version": 2,
+        "meaning": "The target weaves: its turn rate is a sine, drawn for each world.",
+        "target_motion": "accelerating",
+    },
+    "smart": {
+        "meaning": "The target turns faster than the trackers, flees through the widest gap, and darts.",
+        "target_motion": "smart",
+        "tracker_turn_rate": 1.2,
+        "target_turn_rate": 2.0,
+    },
+    "search": {
+        "version": 3,
+        "meaning": "Sight is short: the team has to spread out in an arena, find the target, and tell the others.",
+        "target_motion": "accelerating",
+        "tracker_turn_rate": 1.2,
+        "target_turn_rate": 1.2,
+        "arena": 20.0,
+        "start_distance": (4.0, 20.0),
+        "sensing_range": 3.0,
+    },
+    "obstacles": {
+        "version": 2,
+        "meaning": "Discs block paths and the view in a walled arena, and the target is smart.",
+        "target_motion": "smart",
+        "tracker_turn_rate": 1.8,
+        "target_turn_rate": 1.8,
+        "arena": 20.0,
+        "num_obstacles": 8,
+    },
+    "radio": {
+        "version": 2,
+        "meaning": "Sight is too short without communication; messages are late, three in ten are lost.",
+        "target_motion": "smart",
+        "tracker_turn_rate": 1.5,
+        "target_turn_rate": 2.0,
+        "start_distance": (2.0, 5.0),
+        "sensing_range": 4.0,
+        "radio_range": 6.0,
+        "radio_delay": 3,
+        "radio_loss": 0.3,
+    },
+    "leader-loss": {
+        "version": 2,
+        "meaning": "Only the first tracker sees the target from its slot; it breaks, and another must lead.",
+        "target_motion": "accelerating",
+        "tracker_turn_rate": 1.1,
+        "target_turn_rate": 0.2,
+        "formation_distance": 2.4,
+        "formation_spacing": 2.4,
+        "start_distance": (2.0, 3.9),
+        "sensing_range": 4.0,
+        "breaks": 1,
+        "horizon": 300,
+    },
+    "field": {
+        "version": 3,
+        "meaning": "Search, obstacles, noise, a lossy radio, a broken robot, outages, and a smart target.",
+        "target_motion": "smart",
+        "tracker_turn_rate": 1.5,
+        "target_turn_rate": 1.5,
+        "arena": 24.0,
+        "num_obstacles": 6,
+        "start_distance": (4.0, 20.0),
+        "sensing_range": 6.0,
+        "range_noise": 0.02,
+        "bearing_noise": 0.02,
+        "velocity_smoothing": 0.5,
+        "radio_range": 8.0,
+        "radio_delay": 2,
+        "radio_loss": 0.2,
+        "breaks": 1,
+        "break_choice": "drawn",
+        "sensor_outages": 0.2,
+        "radio_outages": 0.2,
+    },
+    "duel": {
+        "version": 2,
+        "meaning": "Two sides that both can learn; by itself the target is smart, and nearly as fast as the trackers.",
+        "target_speed": 0.8,
+        "target_motion": "smart",
+        "tracker_turn_rate": 1.5,
+        "target_turn_rate": 1.5,
+        "target_reward_weights": {"team": -1.0, "contact": -0.2},
+    },
+    "paper-centralized": _PAPER,
+    "paper-distributed": _PAPER,
+}
 
 
 def scenario_names() -> tuple[str, ...]:
     """Return the names of all scenarios."""
-    return tuple(_named())
+    return tuple(SCENARIOS)
+
+
+@functools.cache
+def _named(name: str) -> Scenario:
+    return Scenario(name=name, **SCENARIOS[name])
 
 
 def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: Any) -> Scenario:
@@ -151,32 +141,22 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
     """
     if isinstance(scenario, Scenario):
         found = scenario
-    elif is_one_of(_named(), scenario):
-        found = _named()[scenario]
+    elif scenario in tuple(SCENARIOS):  # also of what is not hashable
+        found = _named(scenario)
     else:
-        raise ScenarioError(unknown("scenario", scenario, _named()))
-    overrides = _with_target(target, overrides)
+        raise ScenarioError(unknown("scenario", scenario, SCENARIOS))
+    if target is not None:
+        motion = overrides.setdefault("target_motion", "agent")
+        if not isinstance(target, str) or target != "agent":
+            given = f"target={reprlib.repr(target)}"
+            raise ScenarioError(f"{given} is refused: the one choice is 'agent'; target_motion= names a scripted one")
+        if motion != "agent":
+            raise ScenarioError(f"target='agent' and target_motion={reprlib.repr(motion)} exclude each other")
     if not overrides:
         return found
     if "horizon" in overrides and "settle_time" not in overrides:
-        settings, step = Scenario.settings(), overrides.get("control_step", found.control_step)
-        length = settings["horizon"].accept("horizon", overrides["horizon"]) * (
-            settings["control_step"].accept("control_step", step)
-        )
-        overrides["settle_time"] = min(found.settle_time, length)
+        settings = Scenario.settings()
+        horizon, step = overrides["horizon"], overrides.get("control_step", found.control_step)
+        steps = settings["horizon"].accept("horizon", horizon)
+        overrides["settle_time"] = min(found.settle_time, steps * settings["control_step"].accept("control_step", step))
     return found.replace(**overrides)
-
-
-def _with_target(target: Any, overrides: dict[str, Any]) -> dict[str, Any]:
-    """Return the overrides with ``target="agent"`` resolved."""
-    if target is None:
-        return overrides
-    if not isinstance(target, str) or target != "agent":
-        raise ScenarioError(
-            f"target={shown(target)} is refused: the one choice is 'agent'; "
-            "target_motion= chooses among the scripted ones"
-        )
-    motion = overrides.get("target_motion", "agent")
-    if motion != "agent":
-        raise ScenarioError(f"target='agent' and target_motion={shown(motion)} exclude each other")
-    return {**overrides, "target_motion": "agent"}

@@ -1,7 +1,6 @@
-"""The settings of a world: one frozen, validated dataclass.
+"""The settings of a world: one frozen dataclass, and the checks of its fields against each other.
 
-Scenarios with equal fields define the same benchmark. Named ones are in
-:mod:`posse.scenarios.named`, checks across fields in :mod:`posse.scenarios.checks`.
+Scenarios with equal fields define the same benchmark. Named ones are in :mod:`posse.scenarios.named`.
 """
 
 from __future__ import annotations
@@ -9,17 +8,19 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
-from posse.registry import SENSORS, TARGET_MOTIONS
-from posse.scenarios.checks import check_together
+from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
     BREAK_CHOICES,
     FAR,
     FARTHEST,
+    LEAST_CHANGE,
+    LONGEST_MOVE,
     MAX_OBSTACLES,
     MAX_TRACKERS,
     MOST_WEIGHT,
@@ -28,8 +29,7 @@ from posse.scenarios.limits import (
     SMALL,
     WIDE,
 )
-from posse.scenarios.setting import Setting, UnknownSettingError, setting
-from posse.shown import shown, unknown
+from posse.scenarios.setting import ScenarioError, Setting, UnknownSettingError, fail, setting, unknown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,7 +205,9 @@ class Scenario:
     def __post_init__(self) -> None:
         for name, declared in self.settings().items():
             object.__setattr__(self, name, declared.accept(name, getattr(self, name)))
-        check_together(self)
+        # Whether a start can be drawn is found at the reset (posse.rules.start.check_drawn).
+        for check in (_check_team, _check_time, _check_formation, _check_arena, _check_rounding, _check_declarations):
+            check(self)
 
     @staticmethod
     @functools.cache
@@ -290,13 +292,18 @@ class Scenario:
         return 2 * math.sqrt(2) * self.position_bound
 
     @property
+    def slot_offsets(self) -> list[tuple[float, float]]:
+        """The (x, y) of each slot in the slot frame, m (:func:`posse.scenarios.formation.slot_offsets`)."""
+        return slot_offsets(self.formation, self.num_trackers, self.formation_distance, self.formation_spacing)
+
+    @property
     def slot_turn_rate(self) -> float:
         """Greatest turn rate of the slot frame, rad/s.
 
         ω_s = min(0.8 (V - v_t), v_t) / ρ_max with V of the slowest tracker, so that no slot moves
         backwards or faster than a tracker.
         """
-        rho = max(math.hypot(x, y) for x, y in slot_offsets(self))
+        rho = max(math.hypot(x, y) for x, y in self.slot_offsets)
         slowest = min(self.tracker_speeds)
         return min(0.8 * (slowest - self.target_speed), self.target_speed) / rho
 
@@ -310,7 +317,7 @@ class Scenario:
             if key not in self.settings():
                 # Libraries that try a keyword of their own look for the words of Python's TypeError.
                 message = unknown("setting", key, self.settings())
-                raise UnknownSettingError(f"unexpected keyword argument {shown(key)}: {message}")
+                raise UnknownSettingError(f"unexpected keyword argument {reprlib.repr(key)}: {message}")
         return dataclasses.replace(self, **overrides)
 
     def to_dict(self) -> dict[str, Any]:
@@ -319,3 +326,123 @@ class Scenario:
         values["reward_weights"] = dict(self.reward_weights)
         values["target_reward_weights"] = dict(self.target_reward_weights)
         return values
+
+
+def _refuse(s: Scenario, name: str, why: str) -> NoReturn:
+    fail(name, getattr(s, name), why)
+
+
+def _check_team(s: Scenario) -> None:
+    n, slowest = s.num_trackers, min(s.tracker_speeds)
+    for name, declared in s.settings().items():
+        each = getattr(s, name)
+        if declared.per_tracker and isinstance(each, tuple) and len(each) != n:
+            _refuse(s, name, f"{len(each)} values for num_trackers={n}: give one number, or one for each")
+    if s.target_speed > 0.9999 * slowest:
+        why = "by 0.01 % at least: a slower team cannot catch up (paper, assumption ii)"
+        _refuse(s, "target_speed", f"it must be below tracker_speed={slowest:g}, {why}")
+    if s.target_least_speed > s.target_speed:
+        _refuse(s, "target_least_speed", f"it must be at most target_speed={s.target_speed:g}")
+    if s.target_speed == 0 and s.target_motion != "constant":
+        _refuse(s, "target_speed", "only a target of constant motion may rest")
+    if s.breaks and s.breaks >= n:
+        _refuse(s, "breaks", f"at most num_trackers - 1 = {n - 1}")
+    if s.break_choice == "given" and s.breaks > 1:
+        _refuse(s, "breaks", 'break_choice="given" names one tracker, break_number')
+    if s.break_choice == "given" and s.break_number >= n:
+        _refuse(s, "break_number", f"trackers are 0 to {n - 1}")
+
+
+def _check_time(s: Scenario) -> None:
+    steps = s.control_step / s.physics_step
+    if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+        _refuse(s, "control_step", f"it must be a whole multiple of physics_step={s.physics_step:g}")
+    for name, rate in (("tracker_turn_rate", max(s.tracker_turn_rates)), ("target_turn_rate", s.target_turn_rate)):
+        turn = rate * s.physics_step
+        if turn > 1.0:
+            most = f"at most 1 is possible: choose physics_step <= {1 / rate:.3g}"
+            _refuse(s, name, f"{rate:g} rad/s turns {turn:.2f} rad in a physics step, {most}")
+    if s.settle_time > s.duration:
+        episode = f"an episode of horizon={s.horizon} steps of {s.control_step:g} s"
+        _refuse(
+            s,
+            "settle_time",
+            f"it is longer than {episode}: set settle_time to at most {s.duration:g}, or raise horizon",
+        )
+
+
+def _check_formation(s: Scenario) -> None:
+    offsets = s.slot_offsets
+    apart = min((math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf)
+    if apart <= 2 * max(s.tolerance, s.robot_radius) + 1e-9:
+        limits = f"tolerance={s.tolerance:g} and robot_radius={s.robot_radius:g}"
+        why = f"slots of the {s.formation} lie {apart:.3g} m apart, which must be more than twice {limits}"
+        _refuse(s, "formation_spacing", f"{why}: raise it, or lower them")
+    nearest, farthest = min(math.hypot(*slot) for slot in offsets), max(math.hypot(*slot) for slot in offsets)
+    if nearest <= 2 * s.robot_radius:
+        why = f"a slot lies {nearest:.3g} m from the target, which robots of robot_radius={s.robot_radius:g} touch"
+        _refuse(s, "formation_distance", f"{why}: raise it")
+    if farthest > FARTHEST:
+        why = f"with formation_distance={s.formation_distance:g} a slot lies {farthest:.3g} m from the target"
+        _refuse(s, "formation_spacing", f"{why}, at most {FARTHEST:g} m is possible: lower them or num_trackers")
+
+
+def _check_arena(s: Scenario) -> None:
+    if s.position_bound > FARTHEST:
+        raise ScenarioError(
+            f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most "
+            f"{FARTHEST:g} m is possible: lower tracker_speed={max(s.tracker_speeds):g}, "
+            f"horizon={s.horizon}, control_step={s.control_step:g} or "
+            f"start_distance={s.start_distance}, or set an arena"
+        )
+    if s.start_distance[0] <= 2 * s.robot_radius:
+        _refuse(s, "start_distance", f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m")
+    if s.num_obstacles and math.isinf(s.arena):
+        _refuse(s, "num_obstacles", "obstacles need an arena: set arena to its side in m")
+    if s.num_obstacles and s.obstacle_radius[0] <= 0:
+        _refuse(s, "obstacle_radius", "radii must be above 0")
+    if s.target_extent <= 0:
+        why = f"it is too small for a target that needs {s.target_clearance:.3g} m to turn away from a wall"
+        _refuse(s, "arena", f"{why}: raise arena or target_turn_rate, or lower target_speed")
+
+
+def _check_rounding(s: Scenario) -> None:
+    """Raise where float32 in the kernels would be too coarse for the scenario."""
+    fastest = max(s.tracker_speeds)
+    move, longest = fastest * s.physics_step, math.sqrt(LONGEST_MOVE * s.robot_radius)
+    if move > longest:
+        exact = f"contact of robots of robot_radius={s.robot_radius:g} is exact up to {longest:.3g} m"
+        fix = f"choose physics_step <= {longest / fastest:.3g}"
+        _refuse(s, "tracker_speed", f"{fastest:g} m/s moves {move:.3g} m in a physics step, {exact}: {fix}")
+    for name, value, added_to, most in (
+        ("tracker_speed", min(s.tracker_speeds), "a position", s.position_bound),
+        ("target_speed", s.target_speed, "a position", s.position_bound),
+        ("tracker_turn_rate", min(s.tracker_turn_rates), "a heading", 1.0),
+        ("target_turn_rate", s.target_turn_rate, "a heading", 1.0),
+        ("tracker_acceleration", s.tracker_acceleration, "a speed", fastest),
+        ("tracker_turn_acceleration", s.tracker_turn_acceleration, "a turn rate", max(s.tracker_turn_rates)),
+    ):
+        spacing = math.ulp(most) * 2.0**29  # of float32: a double has 29 more bits
+        least = LEAST_CHANGE * spacing / s.physics_step
+        if 0 < value < least:
+            lost = f"adds {value * s.physics_step:.3g} to {added_to} of up to {most:.3g} in a physics step"
+            fix = f"choose {name} >= {least:.3g}, or a longer physics_step={s.physics_step:g}"
+            _refuse(s, name, f"{value:g} {lost}, which float32 loses to rounding: {fix}")
+
+
+def _check_declarations(s: Scenario) -> None:
+    for where, names, known in (
+        ("extra_fields", s.extra_fields, FIELDS),
+        ("metrics", s.metrics, METRICS),
+        ("reward_weights", dict(s.reward_weights), REWARD_TERMS),
+        ("target_reward_weights", dict(s.target_reward_weights), REWARD_TERMS),
+    ):
+        for name in names:
+            if name not in known:
+                raise ScenarioError(f"in {where}: {known.unknown(name)}")
+    for name in filter(FIELDS.is_built_in, s.extra_fields):
+        _refuse(s, "extra_fields", f"{name!r} is in every observation: leave it out")
+    of_target = [name for name, term in REWARD_TERMS.items() if term.of_target is not None]
+    for name in dict(s.target_reward_weights):
+        if name not in of_target:
+            raise ScenarioError(f"in target_reward_weights: {unknown('term of a target', name, of_target)}")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import math
-from collections.abc import Callable, Iterable, Mapping
+import reprlib
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any, NoReturn
 
 import numpy as np
-
-from posse.shown import shown, unknown
 
 
 class ScenarioError(ValueError):
@@ -20,6 +20,19 @@ class ScenarioError(ValueError):
 
 class UnknownSettingError(ScenarioError, TypeError):
     """A keyword that no scenario has; a TypeError too, as any unexpected keyword argument is."""
+
+
+def fail(name: str, value: object, allowed: str) -> NoReturn:
+    """Raise the error for an invalid value, with what is allowed."""
+    raise ScenarioError(f"{name}={reprlib.repr(value)} is refused: {allowed}")
+
+
+def unknown(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return the message for a name that is none of the known ones, with those most like it."""
+    names, text = tuple(known), name if isinstance(name, str) else reprlib.repr(name)
+    near = difflib.get_close_matches(text[:100], names, n=3, cutoff=0.5)
+    hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+    return f"unknown {kind} {reprlib.repr(name)}{hint}; known: {', '.join(names) or 'none'}"
 
 
 @dataclass(frozen=True)
@@ -74,13 +87,14 @@ class Setting:
         Raises:
             ScenarioError: A wrong type, or out of range; names the setting and its range.
         """
-        several = list(value) if isinstance(value, (tuple, list, np.ndarray)) else None
+        is_array = isinstance(value, np.ndarray) and value.ndim > 0
+        several = list(value) if is_array or isinstance(value, (tuple, list)) else None  # type: ignore[call-overload]
         if value is None and "None" in self.kind:
             return None
         if self.kind.startswith("int"):
             return self._whole(name, value)
         if self.kind == "tuple[float, float]":
-            return self._pair(name, value)
+            return self._pair(name, value, several)
         if self.per_tracker and several is not None:
             return tuple(self._number(f"{name}[{k}]", each) for k, each in enumerate(several))
         if self.kind.startswith("float"):
@@ -113,31 +127,28 @@ class Setting:
         except OverflowError:
             number = math.inf
         inside = self.low < number if self.above else self.low <= number
-        if not (inside and number <= self.high and math.isfinite(number)) and not (
-            self.infinite and number == math.inf
-        ):
+        finite = inside and number <= self.high and math.isfinite(number)
+        if not finite and not (self.infinite and number == math.inf):
             fail(name, value, f"it must be a number in {self.range}")
         return number
 
-    def _pair(self, name: str, value: object) -> tuple[float, float]:
-        if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
+    def _pair(self, name: str, value: object, several: list[Any] | None) -> tuple[float, float]:
+        if several is None or len(several) != 2:
             fail(name, value, f"it must be a tuple (least, greatest), both in {self.range}")
-        least, most = (self._number(f"{name}[{k}]", each) for k, each in enumerate(value))
+        least, most = (self._number(f"{name}[{k}]", each) for k, each in enumerate(several))
         if least > most:
             fail(name, value, "the least must not be above the greatest")
         return least, most
 
     def _weights(self, name: str, value: object) -> tuple[tuple[str, float], ...]:
         """Return weights sorted by name, so that equal scenarios compare equal."""
-        if not isinstance(value, (Mapping, tuple, list)):
-            fail(name, value, "it must map names of reward terms to numbers")
         try:
-            weights = dict(value)
+            weights = dict(value)  # type: ignore[call-overload]
         except (TypeError, ValueError):
             weights = {None: 0.0}
         if not all(isinstance(term, str) for term in weights):
             fail(name, value, "it must map names of reward terms to numbers")
-        return tuple(sorted((term, self._number(f"{name}[{shown(term)}]", weights[term])) for term in weights))
+        return tuple(sorted((term, self._number(f"{name}[{term!r}]", weights[term])) for term in weights))
 
 
 def setting(
@@ -146,13 +157,3 @@ def setting(
     """Return a dataclass field with this default and declaration; see :class:`Setting`."""
     declaration = Setting(meaning, unit, low, high, **more)
     return dataclasses.field(default=default, metadata={"setting": declaration})
-
-
-def is_one_of(names: Iterable[str], value: object) -> bool:
-    """Return whether a value is a string and one of the names."""
-    return isinstance(value, str) and value in names
-
-
-def fail(name: str, value: object, allowed: str) -> NoReturn:
-    """Raise the error for an invalid value, with what is allowed."""
-    raise ScenarioError(f"{name}={shown(value)} is refused: {allowed}")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.support.learned import observations_of
 
 import posse
-from posse.scenarios.formation import FORMATIONS, slot_offsets
+from posse.scenarios.formation import FORMATIONS
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.features import NUM_FEATURES
 from posse_baselines.learned.team import match_slots
@@ -20,7 +20,7 @@ def test_own_slot_is_where_the_state_says() -> None:
     rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
     features = rows[:, :NUM_FEATURES].reshape(8, 5, NUM_FEATURES)
     w, t = batch.worlds[:, None], batch.arrays.tracker
-    slots = np.array(slot_offsets(batch.scenario))
+    slots = np.array(batch.scenario.slot_offsets)
     x = w["x"] + slots[:, 0] * w["frame_cos"] - slots[:, 1] * w["frame_sin"]
     y = w["y"] + slots[:, 0] * w["frame_sin"] + slots[:, 1] * w["frame_cos"]
     dx, dy = x[:, None] - t["x"][..., None], y[:, None] - t["y"][..., None]

@@ -21,8 +21,7 @@ QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
 
 def actions_of(planner: Planner, batch: posse.Batch, steps: int) -> NDArray[np.float32]:
     """Return the actions (steps, E, N, 2 + m) of so many steps."""
-    played = rollout(batch, planner)
-    return np.stack([next(played).actions for _ in range(steps)])
+    return rollout(batch, planner, ["actions"], steps=steps)["actions"]
 
 
 @pytest.mark.long
@@ -111,10 +110,9 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 def test_it_plays_past_the_end_of_episodes(autoreset: str) -> None:
     batch = posse.batch("obstacles", 3, autoreset=autoreset, horizon=25, settle_time=1.0, start_distance=(1.5, 3.0))
-    played = rollout(batch, Planner(QUICK))
-    steps = [step for step, _ in zip(played, range(60), strict=False)]
-    assert len(steps) == (25 if autoreset == "disabled" else 60)
-    assert np.isfinite(np.stack([step.actions for step in steps])).all()
+    played = rollout(batch, Planner(QUICK), ["actions"], steps=60)
+    assert played.steps == (25 if autoreset == "disabled" else 60)
+    assert np.isfinite(played["actions"]).all()
 
 
 def test_it_sends_every_tracker_to_a_slot_of_its_own() -> None:

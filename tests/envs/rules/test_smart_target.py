@@ -12,7 +12,6 @@ import numpy.typing as npt
 import pytest
 
 import posse
-from posse.scenarios.formation import slot_offsets
 
 Floats = npt.NDArray[np.float64]
 Controller = Callable[[posse.Batch], npt.NDArray[np.float32]]
@@ -106,7 +105,7 @@ def pursued(motion: str) -> Play:
 def in_slots(worlds: int) -> tuple[Floats, Floats]:
     """Poses of a team that stands in its slots, one heading a world."""
     theta = np.linspace(-3, 3, worlds)
-    slots = np.array([x + 1j * y for x, y in slot_offsets(posse.get_scenario("smart"))])
+    slots = np.array([x + 1j * y for x, y in posse.get_scenario("smart").slot_offsets])
     places = slots * np.exp(1j * theta)[:, None]
     trackers = np.stack([places.real, places.imag, np.broadcast_to(theta[:, None], places.shape)], -1)
     return trackers, np.stack([0 * theta, 0 * theta, theta], -1)

@@ -10,14 +10,14 @@ from tests.support.reference.score import slots
 from tests.support.reference.state import one_world, snapshot
 
 import posse
-from posse.scenarios.formation import FORMATIONS, slot_offsets
+from posse.scenarios.formation import FORMATIONS
 
 
 @pytest.mark.parametrize("formation", FORMATIONS)
 @pytest.mark.parametrize("number", [1, 2, 3, 4, 5, 8, 13, 64])
 def test_slots_are_where_their_definition_says_and_apart(formation: str, number: int) -> None:
     scenario = posse.get_scenario("constant", num_trackers=number, formation=formation)
-    places = np.array([complex(*offset) for offset in slot_offsets(scenario)])
+    places = np.array([complex(*offset) for offset in scenario.slot_offsets])
     np.testing.assert_allclose(places, slots(scenario), rtol=1e-9, atol=1e-9)
     between = np.abs(places[:, None] - places[None, :]) + np.diag(np.full(number, np.inf))
     assert between.min() > 2 * scenario.tolerance

@@ -1,13 +1,12 @@
 import csv
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import posse
-from posse.scenarios.named import _named
+from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.cli import main
@@ -15,7 +14,7 @@ from posse_training.compare.compare import Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
 from posse_training.errors import ComparisonError
-from posse_training.reports.statistics import difference
+from posse_training.evaluation.statistics import difference
 
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
@@ -132,14 +131,13 @@ def test_training_seeds_are_one_contender(files: list[str], tmp_path: Path) -> N
 def test_who_cannot_play_is_left_out_with_a_line(
     files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    scenario = replace(posse.get_scenario("constant"), name="few-beams", sonar_beams=4)
-    _named()["few-beams"] = scenario
+    SCENARIOS["few-beams"] = {"sonar_beams": 4}
     try:
         command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
         options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
         assert main([*command, *options]) == 0
     finally:
-        del _named()["few-beams"]
+        del SCENARIOS["few-beams"]
     shown = " ".join(capsys.readouterr().out.split())
     assert "left out: any-0 on few-beams:" in shown
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

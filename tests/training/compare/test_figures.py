@@ -11,8 +11,8 @@ from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.compare import figures
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
-from posse_training.reports.pictures.style import BOUND, looks_of
-from posse_training.reports.results import Results
+from posse_training.evaluation.results import Results
+from posse_training.style import BOUND, looks_of
 
 LOOKS = looks_of(["pursuit", "planner", "mine", "other", "idle"])
 
@@ -72,7 +72,9 @@ def test_scores_and_bounds_stand_where_they_should() -> None:
         LOOKS,
     )
     (axis,) = figure.axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == ["smart v1", "radio v1"]
+    assert [label.get_text() for label in axis.get_yticklabels()] == [
+        f"{name} v{posse.get_scenario(name).version}" for name in ("smart", "radio")
+    ]
     points = [
         (round(float(np.ravel(drawn.get_xdata())[0]), 6), round(float(np.ravel(drawn.get_ydata())[0])))
         for drawn in axis.lines
@@ -110,7 +112,9 @@ def test_figures_say_what_was_played() -> None:
     for draw in (figures.profile, figures.scores):
         assert said(draw(plays, LOOKS))[0].endswith("3 worlds (planner 1), test split, seed 7")
     losses = [plays_of("idle", "leader-loss", recovery_time=[1.0, 2.0], score=[0.0, 0.0])]
-    assert said(figures.recovery(losses, LOOKS)) == ["leader-loss v1: 2 worlds, test split, seed 7"]
+    assert said(figures.recovery(losses, LOOKS)) == [
+        f"leader-loss v{posse.get_scenario('leader-loss').version}: 2 worlds, test split, seed 7"
+    ]
 
 
 def learned(curve: object) -> Contender:

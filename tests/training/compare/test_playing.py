@@ -17,7 +17,7 @@ from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
 from posse_training.errors import SettingsError
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[3]
 BAD = "tests.support.bad_policies:"
 
 

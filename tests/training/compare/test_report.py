@@ -13,8 +13,8 @@ import posse
 from posse_training.compare.compare import Comparison, Settings, compare
 from posse_training.compare.plays import Plays
 from posse_training.compare.report import extremes
+from posse_training.evaluation.results import Results
 from posse_training.replay import read_replay
-from posse_training.reports.results import Results
 
 HOSTILE = "</script><script>alert(1)</script><img src onerror>'\"&lt;{{title}}<!--$x$]]>"
 

@@ -18,6 +18,7 @@ from posse_training.commands import watch
 from posse_training.compare.compare import SUMMARY, Settings, compare
 from posse_training.compare.compare import main as compare_main
 from posse_training.compare.contenders import Contender
+from posse_training.compare.playing import Game
 from posse_training.compare.playing import replay as play_again
 from posse_training.errors import TrainedSplitError
 from posse_training.replay import record
@@ -91,7 +92,7 @@ def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None
     actions = replay.players[0].columns["action"].values
     assert actions.shape[1] == SHORT.num_trackers + 1, "the target's action as well"
     # As a comparison's report does.
-    shown = play_again(Contender("p", (load("pursuit"),)), 0, SHORT, 7, 0, "test", target=str(file), limit=60.0)
+    shown = play_again(Contender("p", (load("pursuit"),)), 0, SHORT, 0, Game(7, "test", str(file), 60.0))
     assert shown.players[0].columns["action"].values.shape[1] == SHORT.num_trackers + 1
     film = tmp_path / "film.gif"
     asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--num-trackers", "3"]

@@ -13,9 +13,10 @@ from PIL import Image
 from tests.support.browser import chromium, opened, until
 from tests.support.replays import ATTACK, hostile, short
 
-from posse.rendering.style import PAPER, TARGET
-from posse_training.replay import Replay, read_replay, record, write_replay
-from posse_training.replay.colours import DARK
+import posse
+from posse.rendering.style import TARGET
+from posse_baselines import Recorder
+from posse_training.replay import RECORD, read_replay, record, replay_of, write_replay
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -202,17 +203,6 @@ def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None
         assert state(page, "position") == 4
 
 
-def test_dark_and_light(browser: Browser, written: Path, tmp_path: Path) -> None:
-    with opened(browser, written, dark=True) as page:
-        assert state(page, "dark")
-        assert (drawn(page, tmp_path / "a.png")[10, 5] == DARK["PAPER"]).all()
-        page.keyboard.press("d")
-        assert (drawn(page, tmp_path / "a.png")[10, 5] == PAPER).all()
-        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == (
-            f"rgb({', '.join(map(str, PAPER))})"
-        )
-
-
 def test_on_a_phone(browser: Browser, written: Path) -> None:
     with opened(browser, written, size=(390, 844), touch=True) as page:
         wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
@@ -337,18 +327,6 @@ def test_a_hostile_page_runs_nothing_and_shows_the_text(browser: Browser, tmp_pa
         assert page.locator("img").count() == 0
 
 
-def test_the_policy_stops_code_that_is_not_the_pages_own(browser: Browser, written: Path) -> None:
-    text = written.read_text(encoding="utf-8")
-    path = written.with_name("changed.html")
-    path.write_text(text.replace("</body>", "<script>window.ran=1</script></body>"), "utf-8")
-    context = browser.new_context()
-    page = context.new_page()
-    page.goto(path.as_uri())
-    page.wait_for_selector("html[data-ready]")
-    assert page.evaluate("window.ran") is None
-    context.close()
-
-
 @pytest.mark.parametrize("view", [2.0, 2 * np.pi])
 @pytest.mark.parametrize("reach", [5.0, np.inf])
 def test_the_sensing_area_holds_the_target_when_it_is_seen(
@@ -395,14 +373,12 @@ def test_four_players_of_unequal_length(browser: Browser, tmp_path: Path) -> Non
 
 
 def test_one_player_and_a_target_that_is_driven(browser: Browser, tmp_path: Path) -> None:
-    import posse
-    from posse_training.replay import Recorder
-
-    recorder = Recorder(posse.batch("smart", 1, target_motion="agent"), "me")
+    batch = posse.batch("smart", 1, target_motion="agent")
+    recorder = Recorder(batch, RECORD)
     recorder.reset()
     for _ in range(20):
-        recorder.step(np.zeros(recorder.batch.action_shape, np.float32))
-    replay: Replay = recorder.replay()
-    n = recorder.batch.scenario.num_trackers
+        recorder.step(np.zeros(batch.action_shape, np.float32))
+    replay = replay_of(recorder.trajectory(), "me")
+    n = batch.scenario.num_trackers
     with opened(browser, write_replay(replay, tmp_path / "a.html"), f"#t=1&r={n}") as page:
         assert page.locator("#panel h2").inner_text().startswith("target")

@@ -8,28 +8,28 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import load
-from posse_training.replay import Recorder, record
+from posse_baselines import Recorder, load
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.replay import RECORD, Player, record, replay_of
 from posse_training.replay.episode import EVENT_KINDS
 from posse_training.replay.events import find_events
-from posse_training.reports.evaluation import evaluate
 
 
-def contacts_by_hand() -> Recorder:
+def contacts_by_hand() -> Player:
     """Two trackers run into each other, part, and one runs into the target."""
     batch = posse.batch("constant", 1, num_trackers=2, target_motion="agent", horizon=80)
-    recorder = Recorder(batch, "a")
+    recorder = Recorder(batch, RECORD)
     start = {"tracker_pose": [(0, 0, 0), (1, 0, np.pi)], "target_pose": (-3, 0, 0)}
     recorder.reset(options=start)
     still, ahead, right_about = [-1, 0], [1, 0], [-1, 1]
     for speed, turn, steps in ((ahead, ahead, 8), (right_about, still, 16), (ahead, still, 40)):
         for _ in range(steps):
             recorder.step(np.array([[speed, turn, still]], np.float32))
-    return recorder
+    return replay_of(recorder.trajectory(), "a").players[0]
 
 
 def test_contacts_are_told_with_who_touched_what() -> None:
-    player = contacts_by_hand().player()
+    player = contacts_by_hand()
     found = [event for event in player.events if event.kind == "contact"]
     assert [(event.robots, event.text) for event in found] == [
         ((0, 1), "contact: tracker 0 and tracker 1, with each other"),
@@ -83,6 +83,6 @@ def test_a_leader_is_whom_more_than_half_follow() -> None:
         **{f"world_contacts_{k}": np.zeros(frames) for k in ("tracker", "obstacle", "target")},
     }
     leader = np.array([[-1, -1, -1, -1], [2, 2, 2, 0], [2, 2, 0, 0], [0, 0, 0, 2], [0, 0, 0, 0], [2, 2, 2, 2]])
-    events = find_events(states, 0.1, leader)
+    events = find_events({**states, "annotation/leader": leader})
     assert [(event.step, event.robots) for event in events] == [(3, (2, 0)), (5, (0, 2))]
-    assert find_events(states, 0.1, None) == ()
+    assert find_events(states) == ()

@@ -85,50 +85,9 @@ def test_what_is_no_replay_is_refused() -> None:
         (("[]", data), "not the data of a replay"),
         ((header, b"no zlib"), "not the data of a replay"),
         ((header.replace('"format":1', '"format":2'), data), "format 2 cannot be read"),
-        ((header, zlib.compress(zlib.decompress(data)[:-1])), "end within 'c'"),
+        ((header, zlib.compress(zlib.decompress(data)[:-1])), "not the data of a replay"),
+        ((header, data[:-1]), "not the data of a replay"),
+        ((header.replace('"players":[{', '"players":[3,{'), data), "not the data of a replay"),
     ):
         with pytest.raises(SettingsError, match=message):
             decode(*bad)
-
-
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        (("players",), None),
-        (("players",), [3]),
-        (("world",), 3),
-        (("players", 0, "frames"), -1),
-        (("players", 0, "frames"), 2**40),
-        (("players", 0, "columns", 0, "shape"), [-1]),
-        (("players", 0, "columns", 0, "width"), 0),
-        (("players", 0, "columns", 0, "order"), 10**9),
-        (("players", 0, "columns", 0, "scale"), 0),
-        (("players", 0, "columns", 0, "scale"), "x"),
-        (("players", 0, "columns", 0, "name"), []),
-        (("players", 0, "metrics"), []),
-        (("players", 0, "events"), [[1]]),
-        (("players", 0, "about"), 3),
-    ],
-)
-def test_forged_headers_are_refused(place: tuple[Any, ...], value: Any) -> None:
-    header, data = encode(Replay({}, (Player("p", {"c": Column(np.arange(50.0))}),)))
-    forged = json.loads(header)
-    inner = forged
-    for key in place[:-1]:
-        inner = inner[key]
-    inner[place[-1]] = value
-    with pytest.raises(SettingsError, match=r"not the data of a replay|end within") as caught:
-        decode(json.dumps(forged), data)
-    assert len(str(caught.value)) < 500
-
-
-def test_data_that_only_fill_memory_are_refused() -> None:
-    header, _ = encode(Replay({}, (Player("p", {"c": Column(np.arange(50.0))}),)))
-    bomb = zlib.compressobj()
-    data = b"".join(bomb.compress(bytes(2**20)) for _ in range(300)) + bomb.flush()
-    with pytest.raises(SettingsError, match="hold more than 268,435,456 bytes"):
-        decode(header, data)
-    with pytest.raises(SettingsError, match="cut short"):
-        decode(header, data[:1000])
-    with pytest.raises(SettingsError, match=r"nested|RecursionError"):
-        decode("[" * 200_000 + "]" * 200_000, data)

@@ -9,9 +9,9 @@ import pytest
 from tests.support.replays import short
 
 import posse
-from posse_baselines import begin, load
+from posse_baselines import Recorder, Trajectory, begin, load
 from posse_training.errors import SettingsError
-from posse_training.replay import Player, Recorder, join, record
+from posse_training.replay import RECORD, join, record, replay_of
 from posse_training.replay.format import decode, encode
 
 
@@ -103,32 +103,33 @@ def test_without_observations_only_what_is_drawn_is_kept() -> None:
     assert [field["name"] for field in short(observations=False).world["fields"]] == ["sonar"]
 
 
-def drive(recorder: Recorder, steps: int) -> Player:
+def driven(batch: posse.Batch, steps: int) -> Trajectory:
+    recorder = Recorder(batch, RECORD)
     recorder.reset()
     for step in range(steps):
-        speed = np.full(recorder.batch.action_shape, 0.1 * np.sin(step), np.float32)
-        recorder.step(speed)
-    return recorder.player()
+        recorder.step(np.full(batch.action_shape, 0.1 * np.sin(step), np.float32))
+    return recorder.trajectory()
 
 
 def test_a_world_of_a_larger_batch_is_recorded_as_if_alone() -> None:
-    many = drive(Recorder(posse.batch("radio", 5, seed=2), "a", world=3), 30)
-    alone = drive(Recorder(posse.batch("radio", 1, seed=2, first_world=3), "a"), 30)
-    assert list(many.columns) == list(alone.columns)
-    for name, column in many.columns.items():
-        np.testing.assert_array_equal(column.values, alone.columns[name].values)
-    assert many.events == alone.events
+    many = replay_of(driven(posse.batch("radio", 5, seed=2), 30), "a", world=3)
+    alone = replay_of(driven(posse.batch("radio", 1, seed=2, first_world=3), 30), "a")
+    assert many.world == alone.world
+    one, other = many.players[0], alone.players[0]
+    assert list(one.columns) == list(other.columns)
+    for name, column in one.columns.items():
+        np.testing.assert_array_equal(column.values, other.columns[name].values)
+    assert one.events == other.events
 
 
 def test_a_target_that_is_an_agent_has_a_row_of_its_own() -> None:
     batch = posse.batch("smart", 1, target_motion="agent")
-    recorder = Recorder(batch, "me")
-    player = drive(recorder, 10)
-    n = batch.scenario.num_trackers
-    assert player.columns["action"].values.shape == (11, n + 1, 2)
-    assert player.columns["observation/heading"].values.shape == (11, n + 1, 2)
-    assert player.columns["tracker_x"].values.shape == (11, n)
-    assert recorder.replay().world["agents"] == n + 1
+    replay = replay_of(driven(batch, 10), "me")
+    n, columns = batch.scenario.num_trackers, replay.players[0].columns
+    assert columns["action"].values.shape == (11, n + 1, 2)
+    assert columns["observation/heading"].values.shape == (11, n + 1, 2)
+    assert columns["tracker_x"].values.shape == (11, n)
+    assert replay.world["agents"] == n + 1
 
 
 def test_an_episode_ends_where_it_ends() -> None:
@@ -168,39 +169,8 @@ def test_what_cannot_be_recorded_is_named(wrong: dict[str, Any], message: str) -
         record(**({"policies": ["idle"], "scenario": "smart"} | wrong))
 
 
-def test_a_recorder_used_wrongly_says_so() -> None:
-    recorder = Recorder(posse.batch("constant", 1, horizon=30), "a")
-    actions = np.zeros(recorder.batch.action_shape, np.float32)
-    for use in (recorder.player, lambda: recorder.step(actions)):
-        with pytest.raises(SettingsError, match="before reset"):
-            use()
-    drive(recorder, 30)
-    assert recorder.over
-    with pytest.raises(SettingsError, match="has ended"):
-        recorder.step(actions)
-    with pytest.raises(SettingsError, match="world=1 is not in the batch"):
-        Recorder(posse.batch("constant", 1), "a", world=1)
-    with pytest.raises(SettingsError, match="same_step"):
-        Recorder(posse.batch("constant", 1, autoreset="same_step"), "a")
-
-
-def test_a_reset_begins_a_new_recording() -> None:
-    recorder = Recorder(posse.batch("constant", 1), "a")
-    drive(recorder, 12)
-    assert drive(recorder, 5).frames == 6
-    assert recorder.replay().world["episode"] == 1
-
-
 def test_only_small_entries_of_a_card_are_taken() -> None:
     about = record(["learned-smart"], "smart", seconds=0.5).players[0].about
     assert about["trained_splits"] == "train"
     assert about["steps"] == load("learned-smart").card["steps"]  # type: ignore[attr-defined]
     assert sum(len(str(value)) for value in about.values()) < 3000
-
-
-def test_a_recording_does_not_change_with_the_batch() -> None:
-    recorder = Recorder(posse.batch("constant", 1), "a")
-    first = drive(recorder, 5)
-    before = first.columns["tracker_x"].values.copy()
-    drive(recorder, 5)
-    np.testing.assert_array_equal(first.columns["tracker_x"].values, before)

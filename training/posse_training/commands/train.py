@@ -6,37 +6,45 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import tyro
 
-from posse_training.cluster.settings import RayOption, how_to_resume, of_option
 from posse_training.errors import require
 from posse_training.files import read_json
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.settings import TrainSettings, opponents_of
+from posse_training.parallel import RayOption, address_of
+from posse_training.train.settings import Preset, TrainSettings, default_settings, opponents_of
 
 _NEEDED = ("training", "torch", "stable_baselines3")
 
 
 @dataclass(frozen=True)
 class _Which:
-    """The settings that the defaults of all others depend on."""
+    """What the defaults of all other settings depend on."""
 
     scenario: str = "smart"
     algorithm: str = "ppo"
     side: str = "trackers"
+    preset: Preset = "residual"
 
 
-@dataclass(frozen=True)
-class _Seeds:
-    """Several runs."""
+@dataclass(frozen=True, kw_only=True)
+class _Arguments(TrainSettings):
+    """Settings of a training, and how often and where it is made."""
 
+    preset: Preset = "residual"
+    """Default settings: learn a correction of a scripted team, where the scenario has such defaults
+    and the algorithm is on policy; or learn from nothing, that is from random weights."""
     seeds: tuple[int, ...] = ()
-    """Seeds of the runs."""
+    """Seeds of several runs, in turn, or with --ray at once; the same command again resumes them."""
     ray: RayOption = None
-    """Where they are made."""
+    """Make them on a Ray cluster."""
+
+    @property
+    def settings(self) -> TrainSettings:
+        """The settings alone."""
+        return TrainSettings(**{field.name: getattr(self, field.name) for field in fields(TrainSettings)})
 
 
 @dataclass(frozen=True)
@@ -54,36 +62,32 @@ class _Resume:
 def main(arguments: Sequence[str]) -> None:
     """Train a team, once or with several seeds, or resume: ``posse train --resume DIR``."""
     if any(a == "--resume" or a.startswith("--resume=") for a in arguments):
-        which = tyro.cli(_Resume, prog="posse train", args=arguments)
+        run = tyro.cli(_Resume, prog="posse train", args=arguments)
         require(*_NEEDED)
-        from posse_training.runs.train import resume
+        from posse_training.train.train import resume
 
-        with _how_to_resume(which.resume):
-            path = resume(which.resume, steps=which.steps, trust_code=which.trust_code)
+        with _how_to_resume(run.resume):
+            path = resume(run.resume, steps=run.steps, trust_code=run.trust_code)
         print(_what_next(path))
         return
     asked = [a for a in arguments if a not in ("-h", "--help")]
-    some, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
-    several, rest = tyro.cli(_Seeds, args=asked, return_unknown_args=True)
-    if several.seeds or several.ray is not None:
-        arguments = [*rest, *(a for a in arguments if a in ("-h", "--help"))]
-    settings = tyro.cli(
-        TrainSettings,
+    which, _ = tyro.cli(_Which, args=asked, return_unknown_args=True)
+    default = default_settings(which.scenario, which.algorithm, side=which.side, preset=which.preset)
+    given = tyro.cli(
+        _Arguments,
         prog="posse train",
-        description="Train a team. To resume a run: posse train --resume DIR. Several seeds: "
-        "--seeds 1 2 3 ..., in turn, or with --ray [ADDRESS] at once on a Ray cluster; the same "
-        "command again resumes them.",
-        default=default_settings(some.scenario, some.algorithm, side=some.side),
+        description="Train a team, or a target. To resume a run: posse train --resume DIR.",
+        default=_Arguments.from_dict({**default.to_dict(), "preset": which.preset}),
         args=arguments,
     )
     require(*_NEEDED)
-    if several.seeds or several.ray is not None:
-        _train_all(settings, several)
+    if given.seeds or given.ray is not None:
+        _train_all(given)
         return
-    from posse_training.runs.train import train
+    from posse_training.train.train import train
 
-    with _how_to_resume(settings.run_folder):
-        path = train(settings)
+    with _how_to_resume(given.run_folder):
+        path = train(given.settings)
     print(_what_next(path))
 
 
@@ -107,15 +111,18 @@ def _what_next(path: Path) -> str:
     )
 
 
-def _train_all(settings: TrainSettings, several: _Seeds) -> None:
+def _train_all(given: _Arguments) -> None:
     """Train with every seed, and print the files of the best policies."""
-    from posse_training.runs.seeds.in_turn import train_seeds, with_seeds
+    from posse_training.train.seeds import train_seeds, with_seeds
 
-    cluster = of_option(several.ray, Path())  # the run folders hold the results
-    runs = with_seeds(settings, several.seeds or (settings.seed,))
-    with how_to_resume(("--seeds",)):
-        for path in train_seeds(runs, cluster):
+    ray = address_of(given.ray)
+    runs = with_seeds(given.settings, given.seeds or (given.seed,))
+    try:
+        for path in train_seeds(runs, ray):
             print(path)
+    except KeyboardInterrupt:
+        print("\nto resume: run the same command again", file=sys.stderr)
+        raise
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
@@ -18,20 +19,18 @@ from rich.console import Console
 import posse
 from posse import Batch, Scenario, get_scenario, scenario_names
 from posse_baselines import PolicyError, load_target
-from posse_training.cluster import Cluster
-from posse_training.cluster.settings import RayOption, of_option, work_of
 from posse_training.compare.contenders import Contender, read_contenders
 from posse_training.compare.marl_eval import write_marl_eval
-from posse_training.compare.playing import check, play, replay
+from posse_training.compare.playing import Game, Key, Played, check, play, played_on_ray, replay
 from posse_training.compare.plays import Plays
 from posse_training.compare.table import Row, row_of, table
-from posse_training.errors import ComparisonError, SettingsError, TimeLimitError, require
+from posse_training.errors import ComparisonError, PlayError, SettingsError, TimeLimitError, require
+from posse_training.evaluation.episodes import refuse_trained_split
+from posse_training.evaluation.evaluation import progress_bar
+from posse_training.evaluation.statistics import Estimate
+from posse_training.parallel import RayOption, address_of
 from posse_training.provenance import commit
 from posse_training.replay import join, write_replay
-from posse_training.reports.episodes import refuse_trained_split
-from posse_training.reports.evaluation import progress_bar
-from posse_training.reports.failures import PlayError
-from posse_training.reports.statistics import Estimate
 
 PLANNER: Final = "planner"
 """The reference that is shown with every team."""
@@ -74,8 +73,8 @@ class Settings:
     """Time limit of a policy on one scenario, for each training seed, s (with --ray: of a shard of
     500 worlds); a policy that exceeds it is stopped and skipped on the remaining scenarios."""
     ray: RayOption = None
-    """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
-    this machine, or else all its cores. Extra: cluster."""
+    """Play all at once on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
+    this machine, or else all its cores. The same command resumes an interrupted comparison. Extra: cluster."""
     target: str | None = None
     """Target that all teams play against: a motion, a learned target, a file or
     package.module:Class; default: the scenario's own."""
@@ -130,17 +129,23 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     if settings.target is not None:
         refuse_trained_split(load_target(settings.target), settings.split)
     folder = _free(settings.out)
-    if settings.ray is not None:
+    ray = address_of(settings.ray)
+    if ray is not False:
         require("cluster", "ray")
     for contender in contenders:
         check(contender, settings.time_limit)
-    folder.mkdir(parents=True, exist_ok=True)
     run = _Run(settings, scenarios, contenders, Comparison(contenders[0].label, folder))
-    with progress_bar(console=console or Console(stderr=True)) as bar:
+    with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
+        if ray is not False:
+            played = [(c, scenario, run.episodes(c)) for scenario in scenarios for c in contenders]
+            report = lambda done, total: bar.update(task, completed=done, total=total)  # noqa: E731
+            run.played = stack.enter_context(played_on_ray(played, run.game, ray, report))
+            bar.reset(task, total=len(scenarios) * len(contenders))
+        folder.mkdir(parents=True, exist_ok=True)
         for scenario in scenarios:
             run.play(scenario, lambda what: bar.update(task, description=what, advance=1))
-    run.write()
+        run.write()
     return run.found
 
 
@@ -179,6 +184,20 @@ class _Run:
     stopped: dict[str, str] = field(default_factory=dict)
     """Why policies that exceeded the time limit are not played again, by label."""
     stems: set[str] = field(default_factory=set)
+    played: dict[Key, Played] = field(default_factory=dict)
+    """What a cluster has played already."""
+
+    @property
+    def game(self) -> Game:
+        """What is played."""
+        s = self.settings
+        return Game(s.seed, s.split, s.target, s.time_limit)
+
+    def episodes(self, contender: Contender) -> int:
+        """Number of worlds that a contender plays."""
+        s = self.settings
+        is_reference = contender.label == PLANNER and PLANNER not in s.policies
+        return min(s.episodes, s.planner_episodes) if is_reference else s.episodes
 
     def play(self, scenario: Scenario, report: Callable[[str], object]) -> None:
         """Play one scenario with every contender, and write the rows."""
@@ -208,22 +227,15 @@ class _Run:
         about |= {"comparison": rows, "left_out": found.left_out, "failed": found.failed}
         (found.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
-    def _cluster(self) -> Cluster | None:
-        return of_option(self.settings.ray, work_of(self.found.folder))
-
     def _attempt(self, contender: Contender, scenario: Scenario) -> Plays | None:
         """Play; return ``None`` and note why if the contender cannot or fails."""
-        s, label = self.settings, contender.label
-        worlds = s.episodes
-        if label == PLANNER and PLANNER not in s.policies:
-            worlds = min(worlds, s.planner_episodes)
+        label = contender.label
         why = {"policy": label, "what": scenario.name}
-        if label in self.stopped:
+        if label in self.stopped and not self.played:
             self.found.failed.append({**why, "why": self.stopped[label]})
             return None
-        played = {"target": s.target, "limit": s.time_limit, "cluster": self._cluster()}
         try:
-            return play(contender, scenario, worlds, s.seed, s.split, **played)  # type: ignore[arg-type]
+            return play(contender, scenario, self.episodes(contender), self.game, self.played)
         except PolicyError as error:
             self.found.left_out.append({**why, "why": str(error)})
         except TimeLimitError as error:  # the next scenario would most likely take as long
@@ -272,12 +284,11 @@ class _Run:
 
     def _record(self, one: Any) -> tuple[str, str]:
         """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""
-        s, by_label = self.settings, {each.label: each for each in self.contenders}
+        by_label = {each.label: each for each in self.contenders}
         scenario = get_scenario(one.scenario)
-        played = {"target": s.target, "limit": s.time_limit}
         try:
             replays = [
-                replay(by_label[label], seed, scenario, s.seed, one.world, s.split, **played)  # type: ignore[arg-type]
+                replay(by_label[label], seed, scenario, one.world, self.game)
                 for label, seed in ((self.found.reference, 0), (one.policy, one.seed))
             ]
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"

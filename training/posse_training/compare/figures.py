@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
-from posse_training.reports.pictures.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain
-from posse_training.reports.statistics import share
+from posse_training.evaluation.statistics import share
+from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain
 
 CAPTIONS: Final = {
     "scenarios": "Mean safe score of every team on every scenario.",

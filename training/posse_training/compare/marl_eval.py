@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from posse_training.compare.plays import Plays
-from posse_training.reports.results import Results
+from posse_training.evaluation.results import Results
 
 
 def write_marl_eval(plays: Mapping[tuple[str, str], Plays], path: Path) -> None:

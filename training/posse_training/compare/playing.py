@@ -6,28 +6,23 @@ process of its own, which is ended at the time limit. That is no sandbox.
 
 from __future__ import annotations
 
-import faulthandler
-import os
-import pickle
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Final
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
 
-from posse import Scenario, ScenarioError
+from posse import Scenario
 from posse_baselines import Policy, PolicyError, load
-from posse_training.cluster import Cluster
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
-from posse_training.errors import ClusterError, SettingsError, TimeLimitError, TrainedSplitError
+from posse_training.errors import ClusterError, PlayError, TimeLimitError, describe
+from posse_training.evaluation.evaluation import Evaluation, evaluate, gathered_results, played_errors, prepare
+from posse_training.evaluation.results import Results
+from posse_training.parallel import apart
 from posse_training.replay import Replay, record
-from posse_training.reports.evaluation import evaluate
-from posse_training.reports.failures import PlayError, describe
-from posse_training.reports.results import Results
 
-_GRACE: Final = 3.0  # s beyond the limit, in which the policy may notice it by itself
+Played = Results | Exception
 
 
 def check(contender: Contender, limit: float) -> None:
@@ -39,60 +34,92 @@ def check(contender: Contender, limit: float) -> None:
     for policy in contender.policies:
         if isinstance(policy, str):
             try:
-                _apart(limit, _load, policy)
+                apart(limit, _load, policy)
             except (TimeLimitError, PlayError) as error:
                 raise PolicyError(f"{policy!r} cannot be loaded: {error}") from error
 
 
-def play(
-    contender: Contender,
-    scenario: Scenario,
-    episodes: int,
-    seed: int,
-    split: str,
-    *,
-    target: str | None,
-    limit: float,
-    cluster: Cluster | None = None,
-) -> Plays:
-    """Play the same worlds with every policy of a contender.
+Key = tuple[str, str, int]
+"""Scenario, label of a contender, and which of its policies."""
+
+
+@dataclass(frozen=True)
+class Game:
+    """The worlds of a comparison, and what is played there."""
+
+    seed: int
+    split: str
+    target: str | None
+    limit: float
+    """Time limit of a policy on one scenario, s."""
+
+
+def play(contender: Contender, scenario: Scenario, episodes: int, game: Game, found: Mapping[Key, Played]) -> Plays:
+    """Play the same worlds with every policy of a contender, but for those that are ``found`` already.
 
     Raises:
         PolicyError: A policy does not fit the scenario.
-        TimeLimitError: A policy exceeded the limit, s, and was ended.
+        TimeLimitError: A policy exceeded the limit and was ended.
         PlayError: A policy failed.
     """
     results = []
-    for policy in contender.policies:
-        given = (policy, scenario, episodes, seed, split, target, limit)
-        if isinstance(policy, str) and cluster is None:
-            found: Results = _apart(limit, _evaluate, *given)
-        else:
-            found = _evaluate(*given, cluster)
-        results.append(found)
+    for k, policy in enumerate(contender.policies):
+        played = found.get((scenario.name, contender.label, k))
+        if isinstance(played, Exception):
+            raise played
+        if played is None:
+            given = (policy, scenario, episodes, game)
+            played = apart(game.limit, _evaluate, *given) if isinstance(policy, str) else _evaluate(*given)
+        results.append(played)
     return Plays(contender.label, tuple(results))
 
 
-def replay(
-    contender: Contender,
-    member: int,
-    scenario: Scenario,
-    seed: int,
-    world: int,
-    split: str,
-    *,
-    target: str | None,
-    limit: float,
-) -> Replay:
+@contextmanager
+def played_on_ray(
+    contenders: Sequence[tuple[Contender, Scenario, int]],
+    game: Game,
+    ray: bool | str,
+    progress: Callable[[int, int], object],
+) -> Iterator[dict[Key, Played]]:
+    """Play all of a comparison at once on a Ray cluster; give the results, or why there are none.
+
+    Finished shards are kept until the context ends without an exception.
+
+    Args:
+        contenders: Each contender with a scenario and a number of episodes.
+        game: What is played.
+        ray: The cluster.
+        progress: Is called with the number of finished shards and of all.
+    """
+    found: dict[Key, Played] = {}
+    ready: dict[Key, Evaluation] = {}
+    for contender, scenario, episodes in contenders:
+        for k, policy in enumerate(contender.policies):
+            key = scenario.name, contender.label, k
+            try:
+                with played_errors():
+                    ready[key] = _prepare(policy, scenario, episodes, game)
+            except (PolicyError, PlayError) as error:
+                found[key] = error
+    total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
+    with gathered_results(list(ready.values()), ray, lambda: progress(next(done), total)) as results:
+        found |= zip(ready, results, strict=True)
+        for one in found.values():
+            if isinstance(one, ClusterError):
+                raise one
+        yield found
+
+
+def replay(contender: Contender, member: int, scenario: Scenario, world: int, game: Game) -> Replay:
     """Play one world again with one of a contender's policies and record it, without observations.
 
     Raises:
         PlayError: The policy failed.
-        TimeLimitError: It exceeded the limit, s.
+        TimeLimitError: It exceeded the limit.
     """
     policy = contender.policies[member]
-    given = (contender.label, policy, scenario, seed, world, split, target)
-    found: Replay = _apart(limit, _record, *given) if isinstance(policy, str) else _record(*given)
+    given = (contender.label, policy, scenario, world, game)
+    found: Replay = apart(game.limit, _record, *given) if isinstance(policy, str) else _record(*given)
     return found
 
 
@@ -103,91 +130,21 @@ def _load(policy: str) -> str:
         raise PolicyError(str(error)) from None  # a subclass may not survive pickling
 
 
-def _evaluate(
-    policy: str | Policy,
-    scenario: Scenario,
-    episodes: int,
-    seed: int,
-    split: str,
-    target: str | None,
-    limit: float,
-    cluster: Cluster | None = None,
-) -> Results:
-    try:
-        return evaluate(
-            policy,
-            scenario,
-            episodes,
-            seed,
-            split=split,
-            target=target,
-            progress=False,
-            time_limit=limit,
-            ray=cluster or False,
-        )
-    except PolicyError as error:
-        raise PolicyError(str(error)) from None
-    except (TimeLimitError, TrainedSplitError, SettingsError, ScenarioError, ClusterError):
-        raise
-    except Exception as error:
-        raise PlayError(describe(error)) from None
+def _prepare(policy: str | Policy, scenario: Scenario, episodes: int, game: Game) -> Evaluation:
+    given: dict[str, Any] = {"target": game.target, "split": game.split, "time_limit": game.limit}
+    return prepare(policy, scenario, episodes, game.seed, **given)
 
 
-def _record(
-    label: str, policy: str | Policy, scenario: Scenario, seed: int, world: int, split: str, target: str | None
-) -> Replay:
+def _evaluate(policy: str | Policy, scenario: Scenario, episodes: int, game: Game) -> Results:
+    given: dict[str, Any] = {"target": game.target, "split": game.split, "time_limit": game.limit}
+    with played_errors():
+        return evaluate(policy, scenario, episodes, game.seed, progress=False, **given)
+
+
+def _record(label: str, policy: str | Policy, scenario: Scenario, world: int, game: Game) -> Replay:
     try:
         loaded = load(policy) if isinstance(policy, str) else policy
-        played = {"target": target, "seed": seed, "world": world, "split": split, "observations": False}
-        return record([(label, loaded)], scenario, **played)  # type: ignore[arg-type]
+        played: dict[str, Any] = {"target": game.target, "seed": game.seed, "split": game.split}
+        return record([(label, loaded)], scenario, world=world, observations=False, **played)
     except Exception as error:
         raise PlayError(describe(error)) from None
-
-
-def _apart(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Return ``function(*arguments)``, computed in a process of its own.
-
-    Raises:
-        TimeLimitError: It took longer than the limit, s; the process was ended.
-        PlayError: The process died.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        given, found = Path(folder, "given"), Path(folder, "found")
-        given.write_bytes(pickle.dumps((limit, function, arguments)))
-        try:
-            done = subprocess.run(
-                [sys.executable, "-m", __name__, str(given), str(found)],
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-                stdout=subprocess.DEVNULL,
-                timeout=limit + _GRACE,
-                check=False,
-            )
-        except subprocess.TimeoutExpired as error:
-            raise TimeLimitError(f"it exceeded the time limit of {limit:g} s and was ended") from error
-        if not found.exists():
-            raise PlayError(f"its process ended with exit code {done.returncode}")
-        value = pickle.loads(found.read_bytes())  # noqa: S301 (our own process wrote it)
-    if isinstance(value, Exception):
-        raise value
-    return value
-
-
-def _answer(given: Path, found: Path) -> None:
-    """Compute what a file asks for, and write it, or the error, to another one."""
-    limit, function, arguments = pickle.loads(given.read_bytes())  # noqa: S301 (our parent wrote it)
-    with Path(os.devnull).open("w") as nowhere:
-        # A hanging policy does not outlive a parent that was killed.
-        faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
-        try:
-            value = function(*arguments)
-        except Exception as error:
-            value = error
-        partial = found.with_suffix(".partial")
-        partial.write_bytes(pickle.dumps(value))
-        partial.rename(found)
-
-
-if __name__ == "__main__":
-    from posse_training.compare import playing  # the module that errors are pickled as
-
-    playing._answer(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import Scenario
-from posse_training.reports.results import Results
-from posse_training.reports.statistics import (
+from posse_training.evaluation.results import Results
+from posse_training.evaluation.statistics import (
     Estimate,
     difference,
     improvement,

@@ -13,7 +13,7 @@ import jinja2
 from posse_training.compare.figures import CAPTIONS
 from posse_training.compare.plays import Plays
 from posse_training.compare.table import COLUMNS, Row, cell, ranked
-from posse_training.reports.pictures.style import PLANNER
+from posse_training.style import PLANNER
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from posse_training.compare.plays import Plays
-from posse_training.reports.statistics import Estimate
+from posse_training.evaluation.statistics import Estimate
 
 Row = dict[str, Any]
 """The estimates of one policy on one scenario."""

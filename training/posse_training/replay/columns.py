@@ -32,14 +32,13 @@ Rows are the trackers, followed by the target if it is an agent.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import FloatArray
 from posse_training.replay.episode import Column
 
 _PLACE: Final = 0.001  # m
@@ -54,62 +53,68 @@ _BELIEF: Final = 0.01
 _RESOLUTIONS: Final = {"m": 0.001, "m/s": 0.001, "rad": 0.001, "rad/s": 0.001, "s": 0.01}
 _FINE: Final = 0.001
 STATES: Final = (
-    "tracker_x",
-    "tracker_y",
-    "tracker_heading_cos",
-    "tracker_heading_sin",
-    "tracker_sees",
-    "tracker_slot",
-    "tracker_onsets",
-    "tracker_broken_at",
-    "tracker_sensor_dead_from",
-    "tracker_radio_dead_from",
-    "tracker_fix_step",
-    "tracker_fix_x",
-    "tracker_fix_y",
-    "tracker_fix_cos",
-    "tracker_fix_sin",
-    "heard_step",
-    "world_step",
-    "world_x",
-    "world_y",
-    "world_heading_cos",
-    "world_heading_sin",
-    "world_frame_cos",
-    "world_frame_sin",
-    "world_pressed",
-    "world_score",
-    "world_detected_at",
-    "world_settled_at",
-    "world_recovered_at",
-    "world_contacts_tracker",
-    "world_contacts_obstacle",
-    "world_contacts_target",
+    *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
+    *("tracker_sees", "tracker_slot", "tracker_onsets"),
+    *("tracker_broken_at", "tracker_sensor_dead_from", "tracker_radio_dead_from"),
+    *("tracker_fix_step", "tracker_fix_x", "tracker_fix_y", "tracker_fix_cos", "tracker_fix_sin", "heard_step"),
+    *("world_step", "world_x", "world_y", "world_heading_cos", "world_heading_sin"),
+    *("world_frame_cos", "world_frame_sin", "world_pressed", "world_score"),
+    *("world_detected_at", "world_settled_at", "world_recovered_at"),
+    *("world_contacts_tracker", "world_contacts_obstacle", "world_contacts_target"),
 )
+"""Names of the state arrays that columns and events are made of."""
 
-"""Names of the state arrays that are recorded in each frame."""
-
-States = dict[str, npt.NDArray[Any]]
-"""By name, (T + 1, ...) each."""
+Arrays = Mapping[str, npt.NDArray[Any]]
+"""Of one world, by the names of a trajectory: T + 1 rows each, or T of what belongs to a step."""
 
 
-def last_kept(rows: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+def columns_of(arrays: Arrays, layout: ObservationLayout, terms: Sequence[str], whole: bool) -> dict[str, Column]:
+    """Return the columns of an episode.
+
+    Args:
+        arrays: The episode; annotations may be missing.
+        layout: Of the observations.
+        terms: Names of the reward terms to keep.
+        whole: Whether to keep all observations; else actions and beliefs are coarser.
+    """
+    actions = _last_kept(arrays["actions"])
+    columns = _states(arrays, layout.scenario)
+    columns["action"] = Column(actions[..., :2], _ACTION if whole else _COARSE_ACTION)
+    if actions.shape[-1] > 2:
+        columns["message"] = Column(actions[..., 2:], _MESSAGE)
+    for name in terms:
+        term = arrays[f"reward/{name}"]  # the first frame has no reward
+        columns[f"reward/{name}"] = _number_column(np.concatenate([np.zeros_like(term[:1]), term]), _FINE)
+    for name, values in arrays.items():
+        if name.startswith("annotation/"):
+            belief = f"belief/{name.removeprefix('annotation/')}"
+            columns[belief] = _number_column(_last_kept(values), _BELIEF if whole else _DRAWN)
+    views = layout.views(arrays["observations"])
+    for field in layout.fields:
+        if whole or field.name == "sonar":
+            finest = _RESOLUTIONS.get(field.unit, _FINE) if whole else _DRAWN
+            finest = _MESSAGE if field.name == "neighbour_message" else finest
+            columns[f"observation/{field.name}"] = _number_column(views[field.name], finest, field.unit)
+    return columns
+
+
+def _last_kept(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Return T rows as T + 1; the last frame, which has no action, repeats the row before."""
-    return np.stack([*rows, rows[-1]])
+    return np.concatenate([rows, rows[-1:]])
 
 
-def _number_column(values: npt.NDArray[Any], resolution: float) -> Column:
+def _number_column(values: npt.NDArray[Any], resolution: float, unit: str = "1") -> Column:
     """Return a column that is stored exactly if its values are whole numbers."""
     finite = np.isfinite(values)
     whole = np.array_equal(values[finite], np.rint(values[finite]))
-    return Column(values, 1.0 if whole else resolution)
+    return Column(values, 1.0 if whole else resolution, unit)
 
 
-def _angle(states: States, cosine: str, sine: str) -> Column:
-    return Column(np.unwrap(np.arctan2(states[sine], states[cosine]), axis=0), _ANGLE, "rad")
+def _angle(arrays: Arrays, cosine: str, sine: str) -> Column:
+    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _ANGLE, "rad")
 
 
-def state_columns(states: States, scenario: Scenario) -> dict[str, Column]:
+def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
     """Return the columns of the robots, the target and the radio."""
     step = states["world_step"][:, None]
     outage = max(1, round(scenario.outage_time / scenario.control_step))
@@ -141,44 +146,4 @@ def state_columns(states: States, scenario: Scenario) -> dict[str, Column]:
     }
     if states["heard_step"].size:
         columns["heard_step"] = Column(states["heard_step"])
-    return columns
-
-
-def reward_columns(terms: dict[str, list[npt.NDArray[Any]]]) -> dict[str, Column]:
-    """Return a column of each term of T steps; the first frame has no reward."""
-    return {
-        f"reward/{name}": _number_column(np.stack([np.zeros_like(column[0]), *column]), _FINE)
-        for name, column in terms.items()
-    }
-
-
-def belief_columns(beliefs: States, whole: bool) -> dict[str, Column]:
-    """Return a column of each annotation of the policy, coarse unless ``whole``."""
-    finest = _BELIEF if whole else _DRAWN
-    return {f"belief/{name}": _number_column(value, finest) for name, value in beliefs.items()}
-
-
-def action_columns(actions: Sequence[FloatArray], whole: bool) -> dict[str, Column]:
-    """Return the columns of T actions (rows, 2 + m), coarse unless ``whole``."""
-    if not actions:
-        return {}
-    values = last_kept(actions)
-    columns = {"action": Column(values[..., :2], _ACTION if whole else _COARSE_ACTION)}
-    if values.shape[-1] > 2:
-        columns["message"] = Column(values[..., 2:], _MESSAGE)
-    return columns
-
-
-def observation_columns(layout: ObservationLayout, observations: FloatArray, whole: bool) -> dict[str, Column]:
-    """Return a column of each field of observations (T + 1, rows, F), or only of the sonar."""
-    columns = {}
-    views = layout.views(observations)
-    for field in layout.fields:
-        if not whole and field.name != "sonar":
-            continue
-        finest = _RESOLUTIONS.get(field.unit, _FINE) if whole else _DRAWN
-        if field.name == "neighbour_message":
-            finest = _MESSAGE
-        kept = _number_column(views[field.name], finest)
-        columns[f"observation/{field.name}"] = Column(kept.values, kept.resolution, field.unit)
     return columns

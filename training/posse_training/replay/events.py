@@ -18,16 +18,15 @@ _TOUCHED: Final = {
 }
 
 
-def find_events(states: _States, control_step: float, leader: npt.NDArray[Any] | None) -> tuple[Event, ...]:
-    """Return the events of an episode in order of time.
+def find_events(states: _States) -> tuple[Event, ...]:
+    """Return the events of an episode of one world in order of time.
 
     Args:
-        states: Engine states by name, (T + 1, ...) each.
-        control_step: Length of a step, s.
-        leader: Leader of each tracker, (T + 1, N), -1: none; ``None``: not known.
+        states: States by name, (T + 1, ...) each, and perhaps ``annotation/leader`` (T, N), -1: none.
     """
+    leader = states.get("annotation/leader")
     found = [
-        *_marks(states, control_step),
+        *_marks(states),
         *_darts(states),
         *_contacts(states),
         *_breaks(states),
@@ -36,7 +35,7 @@ def find_events(states: _States, control_step: float, leader: npt.NDArray[Any] |
     return tuple(sorted(found, key=lambda event: event.step))
 
 
-def _marks(states: _States, control_step: float) -> list[Event]:
+def _marks(states: _States) -> list[Event]:
     """Return the events whose times the engine records."""
     events = []
     for name, kind, text in (

@@ -1,155 +1,111 @@
-"""Records an episode of a batch for a replay."""
+"""Plays a world with each policy and makes a replay of the trajectories."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
-import numpy as np
-import numpy.typing as npt
-
-from posse import Batch
-from posse.numeric import BoolArray, FloatArray
+from posse import Batch, Scenario, get_scenario
+from posse_baselines import Policy, Target, Trajectory, against, load, load_target, rollout
+from posse_baselines.playing import check_moves_all
 from posse_training.errors import SettingsError
-from posse_training.replay.columns import (
-    STATES,
-    action_columns,
-    belief_columns,
-    last_kept,
-    observation_columns,
-    reward_columns,
-    state_columns,
-)
-from posse_training.replay.episode import Player, Replay
+from posse_training.replay.columns import STATES, columns_of
+from posse_training.replay.episode import MOST_PLAYERS, Player, Replay, join
 from posse_training.replay.events import find_events
-from posse_training.replay.world import describe_world
+from posse_training.replay.world import PLACES, describe_world
+
+RECORD: Final = (*STATES, *PLACES, "observations", "actions", "terms", "annotations")
+"""Names of the arrays of a trajectory that a replay is made of."""
+_LONGEST_ENTRY: Final = 400  # characters, of a card
 
 
-class Recorder:
-    """A batch that records one of its worlds for a replay.
-
-    It is used instead of the batch, one episode at a time::
-
-        recorder = Recorder(batch, "mine")
-        observations = recorder.reset()
-        while not recorder.over:
-            actions = ...
-            observations, rewards, terminated, truncated, infos = recorder.step(actions)
-        write_replay(recorder.replay(), "mine.html")
+def record(
+    policies: Sequence[str | Policy | tuple[str, Policy]],
+    scenario: str | Scenario = "smart",
+    *,
+    target: str | Target | None = None,
+    seed: int = 7,
+    world: int = 0,
+    split: str = "test",
+    seconds: float | None = None,
+    observations: bool = True,
+    **overrides: Any,
+) -> Replay:
+    """Play one world with each policy.
 
     Args:
-        batch: The worlds.
-        name: Name of the player on the page.
-        world: Index of the recorded world in the batch.
-        observations: Whether to record all observations.
-        about: Description of the policy; plain JSON.
+        policies: One to four: names (see :func:`posse_baselines.load`), policies, or pairs
+            (label, policy).
+        scenario: Scenario or its name; ``message_size`` is raised to that of each policy.
+        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
+            scenario's own motion.
+        seed: Seed of the world.
+        world: Index of the world within the seed.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        seconds: Longest duration, s; ``None``: the whole episode.
+        observations: Whether to keep all observations, which are most of a page's size.
+        **overrides: Settings of the scenario.
 
     Raises:
-        SettingsError: No such world in the batch, or autoreset "same_step", which overwrites the
-            last state of an episode.
+        SettingsError: No policy, more than four, ``seconds`` not above 0.
+        PolicyError: A policy or target that is unknown or does not fit the scenario.
+        ScenarioError: An unknown scenario or split, an invalid setting, seed or world.
     """
+    settings = get_scenario(scenario, **overrides)
+    opponent = None if target is None else load_target(target)
+    if opponent is not None:
+        settings = opponent.fit(settings)
+    if not 1 <= len(policies) <= MOST_PLAYERS:
+        raise SettingsError(f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies")
+    if seconds is not None and not seconds > 0:
+        raise SettingsError(f"seconds={seconds!r} must be above 0")
+    steps = settings.horizon if seconds is None else max(1, round(seconds / settings.control_step))
+    replays = []
+    for given in policies:
+        label, policy = given if isinstance(given, tuple) else (None, given)
+        if isinstance(policy, str):
+            policy = load(policy)
+        player = against(policy, opponent)
+        check_moves_all(player, settings)
+        fitting = settings.replace(message_size=max(settings.message_size, policy.message_size))
+        batch = Batch(fitting, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
+        played = rollout(batch, player, RECORD, steps=steps)
+        replays.append(replay_of(played, label or policy.name, observations=observations, about=_about(policy)))
+    return join(replays)
 
-    def __init__(
-        self,
-        batch: Batch,
-        name: str,
-        *,
-        world: int = 0,
-        observations: bool = True,
-        about: Mapping[str, Any] | None = None,
-    ) -> None:
-        if not 0 <= world < batch.num_worlds:
-            raise SettingsError(f"world={world} is not in the batch: it holds worlds 0 to {batch.num_worlds - 1}")
-        if batch.autoreset == "same_step":
-            raise SettingsError(
-                "a batch with autoreset='same_step' loses its last states and cannot be recorded: "
-                "make it with autoreset='disabled'"
-            )
-        self.batch = batch
-        self.name = name
-        self._world = world
-        self._whole = observations
-        self._about = dict(about or {})
-        self._clear()
 
-    def _clear(self) -> None:
-        self._states: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in STATES}
-        self._observations: list[FloatArray] = []
-        self._actions: list[FloatArray] = []
-        self._terms: dict[str, list[npt.NDArray[Any]]] = {}
-        self._beliefs: dict[str, list[npt.NDArray[Any]]] = {}
-        self._described: dict[str, Any] = {}
-        self._metrics: dict[str, float] = {}
+def replay_of(
+    trajectory: Trajectory,
+    name: str,
+    *,
+    world: int = 0,
+    observations: bool = True,
+    about: Mapping[str, Any] | None = None,
+) -> Replay:
+    """Return the first episode of a world as a replay with one player.
 
-    @property
-    def over(self) -> bool:
-        """Whether the recorded episode has ended."""
-        return bool(self.batch.terminated[self._world] or self.batch.truncated[self._world])
+    Args:
+        trajectory: Has the arrays that :data:`RECORD` names; annotations may be missing.
+        name: Name of the player on the page.
+        world: Index in the trajectory.
+        observations: Whether to keep all observations, which are most of a page's size.
+        about: Description of the policy; plain JSON.
+    """
+    one = trajectory.episode(world)
+    arrays = {key: array[:, 0] for key, array in one.arrays.items()}
+    described = describe_world(arrays, one, observations)
+    events = find_events(arrays)
+    metrics = {key: float(values[0]) for key, values in one.metrics.items()}
+    columns = columns_of(arrays, one.layout, list(described["weights"]), observations)
+    return Replay(described, (Player(name, columns, events, metrics, dict(about or {})),))
 
-    def reset(self, **arguments: Any) -> FloatArray:
-        """Start an episode (see :meth:`posse.Batch.reset`) and record from here."""
-        observations = self.batch.reset(**arguments)
-        self._clear()
-        self._described = describe_world(self.batch, self._world, self._whole)
-        self._note(observations)
-        return observations
 
-    def step(
-        self, actions: npt.ArrayLike, beliefs: Mapping[str, npt.ArrayLike] | None = None
-    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
-        """Advance the batch (see :meth:`posse.Batch.step`) and record the step.
-
-        Args:
-            actions: (E, rows, 2 + message_size) in [-1, 1].
-            beliefs: Annotations by the policy, (E, N, ...) each: ``policy.annotations(memory)``.
-
-        Raises:
-            SettingsError: Before :meth:`reset`, or after the end of the recorded episode.
-        """
-        if not self._observations:
-            raise SettingsError("nothing is recorded before reset: call the recorder's reset()")
-        if self.over:
-            raise SettingsError("the recorded episode has ended: call the recorder's reset()")
-        told = {name: np.array(value)[self._world] for name, value in (beliefs or {}).items()}
-        done = self.batch.step(actions)
-        observations, *_, infos = done
-        self._actions.append(np.array(actions, np.float32)[self._world])
-        for name in self._described["weights"]:
-            self._terms.setdefault(name, []).append(infos[f"reward/{name}"][self._world])
-        for name, value in told.items():
-            self._beliefs.setdefault(name, []).append(value)
-        self._note(observations)
-        return done
-
-    def _note(self, observations: FloatArray) -> None:
-        state = self.batch.state
-        for name, column in self._states.items():
-            column.append(state[name][self._world].copy())
-        self._observations.append(observations[self._world].copy())
-        self._metrics = {name: float(value[self._world]) for name, value in self.batch.metrics().items()}
-
-    def player(self) -> Player:
-        """Return the episode recorded so far.
-
-        Raises:
-            SettingsError: Nothing has been recorded.
-        """
-        if not self._observations:
-            raise SettingsError("nothing is recorded before reset: call the recorder's reset()")
-        states = {name: np.stack(column) for name, column in self._states.items()}
-        beliefs = {name: last_kept(column) for name, column in self._beliefs.items()}
-        scenario = self.batch.scenario
-        columns = {
-            **state_columns(states, scenario),
-            **action_columns(self._actions, self._whole),
-            **reward_columns(self._terms),
-            **belief_columns(beliefs, self._whole),
-            **observation_columns(self.batch.layout, np.stack(self._observations), self._whole),
-        }
-        events = find_events(states, scenario.control_step, beliefs.get("leader"))
-        return Player(self.name, columns, events, dict(self._metrics), self._about)
-
-    def replay(self) -> Replay:
-        """Return the episode recorded so far as a replay with one player."""
-        player = self.player()
-        return Replay(self._described, (player,))
+def _about(policy: Policy) -> dict[str, Any]:
+    """Return a description of a policy, including the short entries of a learned one's card."""
+    about: dict[str, Any] = {"reads_state": True} if policy.reads_state else {}
+    card = getattr(policy, "card", None)
+    for name, value in card.items() if isinstance(card, Mapping) else ():
+        text = ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+        if not isinstance(value, Mapping) and len(text) <= _LONGEST_ENTRY:
+            about[str(name)] = value if isinstance(value, (int, float)) else text
+    return about

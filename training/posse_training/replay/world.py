@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any, Final
 
+import numpy.typing as npt
+
 import posse
-from posse import REWARD_TERMS, Batch, Field, Scenario, ScenarioError, get_scenario
-from posse.scenarios.formation import slot_offsets
+from posse import REWARD_TERMS, Field, Scenario, ScenarioError, get_scenario
+from posse_baselines import Trajectory
 from posse_baselines.ddcs import TASKS
 from posse_training.provenance import commit
 
+PLACES: Final = ("world_seed", "world_index", "world_episode", "obstacle_x", "obstacle_y", "obstacle_radius")
+"""Names of the state arrays that say which world was played."""
 _OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")
-_BLOCKS: Final = ("own motion", "task", "target", "sonar", "team-mates")
 
 
-def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, Any]:
+def describe_world(
+    arrays: Mapping[str, npt.NDArray[Any]], trajectory: Trajectory, observations: bool
+) -> dict[str, Any]:
     """Return the common data of all players of a world, as plain JSON with infinite numbers.
 
-    Without ``observations``, the sonar is the only observation field described.
+    Args:
+        arrays: Of the world, by name.
+        trajectory: That they are from.
+        observations: Whether to describe all fields of an observation, or only the sonar.
     """
-    scenario, state = batch.scenario, batch.state
+    scenario = trajectory.scenario
+    start = {name: arrays[name][0] for name in PLACES}
     weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
     return {
         "posse": posse.__version__,
@@ -29,14 +39,14 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
         "version": scenario.version,
         "settings": _settings(scenario),
         "changed": changed_settings(scenario),
-        "seed": int(state["world_seed"][world]),
-        "split": batch.split,
-        "world": int(state["world_index"][world]),
-        "episode": int(state["world_episode"][world]),
+        "seed": int(start["world_seed"]),
+        "split": trajectory.split,
+        "world": int(start["world_index"]),
+        "episode": int(start["world_episode"]),
         "agents": scenario.num_agents,
-        "slots": [[float(x), float(y)] for x, y in slot_offsets(scenario)],
+        "slots": [[float(x), float(y)] for x, y in scenario.slot_offsets],
         "obstacles": [
-            [float(state[f"obstacle_{name}"][world, k]) for name in ("x", "y", "radius")]
+            [float(start[f"obstacle_{name}"][k]) for name in ("x", "y", "radius")]
             for k in range(scenario.num_obstacles)
         ],
         "tasks": list(TASKS),
@@ -46,7 +56,7 @@ def describe_world(batch: Batch, world: int, observations: bool) -> dict[str, An
             for term in REWARD_TERMS
             if term.name in weights
         ],
-        "fields": [_describe(field) for field in batch.layout.fields if observations or field.name == "sonar"],
+        "fields": [_described(field) for field in trajectory.layout.fields if observations or field.name == "sonar"],
         "metrics": [{"name": metric.name, "unit": metric.unit, "meaning": metric.meaning} for metric in posse.METRICS],
     }
 
@@ -56,28 +66,22 @@ def _settings(scenario: Scenario) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in scenario.to_dict().items()}
 
 
-def _describe(field: Field) -> dict[str, Any]:
-    return {
-        "name": field.name,
-        "block": block_of(field),
-        "size": field.size,
-        "unit": field.unit,
-        "low": float(field.low),
-        "high": float(field.high),
-        "meaning": field.meaning,
-        "unknown": None if field.unknown is None else float(field.unknown),
-    }
+def _described(field: Field) -> dict[str, Any]:
+    numbers = {"low": float(field.low), "high": float(field.high)}
+    unknown = None if field.unknown is None else float(field.unknown)
+    told = {"size": field.size, "unit": field.unit, **numbers, "meaning": field.meaning, "unknown": unknown}
+    return {"name": field.name, "block": _block_of(field), **told}
 
 
-def block_of(field: Field) -> str:
+def _block_of(field: Field) -> str:
     """Return the heading in the panel under which a field is listed."""
     if field.of_neighbour:
-        return _BLOCKS[4]
+        return "team-mates"
     if field.name == "sonar":
-        return _BLOCKS[3]
+        return "sonar"
     if field.name.startswith("target_"):
-        return _BLOCKS[2]
-    return _BLOCKS[0] if field.name in _OWN else _BLOCKS[1]
+        return "target"
+    return "own motion" if field.name in _OWN else "task"
 
 
 def changed_settings(scenario: Scenario) -> dict[str, list[Any]]:

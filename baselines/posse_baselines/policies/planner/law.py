@@ -169,7 +169,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
             arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
             x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, scene.config.dt)
+                time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, scene.config.control_step)
             else:
                 time = time_to_slot(x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, _WEAVE_TIME, speed)
             # Time for turning towards it.
@@ -191,7 +191,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
 def surround(scene: Scene, i: int, discs: Records) -> int:
     """List what is near tracker i, as discs for the safeguard; return how many things that are."""
     c, w, t = scene.config, scene.world, scene.trackers[i]
-    count, two = 0, 2.0 * c.radius
+    count, two = 0, 2.0 * c.robot_radius
     dx, dy = w.x - t.x, w.y - t.y
     if dx * dx + dy * dy < _NEAR * _NEAR:
         vx, vy = w.speed * w.heading_cos, w.speed * w.heading_sin
@@ -205,11 +205,11 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
     for k in range(c.num_obstacles):
         disc = scene.obstacles[k]
         dx, dy = disc.x - t.x, disc.y - t.y
-        reach = disc.radius + c.radius
+        reach = disc.radius + c.robot_radius
         if dx * dx + dy * dy < (_NEAR + reach) * (_NEAR + reach):
             count = put_disc(discs, count, dx, dy, 0.0, 0.0, reach, _MARGIN)
     if c.walled:
-        count = put_walls(discs, count, t.x, t.y, c.half_arena, _NEAR, c.radius, _MARGIN)
+        count = put_walls(discs, count, t.x, t.y, c.half_arena, _NEAR, c.robot_radius, _MARGIN)
     return count
 
 
@@ -217,7 +217,7 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
 def wanted_velocity(scene: Scene, i: int, acceleration: float) -> tuple[float, float]:
     """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
     w, t, way = scene.world, scene.trackers[i], scene.ways[i]
-    slot, target, dt = scene.slots[scene.plans[i].slot], scene.plans[0], scene.config.dt
+    slot, target, dt = scene.slots[scene.plans[i].slot], scene.plans[0], scene.config.control_step
     speed = float(t.max_speed)
     arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
     shift_x, shift_y = rotate(way.ahead, way.left, w.heading_cos, w.heading_sin)
@@ -253,21 +253,21 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> tuple[float, f
 def frame_rate_of(c: Record, w: Record) -> float:
     """Return the turn rate of the slot frame (rad/s): at its limit until it is at the target's heading."""
     lag = wrap(math.atan2(w.heading_sin, w.heading_cos) - math.atan2(w.frame_sin, w.frame_cos))
-    most = math.atan2(c.frame_s, c.frame_c) / float(c.dt)
-    return min(max(lag / float(c.dt), -most), most)
+    most = math.atan2(c.frame_s, c.frame_c) / float(c.control_step)
+    return min(max(lag / float(c.control_step), -most), most)
 
 
 @compiled
 def drive(scene: Scene, work: Work, actions: FloatArray) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
     c, w, body = scene.config, scene.world, work.body
-    body.dt, body.acceleration, body.turn_acceleration = float(c.dt), _UNLIMITED, _UNLIMITED
+    body.dt, body.acceleration, body.turn_acceleration = float(c.control_step), _UNLIMITED, _UNLIMITED
     if c.per_acceleration > 0.0:
         body.acceleration = 1.0 / c.per_acceleration
     if c.per_turn_acceleration > 0.0:
         body.turn_acceleration = 1.0 / c.per_turn_acceleration
     target = scene.plans[0]
-    share = min(1.0, float(c.dt) / _MEAN_TIME) if w.step > 0 else 1.0
+    share = min(1.0, float(c.control_step) / _MEAN_TIME) if w.step > 0 else 1.0
     target.mean_x += share * (w.speed * w.heading_cos - target.mean_x)
     target.mean_y += share * (w.speed * w.heading_sin - target.mean_y)
     if w.step % _REPLAN_STEPS == 0 or target.slot < 0:

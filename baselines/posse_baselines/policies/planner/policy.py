@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
+from posse_baselines.fields import check, number
 from posse_baselines.policies.planner.law import PLAN
 from posse_baselines.policies.planner.model import RANGES, TRIES, Foresight, Law, play_ahead, standard_ways
 from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations, message_size_of
-from posse_baselines.tuning import check, number
 
 _REPEAT: Final = 64  # plannings after which the variations repeat
 

@@ -10,6 +10,7 @@ import numpy as np
 from posse.numeric import (
     ONE,
     TINY,
+    WIDTH,
     ZERO,
     Lanes,
     Record,
@@ -24,7 +25,7 @@ from posse.numeric import (
     root,
     store_fields,
 )
-from posse.rules.discs import BLOCK, blocks, columns, natural, store_rows
+from posse.rules.discs import blocks, columns, natural, store_rows
 from posse.rules.randomness import SENSOR_NOISE, normal_pair
 from posse.rules.senses.declaring import sensor
 from posse.rules.state import FIX, NEVER, Fix
@@ -60,7 +61,7 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> b
     d2 = dx * dx + dy * dy
     first = natural(c.num_trackers) + 1
     for block in range(blocks(c.num_obstacles)):
-        j = first + BLOCK * block
+        j = first + WIDTH * block
         ox, oy, radius = load(s.x, j) - t.x, load(s.y, j) - t.y, load(s.radius, j)
         along, across = ox * dx + oy * dy, ox * dy - oy * dx
         meets = (along > ZERO) & (along < d2) & (across * across < radius * radius * d2)
@@ -76,7 +77,7 @@ def fix_velocity(c: Record, since: Lanes, dx: Lanes, dy: Lanes, old_vx: Lanes, o
     ``since`` counts the control steps between them; ``old_vx`` and ``old_vy`` are the previous
     velocity. All are numbers or lanes.
     """
-    rate = ONE / (since * c.dt)
+    rate = ONE / (since * c.control_step)
     vx, vy, keep = dx * rate, dy * rate, lesser(ONE, c.smoothing * since)
     vx, vy = old_vx + keep * (vx - old_vx), old_vy + keep * (vy - old_vy)
     # No target is faster than a tracker (assumption ii): limit the effect of noise.
@@ -90,7 +91,7 @@ def fix_velocity(c: Record, since: Lanes, dx: Lanes, dy: Lanes, old_vx: Lanes, o
 def take_fix(c: Record, t: Record, sender: Record) -> None:
     """Take a sender's newer fix, with the velocity from this and the previous one."""
     since = np.float32(sender.fix_step - t.fix_step)
-    if t.fix_step >= 0 and since * c.dt <= _VELOCITY_MEMORY:
+    if t.fix_step >= 0 and since * c.control_step <= _VELOCITY_MEMORY:
         dx, dy = sender.fix.x - t.fix.x, sender.fix.y - t.fix.y
         t.fix_vx, t.fix_vy = fix_velocity(c, since, dx, dy, t.fix_vx, t.fix_vy)
     else:
@@ -123,7 +124,7 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
         note_bearings(c, w, trackers, s)
         return seeing
     for block in range(blocks(n)):
-        i = BLOCK * block
+        i = WIDTH * block
         own_x, own_y, before = load(s.x, i), load(s.y, i), load(s.fixed_at, i)
         dx, dy = w.x - own_x, w.y - own_y
         if measured:
@@ -132,7 +133,7 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
         old = Fix(*columns(trackers, i, n, FIX))
         since = greater(np.float32(w.step) - before, ONE)
         vx, vy = fix_velocity(c, since, x - old.fix_x, y - old.fix_y, old.fix_vx, old.fix_vy)
-        fresh = (before >= ZERO) & (since * c.dt <= _VELOCITY_MEMORY)
+        fresh = (before >= ZERO) & (since * c.control_step <= _VELOCITY_MEMORY)
         new = Fix(
             fix_x=x,
             fix_y=y,
@@ -143,12 +144,12 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
             fix_vx=choose(fresh, vx, ZERO),
             fix_vy=choose(fresh, vy, ZERO),
         )
-        store_rows(new, s.new_fix, BLOCK * i)
+        store_rows(new, s.new_fix, WIDTH * i)
     for i in range(n):
         t = trackers[i]
         if t.sees:
             t.fix_step = w.step
-            store_fields(t, FIX, load(s.new_fix, BLOCK * i))
+            store_fields(t, FIX, load(s.new_fix, WIDTH * i))
     return seeing
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from posse.numeric import (
     ONE,
     TINY,
+    WIDTH,
     ZERO,
     FloatArray,
     Record,
@@ -23,18 +24,18 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import BLOCK, FAR, blocks, natural, num_discs
+from posse.rules.discs import FAR, blocks, natural, num_discs
 
 _WORD: Final = 8  # blocks of eight discs in a bit set of 64
 
 _A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
 
-Pose = tuple[np.float32, np.float32, np.float32, np.float32]
+Place = tuple[np.float32, np.float32, np.float32, np.float32]
 """x, y, cosine and sine of the heading, of a tracker or the target."""
 
 
 @compiled
-def echo_of_disc(c: Record, robot: Pose, j: int, s: Record) -> None:
+def echo_of_disc(c: Record, robot: Place, j: int, s: Record) -> None:
     """Update the sonar readings with disc j.
 
     A beam that contains the nearest point of the disc reads the distance of that point; another one, the distance at
@@ -44,89 +45,79 @@ def echo_of_disc(c: Record, robot: Pose, j: int, s: Record) -> None:
     dx, dy, radius = s.x[j] - x, s.y[j] - y, s.radius[j]
     ahead, left = dx * hc + dy * hs, dy * hc - dx * hs
     distance = root(ahead * ahead + left * left)
-    if distance - radius >= c.sonar_range + c.radius:
+    if distance - radius >= c.sonar_range + c.robot_radius:
         return
-    nearest, least = greater(distance - radius - c.radius, ZERO), c.beam_cosine * distance
+    nearest, least = greater(distance - radius - c.robot_radius, ZERO), c.beam_cosine * distance
     radius2 = radius * radius
     wide = radius2 >= (ONE - c.beam_cosine * c.beam_cosine) * distance * distance
     for block in range(blocks(c.sonar_beams)):
-        k = BLOCK * block
+        k = WIDTH * block
         cosine, sine, reading = load(s.beam_cos, k), load(s.beam_sin, k), load(s.reading, k)
         along = ahead * cosine + left * sine
         reading = lesser(reading, choose(along >= least, nearest, FAR))
         if wide:
             across = left * cosine - ahead * sine
             under_root = radius2 - across * across
-            axis = greater(along - root(greater(under_root, ZERO)) - c.radius, ZERO)
+            axis = greater(along - root(greater(under_root, ZERO)) - c.robot_radius, ZERO)
             meets = (under_root > ZERO) & (along > ZERO) & (along < least)
             reading = lesser(reading, choose(meets, axis, FAR))
         store(s.reading, k, reading)
 
 
 @compiled(seldom=True)
-def echo_of_walls(c: Record, robot: Pose, s: Record) -> None:
+def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
-    half, (x, y, _, _) = c.half_arena, robot
-    echo_of_wall(c, robot, ONE, ZERO, half - x, s)
-    echo_of_wall(c, robot, -ONE, ZERO, half + x, s)
-    echo_of_wall(c, robot, ZERO, ONE, half - y, s)
-    echo_of_wall(c, robot, ZERO, -ONE, half + y, s)
+    x, y, hc, hs = robot
+    for normal_x, normal_y in ((ONE, ZERO), (-ONE, ZERO), (ZERO, ONE), (ZERO, -ONE)):  # outward
+        distance = c.half_arena - (normal_x * x + normal_y * y)
+        if distance >= c.sonar_range + c.robot_radius:
+            continue
+        nearest = max(distance - c.robot_radius, ZERO)
+        ahead, left = normal_x * hc + normal_y * hs, normal_y * hc - normal_x * hs
+        for block in range(blocks(c.sonar_beams)):
+            k = WIDTH * block
+            towards = ahead * load(s.beam_cos, k) + left * load(s.beam_sin, k)
+            axis = greater(distance / greater(towards, TINY) - c.robot_radius, ZERO)
+            found = choose(towards >= c.beam_cosine, nearest, choose(towards > ZERO, axis, FAR))
+            store(s.reading, k, lesser(load(s.reading, k), found))
 
 
 @compiled
-def echo_of_wall(
-    c: Record, robot: Pose, normal_x: np.float32, normal_y: np.float32, distance: np.float32, s: Record
-) -> None:
-    """Update the sonar readings with a wall at a distance along its outward normal."""
-    if distance >= c.sonar_range + c.radius:
-        return
-    nearest = max(distance - c.radius, ZERO)
-    _, _, hc, hs = robot
-    ahead, left = normal_x * hc + normal_y * hs, normal_y * hc - normal_x * hs
-    for block in range(blocks(c.sonar_beams)):
-        k = BLOCK * block
-        towards = ahead * load(s.beam_cos, k) + left * load(s.beam_sin, k)
-        axis = greater(distance / greater(towards, TINY) - c.radius, ZERO)
-        found = choose(towards >= c.beam_cosine, nearest, choose(towards > ZERO, axis, FAR))
-        store(s.reading, k, lesser(load(s.reading, k), found))
-
-
-@compiled
-def echo_of_discs(c: Record, robot: Pose, number: int, s: Record) -> None:
+def echo_of_discs(c: Record, robot: Place, number: int, s: Record) -> None:
     """Update the sonar readings with all discs in range."""
     x, y, _, _ = robot
     discs = blocks(num_discs(c))
     for first_block in range(0, discs, _WORD):
         near = 0  # candidate discs as bits, found without a square root
         for block in range(min(_WORD, discs - first_block)):
-            j = BLOCK * (first_block + block)
+            j = WIDTH * (first_block + block)
             dx, dy = load(s.x, j) - x, load(s.y, j) - y
-            near |= bits(dx * dx + dy * dy < load(s.sonar_reach2, j)) << (BLOCK * block)
-        own = int(number) - BLOCK * first_block
-        if 0 <= own < BLOCK * _WORD:
+            near |= bits(dx * dx + dy * dy < load(s.sonar_reach2, j)) << (WIDTH * block)
+        own = int(number) - WIDTH * first_block
+        if 0 <= own < WIDTH * _WORD:
             near &= ~(1 << own)
         while near != 0:
-            echo_of_disc(c, robot, natural(BLOCK * first_block + lowest_bit(near)), s)
+            echo_of_disc(c, robot, natural(WIDTH * first_block + lowest_bit(near)), s)
             near &= near - 1
 
 
 @compiled
-def ping(c: Record, robot: Pose, number: int, gap: np.float32, s: Record, o: FloatArray, first: int) -> None:
+def ping(c: Record, robot: Place, number: int, gap: np.float32, s: Record, o: FloatArray, first: int) -> None:
     """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
 
     The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`); the gap to
     the nearest other disc is at least ``gap``, m.
     """
     for block in range(blocks(c.sonar_beams)):
-        store(s.reading, BLOCK * block, eight(c.sonar_range))
+        store(s.reading, WIDTH * block, eight(c.sonar_range))
     if gap < c.sonar_range + _A_LITTLE:
         echo_of_discs(c, robot, number, s)
     x, y, _, _ = robot
-    if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.radius:
+    if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
     beams = natural(c.sonar_beams)
-    whole = beams // BLOCK
+    whole = beams // WIDTH
     for block in range(whole):
-        store(o, first + BLOCK * block, load(s.reading, BLOCK * block))
-    for k in range(BLOCK * whole, beams):
+        store(o, first + WIDTH * block, load(s.reading, WIDTH * block))
+    for k in range(WIDTH * whole, beams):
         o[first + k] = s.reading[k]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def draw_weave(c: Record, w: Record) -> None:
 
 
 @compiled
-def walked(value: float, step: float, low: float, high: float) -> np.float32:
+def walked(value: Any, step: Any, low: Any, high: Any) -> np.float32:
     """Return a value moved by a step, reflected at the ends of its range."""
     moved = value + step
     if moved > high:
@@ -57,9 +57,12 @@ def walked(value: float, step: float, low: float, high: float) -> np.float32:
 @target_motion("accelerating", draw=draw_weave, memory=_MEMORY)
 def accelerating(c: Record, w: Record) -> None:
     """Turn rate is a sine whose random amplitude and rate walk slowly, within the turn limit (paper, section 2)."""
-    limit, spread = c.target_turn_rate, np.float32(math.sqrt(3.0 * c.dt))  # of a uniform step of deviation sqrt(dt)
+    limit, spread = (
+        c.target_turn_rate,
+        np.float32(math.sqrt(3.0 * c.control_step)),
+    )  # of a uniform step of deviation sqrt(dt)
     turn = w.weave_amplitude * np.float32(math.sin(w.weave_phase))
-    w.weave_phase += w.weave_rate * c.dt
+    w.weave_phase += w.weave_rate * c.control_step
     if w.weave_phase >= TWO_PI:
         w.weave_phase -= TWO_PI
     wider = _AMPLITUDE_WALK * limit * spread * between(-1.0, 1.0, w.key, w.step, TARGET, 103)
@@ -67,7 +70,7 @@ def accelerating(c: Record, w: Record) -> None:
     faster = _RATE_WALK * spread * between(-1.0, 1.0, w.key, w.step, TARGET, 104)
     w.weave_rate = walked(w.weave_rate, faster, _LEAST_RATE, _MOST_RATE)
     for _ in range(c.physics_steps):  # an arc turns by 1 rad at most
-        _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, ZERO, turn, c.physics_dt)
+        _, _, w.goal_cos, w.goal_sin = arc(w.goal_cos, w.goal_sin, ZERO, turn, c.physics_step)
 
 
 @target_motion("agent")

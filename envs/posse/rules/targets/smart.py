@@ -33,7 +33,6 @@ SMART_DIRECTIONS: Final = 2 * WIDTH
 """Number of candidate directions."""
 
 _TINY: Final = np.float32(1e-12)
-_HALF_ROUND: Final = WIDTH
 _FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by this time
 _LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
 _LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
@@ -61,14 +60,9 @@ _PRESSED: Final = Memory(
 @target_motion("smart", memory=(_PRESSED,), mirrored=False)
 def smart(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Escapes through the widest gap, and darts when the team keeps station (paper, section 2)."""
-    if w.step % SMART_REPLAN == 0:
-        evade(c, w, trackers, obstacles, s)
-
-
-@compiled
-def evade(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
-    """Set the goal heading until the next decision."""
-    past = np.float32(SMART_REPLAN) * c.dt
+    if w.step % SMART_REPLAN != 0:
+        return
+    past = np.float32(SMART_REPLAN) * c.control_step
     if w.touching != NO_BITS:
         # Blocked by contact: leave in a free direction.
         w.pressed = ZERO
@@ -94,7 +88,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
     much nearer than any slot triggers a dart at once.
     """
     near = c.slots_reach + _STATION_MARGIN
-    danger = max(_DANGER * c.formation_distance, c.radius + c.radius)
+    danger = max(_DANGER * c.formation_distance, c.robot_radius + c.robot_radius)
     vx, vy = c.target_speed * w.heading_cos, c.target_speed * w.heading_sin
     committed = ZERO
     for i in range(c.num_trackers):
@@ -123,7 +117,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     v, most = c.target_speed, c.fastest
     a = most * most - v * v
     per_a = ONE / a
-    clear = c.radius + c.radius + _CLEARANCE
+    clear = c.robot_radius + c.robot_radius + _CLEARANCE
     # No hysteresis for the initial heading, nor for a choice that ended in contact.
     loyalty = _LOYALTY if w.step > 0 and w.touching == NO_BITS else ZERO
     # Half the directions; the opposite ones share the square root.
@@ -147,12 +141,12 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
             ahead, astern = lesser(ahead, until - b), lesser(astern, until + b)
     same_way = loyalty * (ux * w.goal_cos + uy * w.goal_sin)
     store(s.worth, 0, ahead * per_a + same_way)
-    store(s.worth, _HALF_ROUND, astern * per_a - same_way)
+    store(s.worth, WIDTH, astern * per_a - same_way)
     best = np.float32(-1e9)
-    for k in range(_HALF_ROUND):
+    for k in range(WIDTH):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         for side in range(2):
-            value = s.worth[_HALF_ROUND * side + k]
+            value = s.worth[WIDTH * side + k]
             if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
@@ -188,7 +182,7 @@ def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> No
     displaces them farthest from their places around the target, without a collision.
     """
     moment = DART_TURN / (c.target_turn_rate * np.float32(_DART_MOMENTS))
-    clear = c.radius + c.radius + _CLEARANCE
+    clear = c.robot_radius + c.robot_radius + _CLEARANCE
     best = np.float32(-1e9)
     for k in range(0, SMART_DIRECTIONS, _DART_STRIDE):
         ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]

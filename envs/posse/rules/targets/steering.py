@@ -29,7 +29,7 @@ def target_turn_rate(
     set_goal(c, w, trackers, obstacles, s)
     if c.mirrored:
         mirror_at_walls(c, w)
-    turn = turn_towards(w.heading_cos, w.heading_sin, w.goal_cos, w.goal_sin, c.target_turn_rate, c.dt)
+    turn = turn_towards(w.heading_cos, w.heading_sin, w.goal_cos, w.goal_sin, c.target_turn_rate, c.control_step)
     if c.walled:
         turn = safe_turn(c, w, obstacles, turn)
     return turn
@@ -46,16 +46,6 @@ def mirror_at_walls(c: Record, w: Record) -> None:
 
 
 @compiled
-def circle_is_free(c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32) -> bool:
-    """Return whether the disc of the target's turning circle is clear of walls and obstacles."""
-    room = radius + c.safe_distance
-    if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:
-        return False
-    # A circle that contains an obstacle is not free, either.
-    return not obstacle_within(obstacles, c.num_obstacles, x, y, room)
-
-
-@compiled
 def has_free_circle(
     c: Record,
     obstacles: Records,
@@ -69,7 +59,11 @@ def has_free_circle(
     """Return whether the turning circle on a side (+1 left, -1 right) is free, to an allowance."""
     radius = c.target_speed / c.target_turn_rate
     x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
-    return circle_is_free(c, obstacles, x, y, radius - allowance)
+    room = radius - allowance + c.safe_distance
+    if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:
+        return False
+    # A circle that contains an obstacle is not free, either.
+    return not obstacle_within(obstacles, c.num_obstacles, x, y, room)
 
 
 @compiled(seldom=True)
@@ -81,7 +75,7 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
     dx, dy, hc, hs = w.heading_cos, w.heading_sin, w.heading_cos, w.heading_sin
     x, y = w.x, w.y
     for _ in range(c.physics_steps):
-        dx, dy, hc, hs = arc(hc, hs, c.target_speed, turn, c.physics_dt)
+        dx, dy, hc, hs = arc(hc, hs, c.target_speed, turn, c.physics_step)
         x, y = x + dx, y + dy
     if has_free_circle(c, obstacles, x, y, hc, hs, ONE):
         return turn

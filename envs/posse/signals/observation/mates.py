@@ -148,7 +148,7 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
         t = Pose(*fields)
         return _mate(v, number, distance, eight(_ZERO), t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate)
     h = Heard(*fields)
-    age = (v.step - counts(h.step)) * c.dt
+    age = (v.step - counts(h.step)) * c.control_step
     return _mate(v, number, distance, age, h.x, h.y, h.heading_cos, h.heading_sin, h.speed, h.turn_rate)
 
 

@@ -150,13 +150,13 @@ def tolerance(c: Record) -> np.float32:
 @setting("m", lambda s: s.robot_radius)
 def robot_radius(c: Record) -> np.float32:
     """Radius of every robot's disc."""
-    return np.float32(c.radius)
+    return np.float32(c.robot_radius)
 
 
 @setting("s", lambda s: s.control_step)
 def control_step(c: Record) -> np.float32:
     """Time between two actions."""
-    return np.float32(c.dt)
+    return np.float32(c.control_step)
 
 
 @setting("m", lambda s: s.sensing_range)
@@ -180,7 +180,7 @@ def arena(c: Record) -> np.float32:
 @field("s", 0, lambda s: s.duration * SLACK)
 def time_left(c: Record, v: View) -> Lanes:
     """Time until the episode is truncated."""
-    return (np.float32(c.horizon) - v.step) * c.dt
+    return (np.float32(c.horizon) - v.step) * c.control_step
 
 
 # The target
@@ -213,7 +213,7 @@ def target_seen(c: Record, v: View) -> Lanes:
 @field("s", -1, lambda s: s.duration * SLACK, unknown=-1)
 def target_age(c: Record, v: View) -> Lanes:
     """Age of the fix described by the following fields."""
-    return choose(v.target_known, (v.step - v.target_step) * c.dt, _MINUS_ONE)
+    return choose(v.target_known, (v.step - v.target_step) * c.control_step, _MINUS_ONE)
 
 
 def _farthest_fix(s: Scenario) -> float:

@@ -1,19 +1,12 @@
-// The colours of figures and films, light and dark.
+// The colours of figures and films.
 import { readJson } from "./data.js";
 
-const themes = readJson("colours");
-export const colours = {};
+export const colours = readJson("colours");
 
-export function useTheme(dark) {
-  Object.assign(colours, themes[dark ? "dark" : "light"]);
-  const root = document.documentElement;
-  root.classList.toggle("dark", dark);
-  for (const [name, value] of Object.entries(colours)) {
-    if (typeof value === "string") {
-      root.style.setProperty(`--${name.toLowerCase().replaceAll("_", "-")}`, value);
-    }
+for (const [name, value] of Object.entries(colours)) {
+  if (typeof value === "string") {
+    document.documentElement.style.setProperty(`--${name.toLowerCase().replaceAll("_", "-")}`, value);
   }
-  colours.PLAYERS.forEach((value, k) => root.style.setProperty(`--player-${k}`, value));
 }
 
 export function faded(colour, share) {

@@ -1,7 +1,7 @@
 // The ticks of the timeline: a shape for each kind, so that colour is never all that tells.
 import { colours } from "./colours.js";
 import { cross, leaderMark } from "./robots.js";
-import { disc } from "./world.js";
+import { disc, pen } from "./world.js";
 
 export const EVENT_KINDS = {
   detection: "target detected",
@@ -14,7 +14,7 @@ export const EVENT_KINDS = {
 
 const draw = {
   detection(ctx, x, y) {
-    ctx.strokeStyle = colours.INK;
+    pen(ctx, colours.INK, 1.6);
     disc(ctx, x, y, 4);
     ctx.stroke();
     ctx.fillStyle = colours.INK;
@@ -40,14 +40,12 @@ const draw = {
     ctx.fill();
   },
   break(ctx, x, y) {
-    ctx.strokeStyle = colours.INK;
-    ctx.lineWidth = 2;
+    pen(ctx, colours.INK, 2);
     cross(ctx, x, y, 3.8);
   },
   leader: (ctx, x, y) => leaderMark(ctx, x, y + 4, 4.5),
   settled(ctx, x, y) {
-    ctx.strokeStyle = colours.TASKS[2];
-    ctx.lineWidth = 2.2;
+    pen(ctx, colours.TASKS[2], 2.2);
     ctx.beginPath();
     ctx.moveTo(x - 4.5, y);
     ctx.lineTo(x - 1, y + 3.8);
@@ -57,6 +55,5 @@ const draw = {
 };
 
 export function eventGlyph(ctx, kind, x, y) {
-  ctx.lineWidth = 1.6;
   draw[kind]?.(ctx, x, y);
 }

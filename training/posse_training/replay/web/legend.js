@@ -4,7 +4,7 @@ import { EVENT_KINDS, eventGlyph } from "./events.js";
 import { cross, leaderMark, wafer } from "./robots.js";
 import { app } from "./state.js";
 import { button, element } from "./values.js";
-import { disc, line } from "./world.js";
+import { disc, line, pen } from "./world.js";
 
 const KEYS = [
   ["Space", "play or pause"],
@@ -18,7 +18,6 @@ const KEYS = [
   ["R", "show everything again (double click)"],
   ["wheel, drag", "zoom, move; on a touch screen pinch, drag"],
   ["L, S, T", "links, sensing, trails"],
-  ["D", "dark or light"],
   ["P, V", "save a picture; record a film"],
 ];
 
@@ -28,26 +27,20 @@ function robot(colour, rim = colours.TRACKER_RIM) {
 
 function dashed(colour, dashes, width = 1.6) {
   return (ctx) => {
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = width;
-    ctx.setLineDash(dashes);
+    pen(ctx, colour, width, dashes);
     line(ctx, 4, 13, 42, 13);
-    ctx.setLineDash([]);
   };
 }
 
 function ring(colour, fill, dashes = []) {
   return (ctx) => {
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = 1.6;
-    ctx.setLineDash(dashes);
+    pen(ctx, colour, 1.6, dashes);
     disc(ctx, 22, 13, 9);
     if (fill) {
       ctx.fillStyle = fill;
       ctx.fill();
     }
     ctx.stroke();
-    ctx.setLineDash([]);
   };
 }
 
@@ -68,8 +61,7 @@ function entries() {
     }, "pale: it does not see the target"],
     [(ctx) => {
       robot(c.BROKEN, c.TRACKER)(ctx);
-      ctx.strokeStyle = c.INK;
-      ctx.lineWidth = 2;
+      pen(ctx, c.INK, 2);
       cross(ctx, 22, 13, 7);
     }, "broken"],
     [(ctx) => leaderMark(ctx, 22, 18, 6), "leader"],

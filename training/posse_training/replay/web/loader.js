@@ -1,4 +1,4 @@
-// Unpacks the page's code and runs it. The page's policy allows this text and that code, no other.
+// Unpacks the page's code and runs it.
 (async () => {
   const say = (text) => {
     const message = document.getElementById("message");

@@ -1,6 +1,5 @@
 // Puts the page together, and draws it whenever something has changed.
 import { Camera } from "./camera.js";
-import { useTheme } from "./colours.js";
 import { connectControls, connectView } from "./controls.js";
 import { readReplay } from "./data.js";
 import { connectExport, filmFrame } from "./export.js";
@@ -77,10 +76,7 @@ function start() {
     requestAnimationFrame(tick);
   };
 
-  let dark = null;
   listen(() => {
-    if (dark !== app.dark) useTheme(app.dark);
-    dark = app.dark;
     strip.setAttribute("aria-valuenow", seconds().toFixed(1));
     strip.setAttribute("aria-valuemax", seconds(app.last).toFixed(1));
     clearTimeout(timer);
@@ -105,7 +101,7 @@ function start() {
   addEventListener("resize", arrange);
   addEventListener("hashchange", readHash);
   if (narrow.matches) document.body.classList.add("no-panel");
-  set({ dark: matchMedia("(prefers-color-scheme: dark)").matches });
+  set({});
   arrange();
   readHash();
   return cameras;

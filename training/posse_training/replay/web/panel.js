@@ -1,4 +1,5 @@
 // Beside the pictures: all numbers of the selected robot, the players abreast.
+import { colours } from "./colours.js";
 import { app, frameOf, listen, robotName, seconds, seek, select } from "./state.js";
 import { button, element, number, setting, unit, words } from "./values.js";
 import { scoresOf } from "./view.js";
@@ -222,7 +223,7 @@ function eventList() {
     const jump = button(`${seconds(event.step).toFixed(1)} s`, () => seek(event.step), "jump");
     const text = element("td", event.text);
     const made = element("tr", [element("td", [jump]), text]);
-    made.style.boxShadow = `inset 3px 0 var(--player-${player.number})`;
+    made.style.boxShadow = `inset 3px 0 ${colours.PLAYERS[player.number]}`;
     return made;
   });
   return section("events", rows, `events (${items.length})`);
@@ -243,7 +244,7 @@ function cards() {
 function heading(robot) {
   const names = app.players.map((player) => {
     const name = element("td", player.name, "player");
-    name.style.borderTopColor = `var(--player-${player.number})`;
+    name.style.borderTopColor = colours.PLAYERS[player.number];
     return name;
   });
   const close = button("×", () => select(null));

@@ -1,6 +1,6 @@
 // The robots of a view: trails, trackers, target, contacts that have just begun.
 import { colours, faded } from "./colours.js";
-import { disc, line } from "./world.js";
+import { disc, line, pen } from "./world.js";
 
 const TRAIL_TIME = 6; // s
 const FLASH_TIME = 1; // s
@@ -11,13 +11,12 @@ function trail(d, xs, ys, k, colour, width) {
   const length = Math.round(TRAIL_TIME / settings.control_step);
   const end = Math.min(d.position, d.player.last);
   const start = Math.max(0, end - length);
-  ctx.lineWidth = width;
   ctx.lineCap = "round";
   for (let band = 0; band < BANDS; band++) {
     const from = end - (length * (BANDS - band)) / BANDS;
     const to = from + length / BANDS;
     if (to < start) continue;
-    ctx.strokeStyle = faded(colour, 0.8 * ((band + 1) / BANDS) ** 1.5);
+    pen(ctx, faded(colour, 0.8 * ((band + 1) / BANDS) ** 1.5), width);
     ctx.beginPath();
     const first = Math.max(from, start);
     ctx.moveTo(...look.project(xs.between(first, k), ys.between(first, k)));
@@ -53,8 +52,7 @@ export function leaderMark(ctx, x, y, size) {
 }
 
 export function wafer(ctx, x, y, heading, radius, fill, rim) {
-  ctx.strokeStyle = rim;
-  ctx.lineWidth = 2;
+  pen(ctx, rim, 2);
   line(ctx, x, y, x + Math.cos(heading) * (radius + 5), y - Math.sin(heading) * (radius + 5));
   ctx.fillStyle = fill;
   ctx.lineWidth = 1.4;
@@ -103,8 +101,7 @@ function trackers(d) {
     const [x, y, heading] = d.pose(i);
     const [px, py] = look.project(x, y);
     if (i === d.robot) {
-      ctx.strokeStyle = colours.INK;
-      ctx.lineWidth = 2.5;
+      pen(ctx, colours.INK, 2.5);
       disc(ctx, px, py, radius + 5);
       ctx.stroke();
     }
@@ -126,8 +123,7 @@ function trackers(d) {
 function faults(d, i, x, y) {
   const { ctx, radius } = d;
   if (d.at("tracker_broken", i)) {
-    ctx.strokeStyle = colours.INK;
-    ctx.lineWidth = 2;
+    pen(ctx, colours.INK, 2);
     cross(ctx, x, y, radius * 0.95);
     return;
   }
@@ -144,18 +140,17 @@ function target(d) {
   const [px, py] = look.project(x, y);
   const end = [Math.cos(heading) * (radius + 6), -Math.sin(heading) * (radius + 6)];
   if (d.robot === d.settings.num_trackers) {
-    ctx.strokeStyle = colours.INK;
-    ctx.lineWidth = 2.5;
+    pen(ctx, colours.INK, 2.5);
     disc(ctx, px, py, radius + 6);
     ctx.stroke();
   }
-  ctx.strokeStyle = ctx.fillStyle = colours.PAPER;
-  ctx.lineWidth = 6;
+  ctx.fillStyle = colours.PAPER;
+  pen(ctx, colours.PAPER, 6);
   line(ctx, px, py, px + end[0], py + end[1]);
   disc(ctx, px, py, radius + 3);
   ctx.fill();
-  ctx.strokeStyle = ctx.fillStyle = colours.TARGET;
-  ctx.lineWidth = 2.8;
+  ctx.fillStyle = colours.TARGET;
+  pen(ctx, colours.TARGET, 2.8);
   line(ctx, px, py, px + end[0], py + end[1]);
   disc(ctx, px, py, radius + 1);
   ctx.fill();
@@ -170,8 +165,7 @@ function flashes(d) {
     for (const i of event.robots) {
       const x = d.player.columns.get("tracker_x").at(event.step, i);
       const y = d.player.columns.get("tracker_y").at(event.step, i);
-      ctx.strokeStyle = faded(colours.CONTACT, 1 - age / FLASH_TIME);
-      ctx.lineWidth = 3;
+      pen(ctx, faded(colours.CONTACT, 1 - age / FLASH_TIME), 3);
       disc(ctx, ...look.project(x, y), d.radius + 4 + (16 * age) / FLASH_TIME);
       ctx.stroke();
     }

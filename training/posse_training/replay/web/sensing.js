@@ -1,7 +1,7 @@
 // What the selected robot senses and hears, and where it takes the target to be.
 import { colours, faded } from "./colours.js";
 import { areaInSight, slotPlaces } from "./geometry.js";
-import { disc, line } from "./world.js";
+import { disc, line, pen } from "./world.js";
 
 const VIEW_SHOWN = 1.5; // m; how far a field of view of unlimited range is drawn
 const GHOST_FADES = 10; // s
@@ -37,8 +37,7 @@ function sight(d) {
   if (corners === null) return;
   path(ctx, look, corners);
   ctx.fillStyle = colours.SENSING;
-  ctx.strokeStyle = colours.SENSING_RIM;
-  ctx.lineWidth = 1;
+  pen(ctx, colours.SENSING_RIM, 1);
   ctx.fill();
   ctx.stroke();
 }
@@ -59,8 +58,7 @@ function sonar(d) {
       look.project(x + radius * Math.cos(angle + turn), y + radius * Math.sin(angle + turn));
     const [cx, cy] = look.project(x, y);
     const radius = (rim + reading) * look.scale;
-    ctx.strokeStyle = faded(meets ? colours.INK : colours.FAINT_INK, meets ? 0.6 : 0.3);
-    ctx.lineWidth = meets ? 1.6 : 1;
+    pen(ctx, faded(meets ? colours.INK : colours.FAINT_INK, meets ? 0.6 : 0.3), meets ? 1.6 : 1);
     line(ctx, ...at(rim, 0), ...at(rim + reading, 0));
     if (meets) {
       ctx.beginPath();
@@ -92,11 +90,8 @@ function links(d) {
       const old = age(robot, j);
       if (j === robot || old > settings.forget_after) continue;
       const [mx, my] = look.project(...d.pose(j));
-      ctx.strokeStyle = faded(colours.LINK, 0.25 + 0.6 * strength(old));
-      ctx.lineWidth = 1.5;
-      ctx.setLineDash(old > usual + 1e-6 ? [3, 4] : []);
+      pen(ctx, faded(colours.LINK, 0.25 + 0.6 * strength(old)), 1.5, old > usual + 1e-6 ? [3, 4] : []);
       line(ctx, x, y, mx, my);
-      ctx.setLineDash([]);
       if (old > usual + 0.05) {
         d.label(`${old.toFixed(1)} s`, (x + mx) / 2, (y + my) / 2, colours.LINK);
       }
@@ -106,12 +101,11 @@ function links(d) {
   // A large team has hundreds of links: together they weigh no more than a small team's.
   if (!heard) return;
   const weight = 0.5 * Math.max(0.12, Math.min(1, 24 / (n * n)));
-  ctx.lineWidth = 1;
   for (let i = 0; i < n; i++) {
     for (let j = 0; j < i; j++) {
       const shown = Math.max(strength(age(i, j)), strength(age(j, i)));
       if (shown <= 0) continue;
-      ctx.strokeStyle = faded(colours.LINK, weight * shown);
+      pen(ctx, faded(colours.LINK, weight * shown), 1);
       line(ctx, ...look.project(...d.pose(i)), ...look.project(...d.pose(j)));
     }
   }
@@ -141,22 +135,16 @@ function beliefs(d) {
   const [x, y] = [d.at("tracker_fix_x", robot), d.at("tracker_fix_y", robot)];
   const apart = Math.hypot(x - d.at("target_x"), y - d.at("target_y"));
   if (step >= 0 && (age > 0.05 || apart > 0.05)) {
-    ctx.strokeStyle = faded(colours.TARGET, Math.max(0.35, 1 - age / GHOST_FADES));
-    ctx.lineWidth = 1.8;
-    ctx.setLineDash([4, 3]);
+    pen(ctx, faded(colours.TARGET, Math.max(0.35, 1 - age / GHOST_FADES)), 1.8, [4, 3]);
     const [px, py] = ghost(d, x, y, d.at("tracker_fix_heading", robot), d.radius + 3);
-    ctx.setLineDash([]);
     if (age > 0.05) d.label(`fix ${age.toFixed(1)} s ago`, px, py + d.radius + 14, colours.TARGET);
   }
   const estimate = d.player.columns.get("belief/estimate");
   const known = d.player.columns.get("belief/estimate_age");
   if (estimate && estimate.shape[1] === 3 && !(known && known.at(d.frame, robot) < 0)) {
-    ctx.strokeStyle = colours.LINK;
-    ctx.lineWidth = 1.4;
-    ctx.setLineDash([1.5, 3]);
+    pen(ctx, colours.LINK, 1.4, [1.5, 3]);
     const [x, y, heading] = [0, 1, 2].map((k) => estimate.at(d.frame, 3 * robot + k));
     ghost(d, x, y, heading, d.radius + 6);
-    ctx.setLineDash([]);
   }
   const slot = d.player.columns.get("belief/slot");
   if (slot && slot.at(d.frame, robot) >= 0) {
@@ -165,11 +153,8 @@ function beliefs(d) {
     );
     const place = places[slot.at(d.frame, robot)];
     if (place) {
-      ctx.strokeStyle = faded(colours.TARGET, 0.7);
-      ctx.lineWidth = 1.2;
-      ctx.setLineDash([2, 4]);
+      pen(ctx, faded(colours.TARGET, 0.7), 1.2, [2, 4]);
       line(ctx, ...look.project(...d.pose(robot)), ...look.project(...place));
-      ctx.setLineDash([]);
     }
   }
 }

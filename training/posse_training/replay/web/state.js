@@ -13,7 +13,6 @@ export const app = {
   layers: { links: true, sensing: true, trails: true },
   linked: true,
   follow: false,
-  dark: false,
   recording: false,
 };
 

@@ -3,7 +3,7 @@ import { colours, faded } from "./colours.js";
 import { eventGlyph } from "./events.js";
 import { app, frameOf, seconds, seek, set } from "./state.js";
 import { font, scoresOf } from "./view.js";
-import { disc, line } from "./world.js";
+import { disc, line, pen } from "./world.js";
 
 const LEFT = 58;
 const RIGHT = 14;
@@ -68,8 +68,7 @@ function axis(ctx, at, height) {
   ctx.textBaseline = "middle";
   for (let time = 0; time <= total + 1e-9; time += step) {
     const x = at.x(time / seconds(1));
-    ctx.strokeStyle = faded(colours.GRID, 0.6);
-    ctx.lineWidth = 1;
+    pen(ctx, faded(colours.GRID, 0.6), 1);
     line(ctx, x, at.rows, x, height - AXIS);
     ctx.fillStyle = colours.FAINT_INK;
     ctx.fillText(`${Number(time.toFixed(1))} s`, x, height - AXIS / 2);
@@ -82,8 +81,7 @@ function ticks(ctx, at) {
     ctx.fillStyle = colours.PLAYERS[row];
     disc(ctx, LEFT - 12, y, 4);
     ctx.fill();
-    ctx.strokeStyle = colours.GRID;
-    ctx.lineWidth = 1;
+    pen(ctx, colours.GRID, 1);
     line(ctx, LEFT, y, at.x(player.last), y);
     for (const event of player.events) eventGlyph(ctx, event.kind, at.x(event.step), y);
   });
@@ -101,16 +99,12 @@ function scores(ctx, at) {
   name(ctx, "score", (top + bottom) / 2);
   ctx.font = font(9.5);
   for (const value of [0, 1]) ctx.fillText(String(value), LEFT - 4, height(value));
-  ctx.strokeStyle = colours.GRID;
-  ctx.lineWidth = 1;
+  pen(ctx, colours.GRID, 1);
   for (const value of [0, 1]) line(ctx, LEFT, height(value), at.right, height(value));
   app.players.forEach((player, k) => {
     const values = curve(player);
-    ctx.strokeStyle = colours.PLAYERS[k];
-    ctx.lineWidth = 1.8;
-    ctx.setLineDash(DASHES[k]);
+    pen(ctx, colours.PLAYERS[k], 1.8, DASHES[k]);
     stroke(ctx, at, player.frames, (frame) => height(values[frame]));
-    ctx.setLineDash([]);
   });
 }
 
@@ -128,8 +122,7 @@ function differences(ctx, at) {
   name(ctx, "lead", middle);
   ctx.font = font(9.5);
   if (bottom - top > 24) ctx.fillText(`±${most.toFixed(2)}`, LEFT - 4, top + 3);
-  ctx.strokeStyle = colours.FAINT_INK;
-  ctx.lineWidth = 1;
+  pen(ctx, colours.FAINT_INK, 1);
   line(ctx, LEFT, middle, at.right, middle);
   app.players.slice(1).forEach((player, k) => {
     const colour = (ahead) => colours.PLAYERS[ahead ? k + 1 : 0];
@@ -146,18 +139,14 @@ function differences(ctx, at) {
         ctx.fill();
       }
     }
-    ctx.strokeStyle = colour(true);
-    ctx.lineWidth = 1.4;
-    ctx.setLineDash(DASHES[k + 1]);
+    pen(ctx, colour(true), 1.4, DASHES[k + 1]);
     stroke(ctx, at, frames, (frame) => height(gap(player, frame)));
-    ctx.setLineDash([]);
   });
 }
 
 function cursor(ctx, at, height, hover) {
   const x = at.x(app.position);
-  ctx.strokeStyle = colours.INK;
-  ctx.lineWidth = 1.6;
+  pen(ctx, colours.INK, 1.6);
   line(ctx, x, 0, x, height - AXIS);
   ctx.fillStyle = colours.INK;
   ctx.beginPath();

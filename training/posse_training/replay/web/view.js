@@ -4,7 +4,7 @@ import { colours, faded } from "./colours.js";
 import { robotLayers, trailLayers } from "./robots.js";
 import { sensingLayers, sightLayers } from "./sensing.js";
 import { app, frameOf, seconds } from "./state.js";
-import { groundLayers, placeLayers, scaleBar } from "./world.js";
+import { groundLayers, pen, placeLayers, scaleBar } from "./world.js";
 
 const LEAST_ROBOT = 7; // px
 const LAYERS = [
@@ -50,9 +50,8 @@ function drawing(ctx, player, look, position) {
       ctx.font = font(11, 500);
       ctx.textAlign = "center";
       ctx.textBaseline = "middle";
-      ctx.lineWidth = 3.5;
+      pen(ctx, faded(colours.PAPER, 0.85), 3.5);
       ctx.lineJoin = "round";
-      ctx.strokeStyle = faded(colours.PAPER, 0.85);
       ctx.strokeText(text, x, y);
       ctx.fillStyle = colour;
       ctx.fillText(text, x, y);

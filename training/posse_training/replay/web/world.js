@@ -10,6 +10,13 @@ export function disc(ctx, x, y, radius) {
   ctx.arc(x, y, radius, 0, 2 * Math.PI);
 }
 
+// How the next strokes look.
+export function pen(ctx, colour, width, dashes = []) {
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = width;
+  ctx.setLineDash(dashes);
+}
+
 export function line(ctx, ax, ay, bx, by) {
   ctx.beginPath();
   ctx.moveTo(ax, ay);
@@ -43,8 +50,7 @@ function grid(d) {
   const half = settings.arena / 2;
   [left, bottom] = [Math.max(left, -half), Math.max(bottom, -half)];
   [right, top] = [Math.min(right, half), Math.min(top, half)];
-  ctx.strokeStyle = colours.GRID;
-  ctx.lineWidth = 1;
+  pen(ctx, colours.GRID, 1);
   for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
     for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
       const [px, py] = look.project(x, y);
@@ -57,8 +63,7 @@ function grid(d) {
 function obstacles(d) {
   const { ctx, look } = d;
   ctx.fillStyle = colours.OBSTACLE;
-  ctx.strokeStyle = colours.OBSTACLE_RIM;
-  ctx.lineWidth = 1.2;
+  pen(ctx, colours.OBSTACLE_RIM, 1.2);
   for (const [x, y, radius] of d.world.obstacles) {
     disc(ctx, ...look.project(x, y), radius * look.scale);
     ctx.fill();
@@ -71,8 +76,7 @@ function walls(d) {
   if (!Number.isFinite(settings.arena)) return;
   const [left, top] = look.project(-settings.arena / 2, settings.arena / 2);
   const side = settings.arena * look.scale;
-  ctx.strokeStyle = colours.WALL;
-  ctx.lineWidth = 3;
+  pen(ctx, colours.WALL, 3);
   ctx.strokeRect(left - 1.5, top - 1.5, side + 3, side + 3);
 }
 
@@ -85,16 +89,13 @@ function slots(d) {
   for (let i = 0; i < n; i++) filled.add(d.at("tracker_slot", i));
   const behind = Math.min(0, ...d.world.slots.map(([sx]) => sx));
   const [cosine, sine] = [Math.cos(frame), Math.sin(frame)];
-  ctx.strokeStyle = colours.SLOT;
-  ctx.lineWidth = 1;
-  ctx.setLineDash([4, 4]);
+  pen(ctx, colours.SLOT, 1, [4, 4]);
   line(
     ctx,
     ...look.project(x + behind * cosine, y + behind * sine),
     ...look.project(x + cosine, y + sine),
   );
-  ctx.setLineDash([]);
-  ctx.lineWidth = 1.5;
+  pen(ctx, colours.SLOT, 1.5);
   ctx.fillStyle = colours.SLOT_FILLED;
   places.forEach(([sx, sy], k) => {
     disc(ctx, ...look.project(sx, sy), settings.tolerance * look.scale);
@@ -109,8 +110,8 @@ export function scaleBar(d) {
   const length = lengths.findLast((value) => value * look.scale <= 90) ?? 0.1;
   const [left, right] = [12, 12 + length * look.scale];
   const middle = look.height - FOOT / 2;
-  ctx.strokeStyle = ctx.fillStyle = colours.FAINT_INK;
-  ctx.lineWidth = 1.4;
+  ctx.fillStyle = colours.FAINT_INK;
+  pen(ctx, colours.FAINT_INK, 1.4);
   line(ctx, left, middle, right, middle);
   for (const end of [left, right]) line(ctx, end, middle - 3.5, end, middle + 3.5);
   ctx.font = d.font(11);

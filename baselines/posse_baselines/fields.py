@@ -1,0 +1,103 @@
+"""Settings that declare themselves: unit, range, and whether tuning may change them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Tunable:
+    """A setting that a search may change.
+
+    Attributes:
+        name: Of the field.
+        default: Its value in the policy asked for.
+        low: Least value.
+        high: Greatest value.
+        unit: Empty for a plain number.
+        above: Name of the setting that it must exceed; empty: none.
+    """
+
+    name: str
+    default: float
+    low: float
+    high: float
+    unit: str
+    above: str = ""
+
+
+def number(default: float, unit: str, low: float, high: float, *, tune: bool = False, above: str = "") -> Any:
+    """Declare a numeric field of a settings class, allowed in [low, high].
+
+    Args:
+        default: Its value.
+        unit: Empty for a plain number.
+        low: Least value.
+        high: Greatest value.
+        tune: Whether a search may change it.
+        above: Name of another field that it must exceed; empty: none.
+    """
+    meta = {"unit": unit, "low": low, "high": high, "tunable": tune, "above": above}
+    return dataclasses.field(default=default, metadata=meta)
+
+
+def tuned(default: float, unit: str, low: float, high: float, *, above: str = "") -> Any:
+    """Declare a numeric field that a search may change."""
+    return number(default, unit, low, high, tune=True, above=above)
+
+
+def choice(default: str, choices: tuple[str, ...]) -> Any:
+    """Declare a field that names one of several laws."""
+    return dataclasses.field(default=default, metadata={"choices": choices})
+
+
+def optional(low: float, high: float, *, whole: bool = False) -> Any:
+    """Declare a field that is ``None`` by default, or a number in [low, high]; a whole one if so said."""
+    meta = {"unit": "", "low": low, "high": high, "above": "", "whole": whole}
+    return dataclasses.field(default=None, metadata=meta)
+
+
+def _text(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:g}"
+
+
+def check(settings: Any) -> None:
+    """Check the fields of a settings object against what they declare.
+
+    Raises:
+        ValueError: An unknown choice, a number of another kind or out of its range, or one that does not exceed the
+            field that it must exceed.
+    """
+    for field in dataclasses.fields(settings):
+        name, value, meta = field.name, getattr(settings, field.name), field.metadata
+        if "choices" in meta and value not in meta["choices"]:
+            raise ValueError(f"{name}={value!r} is unknown; known: {', '.join(meta['choices'])}")
+        if "low" not in meta or (value is None and field.default is None):
+            continue
+        whole = meta.get("whole", isinstance(field.default, int))
+        if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
+            raise ValueError(f"{name}={value!r} must be {'a whole number' if whole else 'a number'}")
+        if not meta["low"] <= value <= meta["high"]:
+            unit = f" {meta['unit']}" if meta["unit"] else ""
+            raise ValueError(f"{name}={value!r} must lie in [{_text(meta['low'])}, {_text(meta['high'])}]{unit}")
+        if meta["above"] and not getattr(settings, meta["above"]) < value:
+            low = getattr(settings, meta["above"])
+            raise ValueError(f"{meta['above']}={low!r} must be below {name}={value!r}: a hysteresis")
+
+
+def tunables(settings: Any) -> tuple[Tunable, ...]:
+    """Return the tunable fields of a settings object, with its values as defaults."""
+    return tuple(
+        Tunable(
+            field.name,
+            getattr(settings, field.name),
+            field.metadata["low"],
+            field.metadata["high"],
+            field.metadata["unit"],
+            field.metadata["above"],
+        )
+        for field in dataclasses.fields(settings)
+        if field.metadata.get("tunable")
+    )

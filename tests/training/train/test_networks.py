@@ -1,0 +1,76 @@
+"""The layers of a model: input statistics, the critic of mappo, and parts that agree with the libraries' own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+from tests.support.runs import quiet, small
+
+from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.networks import Normaliser, QuickTanh, RunningStatistics
+from posse_training.train.train import train
+from posse_training.train.worlds import make_env
+
+
+def test_adding_in_parts_is_adding_at_once() -> None:
+    rows = np.random.default_rng(0).normal(3, 2, (500, 4)).astype(np.float32)
+    rows[:, 3] = 7.0
+    statistics = RunningStatistics(4)
+    for part in np.split(rows, [1, 50, 300]):
+        statistics.add(part)
+    np.testing.assert_allclose(statistics.mean, rows.mean(axis=0), rtol=1e-5)
+    np.testing.assert_allclose(statistics.variance, rows.var(axis=0), rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(statistics.scale[:3], 1 / rows[:, :3].std(axis=0), rtol=1e-5)
+    assert statistics.scale[3] == 0, "an input that never varies says nothing"
+
+
+def test_a_rollout_is_learned_from_with_the_statistics_it_was_played_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    means: list[Any] = []
+    ratios: list[Any] = []
+    original = PPO.train
+
+    def look(self: PPO) -> None:
+        normaliser = next(m for m in self.policy.modules() if isinstance(m, Normaliser))
+        means.append(normaliser.mean.numpy().copy())
+        buffer = self.rollout_buffer
+        with torch.no_grad():
+            _, log_prob, _ = self.policy.evaluate_actions(
+                torch.as_tensor(buffer.observations[0]), torch.as_tensor(buffer.actions[0])
+            )
+        ratios.append(np.abs(log_prob.numpy() - buffer.log_probs[0]).max())
+        original(self)
+
+    monkeypatch.setattr(PPO, "train", look)
+    train(small(tmp_path), console=quiet())
+    assert max(ratios) < 1e-5
+    assert not np.array_equal(means[0], means[-1])
+
+
+def test_the_state_changes_values_but_no_actions(tmp_path: Path) -> None:
+    settings = small(tmp_path, "mappo")
+    env = make_env(settings)
+    policy: Any = ALGORITHMS["mappo"].make(settings, env).policy
+    rows = torch.from_numpy(env.reset()).requires_grad_()
+    policy.get_distribution(rows).distribution.mean.sum().backward()
+    gradient: Any = rows.grad
+    assert not gradient[:, env.private_size :].any()
+    assert gradient[:, : env.private_size].any()
+    other = rows.detach().clone()
+    other[:, env.private_size :] += 5.0
+    with torch.no_grad():
+        assert (policy.predict_values(rows) - policy.predict_values(other)).abs().max() > 1e-4
+
+
+def test_it_is_the_hyperbolic_tangent() -> None:
+    x = torch.cat([torch.linspace(-12, 12, 10_001), torch.tensor([90.0, -90.0, 1e-6, np.inf, -np.inf, np.nan])])
+    y = QuickTanh()(x)
+    np.testing.assert_allclose(y.numpy(), np.tanh(x.double().numpy()), rtol=0, atol=3e-7)
+    assert y.abs().nan_to_num().max() == 1.0
+    assert torch.autograd.gradcheck(QuickTanh(), torch.randn(500, dtype=torch.float64, requires_grad=True))

@@ -1,0 +1,105 @@
+"""Errors of a run folder are named, and no data are lost."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.support.disk import largest_file
+from tests.support.runs import assert_equal, numbers, quiet, small, steps_saved
+
+from posse_training.errors import CheckpointError, RunFolderError, SettingsError
+from posse_training.files import locked
+from posse_training.train import checkpoint
+from posse_training.train.train import resume, train
+
+
+def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "run"
+    write, count = checkpoint.write_checkpoint, 0
+
+    def full(*arguments: Any) -> None:
+        nonlocal count
+        count += 1
+        with largest_file(1000) if count == 3 else contextlib.nullcontext():
+            write(*arguments)
+
+    monkeypatch.setattr(checkpoint, "write_checkpoint", full)
+    with pytest.raises(CheckpointError, match=r"File too large.*--resume"):
+        train(small(folder), console=quiet())
+    monkeypatch.undo()
+    assert not list(folder.glob(".*"))
+    assert steps_saved(folder) >= 0
+    resume(folder, console=quiet())
+    train(small(tmp_path / "whole"), console=quiet())
+    assert_equal(numbers(folder), numbers(tmp_path / "whole"))
+
+
+@pytest.mark.parametrize("where", [0.001, 0.3, 0.9])
+def test_a_damaged_checkpoint(tmp_path: Path, where: float) -> None:
+    folder = tmp_path / "run"
+    train(small(folder), console=quiet())
+    path = folder / "checkpoint.pt"
+    content = bytearray(path.read_bytes())
+    content[int(where * len(content))] ^= 4
+    path.write_bytes(content)
+    with pytest.raises(CheckpointError, match=r"checkpoint\.pt is damaged"):
+        resume(folder, console=quiet())
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(CheckpointError, match="damaged"):
+        resume(folder, console=quiet())
+
+
+def test_a_folder_in_use(tmp_path: Path) -> None:
+    code = (
+        "import sys, time; from pathlib import Path;"
+        "from posse_training.files import locked\n"
+        f"with locked(Path({str(tmp_path)!r})): print('held', flush=True); time.sleep(60)"
+    )
+    holder = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    try:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"held\n"
+        with pytest.raises(RunFolderError, match=f"in use by process {holder.pid}"):
+            train(small(tmp_path), console=quiet())
+        assert not (tmp_path / "settings.json").exists()
+    finally:
+        holder.kill()
+        holder.wait()
+        if holder.stdout is not None:
+            holder.stdout.close()
+    with locked(tmp_path):  # the lock ended with its holder
+        pass
+
+
+def test_a_folder_that_holds_a_run(tmp_path: Path) -> None:
+    train(small(tmp_path), console=quiet())
+    before = (tmp_path / "checkpoint.pt").read_bytes()
+    with pytest.raises(RunFolderError, match="--resume"):
+        train(small(tmp_path), console=quiet())
+    assert (tmp_path / "checkpoint.pt").read_bytes() == before
+
+
+def test_no_run_to_go_on_with(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="not a run folder"):
+        resume(tmp_path, console=quiet())
+
+
+def test_a_checkpoint_of_other_settings(tmp_path: Path) -> None:
+    train(small(tmp_path), console=quiet())
+    settings = json.loads((tmp_path / "settings.json").read_text())
+    settings["hidden"] = [8, 8]
+    (tmp_path / "settings.json").write_text(json.dumps(settings))
+    with pytest.raises(CheckpointError, match="does not fit"):
+        resume(tmp_path, console=quiet())
+
+
+def test_damaged_settings(tmp_path: Path) -> None:
+    (tmp_path / "settings.json").write_text("{")
+    with pytest.raises(SettingsError, match=r"settings\.json is damaged"):
+        resume(tmp_path, console=quiet())

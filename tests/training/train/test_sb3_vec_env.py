@@ -1,0 +1,300 @@
+"""The adapter: slots are trackers, last observations are last, truncation is bootstrapped."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecMonitor
+
+import posse
+from posse_baselines.learned import Encoder, Encoding
+from posse_training.train.networks import Normaliser
+from posse_training.train.vec_env import TeamVecEnv
+
+HORIZON = 12
+
+
+def make(worlds: int = 3, *, staggered: bool = False, see_state: bool = False, **settings: Any) -> TeamVecEnv:
+    values = {"horizon": HORIZON, "settle_time": 0.5, **settings}
+    batch = posse.batch("constant", worlds, seed=5, autoreset="disabled", **values)
+    return TeamVecEnv([batch], Encoding.of(batch.layout), staggered=staggered, see_state=see_state)
+
+
+def move(env: TeamVecEnv, actions: Any) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
+    """Step, without type checks of the result."""
+    return env.step(actions)
+
+
+def draw(env: TeamVecEnv, generator: np.random.Generator) -> Any:
+    assert env.action_space.shape is not None
+    return generator.uniform(-1, 1, (env.num_envs, *env.action_space.shape)).astype(np.float32)
+
+
+def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
+    env = make()
+    batch = posse.batch("constant", 3, seed=5, horizon=HORIZON, settle_time=0.5, autoreset="same_step")
+    np.testing.assert_array_equal(env.reset().reshape(3, 5, -1), batch.reset())
+    generator = np.random.default_rng(1)
+    total = np.zeros((3, 5))
+    for step in range(1, 3 * HORIZON + 1):
+        actions = draw(env, generator)
+        observations, rewards, dones, infos = move(env, actions)
+        expected, wanted, _, truncated, info = batch.step(actions.reshape(3, 5, 2))
+        np.testing.assert_array_equal(observations.reshape(3, 5, -1), expected)
+        np.testing.assert_array_equal(rewards.reshape(3, 5), wanted)
+        total += wanted
+        assert dones.all() == dones.any() == truncated.all() == (step % HORIZON == 0)
+        if dones.any():
+            for slot, told in enumerate(infos):
+                e, i = divmod(slot, 5)
+                np.testing.assert_array_equal(told["terminal_observation"], info["final_obs"][e, i])
+                assert told["TimeLimit.truncated"] is True
+                assert told["episode"]["l"] == HORIZON
+                assert told["episode"]["r"] == pytest.approx(total[e, i])
+                assert told["episode"]["score"] == info["metrics/score"][e]
+                assert told["metrics"]["score"] == info["metrics/score"][e]
+                assert told["is_success"] == np.isfinite(info["metrics/settling_time"][e])
+            total[:] = 0
+        else:
+            assert all(told == {} for told in infos)
+
+
+def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:
+    env = make(terminate_on_contact=True, horizon=400, num_trackers=2, start_distance=(0.5, 1.0))
+    env.reset()
+    told: list[dict[str, Any]] = []
+    forward = np.tile(np.array([1.0, 0.3], np.float32), (env.num_envs, 1))
+    for _ in range(400):
+        _, _, _, infos = move(env, forward)
+        told += [info for info in infos if "terminal_observation" in info]
+    ended = [info for info in told if info["episode"]["l"] < 400]
+    assert ended
+    assert not any(info["TimeLimit.truncated"] for info in ended)
+
+
+def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
+    env = make(worlds=4, staggered=True)
+    env.reset()
+    generator = np.random.default_rng(0)
+    ends: dict[int, list[int]] = {e: [] for e in range(4)}
+    for step in range(1, 4 * HORIZON + 1):
+        _, _, dones, infos = move(env, draw(env, generator))
+        for e in np.flatnonzero(dones.reshape(4, 5).all(axis=1)).tolist():
+            first = not ends[e]
+            ends[e].append(step)
+            info = infos[5 * e]
+            assert info["TimeLimit.truncated"] is True
+            whole = not first or step == HORIZON
+            assert ("episode" in info) == ("metrics" in info) == whole
+        assert (dones.reshape(4, 5).all(axis=1) == dones.reshape(4, 5).any(axis=1)).all()
+    for e in ends:
+        begin = (e + 1) * HORIZON // 4
+        assert ends[e] == list(range(begin, 4 * HORIZON + 1, HORIZON))
+    # A reset spreads the episodes again.
+    env.reset()
+    for _ in range(HORIZON // 4):
+        _, _, dones, _ = move(env, draw(env, generator))
+    np.testing.assert_array_equal(dones.reshape(4, 5).all(axis=1), [True, False, False, False])
+
+
+def test_more_worlds_than_steps_all_end() -> None:
+    env = make(worlds=2 * HORIZON + 1, staggered=True, num_trackers=1)
+    env.reset()
+    ended = np.zeros(env.num_envs, bool)
+    for _ in range(HORIZON):
+        _, _, dones, _ = move(env, np.zeros((env.num_envs, 2), np.float32))
+        ended |= dones
+    assert ended.all()
+
+
+def test_nothing_returned_is_overwritten_or_shared() -> None:
+    env = make(worlds=2, staggered=True)
+    kept: list[tuple[Any, ...]] = [(env.reset(),)]
+    copies = [tuple(array.copy() for array in kept[0])]
+    generator = np.random.default_rng(0)
+    for _ in range(2 * HORIZON):
+        observations, rewards, dones, infos = move(env, draw(env, generator))
+        assert len({id(info) for info in infos}) == env.num_envs
+        finals = [i["terminal_observation"] for i in infos if "terminal_observation" in i]
+        kept.append((observations, rewards, dones, *finals))
+        copies.append(tuple(array.copy() for array in kept[-1]))
+    for arrays, before in zip(kept, copies, strict=True):
+        for array, copy in zip(arrays, before, strict=True):
+            np.testing.assert_array_equal(array, copy)
+            assert array.base is None or array.base is not kept[0][0]
+
+
+def test_seed_and_options_are_used_once() -> None:
+    env = make()
+    env.seed(9)
+    first = env.reset()
+    assert env._seeds == [None] * env.num_envs
+    second = env.reset()
+    assert not np.array_equal(first, second)
+    env.seed(9)
+    np.testing.assert_array_equal(env.reset(), first)
+    pose = np.array([[6.0 + i, 0.0, 0.0] for i in range(5)])
+    env.set_options({"tracker_pose": pose, "target_pose": np.zeros(3)})
+    views = env.batches[0].layout.views(env.reset())
+    np.testing.assert_allclose(views["position"].reshape(3, 5, 2)[:, :, 0], [pose[:, 0]] * 3)
+    assert env._options == [{}] * env.num_envs
+    assert not np.allclose(env.batches[0].layout.views(env.reset())["position"][:5, 0], pose[:, 0])
+    env.set_options([{"target_pose": np.zeros(3)}] + [{}] * (env.num_envs - 1))
+    with pytest.raises(ValueError, match="equal options"):
+        env.reset()
+
+
+def test_teams_of_several_sizes_and_scenarios() -> None:
+    batches = [
+        posse.batch("constant", 2, num_trackers=3, autoreset="disabled", horizon=50),
+        posse.batch("radio", 3, num_trackers=7, autoreset="disabled", horizon=50),
+    ]
+    encoding = Encoding.of(batches[1].layout, "slots", 4)
+    env = TeamVecEnv(batches, encoding, see_state=True)
+    assert env.num_envs == 2 * 3 + 3 * 7
+    observations = env.reset()
+    again = posse.batch("radio", 3, num_trackers=7, horizon=50)
+    expected = Encoder(encoding, again.layout).encode(again.reset())
+    np.testing.assert_array_equal(observations[6:, : encoding.size], expected)
+    assert np.isfinite(move(env, np.zeros((27, 2), np.float32))[0]).all()
+
+
+def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
+    env = make(worlds=2, see_state=True)
+    env.reset()
+    for step in range(HORIZON):
+        observations, _, dones, infos = move(env, np.zeros((10, 2), np.float32))
+        assert dones.all() == (step == HORIZON - 1)
+    time_left = env.private_size + 5
+    assert observations[:, time_left] == pytest.approx(HORIZON * 0.1)
+    finals = np.stack([info["terminal_observation"] for info in infos])
+    assert finals[:, time_left] == pytest.approx(0)
+    # Each tracker comes first in its own copy, the others follow by number.
+    w, t = env.batches[0].worlds, env.batches[0].arrays.tracker
+    for i in (0, 3):
+        dx, dy = t["x"][1, i] - w["x"][1], t["y"][1, i] - w["y"][1]
+        ahead = dx * w["frame_cos"][1] + dy * w["frame_sin"][1]
+        assert observations[5 + i, env.private_size + 6] == pytest.approx(ahead, rel=1e-5)
+        other = observations[5 + (i + 4) % 5]
+        assert other[env.private_size + 6 + 11] == pytest.approx(ahead, rel=1e-5)
+
+
+class TestMethods:
+    def test_env_method_calls_each_batch_once(self) -> None:
+        env = make()
+        env.reset()
+        results = env.env_method("metrics", indices=[0, 7])
+        assert results[0] is results[1]
+
+    def test_attributes(self) -> None:
+        env = make()
+        assert env.get_attr("num_worlds", indices=2) == [3]
+        assert env.get_attr("render_mode") == [None] * 15
+        env.set_attr("seed", 4)
+        assert env.get_attr("seed", [0]) == [4]
+        with pytest.raises(AttributeError):
+            env.set_attr("nonsense", 1)
+        with pytest.raises(AttributeError):
+            env.get_attr("nonsense")
+        assert not env.has_attr("nonsense")
+        assert env.env_is_wrapped(VecMonitor, [0]) == [False]  # type: ignore[arg-type]
+
+    @pytest.mark.parametrize(
+        ("batches", "message"),
+        [
+            ([], "no batches given"),
+            ([{"autoreset": "same_step"}], 'autoreset="disabled"'),
+            ([{"autoreset": "disabled", "target_motion": "agent"}], "the target"),
+            ([{"autoreset": "disabled"}, {"autoreset": "disabled", "message_size": 1}], "different lengths"),
+        ],
+    )
+    def test_bad_batches(self, batches: list[dict[str, Any]], message: str) -> None:
+        made = [posse.batch("constant", 1, **settings) for settings in batches]
+        layout = posse.ObservationLayout(posse.get_scenario("constant"))
+        with pytest.raises(ValueError, match=message):
+            TeamVecEnv(made, Encoding.of(layout))
+
+
+def test_saved_worlds_go_on_as_they_would_have() -> None:
+    first, second = make(staggered=True), make(staggered=True)
+    generator = np.random.default_rng(0)
+    first.reset()
+    for _ in range(5):
+        first.step(draw(first, generator))
+    saved = first.save()
+    second.restore(saved)
+    for _ in range(2 * HORIZON):
+        actions = draw(first, generator)
+        mine, theirs = move(first, actions), move(second, actions)
+        for a, b in zip(mine[:3], theirs[:3], strict=True):
+            np.testing.assert_array_equal(a, b)
+        assert [i.get("episode") for i in mine[3]] == [i.get("episode") for i in theirs[3]]
+    with pytest.raises(ValueError, match="do not fit"):
+        make(worlds=4).restore(saved)
+
+
+class _Recorder(BaseCallback):
+    """Keeps the environment's results before the learner modifies them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rewards: list[Any] = []
+        self.dones: list[Any] = []
+        self.finals: list[dict[int, Any]] = []
+
+    def _on_step(self) -> bool:
+        infos = self.locals["infos"]
+        self.rewards.append(self.locals["rewards"].copy())
+        self.dones.append(self.locals["dones"].copy())
+        self.finals.append({s: i["terminal_observation"] for s, i in enumerate(infos) if i.get("TimeLimit.truncated")})
+        return True
+
+
+def test_returns_are_bootstrapped_at_truncation_and_nowhere_else() -> None:
+    """Against an independent computation of generalized advantages."""
+    discount, decay, steps = 0.9, 0.8, 3 * HORIZON
+    env = make(staggered=True)
+    model = PPO(
+        "MlpPolicy",
+        env,
+        n_steps=steps,
+        batch_size=steps * env.num_envs,
+        gamma=discount,
+        gae_lambda=decay,
+        seed=0,
+        device="cpu",
+        policy_kwargs={"features_extractor_class": Normaliser},
+    )
+    recorder = _Recorder()
+    _, callback = model._setup_learn(steps, recorder)
+    model.collect_rollouts(env, callback, model.rollout_buffer, steps)
+
+    def value(rows: Any) -> Any:
+        with torch.no_grad():
+            return model.policy.predict_values(torch.as_tensor(rows)).numpy().reshape(-1)
+
+    buffer = model.rollout_buffer
+    values = np.stack([value(rows) for rows in buffer.observations])
+    after = value(model._last_obs)
+    advantages = np.zeros_like(values)
+    truncated = 0
+    for slot in range(env.num_envs):
+        ahead = 0.0
+        for t in reversed(range(steps)):
+            following = after[slot] if t == steps - 1 else values[t + 1, slot]
+            if recorder.dones[t][slot]:
+                # The value of where it truly was, not of the next episode's start.
+                following = value(recorder.finals[t][slot][None])[0]
+                ahead = 0.0
+                truncated += 1
+            delta = recorder.rewards[t][slot] + discount * following - values[t, slot]
+            ahead = delta + discount * decay * ahead
+            advantages[t, slot] = ahead
+    assert truncated >= 2 * env.num_envs
+    np.testing.assert_allclose(buffer.advantages, advantages, rtol=1e-4, atol=2e-4)
+    np.testing.assert_allclose(buffer.returns, advantages + values, rtol=1e-4, atol=2e-4)

@@ -1,0 +1,195 @@
+"""Training of targets against teams, and of teams against targets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.learned import target_for
+from tests.support.runs import HORIZON, assert_equal, numbers, quiet, small
+
+import posse
+from posse_baselines import PolicyError, load, load_target
+from posse_training import evaluate
+from posse_training.cli import main as cli
+from posse_training.errors import CheckpointError, SettingsError
+from posse_training.train import TrainSettings
+from posse_training.train.settings import default_settings, read_settings
+from posse_training.train.train import Run, resume, train
+from posse_training.train.validation import play_all
+from posse_training.train.worlds import make_env
+
+SPLIT = "validation"
+
+
+def target_run(folder: Path, **changes: Any) -> TrainSettings:
+    return small(
+        folder,
+        **{
+            "side": "target",
+            "encoding": "plain",
+            "against": "ddcs-distributed,idle",
+            "scenario": "smart",
+            "team_sizes": (),
+            "steps": 640,
+            "evaluate_every": 320,
+            "overrides": {"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 3},
+            "reward_weights": {"team": -1.0, "contact": -0.5},
+            "checkpoint_every": 160,
+            **changes,
+        },
+    )
+
+
+def test_a_target_is_trained_and_played(tmp_path: Path) -> None:
+    whole = train(target_run(tmp_path / "whole"), console=quiet())
+    target = load_target(whole)
+    assert target.motion == "agent"
+    assert target.name == "smart-target-ppo-3"
+    with pytest.raises(PolicyError, match="policy of a target"):
+        load(whole)
+    scenario = posse.get_scenario("smart", horizon=HORIZON, num_trackers=3, settle_time=1.0)
+    assert evaluate("ddcs-distributed", scenario, 2, target=target, progress=False).episodes == 2
+    assert any(name.startswith("/checkpoint/worlds/0.opponent.") for name in numbers(tmp_path / "whole"))
+
+
+class Killed(BaseException):
+    pass
+
+
+@pytest.mark.parametrize("side", ["target", "trackers"])
+def test_a_killed_run_resumes_bit_for_bit(side: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changes: dict[str, Any] = {}
+    if side == "trackers":
+        file = tmp_path / "evader.safetensors"
+        target_for(posse.get_scenario("smart")).save(file)
+        changes = {
+            "side": "trackers",
+            "encoding": "slots",
+            "against": f"smart,{file}",
+            "reward_weights": {},
+            "steps": 1920,
+            "checkpoint_every": 480,
+            "evaluate_every": 960,
+        }
+    train(target_run(tmp_path / "whole", **changes), console=quiet())
+    settings = target_run(tmp_path / "cut", **changes)
+    original, calls = Run._on_rollout_start, [0]
+
+    def dying(self: Run) -> None:
+        calls[0] += 1
+        if calls[0] == 5:
+            raise Killed
+        original(self)
+
+    monkeypatch.setattr(Run, "_on_rollout_start", dying)
+    with pytest.raises(Killed):
+        train(settings, console=quiet())
+    monkeypatch.setattr(Run, "_on_rollout_start", original)
+    resume(tmp_path / "cut", console=quiet())
+    assert_equal(numbers(tmp_path / "cut"), numbers(tmp_path / "whole"))
+
+
+def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
+    settings = target_run(tmp_path, against="idle,ddcs-distributed,idle", num_worlds=9)
+    env = make_env(settings)
+    assert [batch.num_worlds for batch in env.batches] == [6, 3]
+    assert [batch.first_world for batch in env.batches] == [0, 6]
+    assert env.num_envs == 9, "one slot for each target"
+    assert env.action_shape == (2,)
+    weights = dict(env.batches[0].scenario.target_reward_weights)
+    assert weights == {"team": -1.0, "contact": -0.5}
+    observations = env.reset()
+    assert observations.shape == (9, env.encoding.size)
+    assert not any(f.name == "neighbour_message" for f in env.encoding.fields)
+
+
+def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
+    settings = target_run(tmp_path, against="ddcs-distributed", evaluate_worlds=4)
+    smart = load_target("smart")
+    (denied,) = play_all(settings, smart, 0, SPLIT)
+    scenario = settings.scenarios[0]
+    played = evaluate("ddcs-distributed", scenario, 4, 0, split=SPLIT, progress=False)
+    np.testing.assert_allclose(denied["score"], 1 - played["score"])
+
+
+def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
+    train(target_run(tmp_path / "first", steps=160), console=quiet())
+    second = target_run(
+        tmp_path / "second",
+        steps=80,
+        start=str(tmp_path / "first"),
+        learning_rate=0.0,
+        final_learning_rate=0.0,
+        evaluate_every=10**6,
+    )
+    train(second, console=quiet())
+    before, after = (numbers(tmp_path / name)["/last/layers.0.weight"] for name in ("first", "second"))
+    assert before == after
+    with pytest.raises(CheckpointError, match=r"(?s)do not fit this run.*hidden"):
+        train(replace(second, folder=tmp_path / "third", hidden=(8,)), console=quiet())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"against": None}, "set against"),
+        ({"algorithm": "mappo"}, "mappo"),
+        ({"encoding": "slots"}, "encoding='slots'"),
+        ({"message_size": 2}, "message_size=2"),
+        ({"side": "neither"}, "side='neither'"),
+        ({"overrides": {"target_motion": "agent"}}, "the setting against"),
+        ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "unknown term of a target 'slot'"),
+    ],
+)
+def test_settings_that_fit_no_target_are_refused(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
+    with pytest.raises((SettingsError, posse.ScenarioError), match=message):
+        target_run(tmp_path, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"against": "nobody"}, "unknown policy 'nobody'"),
+        ({"against": "planner"}, "cannot be trained against"),
+        ({"beside": "evadr"}, "unknown target 'evadr'"),
+        ({"side": "trackers", "against": "idle", "reward_weights": {}}, "unknown target 'idle'"),
+    ],
+)
+def test_unknown_opponents_are_refused_before_anything_is_made(
+    changes: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(PolicyError, match=message):
+        train(target_run(tmp_path / "run", **changes), console=quiet())
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_that_names_code_is_not_resumed(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text('{"against": "ddcs-tuned,os:getcwd", "side": "target"}')
+    with pytest.raises(SettingsError, match=r"'os:getcwd' as 'against'"):
+        read_settings(path)
+
+
+def test_a_target_has_defaults_of_its_own() -> None:
+    settings = default_settings("smart", side="target")
+    assert (settings.encoding, settings.beside) == ("plain", "smart")
+    assert set(settings.reward_weights) == {"team", "contact"}
+
+
+def test_the_command_says_how_to_watch_a_target(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = (
+        "train --side target --scenario smart --against ddcs-distributed,idle --steps 160 "
+        "--num-worlds 4 --rollout 20 --minibatch 20 --hidden 8 --evaluate-worlds 2 --beside None "
+        "--no-tensorboard --overrides horizon 40 settle_time 1.0 num_trackers 2 "
+        f"--folder {tmp_path / 'run'}"
+    )
+    assert cli(words.split()) == 0
+    file = tmp_path / "run" / "best.safetensors"
+    shown = capsys.readouterr().out
+    assert f"posse watch ddcs-distributed --scenario smart --target {file}" in shown
+    assert f"posse compare ddcs-distributed idle --scenarios smart --target {file}" in shown
+    assert load_target(file).motion == "agent"

@@ -1,0 +1,187 @@
+"""Training: the same from the same seed, and the best policy is kept."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from rich.console import Console
+from stable_baselines3 import PPO
+from tests.support.runs import ADVISED, ALGORITHM_CASES, BELIEVING, assert_equal, numbers, quiet, small, steps_saved
+
+from posse_baselines import PolicyError, load
+from posse_baselines.learned import LearnedPolicy
+from posse_training.errors import DivergedError, SettingsError
+from posse_training.evaluation import evaluate
+from posse_training.train import train as module
+from posse_training.train.algorithms import ALGORITHMS, even_minibatch
+from posse_training.train.train import resume, train
+from posse_training.train.worlds import make_env
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHM_CASES)
+def test_two_trainings_from_one_seed_agree_exactly(tmp_path: Path, algorithm: str) -> None:
+    for name in "ab":
+        train(small(tmp_path / name, algorithm), console=quiet())
+    assert_equal(numbers(tmp_path / "a"), numbers(tmp_path / "b"))
+    train(small(tmp_path / "c", algorithm, seed=4), console=quiet())
+    mine, other = (numbers(tmp_path / name)["/last/layers.0.weight"] for name in "ac")
+    assert mine != other
+
+
+@pytest.mark.parametrize("changes", [ADVISED, BELIEVING])
+def test_an_advised_training_exports_what_it_played(tmp_path: Path, changes: dict[str, Any]) -> None:
+    file = train(small(tmp_path / "run", **changes), console=quiet())
+    policy = load(file)
+    assert isinstance(policy, LearnedPolicy)
+    assert policy.adviser is not None
+    scenario = small(tmp_path, **changes).scenarios[0]
+    results = evaluate(policy, scenario, 3, 0, split="validation", progress=False)
+    for name in ("safe_score", "score", "contact_free"):
+        assert results[name].mean() == pytest.approx(policy.card[f"validation_{name}"], abs=1e-12)
+    again = results["safe_score"].mean()
+    with (file.parent / "curve.csv").open(newline="") as lines:
+        curve = list(csv.DictReader(lines))
+    assert float(curve[0]["steps"]) == 0, "what it begins with is scored, too"
+    assert again == pytest.approx(max(float(row["safe_score"]) for row in curve), abs=1e-12)
+    with pytest.raises(SettingsError, match="neither imitate nor message_size"):
+        small(tmp_path, advise="ddcs-distributed", message_size=1)
+
+
+def test_a_line_is_printed_for_each_evaluation(tmp_path: Path) -> None:
+    console = Console(file=StringIO(), width=20)
+    train(small(tmp_path, beside="pursuit", imitate="pursuit", imitate_rounds=1), console=console)
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert "copying pursuit: 1 of 1 rounds" in lines[1]
+    found = [line.split(" steps ")[0].strip() for line in lines if "safe score" in line]
+    assert found == ["0", "640", "1,280"]
+    assert "pursuit 0." in lines[-1]
+
+
+def test_the_card_says_what_it_is(tmp_path: Path) -> None:
+    best = train(small(tmp_path), console=quiet())
+    policy = LearnedPolicy.from_file(best)
+    card = policy.card
+    assert card["scenarios"][0]["name"] == "constant"
+    assert card["scenarios"][0]["num_trackers"] == 2
+    assert card["trained_splits"] == ["train"]
+    assert card["seed"] == 3
+    assert card["encoding_hash"] == policy.encoding.digest
+    curve = LearnedPolicy.from_file(tmp_path / "last.safetensors").card["curve"]
+    assert [point["steps"] for point in curve] == [640, 1280]
+    assert card["validation_safe_score"] == max(p["safe_score"] for p in curve)
+    table = (tmp_path / "curve.csv").read_text().splitlines()
+    assert len(table) == 3
+
+
+def test_the_best_policy_is_kept_not_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scores = iter([0.2, 0.9, 0.4])
+    monkeypatch.setattr(
+        module,
+        "validate",
+        # The score alone would choose the first.
+        lambda *_: {
+            "safe_score": (safe := next(scores)),
+            "low": 0.0,
+            "high": 1.0,
+            "score": 1 - safe,
+            "contact_free": 1.0,
+        },
+    )
+    best = train(small(tmp_path, steps=1920), console=quiet())
+    assert LearnedPolicy.from_file(best).card["steps"] == 1280
+    assert LearnedPolicy.from_file(best).card["validation_safe_score"] == 0.9
+
+
+def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_path: Path) -> None:
+    """Rollouts are complete, so the number of remaining steps may be negative."""
+    settings = small(tmp_path, steps=100, learning_rate=1e-3, final_learning_rate=1e-4)
+    env = make_env(settings)
+    schedule = ALGORITHMS[settings.algorithm].make(settings, env).lr_schedule
+    assert schedule(1.0) == pytest.approx(1e-3)
+    assert schedule(0.5) == pytest.approx(5.5e-4)
+    assert schedule(0.0) == schedule(-7.0) == pytest.approx(1e-4)
+    at_once = env.num_envs * settings.rollout
+    assert settings.steps_made(env.num_envs) == -(-100 // at_once) * at_once
+    assert replace(settings, steps=3 * at_once).steps_made(env.num_envs) == 3 * at_once
+
+
+@pytest.mark.parametrize(("rows", "wanted", "size"), [(81920, 8192, 8192), (100, 40, 50), (7, 3, 7), (6, 100, 6)])
+def test_minibatches_are_even(rows: int, wanted: int, size: int) -> None:
+    assert even_minibatch(rows, wanted) == size
+
+
+def test_a_training_that_diverges_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def diverge(self: PPO) -> None:
+        with torch.no_grad():
+            for parameter in self.policy.parameters():
+                parameter.fill_(float("nan"))
+
+    monkeypatch.setattr(PPO, "train", diverge)
+    with pytest.raises(DivergedError, match=r"diverged at 160 steps.*Lower --learning-rate"):
+        train(small(tmp_path / "run"), console=quiet())
+
+
+def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = PPO.train
+
+    def diverge(self: PPO) -> None:
+        usual(self)
+        if self.num_timesteps > 800:
+            with torch.no_grad():
+                next(self.policy.parameters()).fill_(float("inf"))
+
+    monkeypatch.setattr(PPO, "train", diverge)
+    with pytest.raises(DivergedError, match=r"the checkpoint at 640 steps is kept, and best"):
+        train(small(tmp_path / "run", steps=2560), console=quiet())
+    monkeypatch.undo()
+    assert steps_saved(tmp_path / "run") == 640
+    resume(tmp_path / "run", console=quiet())
+    assert steps_saved(tmp_path / "run") == 2560
+
+
+def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path) -> None:
+    deviations = []
+    usual = PPO.train
+
+    def note(self: PPO) -> None:
+        deviations.append(self.policy.log_std.max().item())
+        usual(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PPO, "train", note)
+        settings = small(tmp_path, log_deviation=-1.0, final_log_deviation=-3.0)
+        train(settings, console=quiet())
+    assert len(deviations) == 8
+    for k, deviation in enumerate(deviations):
+        assert deviation == pytest.approx(-1.0 - 2.0 * k / 8, abs=0.02)
+    with pytest.raises(SettingsError, match=r"final_log_deviation=0.0 must not exceed"):
+        small(tmp_path, log_deviation=-1.0, final_log_deviation=0.0)
+
+
+@pytest.mark.parametrize("name", ["imitate", "advise", "beside"])
+def test_a_name_that_does_not_exist_leaves_no_folder(tmp_path: Path, name: str) -> None:
+    changes: dict[str, Any] = {name: "nobody"}
+    with pytest.raises(PolicyError, match="unknown policy 'nobody'"):
+        train(small(tmp_path / "run", **changes), console=quiet())
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
+    accumulators = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    train(small(tmp_path, tensorboard=True, contact_bound=0.1), console=quiet())
+    log = accumulators.EventAccumulator(str(tmp_path)).Reload()
+    with (tmp_path / "curve.csv").open(newline="") as lines:
+        curve = list(csv.DictReader(lines))
+    for name in ("safe_score", "score", "contact_free"):
+        logged = [(event.step, event.value) for event in log.Scalars(f"validation/{name}")]
+        wanted = [(int(float(row["steps"])), float(row[name])) for row in curve]
+        assert [step for step, _ in logged] == [step for step, _ in wanted] == [640, 1280]
+        assert [v for _, v in logged] == pytest.approx([v for _, v in wanted], rel=1e-5, abs=1e-6)
+    assert {"reward/slot", "reward/contact", "training/score", "rollout/success_rate"} <= set(log.Tags()["scalars"])
+    assert {"contact/share", "contact/multiplier"} <= set(log.Tags()["scalars"])

@@ -1,0 +1,104 @@
+"""One episode in every world of a batch, measured."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import posse
+from posse import Scenario
+from posse_baselines import BasePolicy, Played, Policy, Target, rollout
+from posse_baselines.policy import Memory
+from posse_training.errors import TimeLimitError, TrainedSplitError
+from posse_training.evaluation.results import Column
+
+
+def refuse_trained_split(policy: Policy | Target, split: str) -> None:
+    """Raise if a policy or a target was trained on this split, by its own account."""
+    trained = tuple(getattr(policy, "trained_splits", ()))
+    if split in trained:
+        raise TrainedSplitError(
+            f"{policy.name!r} was trained on the split {split!r}, so that its score there would be "
+            "biased: choose another of 'train', 'validation', 'test' than "
+            f"{', '.join(map(repr, trained))}"
+        )
+
+
+def limited(advance: Callable[[int], object], time_limit: float | None) -> Callable[[int], object]:
+    """Return a function that calls another one, and raises once a time limit is exceeded."""
+    if time_limit is None:
+        return advance
+    ends = time.monotonic() + time_limit
+
+    def check(steps: int) -> None:
+        if time.monotonic() > ends:
+            raise TimeLimitError(f"it exceeded the time limit of {time_limit:g} s")
+        advance(steps)
+
+    return check
+
+
+def play_shard(
+    policy: Policy,
+    scenario: Scenario,
+    seed: int,
+    split: str,
+    num_threads: int | None,
+    advance: Callable[[int], object],
+    shard: range,
+) -> dict[str, Column]:
+    """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
+    batch = posse.Batch(scenario, len(shard), seed=seed, split=split, first_world=shard.start, num_threads=num_threads)
+    return play_episode(batch, policy, advance)
+
+
+def play_episode(
+    batch: posse.Batch, policy: Policy, advance: Callable[[int], object] = lambda steps: None
+) -> dict[str, Column]:
+    """Play one episode in every world of a batch; return every metric by name, (E,).
+
+    They are the batch's metrics and ``leader_exchanges``: how often the leader of the majority
+    changed, ``nan`` for policies without leaders.
+    """
+    exchanges = ExchangeCounter(batch.num_worlds)
+
+    def note(step: Played) -> None:
+        exchanges.count(leaders_of(policy, step.memory), step.running)
+        advance(1)
+
+    return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}
+
+
+def leaders_of(policy: Policy, memory: Memory) -> npt.NDArray[Any] | None:
+    """Return the leader of each tracker, (E, N); ``None``: the policy has none."""
+    if isinstance(policy, BasePolicy):
+        return policy.leaders(memory)
+    return policy.annotations(memory).get("leader")
+
+
+class ExchangeCounter:
+    """Counts in each world how often the leader of the majority changes."""
+
+    def __init__(self, num_worlds: int) -> None:
+        self.total: Column = np.full(num_worlds, np.nan)
+        self._leader = np.full(num_worlds, -1)
+        self._seen: npt.NDArray[Any] = np.empty(0)
+
+    def count(self, leaders: npt.NDArray[Any] | None, running: npt.NDArray[np.bool_]) -> None:
+        """Add one step: the leader of each tracker, (E, N); ``None``: there is none."""
+        if leaders is None or np.array_equal(leaders, self._seen):
+            return
+        self._seen = leaders.copy()
+        # The leader of more than half is in the middle of the sorted row.
+        n = leaders.shape[1]
+        middle = np.sort(leaders, axis=1)[:, n // 2]
+        agreed = np.count_nonzero(leaders == middle[:, None], axis=1) > n / 2
+        chosen = np.where(agreed, middle, -1)
+        known = (chosen >= 0) & running
+        self.total[known & np.isnan(self.total)] = 0
+        self.total[known & (self._leader >= 0) & (chosen != self._leader)] += 1
+        self._leader[known] = chosen[known]

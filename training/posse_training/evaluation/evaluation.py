@@ -1,0 +1,202 @@
+"""Play episodes with a policy and keep a row for each.
+
+Every policy plays the same worlds: world i depends on the seed, the split and i only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import posse
+from posse import Scenario, ScenarioError, get_scenario
+from posse_baselines import Policy, PolicyError, Target, against, load, load_target, policy_names
+from posse_baselines.registry import is_code
+from posse_training.errors import PlayError, SettingsError, TimeLimitError, TrainedSplitError, describe
+from posse_training.evaluation.episodes import limited, play_shard, refuse_trained_split
+from posse_training.evaluation.results import Results
+from posse_training.parallel import Arrays, Job, apart, cut, gathered, joined
+
+WORLDS: Final = 500
+"""Worlds that are played at once."""
+
+
+def evaluate(
+    policy: str | Policy,
+    scenario: str | Scenario,
+    episodes: int = 1000,
+    seed: int = 7,
+    *,
+    target: str | Target | None = None,
+    split: str = "test",
+    progress: bool | Callable[[int], object] = True,
+    num_threads: int | None = None,
+    time_limit: float | None = None,
+    ray: bool | str = False,
+    worlds: int = WORLDS,
+    **overrides: Any,
+) -> Results:
+    """Play episodes of a scenario with a policy, here or on a Ray cluster, with the same result.
+
+    Args:
+        policy: A policy, or an argument of :func:`posse_baselines.load`.
+        scenario: A scenario or its name.
+        episodes: Number of episodes; episode i is world i of the seed.
+        seed: Seed of the worlds.
+        target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
+            scenario's own motion.
+        split: Split of the worlds; no training and no tuning uses ``"test"``.
+        progress: Whether to show a bar; or a function that is called after each control step with
+            the number of steps played, 1; on a cluster after each shard, with its steps.
+        num_threads: Threads that step the worlds; never changes a result; on a cluster one a shard.
+        time_limit: Time for all episodes, on a cluster for each shard, s, checked after each
+            control step; default: none.
+        ray: Play on a Ray cluster (extra ``cluster``): its address; ``True`` for the cluster of
+            this machine, or else all its cores.
+        worlds: Worlds that are played at once; on a cluster a shard. No policy that ships depends on it.
+        **overrides: Settings of the scenario.
+
+    Raises:
+        SettingsError: ``episodes`` or ``worlds`` below 1.
+        PolicyError: An unknown policy or target, or one that does not fit.
+        TrainedSplitError: A split that the policy or the target was trained on.
+        TimeLimitError: The time limit is exceeded.
+        ScenarioError: An unknown scenario or split, an invalid setting or seed.
+        MissingExtraError: Ray is to be used and not installed.
+        ClusterError: There is no such cluster, or one of its nodes has other versions.
+        PlayError: The policy failed on the cluster, or its workers died again and again.
+    """
+    given = get_scenario(scenario, **overrides)
+    one = prepare(policy, given, episodes, seed, target=target, split=split, time_limit=time_limit, worlds=worlds)
+    settings, total = one.scenario, len(one.shards) * one.scenario.horizon
+    with progress_bar(disable=progress is not True) as bar:
+        task = bar.add_task(escape(f"{one.policy.name} on {settings.name}"), total=total)
+
+        def advance(steps: int) -> None:
+            bar.advance(task, steps)
+
+        report = progress if callable(progress) else advance
+        if ray is False:
+            report = limited(report, time_limit)
+            played = (settings, seed, split, num_threads, report)
+            return one.results(joined([play_shard(one.policy, *played, shard) for shard in one.shards]))
+        with gathered_results([one], ray, lambda: report(settings.horizon)) as (found,):
+            if isinstance(found, Exception):
+                raise found
+            return found
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What :func:`evaluate` plays, checked."""
+
+    policy: Policy
+    sent: str | Policy
+    """What a worker of a cluster gets: a name that it can load itself, else the policy."""
+    scenario: Scenario
+    shards: Sequence[range]
+    seed: int
+    split: str
+    target: Target | None
+    time_limit: float | None
+
+    @property
+    def job(self) -> Job:
+        """The evaluation for a cluster."""
+        return Job(_play_on_worker, (self.sent, self.scenario, self.seed, self.split, self.time_limit), self.shards)
+
+    def results(self, columns: Arrays) -> Results:
+        """Return the results, given the metrics of all worlds."""
+        named = None if self.target is None else self.target.name
+        return Results(self.policy.name, self.scenario, self.seed, self.split, columns, named)
+
+
+def prepare(
+    policy: str | Policy,
+    scenario: Scenario,
+    episodes: int,
+    seed: int,
+    *,
+    target: str | Target | None = None,
+    split: str = "test",
+    time_limit: float | None = None,
+    worlds: int = WORLDS,
+) -> Evaluation:
+    """Return an evaluation whose arguments are those of :func:`evaluate`, and raise its errors."""
+    for name, value in (("episodes", episodes), ("worlds", worlds)):
+        if value < 1:
+            raise SettingsError(f"{name}={value} must be at least 1")
+    loaded = load(policy) if isinstance(policy, str) else policy
+    opponent = None if target is None else load_target(target)
+    if opponent is not None:
+        scenario, loaded = opponent.fit(scenario), against(loaded, opponent)
+    refuse_trained_split(loaded, split)
+    scenario = scenario.replace(message_size=max(scenario.message_size, loaded.message_size))
+    posse.Batch(scenario, 1, seed=seed, split=split)  # raises here what is invalid
+    is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
+    sent = policy if is_name and opponent is None else loaded
+    return Evaluation(loaded, sent, scenario, cut(episodes, worlds), seed, split, opponent, time_limit)
+
+
+@contextmanager
+def gathered_results(
+    evaluations: Sequence[Evaluation], ray: bool | str, done: Callable[[], object]
+) -> Iterator[list[Results | Exception]]:
+    """Play all evaluations at once on a Ray cluster; give the results of each, or why there are none.
+
+    What is finished is kept until the context ends without an exception; see
+    :func:`posse_training.parallel.gathered`. ``done`` is called after each shard.
+    """
+    with gathered([one.job for one in evaluations], ray, lambda shard: done()) as found:
+        both = zip(evaluations, found, strict=True)
+        yield [columns if isinstance(columns, Exception) else one.results(columns) for one, columns in both]
+
+
+def _play_on_worker(
+    policy: str | Policy, scenario: Scenario, seed: int, split: str, time_limit: float | None, shard: range
+) -> Arrays:
+    """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
+    if isinstance(policy, str) and is_code(policy) and time_limit is not None:
+        found: Arrays = apart(time_limit, _play_here, policy, scenario, seed, split, time_limit, shard)
+        return found
+    return _play_here(policy, scenario, seed, split, time_limit, shard)
+
+
+def _play_here(
+    policy: str | Policy, scenario: Scenario, seed: int, split: str, time_limit: float | None, shard: range
+) -> Arrays:
+    with played_errors():
+        loaded = load(policy) if isinstance(policy, str) else policy
+        return play_shard(loaded, scenario, seed, split, 1, limited(lambda steps: None, time_limit), shard)
+
+
+@contextmanager
+def played_errors() -> Iterator[None]:
+    """Turn errors of a policy's own code into a ``PlayError`` that says where; all can be pickled."""
+    try:
+        yield
+    except PolicyError as error:
+        raise PolicyError(str(error)) from None  # a subclass may not survive pickling
+    except (TimeLimitError, TrainedSplitError, SettingsError, ScenarioError):
+        raise
+    except Exception as error:
+        raise PlayError(describe(error)) from None
+
+
+def progress_bar(*, disable: bool = False, console: Console | None = None) -> Progress:
+    """Return a progress bar, as all commands show it."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        transient=True,
+        disable=disable,
+        console=console,
+    )

@@ -1,0 +1,107 @@
+"""The results of an evaluation: one row for each episode."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import Scenario
+from posse_baselines.files import write_atomically
+from posse_training.evaluation.statistics import Estimate, mean
+
+Column = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Results:
+    """The metrics of a policy in a number of episodes of one scenario.
+
+    Attributes:
+        policy: The policy's name.
+        scenario: The scenario with all its settings.
+        seed: Seed of the worlds.
+        split: Split of the worlds.
+        columns: Every metric by name, (episodes,) float64; ``nan`` means "never".
+        target: Name of the target, where one was given; else the scenario's own motion was played.
+    """
+
+    policy: str
+    scenario: Scenario
+    seed: int
+    split: str
+    columns: dict[str, Column] = field(repr=False)
+    target: str | None = None
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes."""
+        return len(next(iter(self.columns.values())))
+
+    def __getitem__(self, metric: str) -> Column:
+        """Return one metric's column."""
+        if metric not in self.columns:
+            raise KeyError(f"unknown metric {metric!r}; metrics are: {', '.join(self.columns)}")
+        return self.columns[metric]
+
+    @property
+    def settled(self) -> npt.NDArray[np.bool_]:
+        """Whether the team settled, (episodes,)."""
+        settled: npt.NDArray[np.bool_] = np.isfinite(self.columns["settling_time"])
+        return settled
+
+    @property
+    def contacts(self) -> Column:
+        """Number of contacts of any kind, (episodes,)."""
+        kinds = ("tracker_contacts", "obstacle_contacts", "target_contacts")
+        total: Column = np.sum([self.columns[kind] for kind in kinds], axis=0)
+        return total
+
+    def estimate(self, metric: str) -> Estimate:
+        """Return the mean of a metric over the episodes that have it, with its 95 % interval."""
+        return mean(self[metric])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return one dictionary for each episode."""
+        return [
+            {
+                "policy": self.policy,
+                "scenario": self.scenario.name,
+                "scenario_version": self.scenario.version,
+                **({} if self.target is None else {"target": self.target}),
+                "seed": self.seed,
+                "split": self.split,
+                "world": world,
+                **{name: float(column[world]) for name, column in self.columns.items()},
+            }
+            for world in range(self.episodes)
+        ]
+
+    def write(self, path: Path) -> None:
+        """Write the rows as CSV and the settings as a JSON file of the same name.
+
+        Raises:
+            OSError: A file could not be written; an old one of that name is unchanged.
+        """
+        path.parent.mkdir(parents=True, exist_ok=True)
+        rows = self.rows()
+        text = io.StringIO(newline="")
+        writer = csv.DictWriter(text, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+        write_atomically(path, text.getvalue().encode())
+        settings = {
+            "policy": self.policy,
+            **({} if self.target is None else {"target": self.target}),
+            "seed": self.seed,
+            "split": self.split,
+            "scenario": self.scenario.to_dict(),
+        }
+        text_of = json.dumps(settings, indent=2) + "\n"
+        write_atomically(path.with_suffix(".json"), text_of.encode())

@@ -1,0 +1,270 @@
+"""Work of many processes: a call in a process of its own, and jobs that a Ray cluster does in shards of worlds.
+
+A world depends on nothing but its index, and how worlds are cut into shards not on the workers. So the results of a
+cluster are those of one process, bit for bit, on processors of the same kind.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import hashlib
+import io
+import os
+import pickle
+import pickletools
+import platform
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Final, NamedTuple
+
+import cloudpickle
+import numpy as np
+import numpy.typing as npt
+import tyro
+
+from posse_baselines.files import write_atomically
+from posse_baselines.registry import is_code
+from posse_training.errors import ClusterError, PlayError, SettingsError, TimeLimitError, require
+from posse_training.provenance import installed, sources
+
+Arrays = dict[str, npt.NDArray[Any]]
+"""Results of some worlds, by name; the first axis runs over the worlds."""
+
+WORK: Final = Path("runs/shards")
+"""Folder of finished shards while others are missing."""
+RETRIES: Final = 3
+"""How often Ray does a call again whose worker died."""
+_GRACE: Final = 3.0  # s beyond a time limit, in which a policy may notice it by itself
+_PATIENCE: Final = 10.0  # s until an address that does not answer is an error
+_LOOK: Final = 1.0  # s between two looks at which calls are finished
+
+
+def cut(count: int, size: int) -> list[range]:
+    """Return the shards of ``count`` worlds: ranges of their indices, of ``size`` worlds at most."""
+    return [range(first, min(first + size, count)) for first in range(0, count, size)]
+
+
+def joined(parts: Sequence[Arrays]) -> Arrays:
+    """Return arrays whose first axis runs over the worlds of all parts."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def apart(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return ``function(*arguments)``, computed in a process of its own. That is no sandbox.
+
+    Raises:
+        TimeLimitError: It took longer than the limit, s; the process was ended.
+        PlayError: The process died.
+    """
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", f"from {__name__} import _answer; _answer()"],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            input=cloudpickle.dumps((limit, function, arguments)),
+            stdout=subprocess.PIPE,
+            timeout=limit + _GRACE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise TimeLimitError(f"it exceeded the time limit of {limit:g} s and was ended") from error
+    if not done.stdout:
+        raise PlayError(f"its process ended with exit code {done.returncode}")
+    value = pickle.loads(done.stdout)  # noqa: S301 (our own process wrote it)
+    if isinstance(value, Exception):
+        raise value
+    return value
+
+
+def _answer() -> None:
+    """Compute what the standard input asks for, and write it, or the error, to the standard output."""
+    limit, function, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301 (our parent wrote it)
+    with os.fdopen(os.dup(1), "wb") as found, Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)  # what a policy prints is no part of the answer
+        # A hanging policy does not outlive a parent that was killed.
+        faulthandler.dump_traceback_later(limit + 2 * _GRACE, exit=True, file=nowhere)
+        try:
+            value = function(*arguments)
+        except Exception as error:
+            value = error
+        found.write(cloudpickle.dumps(value))
+
+
+# --- a Ray cluster --------------------------------------------------------------------------------
+
+RayOption = Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="[ADDRESS]")]
+"""Type of the option ``--ray``: without an address, with one, or left out (``None``)."""
+
+
+def address_of(option: tuple[str, ...] | None) -> bool | str:
+    """Return the argument ``ray`` of an option ``--ray``.
+
+    Raises:
+        SettingsError: More than one address.
+    """
+    if not option:
+        return option is not None
+    if len(option) > 1:
+        given = " ".join(option)
+        raise SettingsError(f"--ray takes one address at most, not {given!r:.100}: put it after the unnamed arguments")
+    return option[0]
+
+
+@contextlib.contextmanager
+def connected(ray: bool | str, *, log: bool = False) -> Iterator[None]:
+    """Connect to a Ray cluster; a connection that there is already is used and left open.
+
+    Args:
+        ray: ``HOST:PORT``, ``auto``, ``ray://HOST:PORT`` or ``local``; ``True``: the address in ``RAY_ADDRESS``, else
+            the cluster that this machine belongs to, else all cores of this machine; ``False``: no connection.
+        log: Show what the workers print.
+
+    Raises:
+        MissingExtraError: Ray is not installed.
+        ClusterError: There is no such cluster.
+    """
+    if ray is False:
+        yield
+        return
+    require("cluster", "ray")
+    import ray as cluster
+
+    if cluster.is_initialized():
+        yield
+        return
+    address = ray if isinstance(ray, str) else None
+    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+    try:
+        if host and port.isdecimal():  # Ray itself notices only after minutes that nothing answers there
+            socket.create_connection((host, int(port)), timeout=_PATIENCE).close()
+        cluster.init(address=address, log_to_driver=log, logging_level="warning")
+    except (OSError, OverflowError, ValueError, RuntimeError) as error:
+        fix = "start one (ray start --head), or leave out the address to use this machine's cores"
+        raise ClusterError(f"no Ray cluster at {address!r} ({error}): {fix}") from error
+    try:
+        yield
+    finally:
+        cluster.shutdown()
+
+
+def on_ray(
+    function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], dropped: Collection[int] = ()
+) -> Iterator[tuple[int, Any]]:
+    """Yield the index and the result of each call as it finishes, on one core each of the connected cluster.
+
+    A result is an exception if the function raised one, or if the workers of a call died again and again. Calls whose
+    index the caller adds to ``dropped`` meanwhile are cancelled.
+    """
+    import ray
+
+    task = ray.remote(num_cpus=1, max_retries=RETRIES)(_work)
+    running = {task.remote(function, installed(), *call): k for k, call in enumerate(calls)}
+    try:
+        while running:
+            ready, _ = ray.wait(list(running), num_returns=len(running), timeout=_LOOK)
+            for k, reference in [(running.pop(reference), reference) for reference in ready]:
+                try:
+                    yield k, ray.get(reference)
+                except ray.exceptions.RayTaskError as error:  # the function or an argument cannot be imported there
+                    yield k, ClusterError(f"a worker cannot begin: {' '.join(str(error.cause).split()):.300}")
+                except ray.exceptions.RayError as error:
+                    why = f"{type(error).__name__}: {' '.join(str(error).split()):.200}"
+                    yield k, PlayError(f"{RETRIES + 1} workers died with it; the last one: {why}")
+            for reference in [reference for reference, k in running.items() if k in dropped]:
+                del running[reference]
+                ray.cancel(reference, force=True)
+    finally:
+        for reference in running:
+            ray.cancel(reference, force=True)
+
+
+def _work(function: Callable[..., Any], expected: str, *arguments: Any) -> Any:
+    """Return the result of a function, or the exception that it raised: Ray prints those that it is told of."""
+    if installed() != expected:
+        what = f"node {platform.node()} has {installed()}, and the driver {expected}"
+        return ClusterError(f"{what}: install the same on all nodes")
+    try:
+        return function(*arguments)
+    except Exception as error:
+        return error
+
+
+class Job(NamedTuple):
+    """Work whose shards can be done anywhere, in any order."""
+
+    function: Callable[..., Arrays]
+    """``function(*arguments, shard)`` returns the arrays of a shard."""
+    arguments: tuple[Any, ...]
+    shards: Sequence[range]
+
+    @property
+    def folder(self) -> Path:
+        """Folder of finished shards; its name is a digest of all that their arrays depend on."""
+        call = cloudpickle.dumps((self.function, self.arguments))
+        digest = hashlib.sha256(call + installed().encode())
+        texts = {text for _, text, _ in pickletools.genops(call) if isinstance(text, str)}
+        modules = {text.partition(":")[0] for text in texts if text in sys.modules or is_code(text)}
+        for package in sorted({module.partition(".")[0] for module in modules} - sys.stdlib_module_names):
+            digest.update(sources(package).encode())
+        return WORK / digest.hexdigest()[:24]
+
+
+@contextlib.contextmanager
+def gathered(
+    jobs: Sequence[Job], ray: bool | str, done: Callable[[range], object] = lambda shard: None
+) -> Iterator[list[Arrays | Exception]]:
+    """Do all jobs at once on a Ray cluster; give the joined arrays of each, or the exception that ended it.
+
+    Each finished shard is a file, where the same jobs find it again after an interruption. The files are removed when
+    the context ends without an exception.
+
+    Args:
+        jobs: The jobs.
+        ray: See :func:`connected`.
+        done: Is called with each shard that is done or was found.
+
+    Raises:
+        MissingExtraError: Ray is not installed.
+        ClusterError: There is no such cluster.
+    """
+    folders = []
+    with connected(ray):
+        import ray as cluster
+
+        folders = [job.folder for job in jobs]
+        parts: list[dict[range, Arrays]] = []
+        for job, folder in zip(jobs, folders, strict=True):
+            files = {shard: folder / f"{shard.start}-{shard.stop}.npz" for shard in job.shards}
+            parts.append({shard: dict(np.load(file)) for shard, file in files.items() if file.exists()})
+            for shard in parts[-1]:
+                done(shard)
+        calls = [(k, shard) for k, job in enumerate(jobs) for shard in job.shards if shard not in parts[k]]
+        sent = [cluster.put((job.function, job.arguments)) for job in jobs]  # to each node once, not with each shard
+        failed: dict[int, Exception] = {}
+        dropped: set[int] = set()
+        for call, result in on_ray(_play, [(sent[k], shard) for k, shard in calls], dropped):
+            k, shard = calls[call]
+            if isinstance(result, Exception):
+                failed.setdefault(k, result)
+                dropped |= {other for other, (job_of, _) in enumerate(calls) if job_of == k}
+            elif k not in failed:
+                parts[k][shard] = result
+                content = io.BytesIO()
+                np.savez(content, allow_pickle=False, **result)
+                folders[k].mkdir(parents=True, exist_ok=True)
+                write_atomically(folders[k] / f"{shard.start}-{shard.stop}.npz", content.getvalue())
+                done(shard)
+    yield [failed.get(k) or joined([parts[k][shard] for shard in job.shards]) for k, job in enumerate(jobs)]
+    for folder in folders:
+        shutil.rmtree(folder, ignore_errors=True)
+    with contextlib.suppress(OSError):  # others are in it
+        os.removedirs(WORK)
+
+
+def _play(call: tuple[Callable[..., Arrays], tuple[Any, ...]], shard: range) -> Arrays:
+    function, arguments = call
+    return function(*arguments, shard)

@@ -1,0 +1,260 @@
+"""Figures 7 to 10 of the paper, and of what it announces but does not show: several K and c, a leader's loss."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch
+
+import posse
+from posse_baselines import Trajectory, with_settings
+from posse_baselines.ddcs import TASKS
+from posse_training.reproduce import runs
+from posse_training.reproduce.runs import relative, slot_error, times, told
+from posse_training.style import BLUE, GREEN, GREY, GRID, INK, ORANGE, PINK, RED, note
+
+COLOURS: Final = (BLUE, RED, GREEN, PINK, GREY)
+LINES: Final[tuple[Any, ...]] = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3)))
+TARGET: Final = INK
+_AFTER: Final = 1.5  # share of the settling time that curves go on for
+_LEAST: Final = 5.0  # s
+_HEADING: Final = 2.6  # rad; of the target in the tracks
+_TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
+
+
+def look_of(number: int) -> dict[str, Any]:
+    """Colour and line style of a robot."""
+    return {"color": COLOURS[number % 5], "ls": LINES[number % 5]}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A world of a run, and the time at which it settled, s; nan: it did not."""
+
+    policy: str
+    run: Trajectory
+    world: int
+    settled: float
+
+
+def frames(shown: Sequence[Shown], played: str) -> Figure:
+    """Draw start, half the settling time and the settled formation, a row for each policy.
+
+    ``played`` is written below: world, split, seed and version.
+    """
+    figure, axes = plt.subplots(len(shown), 3, figsize=(9.6, 3.3 * len(shown)), layout="constrained", squeeze=False)
+    for row, one in zip(axes, shown, strict=True):
+        time = times(one.run)
+        last = one.settled if np.isfinite(one.settled) else time[-1]
+        for axis, when in zip(row, (0.0, last / 2, last), strict=True):
+            frame = int(np.searchsorted(time, when - 1e-9))
+            draw_robots(axis, one.run, one.world, frame)
+            axis.set_title(f"t = {time[frame]:.1f} s", loc="left")
+        row[0].set_ylabel(f"{one.policy}\ny, m")
+    for axis in axes[-1]:
+        axis.set_xlabel("x, m")
+    handles = [
+        Line2D([], [], marker="o", ls="", mfc="none", mec=GREY, ms=9, label="slot"),
+        Line2D([], [], marker="o", ls="", mfc=TARGET, mec=TARGET, ms=7, label="target"),
+        Line2D([], [], color=GREY, lw=1.2, label="trail"),
+    ]
+    if any((told(one.run, "leader")[:, one.world] >= 0).any() for one in shown):
+        rim = Line2D([], [], marker="o", ls="", mfc="w", mec=TARGET, mew=2.2, ms=8, label="leader")
+        handles.append(rim)
+    note(figure, played)
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
+    return figure
+
+
+def draw_robots(axis: Axes, run: Trajectory, world: int, frame: int, since: int = 0) -> None:
+    """Draw robots with headings, trails since a frame, slots; the leader has a thick rim."""
+    targets, teams = run["target_pose"][:, world], run["tracker_pose"][:, world]
+    target, trackers = targets[frame].astype(np.float64), teams[frame].astype(np.float64)
+    r = run.scenario.robot_radius
+    for x, y in runs.slots(run)[frame, world]:
+        axis.add_patch(Circle((x, y), 1.35 * r, fill=False, ec=GREY, lw=0.8))
+    trail = slice(since, frame + 1)
+    axis.plot(targets[trail, 0], targets[trail, 1], color=TARGET, lw=0.9)
+    for number in range(len(trackers)):
+        axis.plot(teams[trail, number, 0], teams[trail, number, 1], lw=1.1, **look_of(number))
+    leader = told(run, "leader")[frame, world].max()
+    for number, (x, y, theta) in enumerate([*trackers, target]):
+        is_target = number == len(trackers)
+        edge = TARGET if is_target else COLOURS[number % 5]
+        face = TARGET if is_target else "w"
+        rim = 2.4 if number == leader else 1.0
+        axis.add_patch(Circle((x, y), r, fc=face, ec=edge, lw=rim, zorder=3))
+        nose = (x + 1.5 * r * np.cos(theta), y + 1.5 * r * np.sin(theta))
+        axis.plot(*zip((x, y), nose, strict=True), color=edge, lw=1.3, zorder=4)
+        if not is_target:
+            axis.text(x, y, str(number), ha="center", va="center", fontsize=6, zorder=5)
+    centre = np.vstack([trackers, target])[:, :2]
+    middle = (centre.min(axis=0) + centre.max(axis=0)) / 2
+    reach = max(1.9, 0.35 + float(np.abs(centre - middle).max()))
+    axis.set_xlim(middle[0] - reach, middle[0] + reach)
+    axis.set_ylim(middle[1] - reach, middle[1] + reach)
+    axis.set_aspect("equal")
+
+
+def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
+    """Draw every tracker against time, a column for each policy."""
+    figure, axes = plt.subplots(
+        5, len(shown), figsize=(4.6 * len(shown), 8.6), layout="constrained", sharex="col", sharey="row", squeeze=False
+    )
+    for column, one in zip(axes.T, shown, strict=True):
+        run, world, settled, time = one.run, one.world, one.settled, times(one.run)
+        end = max(_LEAST, _AFTER * settled) if np.isfinite(settled) else time[-1]
+        keep = time <= end + 1e-9
+        place = relative(run)[keep, world]
+        turned = run["tracker_pose"][keep, world, :, 2].astype(np.float64) - run["target_pose"][keep, world, None, 2]
+        values = {
+            "x from the\ntarget, m": place[..., 0],
+            "y from the\ntarget, m": place[..., 1],
+            "speed V, m/s": run["tracker_speed"][keep, world],
+            "heading from the\ntarget's, rad": np.unwrap((turned + np.pi) % (2 * np.pi) - np.pi, axis=0),
+            "distance from\nthe slot, m": slot_error(run)[keep, world],
+        }
+        for axis, (label, what) in zip(column, values.items(), strict=True):
+            for number in range(what.shape[1]):
+                axis.plot(time[keep], what[:, number], lw=1.3, **look_of(number))
+            axis.axvline(paper, color=GREY, ls=":", lw=1.2)
+            if np.isfinite(settled):
+                axis.axvline(settled, color=GREY, lw=1.0)
+            if one is shown[0]:
+                axis.set_ylabel(label)
+        when = f"settled at {settled:.1f} s" if np.isfinite(settled) else "not settled"
+        column[0].set_title(f"{one.policy}: {when}", loc="left")
+        column[-1].set_xlabel("time, s")
+    robots = range(shown[0].run.scenario.num_trackers)
+    handles = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in robots]
+    handles += [
+        Line2D([], [], color=GREY, lw=1.0, label="settled"),
+        Line2D([], [], color=GREY, ls=":", lw=1.2, label=f"the paper's {paper:g} s"),
+    ]
+    note(figure, played)
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
+    return figure
+
+
+def tracks(seed: int) -> Figure:
+    """Draw one tracker for three K with c = 0, and a team with different K and c."""
+    figure, axes = plt.subplots(2, 3, figsize=(10, 5.2), layout="constrained", gridspec_kw={"height_ratios": (1.3, 1)})
+    alone = posse.get_scenario("constant", num_trackers=1, horizon=300)
+    start = {"tracker_pose": [(6.0, -1.5, 3.0)], "target_pose": (0.0, 0.0, _HEADING)}
+    for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
+        for number, k in enumerate((0.9, 1.0, 1.1)):
+            policy = with_settings(name, navigation_constant=k)
+            run = runs.run_of(policy, alone, 1, seed, start)
+            _track(axes[0, column], run, 0, number)
+            _bearing(axes[1, column], run, 0, number, f"K = {k:g}")
+            if column == 0:
+                axes[1, 0].axhline(_HEADING / k, color=GREY, lw=0.6)
+    axes[0, 0].set_title("K of three values, c = 0", loc="left")
+    axes[0, 1].set_title("K of three values, c = ψ - K σ_d", loc="left")
+    team = posse.get_scenario("constant", horizon=300)
+    rng = np.random.default_rng(seed)
+    pose = [(5.0 + rng.uniform(-1, 1), y, rng.uniform(2, 4)) for y in (-3.0, -1.8, -0.6, 0.6, 1.8)]
+    start = {"tracker_pose": pose, "target_pose": (0.0, 0.0, _HEADING)}
+    run = runs.run_of("deviated-pursuit", team, 1, seed, start)
+    for number in range(5):
+        _track(axes[0, 2], run, number, number)
+        _bearing(axes[1, 2], run, number, number, f"robot {number}")
+    axes[0, 2].set_title("K = 1, five c", loc="left")
+    for axis in axes[0]:
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.set_xlabel("x, m")
+    for axis in axes[1]:
+        axis.set_xlabel("time, s")
+    for axis in axes[1, :2]:
+        axis.legend(frameon=False, ncols=3, loc="upper right", columnspacing=1.0)
+        axis.set_ylim(axis.get_ylim()[0], axis.get_ylim()[1] + 0.15)
+    axes[0, 0].set_ylabel("y, m")
+    axes[1, 0].set_ylabel("line of sight σ, rad")
+    handles = [Line2D([], [], lw=1.4, label=f"robot {n}", **look_of(n)) for n in range(5)]
+    handles.append(Line2D([], [], color=TARGET, lw=1.0, label="target"))
+    note(figure, f"one run each from a given start, {runs.played(team, seed)}")
+    figure.legend(handles=handles, loc="outside upper center", ncols=6, frameon=False)
+    return figure
+
+
+def _track(axis: Axes, run: Trajectory, number: int, look: int) -> None:
+    target, path = run["target_pose"][:, 0], run["tracker_pose"][:, 0, number]
+    axis.plot(target[:, 0], target[:, 1], color=TARGET, lw=1.0)
+    axis.plot(path[:, 0], path[:, 1], lw=1.4, **look_of(look))
+    for marker, instant in (("o", 0), ("s", -1)):
+        axis.plot(*path[instant, :2], marker, ms=4, color=COLOURS[look % 5])
+
+
+def _bearing(axis: Axes, run: Trajectory, number: int, look: int, label: str) -> None:
+    x, y = -relative(run)[:, 0, number].T
+    sigma = np.unwrap(np.arctan2(y, x))
+    sigma += 2 * math.pi * round((_HEADING - sigma[-1]) / (2 * math.pi))
+    axis.plot(times(run), sigma, lw=1.4, label=label, **look_of(look))
+
+
+def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
+    """Draw a run in which the leader breaks: error, task and leader of each robot over time."""
+    scenario = posse.get_scenario("leader-loss")
+    run = runs.run_of(policy, scenario, worlds, seed)
+    world, broke, recovered = _shown(run)
+    time, alive, error = times(run), runs.working(run)[:, world], slot_error(run)[:, world]
+    figure, axes = plt.subplots(
+        4, 1, figsize=(8.4, 8.2), layout="constrained", gridspec_kw={"height_ratios": (2.6, 2, 1, 1)}
+    )
+    start = max(0.0, broke - 5.0)
+    end = min(time[-1], max(recovered, broke) + 5.0)
+    keep = (time >= start) & (time <= end)
+    draw_robots(axes[0], run, world, *(int(np.searchsorted(time, when)) for when in (broke, start)))
+    axes[0].set_title(f"{policy}: the leader (thick rim) breaks at {broke:.1f} s", loc="left")
+    axes[0].set_xlabel("x, m")
+    axes[0].set_ylabel("y, m")
+    robots = scenario.num_trackers
+    for number in range(robots):
+        at = alive[:, number] & keep
+        axes[1].plot(time[at], error[at, number], lw=1.3, **look_of(number))
+    axes[1].axhline(0.3, color=GREY, lw=0.8)
+    axes[1].set_ylabel("distance from\nthe nearest slot, m")
+    axes[1].set_ylim(0.0, None)
+    extent = (start, end, robots - 0.5, -0.5)
+    for axis, name, colours in ((axes[2], "task", _TASK_COLOURS), (axes[3], "leader", COLOURS)):
+        known = np.ma.masked_where(~alive[keep].T, told(run, name)[keep, world].T)
+        look = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": len(colours) - 0.5}
+        axis.imshow(known, aspect="auto", extent=extent, interpolation="nearest", **look)
+        axis.set_ylabel(f"{name} of\nrobot")
+        axis.set_yticks(range(robots))
+        axis.grid(visible=False)
+    for axis in axes[1:]:
+        axis.set_xlim(start, end)
+        axis.axvline(broke, color=TARGET, lw=1.0)
+        if np.isfinite(recovered):
+            axis.axvline(recovered, color=TARGET, lw=1.0, ls=":")
+    axes[3].set_xlabel("time, s (line: the leader breaks; dotted: all slots are held again)")
+    handles: list[Artist] = [Line2D([], [], lw=1.3, label=f"robot {n}", **look_of(n)) for n in range(robots)]
+    handles += [Patch(fc=c, label=t) for c, t in zip(_TASK_COLOURS, TASKS, strict=True)]
+    note(figure, f"world {world}, the median of {worlds:,} worlds, {runs.played(scenario, seed)}")
+    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False)
+    return figure
+
+
+def _shown(run: Trajectory) -> tuple[int, float, float]:
+    """Return the world of the median recovery, when its leader broke, and when it recovered (s)."""
+    time, alive = times(run), runs.working(run)
+    broken = np.asarray(~alive.all(axis=2))
+    broke = np.where(broken.any(axis=0), time[broken.argmax(axis=0)], np.nan)
+    away = np.asarray(alive & (slot_error(run) >= 0.3))
+    off = broken & away.any(axis=2)  # (T + 1, E)
+    last = run.steps - off[::-1].argmax(axis=0)
+    recovered = time[np.minimum(last + 1, run.steps)]
+    taken = np.where(off.any(axis=0) & ~off[-1], recovered - broke, np.nan)
+    world = runs.median_world(taken)
+    return world, float(broke[world]), float(broke[world] + taken[world])

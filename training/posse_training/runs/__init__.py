@@ -1,8 +1,0 @@
-"""Training runs: settings, training, checkpoints."""
-
-from __future__ import annotations
-
-from posse_training.runs.defaults import default_settings
-from posse_training.runs.settings import TrainSettings, read_settings
-
-__all__ = ["TrainSettings", "default_settings", "read_settings"]

@@ -1,1 +1,0 @@
-"""One training with several seeds, here or on a cluster."""

@@ -1,0 +1,165 @@
+"""The algorithms: one entry of a table and one function for each.
+
+Importing this module does not import torch: ``posse train --help`` lists the algorithms without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+    from torch import nn
+
+    from posse_training.train.settings import TrainSettings
+    from posse_training.train.vec_env import TeamVecEnv
+
+_ADAM_EPSILON: Final = 1e-5  # the default of stable-baselines3's PPO
+_EXPLORATION: Final = 0.1  # standard deviation of the noise on td3's actions
+_ENTROPY: Final = "auto_0.01"  # of sac: from 1, rewards of 0.1 a step count for nothing at first
+
+
+@dataclass(frozen=True)
+class Algorithm:
+    """What a run needs to know of an algorithm.
+
+    Attributes:
+        make: Returns an untrained model of stable-baselines3.
+        actor: Returns the layers of a model from normalised input to action, for the exported policy.
+        bound: How the exported policy bounds the last layer's output: ``"clip"`` or ``"tanh"``.
+        on_policy: Whether it learns from its latest rollout only.
+        reads_state: Whether its observations end with the state of the world, for its value function.
+    """
+
+    make: Callable[[TrainSettings, TeamVecEnv], BaseAlgorithm]
+    actor: Callable[[Any], list[nn.Module]]
+    bound: str
+    on_policy: bool = False
+    reads_state: bool = False
+
+
+def _ppo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
+    return _any_ppo(s, env, "MlpPolicy", {"net_arch": list(s.hidden)})
+
+
+def _mappo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
+    from posse_training.train.networks import CentralizedCriticPolicy
+
+    return _any_ppo(s, env, CentralizedCriticPolicy, {"private_size": env.private_size, "hidden": s.hidden})
+
+
+def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, network: dict[str, Any]) -> BaseAlgorithm:
+    from stable_baselines3 import PPO
+    from torch import nn
+
+    model = PPO(
+        policy,
+        env,
+        n_steps=s.rollout,
+        batch_size=even_minibatch(s.rollout * env.num_envs, s.minibatch),
+        n_epochs=s.epochs,
+        gae_lambda=s.gae_lambda,
+        clip_range=s.clip,
+        ent_coef=s.entropy,
+        vf_coef=s.value_weight,
+        stats_window_size=500,
+        policy_kwargs=_network(s, log_std_init=s.log_deviation, **network),
+        **_common(s),
+    )
+    if s.advise is not None:
+        # The policy begins as its adviser, which small random corrections would already impair.
+        made: Any = model.policy
+        nn.init.zeros_(made.action_net.weight)
+    return model
+
+
+def _sac(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
+    from stable_baselines3 import SAC
+
+    return SAC("MlpPolicy", env, ent_coef=_ENTROPY, **_off_policy(s))
+
+
+def _td3(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
+    from stable_baselines3 import TD3
+    from stable_baselines3.common.noise import NormalActionNoise
+
+    shape = env.action_shape
+    noise = NormalActionNoise(np.zeros(shape), np.full(shape, _EXPLORATION))
+    return TD3("MlpPolicy", env, action_noise=noise, **_off_policy(s))
+
+
+def _off_policy(s: TrainSettings) -> dict[str, Any]:
+    return {
+        "buffer_size": s.replay,
+        "learning_starts": s.learning_starts,
+        "batch_size": s.minibatch,
+        "gradient_steps": s.gradients,
+        "policy_kwargs": _network(s, net_arch=list(s.hidden)),
+        **_common(s),
+    }
+
+
+def _common(s: TrainSettings) -> dict[str, Any]:
+    return {"learning_rate": _LearningRate(s), "gamma": s.discount, "seed": s.seed, "device": "cpu"}
+
+
+def _network(s: TrainSettings, **further: Any) -> dict[str, Any]:
+    """Return the arguments of a policy's networks."""
+    from posse_training.train.networks import ACTIVATIONS, Normaliser
+
+    adam = {"fused": True, "eps": _ADAM_EPSILON} if s.on_policy else {"fused": True}
+    return {
+        "activation_fn": ACTIVATIONS[s.activation],
+        "features_extractor_class": Normaliser,
+        "optimizer_kwargs": adam,
+        **further,
+    }
+
+
+def _ppo_actor(policy: Any) -> list[nn.Module]:
+    return [*_flat(policy.mlp_extractor.policy_net), policy.action_net]
+
+
+def _sac_actor(policy: Any) -> list[nn.Module]:
+    return [*_flat(policy.actor.latent_pi), policy.actor.mu]
+
+
+def _td3_actor(policy: Any) -> list[nn.Module]:
+    return _flat(policy.actor.mu)[:-1]  # the last one is the tangent that bounds the output
+
+
+def _flat(module: nn.Module) -> list[nn.Module]:
+    from torch import nn
+
+    return [m for m in module.modules() if not isinstance(m, nn.Sequential)]
+
+
+ALGORITHMS: Final = {
+    "ppo": Algorithm(_ppo, _ppo_actor, "clip", on_policy=True),
+    "mappo": Algorithm(_mappo, _ppo_actor, "clip", on_policy=True, reads_state=True),
+    "sac": Algorithm(_sac, _sac_actor, "tanh"),
+    "td3": Algorithm(_td3, _td3_actor, "tanh"),
+}
+"""By name; a new algorithm is an entry here, and the function that makes it."""
+
+
+class _LearningRate:
+    """A learning rate that falls linearly from the start to the end of training."""
+
+    def __init__(self, settings: TrainSettings) -> None:
+        self._first, self._last = settings.learning_rate, settings.final_learning_rate
+
+    def __call__(self, remaining: float) -> float:
+        # Rollouts are completed, so the last one may end after the requested steps.
+        left = max(0.0, remaining)
+        return self._last + left * (self._first - self._last)
+
+
+def even_minibatch(rows: int, wanted: int) -> int:
+    """Return the divisor of ``rows`` that is nearest to ``wanted`` in proportion."""
+    sizes = [d for k in range(1, int(rows**0.5) + 1) if rows % k == 0 for d in (k, rows // k)]
+    return min(sizes, key=lambda size: max(size / wanted, wanted / size))

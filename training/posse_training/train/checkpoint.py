@@ -1,0 +1,249 @@
+"""What a run keeps on disk: its folder, its settings, its learning curve and its checkpoint.
+
+A checkpoint is one file of tensors and plain values, protected by a digest; reading one runs no code
+(``torch.load`` with ``weights_only``). A new one replaces the last one atomically, so that a whole
+one exists whenever the process is killed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import functools
+import hashlib
+import io
+import json
+import random
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from posse_baselines.files import write_atomically
+from posse_training.errors import CheckpointError, RunFolderError
+from posse_training.files import InUseError, locked
+from posse_training.train.networks import RunningStatistics
+from posse_training.train.settings import SETTINGS, Point, TrainSettings
+
+Arrays = Mapping[str, npt.NDArray[Any]]
+State = dict[str, Any]
+"""Nested dictionaries of tensors and plain values."""
+
+CHECKPOINT: Final = "checkpoint.pt"
+POINT: Final = ("steps", "seconds", "safe_score", "low", "high", "score", "contact_free")
+"""Of the curve: agent steps, s, mean safe score and its 95 % interval, mean score, share of episodes."""
+_REPLAY: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+_DIGEST: Final = hashlib.sha256().digest_size
+
+
+@dataclass
+class Progress:
+    """How far a run is, as its checkpoint has it."""
+
+    next_evaluation: int  # steps
+    next_checkpoint: int = 0  # steps
+    rollouts: int = 0
+    seconds: float = 0.0
+    curve: list[Point] = field(default_factory=list)
+
+
+@contextlib.contextmanager
+def locked_run(folder: Path) -> Iterator[None]:
+    """Hold a run folder, made if missing.
+
+    Raises:
+        RunFolderError: Another process holds it (the message names it), or it cannot be written to.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(locked(folder))
+        except InUseError as error:
+            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --folder") from error
+        except OSError as error:
+            raise RunFolderError(f"cannot write to run folder {folder}: {error}") from error
+        yield
+
+
+def open_run(folder: Path, settings: TrainSettings, resume: bool) -> State | None:
+    """Write the settings to a run folder; return its checkpoint, or ``None`` to start from scratch.
+
+    Raises:
+        RunFolderError: It holds a run that is not to be resumed, or it cannot be written to.
+        CheckpointError: Its checkpoint is damaged.
+    """
+    saved = None
+    if resume:
+        # A run killed before its first checkpoint starts again, with the same result.
+        if (folder / CHECKPOINT).exists():
+            saved = read_checkpoint(folder)
+    elif (folder / SETTINGS).exists():
+        raise RunFolderError(
+            f"{folder} already holds a run: resume it (posse train --resume {folder}), remove it, "
+            "or choose another --folder"
+        )
+    text = json.dumps({**settings.to_dict(), "folder": None}, indent=2) + "\n"
+    try:
+        write_atomically(folder / SETTINGS, text.encode())
+    except OSError as error:
+        raise RunFolderError(f"cannot write to run folder {folder}: {error}") from error
+    return saved
+
+
+def as_csv(curve: Iterable[Point]) -> bytes:
+    """Return a curve as the contents of ``curve.csv``."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, POINT)
+    writer.writeheader()
+    writer.writerows(curve)
+    return text.getvalue().encode()
+
+
+def write_checkpoint(folder: Path, state: State) -> None:
+    """Write a checkpoint.
+
+    Raises:
+        CheckpointError: It could not be written; the last one is unchanged.
+    """
+    text = io.BytesIO()
+    torch.save(state, text)
+    content = text.getvalue()
+    path = folder / CHECKPOINT
+    try:
+        write_atomically(path, hashlib.sha256(content).digest() + content)
+    except OSError as error:
+        kept = "the last one is kept" if path.is_file() else "there is no earlier one"
+        raise CheckpointError(
+            f"cannot write checkpoint {path}: {error.strerror or error}; {kept}. Make room, then "
+            f"resume with: posse train --resume {folder}"
+        ) from error
+
+
+def read_checkpoint(folder: Path) -> State:
+    """Return the state of a folder's checkpoint.
+
+    Raises:
+        CheckpointError: There is none, or it is damaged.
+    """
+    path = folder / CHECKPOINT
+    if not path.is_file():
+        raise CheckpointError(f"{folder} has no {CHECKPOINT}: start the training again")
+    whole = path.read_bytes()
+    if hashlib.sha256(whole[_DIGEST:]).digest() != whole[:_DIGEST]:
+        raise CheckpointError(
+            f"checkpoint {path} is damaged: its digest does not match its contents. The run cannot be resumed from "
+            "it; the policies in the folder are separate files"
+        )
+    state: State = torch.load(io.BytesIO(whole[_DIGEST:]), weights_only=True)
+    return state
+
+
+def start_from(folder: Path, model: BaseAlgorithm, statistics: RunningStatistics, log_deviation: float) -> None:
+    """Take networks and input statistics from a run's checkpoint; optimisers start anew.
+
+    Args:
+        folder: The other run's folder.
+        model: Takes the networks.
+        statistics: Takes the input statistics.
+        log_deviation: Exploration starts anew with it.
+
+    Raises:
+        CheckpointError: There is no checkpoint, it is damaged, or of other networks or inputs.
+    """
+    state = read_checkpoint(folder)
+    try:
+        model.policy.load_state_dict(state["model"]["parts"]["policy"])
+        statistics.restore(arrays_of(state["statistics"]))
+    except (KeyError, RuntimeError, TypeError, ValueError) as error:
+        raise CheckpointError(
+            f"the networks in {folder} do not fit this run: {error!s:.300}. Train with its hidden, "
+            "activation, encoding and algorithm, or leave start out"
+        ) from error
+    spread = getattr(model.policy, "log_std", None)
+    if spread is not None:
+        with torch.no_grad():
+            spread.fill_(log_deviation)
+
+
+def tensors_of(arrays: Arrays) -> dict[str, torch.Tensor]:
+    """Return copies of arrays as tensors."""
+    return {name: torch.from_numpy(np.array(array, order="C")) for name, array in arrays.items()}
+
+
+def arrays_of(tensors: Mapping[str, torch.Tensor]) -> dict[str, npt.NDArray[Any]]:
+    """Return tensors as arrays."""
+    return {name: tensor.numpy() for name, tensor in tensors.items()}
+
+
+def random_state() -> State:
+    """Return the state of every global random generator that training draws from."""
+    name, keys, *rest = np.random.get_state()  # noqa: NPY002 (SB3 draws from it)
+    return {
+        "python": random.getstate(),
+        "numpy": (str(name), torch.from_numpy(np.asarray(keys)), *rest),
+        "torch": torch.get_rng_state(),
+    }
+
+
+def restore_random_state(state: State) -> None:
+    """Set the generators to the state of :func:`random_state`."""
+    random.setstate(state["python"])
+    name, keys, *rest = state["numpy"]
+    np.random.set_state((name, keys.numpy(), *rest))  # noqa: NPY002
+    torch.set_rng_state(state["torch"])
+
+
+def model_state(model: BaseAlgorithm) -> State:
+    """Return all that resuming needs: networks and their states, optimisers, counters, replay."""
+    names, tensors = model._get_torch_save_params()
+    arrays = {"obs": np.asarray(model._last_obs), "starts": np.asarray(model._last_episode_starts)}
+    state: State = {
+        "parts": {name: _find(model, name).state_dict() for name in names},
+        "tensors": {name: _find(model, name).detach() for name in tensors},
+        "num_timesteps": model.num_timesteps,
+        "episode_num": model._episode_num,
+        "n_updates": model._n_updates,
+        "progress": model._current_progress_remaining,
+        "episodes": list(model.ep_info_buffer or ()),
+        "successes": [bool(success) for success in model.ep_success_buffer or ()],
+        "action_space": model.action_space.np_random.bit_generator.state,
+        "last": tensors_of(arrays),
+    }
+    buffer = getattr(model, "replay_buffer", None)
+    if buffer is not None:
+        parts = tensors_of({name: getattr(buffer, name)[: buffer.size()] for name in _REPLAY})
+        state["replay"] = {"position": buffer.pos, "full": buffer.full, "parts": parts}
+    return state
+
+
+def restore_model(model: BaseAlgorithm, state: State) -> None:
+    """Set a model of the same settings to the state of :func:`model_state`."""
+    names, tensors = model._get_torch_save_params()
+    for name in names:
+        _find(model, name).load_state_dict(state["parts"][name])
+    for name in tensors:
+        _find(model, name).data.copy_(state["tensors"][name])
+    model.num_timesteps = state["num_timesteps"]
+    model._episode_num = state["episode_num"]
+    model._n_updates = state["n_updates"]
+    model._current_progress_remaining = state["progress"]
+    model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
+    model.ep_success_buffer = deque(state["successes"], maxlen=model._stats_window_size)
+    model.action_space.np_random.bit_generator.state = state["action_space"]
+    last = arrays_of(state["last"])
+    model._last_obs, model._last_episode_starts = last["obs"], last["starts"]
+    buffer = getattr(model, "replay_buffer", None)
+    if buffer is not None:
+        buffer.pos, buffer.full = state["replay"]["position"], state["replay"]["full"]
+        for name, part in arrays_of(state["replay"]["parts"]).items():
+            getattr(buffer, name)[: buffer.size()] = part
+
+
+def _find(model: BaseAlgorithm, name: str) -> Any:
+    """Return the part of a model with a dotted name like ``"policy.optimizer"``."""
+    return functools.reduce(getattr, name.split("."), model)

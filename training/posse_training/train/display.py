@@ -1,0 +1,111 @@
+"""What a training run shows: a bar on a terminal, a line for each evaluation, and logs."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import time
+from pathlib import Path
+from typing import Any, Self
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3.common.logger import Logger, configure
+
+from posse_training.train.contact_bound import ContactBound
+from posse_training.train.settings import Point, TrainSettings
+
+
+class Display:
+    """Shows the steps made, time left, and scores on the validation worlds.
+
+    Args:
+        settings: Of the run.
+        console: Where to show it.
+    """
+
+    def __init__(self, settings: TrainSettings, console: Console) -> None:
+        self._settings = settings
+        self._started, self._from_steps, self._steps = time.monotonic(), 0, 0
+        self._bound = ""
+        self._beside: float | None = None
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:,.0f} of {task.total:,.0f} steps{task.fields[state]}"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._task = self._bar.add_task(escape(settings.name), total=settings.steps, state="")
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def note(self, text: str) -> None:
+        """Print what the run is doing."""
+        self._bar.console.print(text, markup=False, soft_wrap=True)
+
+    def copied(self, done: int, rounds: int, error: float) -> None:
+        """Print how many rounds of imitation are done, and the mean squared error of the last."""
+        self.note(f"copying {self._settings.imitate}: {done} of {rounds} rounds, squared error {error:.4f}")
+
+    def beside(self, score: float | None) -> None:
+        """Take the safe score of ``settings.beside`` on the same worlds."""
+        self._beside = score
+
+    def begin(self, steps: int, total: int) -> None:
+        """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps.
+
+        The total includes the rollout that is completed at the end.
+        """
+        if total != self._settings.steps:
+            self.note(f"rollouts are completed: {total:,} steps in all")
+        self._started, self._from_steps, self._steps = time.monotonic(), steps, steps
+        self._bar.reset(self._task, total=total, completed=steps)
+
+    def progress(self, steps: int, training_score: float | None, bound: ContactBound | None = None) -> None:
+        """Show the steps made, the mean score of the latest training episodes, and contacts."""
+        self._steps = steps
+        if bound is not None and bound.share is not None:
+            self._bound = (
+                f", contact in {bound.share:.1%} of episodes "
+                f"(bound {bound.bound:.1%}, multiplier {bound.multiplier:.2f})"
+            )
+        score = "" if training_score is None else f", training score {training_score:.3f}"
+        self._bar.update(self._task, completed=steps, state=score + self._bound)
+
+    def evaluated(self, point: Point) -> None:
+        """Print results on the validation worlds, after as many steps as they say."""
+        line = (
+            f"{int(point['steps']):>12,} steps  safe score {point['safe_score']:.3f} "
+            f"[{point['low']:.3f}, {point['high']:.3f}], score {point['score']:.3f}, "
+            f"contact-free {point['contact_free']:.2f}"
+        )
+        if self._beside is not None:
+            line += f", {self._settings.beside} {self._beside:.3f}"
+        made = self._steps - self._from_steps
+        rate = f", {made / (time.monotonic() - self._started):,.0f} steps/s" if made else ""
+        self.note(line + self._bound + rate)
+
+
+def make_logger(folder: Path, settings: TrainSettings) -> Logger:
+    """Return the logger: TensorBoard files if it is installed, which Weights & Biases copies."""
+    if settings.wandb is not None:
+        wandb: Any = importlib.import_module("wandb")
+        wandb.init(
+            project=settings.wandb,
+            name=folder.name,
+            dir=folder,
+            config=settings.to_dict(),
+            sync_tensorboard=True,
+            resume="allow",
+        )
+    wanted = settings.tensorboard and importlib.util.find_spec("tensorboard") is not None
+    return configure(str(folder), ["tensorboard"] if wanted else [])

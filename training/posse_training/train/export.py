@@ -1,0 +1,101 @@
+"""From a torch model to a policy that plays without torch, and its card."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import stable_baselines3
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from torch import nn
+
+import posse
+from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_baselines.learned.advice import Advising
+from posse_training.provenance import commit
+from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.networks import LIMIT, Normaliser, QuickTanh
+from posse_training.train.settings import TrainSettings
+from posse_training.train.worlds import make_adviser
+
+_NAMES: dict[type[nn.Module], str] = {nn.Tanh: "tanh", QuickTanh: "tanh", nn.ReLU: "relu"}
+
+
+def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, card: Mapping[str, Any]) -> LearnedPolicy:
+    """Return a model as a policy that plays without torch.
+
+    Its actions are the mode of the distribution, equal to the model's
+    ``predict(..., deterministic=True)`` to rounding.
+
+    Args:
+        model: Of the run; a :class:`Normaliser` stands before its networks.
+        settings: Of the run.
+        encoding: Which inputs the model reads from an observation.
+        card: The policy's card.
+
+    Raises:
+        TypeError: The model's networks are not plain ones that a policy file holds.
+    """
+    algorithm = ALGORITHMS[settings.algorithm]
+    modules = algorithm.actor(model.policy)
+    layers = [module for module in modules if isinstance(module, nn.Linear)]
+    between = {type(m) for m in modules[:-1] if not isinstance(m, (nn.Linear, nn.Flatten))}
+    if len(between) > 1 or not between <= set(_NAMES):
+        raise TypeError(f"no policy file holds layers of {sorted(t.__name__ for t in between)}")
+    adviser = make_adviser(settings)
+    inputs = encoding.size
+    if adviser is not None:
+        inputs += Advising(adviser, settings.correction, believes=encoding.believes).inputs
+    normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
+    network = Network(
+        mean=_numbers(normaliser.mean)[:inputs],
+        scale=_numbers(normaliser.scale)[:inputs],
+        limit=LIMIT,
+        weights=tuple(_numbers(layer.weight) for layer in layers),
+        biases=tuple(_numbers(layer.bias) for layer in layers),
+        activation=_NAMES[between.pop()] if between else "relu",
+        output=algorithm.bound,
+    )
+    return LearnedPolicy(network, encoding, card, adviser, settings.correction)
+
+
+def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
+    return tensor.detach().cpu().numpy().astype(np.float32)
+
+
+def make_card(
+    settings: TrainSettings, encoding: Encoding, *, steps: int, curve: list[dict[str, float]]
+) -> dict[str, Any]:
+    """Return a policy's card: its training scenarios, settings, software and scores."""
+    scenarios = settings.scenarios
+    return {
+        "name": settings.name,
+        "side": settings.side,
+        "scenarios": [scenario.to_dict() for scenario in scenarios],
+        "trained_splits": ["train"],
+        "chosen_on": "validation",
+        "message_size": settings.message_size,
+        "encoding": encoding.to_dict(),
+        "encoding_hash": encoding.digest,
+        "command": " ".join(["posse", *sys.argv[1:]]),
+        "settings": settings.to_dict(),
+        "seed": settings.seed,
+        "steps": steps,
+        "commit": commit(),
+        "curve": curve,
+        "validation_safe_score": curve[-1]["safe_score"] if curve else None,
+        "validation_score": curve[-1]["score"] if curve else None,
+        "validation_contact_free": curve[-1]["contact_free"] if curve else None,
+        "software": {
+            "python": platform.python_version(),
+            "posse": posse.__version__,
+            "numpy": np.__version__,
+            "torch": torch.__version__,
+            "stable-baselines3": stable_baselines3.__version__,
+        },
+    }

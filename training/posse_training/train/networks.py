@@ -1,0 +1,168 @@
+"""The layers and networks of a model: input normalisation, the critic of mappo, and a faster tanh."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, create_mlp
+from torch import nn
+
+LIMIT: Final = 10.0
+"""Largest absolute value of a normalised input."""
+_LEAST_DEVIATION: Final = 1e-3
+_REMEMBERED: Final = 2_000_000.0
+"""Largest count: from there on, new rows weigh more than old ones."""
+
+
+class Normaliser(BaseFeaturesExtractor):
+    """A layer: x → clip((x - mean) * scale, ±LIMIT), to mean 0 and deviation 1.
+
+    Mean and scale are buffers of this layer inside the policy: rollouts and replay buffers store raw
+    observations, a policy is never separated from its statistics, and the statistics change only
+    between rollouts, so that a rollout is learned from with the statistics it was played with.
+    """
+
+    mean: torch.Tensor
+    scale: torch.Tensor
+
+    def __init__(self, observation_space: spaces.Box) -> None:
+        size = observation_space.shape[0]
+        super().__init__(observation_space, size)
+        self.register_buffer("mean", torch.zeros(size))
+        self.register_buffer("scale", torch.ones(size))
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """Return the normalised observations, of the same shape."""
+        return (observations - self.mean).mul_(self.scale).clamp_(-LIMIT, LIMIT)
+
+
+class RunningStatistics:
+    """Running mean and variance of rows, (size,) each, in float64."""
+
+    def __init__(self, size: int) -> None:
+        self.count = 0.0
+        self.mean = np.zeros(size)
+        self.variance = np.ones(size)
+
+    def add(self, rows: npt.NDArray[np.float32]) -> None:
+        """Add rows (..., size) to the statistics."""
+        flat = rows.reshape(-1, rows.shape[-1])
+        count = len(flat)
+        mean = flat.mean(axis=0, dtype=np.float64)
+        variance = flat.var(axis=0, dtype=np.float64)
+        total = self.count + count
+        delta = mean - self.mean
+        self.variance = (self.variance * self.count + variance * count + delta**2 * self.count * count / total) / total
+        self.mean = self.mean + delta * count / total
+        self.count = min(total, _REMEMBERED)
+
+    @property
+    def scale(self) -> npt.NDArray[np.float64]:
+        """1 / deviation, (size,); 0 for inputs that do not vary."""
+        deviation = np.sqrt(self.variance)
+        return np.where(deviation < _LEAST_DEVIATION, 0.0, 1 / np.maximum(deviation, 1e-12))
+
+    def apply(self, policy: nn.Module) -> None:
+        """Write the statistics into every normaliser of a policy."""
+        mean, scale = torch.as_tensor(self.mean), torch.as_tensor(self.scale)
+        for module in policy.modules():
+            if isinstance(module, Normaliser):
+                module.mean.copy_(mean)
+                module.scale.copy_(scale)
+
+    def save(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the statistics as arrays by name."""
+        return {"count": np.array([self.count]), "mean": self.mean, "variance": self.variance}
+
+    def restore(self, saved: dict[str, npt.NDArray[Any]]) -> None:
+        """Set the statistics to those of :meth:`save`.
+
+        Raises:
+            ValueError: They are of another size.
+        """
+        for name in ("mean", "variance"):
+            if saved[name].shape != self.mean.shape:
+                raise ValueError(f"{name} has the shape {saved[name].shape}, wanted {self.mean.shape}")
+        self.count = float(saved["count"][0])
+        self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()
+
+
+class SplitNetworks(nn.Module):
+    """A policy network on the first numbers of the input, a value network on all of them."""
+
+    def __init__(self, size: int, private_size: int, hidden: list[int], activation: type[nn.Module]) -> None:
+        super().__init__()
+        self.private_size = private_size
+        self.latent_dim_pi = self.latent_dim_vf = hidden[-1]
+        self.policy_net = nn.Sequential(*create_mlp(private_size, 0, hidden, activation))
+        self.value_net = nn.Sequential(*create_mlp(size, 0, hidden, activation))
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the latent vectors of policy and value."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        """Return the policy's latent vector, a function of the tracker's own numbers only."""
+        latent: torch.Tensor = self.policy_net(features[:, : self.private_size])
+        return latent
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        """Return the value's latent vector."""
+        latent: torch.Tensor = self.value_net(features)
+        return latent
+
+
+class CentralizedCriticPolicy(ActorCriticPolicy):
+    """An actor and a critic; only the critic reads the state of the world.
+
+    Args:
+        *args: Arguments of stable-baselines3's actor-critic policy.
+        private_size: Numbers at the front of an observation that the actor reads.
+        hidden: Widths of the hidden layers of both networks.
+        **kwargs: Arguments of stable-baselines3's actor-critic policy.
+    """
+
+    def __init__(self, *args: Any, private_size: int, hidden: tuple[int, ...] = (64, 64), **kwargs: Any) -> None:
+        self.private_size = private_size
+        self.hidden = list(hidden)
+        super().__init__(*args, **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor = SplitNetworks(  # type: ignore[assignment]
+            self.features_dim, self.private_size, self.hidden, self.activation_fn
+        )
+
+
+# A rollout of PPO and its updates take 10 % less time than with nn.Tanh: user time on ``smart`` with its defaults, one
+# thread for torch.
+
+
+class _TanhByLogistic(torch.autograd.Function):
+    """tanh x = 2 σ(2x) - 1, with the derivative 1 - tanh² x."""
+
+    @staticmethod
+    def forward(context: Any, x: torch.Tensor) -> torch.Tensor:
+        y = torch.mul(x, 2).sigmoid_().mul_(2).sub_(1)
+        context.save_for_backward(y)
+        return y
+
+    @staticmethod
+    def backward(context: Any, gradient: torch.Tensor) -> torch.Tensor:
+        (y,) = context.saved_tensors
+        return cast("torch.Tensor", torch.ops.aten.tanh_backward(gradient, y))
+
+
+class QuickTanh(nn.Tanh):
+    """``nn.Tanh`` to within 3e-7, computed from the logistic function in half the time."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """Return tanh x, of the same shape."""
+        return cast("torch.Tensor", _TanhByLogistic.apply(x))  # type: ignore[no-untyped-call]
+
+
+ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": QuickTanh, "relu": nn.ReLU}

@@ -1,0 +1,407 @@
+"""The settings of a training run: one typed, frozen class, and its defaults by scenario and algorithm."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import tomllib
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
+
+import tyro
+
+from posse import Scenario, ScenarioError, get_scenario
+from posse_baselines import PolicyError, load, target_names
+from posse_baselines.fields import check, choice, number, optional
+from posse_baselines.registry import ships_or_is_file
+from posse_training.errors import SettingsError
+from posse_training.files import read_json
+from posse_training.train.algorithms import ALGORITHMS
+
+Preset = Literal["residual", "nothing"]
+Point = dict[str, float]
+"""Results of an evaluation, by the columns of ``curve.csv``."""
+
+SETTINGS: Final = "settings.json"
+BEST: Final = "best.safetensors"
+LAST: Final = "last.safetensors"
+CURVE: Final = "curve.csv"
+"""Files of a run folder; the checkpoint is one more."""
+_LONGEST: Final = 4096  # characters of a text
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainSettings:
+    """Settings of a training run; the defaults depend on scenario and algorithm.
+
+    A *step* is one control step of one tracker.
+
+    Raises:
+        SettingsError: A value out of its range; the message names it, the range and the fix.
+    """
+
+    scenario: str = "smart"
+    """Scenario to train on, or several separated by commas."""
+    algorithm: Annotated[str, tyro.conf.arg(metavar="{" + ",".join(ALGORITHMS) + "}")] = choice(
+        "ppo", tuple(ALGORITHMS)
+    )
+    """mappo is ppo with a value function that reads the state of the world."""
+    steps: int = number(20_000_000, "", 1, 10**12)
+    """Steps to train for, at least; rollouts are completed."""
+    seed: int = number(1, "", 0, 2**32 - 1)
+    """Seed of the worlds, the networks and the exploration."""
+    folder: Path | None = None
+    """Run folder; default: runs/train/SCENARIO-ALGORITHM-SEED."""
+
+    # The sides
+    side: Literal["trackers", "target"] = "trackers"
+    """What learns: the trackers, or the target."""
+    against: str | None = None
+    """What it plays: targets where trackers learn, teams where the target learns; names, files or
+    package.module:Class, separated by commas. The worlds are divided evenly among them; a name
+    twice gets two shares. Default for trackers: the scenario's own target."""
+    start: str | None = None
+    """Run folder whose networks and input statistics the run begins with."""
+
+    # The worlds
+    num_worlds: int = number(256, "", 1, 10**6)
+    """Worlds stepped together, over all scenarios and team sizes."""
+    team_sizes: tuple[int, ...] = ()
+    """Numbers of trackers to train with; default: the scenario's own."""
+    num_neighbours: int | None = optional(0, 4096, whole=True)
+    """Team-mates that the policy reads, nearest first; default: as many as are observed."""
+    message_size: int = number(0, "", 0, 64)
+    """Numbers that a tracker adds to its broadcast in each step."""
+    overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
+    """Settings of the scenario to change, by name."""
+    reward_weights: dict[str, float] = field(default_factory=dict)
+    """Weight of each reward term; default: the scenario's own."""
+
+    # The networks
+    encoding: Literal["plain", "slots", "belief"] = "slots"
+    """Network inputs: the observation; with features computed from it; and the adviser's belief."""
+    hidden: tuple[int, ...] = (64, 64)
+    """Widths of the hidden layers of policy and value function."""
+    activation: Literal["tanh", "relu"] = "tanh"
+    """Activation between the layers."""
+
+    # All algorithms
+    learning_rate: float = number(3e-4, "", 0, 10)
+    """Learning rate at the start."""
+    final_learning_rate: float = number(3e-5, "", 0, 10)
+    """Learning rate at the end; it falls linearly in between."""
+    discount: float = number(0.99, "", 0, 1)
+    """Discount of rewards for each control step, γ."""
+    minibatch: int = number(8192, "", 2, 10**9)
+    """Steps in one gradient, about: a rollout is divided evenly."""
+
+    # ppo and mappo
+    rollout: int = number(64, "", 1, 10**6)
+    """Control steps between two updates."""
+    epochs: int = number(4, "", 1, 1000)
+    """Passes over a rollout."""
+    gae_lambda: float = number(0.95, "", 0, 1)
+    """λ of generalized advantage estimation."""
+    clip: float = number(0.2, "", 0, 100)
+    """Largest change of the probability ratio in an update."""
+    entropy: float = number(0.0, "", 0, 1000)
+    """Weight of the policy's entropy."""
+    value_weight: float = number(0.5, "", 0, 1000)
+    """Weight of the value function's error."""
+    log_deviation: float = number(-0.5, "", -20, 5)
+    """Logarithm of the actions' standard deviation at the start."""
+    final_log_deviation: float | None = optional(-20, 5)
+    """Upper limit of that logarithm at the end; it falls linearly. Default: no limit."""
+
+    # sac and td3
+    replay: int = number(400_000, "", 1, 10**9)
+    """Steps in the replay buffer."""
+    learning_starts: int = number(20_000, "", 0, 10**12)
+    """Steps of random actions before learning starts."""
+    gradients: int = number(4, "", 1, 10**4)
+    """Gradient steps for each control step of the batch."""
+
+    # A warm start
+    imitate: str | None = None
+    """Policy to begin as a copy of: a name, a file or package.module:Class."""
+    imitate_rounds: int = number(8, "", 1, 1000)
+    """Rounds of play and fit; the copy acts in a growing share of the worlds."""
+
+    advise: str | None = None
+    """Scripted policy whose proposals are network inputs, and which the output corrects."""
+    correction: Literal["motion", "velocity"] = "motion"
+    """The output corrects the adviser's action, or its wanted velocity before its safeguard."""
+
+    contact_bound: float | None = optional(0.001, 1)
+    """Largest share of training episodes with contact: contacts cost more while it is exceeded."""
+
+    # Evaluation, checkpoints and logs
+    evaluate_every: int = number(1_000_000, "", 1, 10**15)
+    """Steps between two evaluations on validation worlds."""
+    evaluate_worlds: int = number(64, "", 1, 10**6)
+    """Validation worlds of each scenario; the best policy on them is kept."""
+    beside: str | None = "ddcs-tuned"
+    """Policy whose safe score on the same worlds is shown for comparison."""
+    checkpoint_every: int = number(1_000_000, "", 1, 10**15)
+    """Steps between two checkpoints: a killed run loses at most these."""
+    threads: int = number(1, "", 1, 1024)
+    """Threads for torch; results are reproducible for the same number."""
+    tensorboard: bool = True
+    """Write TensorBoard logs, if it is installed."""
+    wandb: str | None = None
+    """Weights & Biases project to log to; needs the package wandb."""
+
+    def __post_init__(self) -> None:
+        _check_each(self)
+        _check_together(self)
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """Every scenario and team size to train on, with messages and reward weights set."""
+        overrides: dict[str, Any] = {**self.overrides, "message_size": self.message_size}
+        if self.advise is not None:
+            overrides["message_size"] = load(self.advise).message_size
+        if self.reward_weights:
+            weights = "target_reward_weights" if self.side == "target" else "reward_weights"
+            overrides[weights] = self.reward_weights
+        found = []
+        for name in self.scenario.split(","):
+            for size in self.team_sizes or (None,):
+                team: dict[str, Any] = {} if size is None else {"num_trackers": size}
+                found.append(get_scenario(name.strip(), **overrides, **team))
+        return tuple(found)
+
+    @property
+    def on_policy(self) -> bool:
+        """Whether the algorithm learns from its latest rollout only."""
+        return ALGORITHMS[self.algorithm].on_policy
+
+    def steps_made(self, num_envs: int) -> int:
+        """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
+        at_once = num_envs * (self.rollout if self.on_policy else 1)
+        return -(-self.steps // at_once) * at_once
+
+    @property
+    def run_folder(self) -> Path:
+        """The folder that the run is written to."""
+        return self.folder or Path("runs/train") / self.name
+
+    @property
+    def name(self) -> str:
+        """The name of the run and of its policies."""
+        side = "-target" if self.side == "target" else ""
+        return f"{self.scenario.replace(',', '+')}{side}-{self.algorithm}-{self.seed}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the settings as plain values."""
+        values = dataclasses.asdict(self)
+        values["folder"] = None if self.folder is None else str(self.folder)
+        return values
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the settings of :meth:`to_dict`.
+
+        Raises:
+            SettingsError: An unknown setting, or an invalid value.
+        """
+        if not isinstance(values, Mapping):
+            raise SettingsError(f"settings must map names to values, got {values!r:.80}")
+        known = {f.name for f in dataclasses.fields(cls)}
+        for name in values:
+            if name not in known:
+                raise SettingsError(f"unknown setting {name!r:.80}; settings are: {', '.join(sorted(known))}")
+        fitted = dict(values)
+        for name in ("hidden", "team_sizes"):
+            if isinstance(fitted.get(name), list):
+                fitted[name] = tuple(fitted[name])
+        if isinstance(fitted.get("folder"), str):
+            fitted["folder"] = Path(fitted["folder"])
+        return cls(**fitted)
+
+
+def opponents_of(against: str | None) -> dict[str, int]:
+    """Return the opponents that the setting ``against`` names, and how often each."""
+    return dict(Counter(name.strip() for name in against.split(",")) if against else {})
+
+
+@functools.cache
+def _types() -> dict[str, Any]:
+    return get_type_hints(TrainSettings)
+
+
+def _check_each(s: TrainSettings) -> None:
+    """Raise if a setting is of a wrong type or out of its range."""
+    try:
+        check(s)
+    except ValueError as error:
+        raise SettingsError(str(error)) from None
+    for name, kind in _types().items():
+        value = getattr(s, name)
+        if get_origin(kind) is Literal and value not in get_args(kind):
+            _fail(name, value, f"known: {', '.join(get_args(kind))}")
+        text = kind is str or (kind == str | None and value is not None)
+        if text and not (isinstance(value, str) and 1 <= len(value) <= _LONGEST and "\0" not in value):
+            _fail(name, value, f"it must be a text of 1 to {_LONGEST} characters")
+        if get_origin(kind) is dict and not isinstance(value, dict):
+            _fail(name, value, "it must map names to values")
+    for name, least, most, widest in (("hidden", 1, 16, 8192), ("team_sizes", 0, 100, 4096)):
+        value = getattr(s, name)
+        if not isinstance(value, tuple) or not least <= len(value) <= most:
+            _fail(name, value, f"it must name {least} to {most} numbers")
+        for size in value:
+            if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= widest:
+                _fail(name, size, f"it must be a whole number in [1, {widest}]")
+    if s.folder is not None and not isinstance(s.folder, Path):
+        _fail("folder", s.folder, "it must be a path")
+
+
+def _fail(name: str, value: Any, why: str) -> NoReturn:
+    raise SettingsError(f"{name}={value!r:.80} is invalid: {why}")
+
+
+def _check_together(s: TrainSettings) -> None:
+    """Raise if settings that are valid on their own exclude each other."""
+    if s.contact_bound is not None and not s.on_policy:
+        raise SettingsError(
+            f"contact_bound={s.contact_bound} needs algorithm ppo or mappo, not {s.algorithm}: "
+            "set a weight of the reward term contact instead"
+        )
+    if s.imitate is not None and not s.on_policy:
+        raise SettingsError(f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out")
+    if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
+        raise SettingsError(
+            f"final_log_deviation={s.final_log_deviation} must not exceed "
+            f"log_deviation={s.log_deviation}, where it begins"
+        )
+    if s.encoding == "belief" and s.advise is None:
+        raise SettingsError("encoding='belief' is the belief of an adviser: set advise, for example to ddcs-tuned")
+    if s.advise is not None and (s.imitate is not None or s.message_size):
+        raise SettingsError(
+            f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
+            "its adviser, which sends the messages"
+        )
+    if s.side == "target":
+        _check_target(s)
+    for name, instead in _ELSEWHERE.items():
+        if name in s.overrides and (name != "num_trackers" or s.team_sizes):
+            raise SettingsError(f"overrides cannot set {name!r}: use {instead} instead")
+    parts = s.scenarios
+    if s.num_worlds < len(parts):
+        raise SettingsError(
+            f"num_worlds={s.num_worlds} is less than one for each of {len(parts)} scenarios and team sizes"
+        )
+    if len({p.sonar_beams for p in parts}) > 1:
+        raise SettingsError("scenarios that are trained on together need equal sonar_beams: set it in overrides")
+
+
+def _check_target(s: TrainSettings) -> None:
+    """Raise if settings do not fit a target that learns."""
+    if s.against is None:
+        raise SettingsError("side='target' needs the teams that chase it: set against, for example to ddcs-tuned")
+    for name, wanted in (("imitate", None), ("advise", None), ("message_size", 0), ("encoding", "plain")):
+        value = getattr(s, name)
+        if value != wanted:
+            raise SettingsError(
+                f"{name}={value!r} does not go with side='target', which needs {wanted!r}: a "
+                "target has no team, no slots and no messages"
+            )
+    if s.algorithm == "mappo":
+        raise SettingsError("algorithm='mappo' does not go with side='target', which observes everything: use ppo")
+
+
+_ELSEWHERE = {
+    "name": "the setting scenario",
+    "message_size": "the setting message_size",
+    "reward_weights": "the setting reward_weights",
+    "target_reward_weights": "the setting reward_weights with side target",
+    "target_motion": "the setting against",
+    "num_trackers": "the setting team_sizes",
+}
+
+
+def default_settings(
+    scenario: str = "smart", algorithm: str = "ppo", *, side: str = "trackers", preset: Preset = "residual"
+) -> TrainSettings:
+    """Return the default settings of a scenario.
+
+    They are kept in ``posse_training/defaults``: ``all.toml`` holds for every scenario, and the file
+    of a scenario for the preset ``"residual"``. In each, the table ``all`` holds for every
+    algorithm, ``on-policy`` and ``off-policy`` for those, and a table that is named after an
+    algorithm for it alone.
+
+    Args:
+        scenario: A scenario's name, or several separated by commas.
+        algorithm: One of the algorithms.
+        side: What learns; the defaults of a target are in ``target.toml``, whatever the preset.
+        preset: ``"residual"``: learn a correction of a scripted team, on policy and where the
+            scenario has a file; ``"nothing"``: learn from random weights.
+
+    Raises:
+        SettingsError: An unknown algorithm, or an invalid default.
+    """
+    if algorithm not in ALGORITHMS:
+        raise SettingsError(f"unknown algorithm {algorithm!r:.80}; algorithms are: {', '.join(ALGORITHMS)}")
+    values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
+    if side == "target":  # its opponents are for the user to name
+        values |= {"side": side, "against": "ddcs-distributed"}
+    folder = resources.files("posse_training") / "defaults"
+    files = [folder / "all.toml"]
+    if side == "target":
+        files.append(folder / "target.toml")
+    elif preset == "residual":
+        name = "mixture.toml" if "," in scenario else f"{scenario}.toml"
+        files += [file for file in folder.iterdir() if file.name == name]
+    for file in files:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        for table in ("all", "on-policy" if ALGORITHMS[algorithm].on_policy else "off-policy", algorithm):
+            values.update(tables.get(table, {}))
+    return TrainSettings.from_dict(values)
+
+
+def best_policy(folder: Path) -> Path:
+    """Return the file of a finished run's best policy; of its last one if it never was evaluated."""
+    return folder / (BEST if (folder / BEST).is_file() else LAST)
+
+
+def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
+    """Return the settings of a run folder's ``settings.json``.
+
+    Args:
+        path: The file.
+        trust_code: Accept policies named ``package.module:Class``, whose code is then imported.
+
+    Raises:
+        SettingsError: There is no such file, it is damaged, or it names code to import.
+    """
+    try:
+        values = read_json(path)
+        if not trust_code:
+            _refuse_code(path, values)
+        return TrainSettings.from_dict(values)
+    except FileNotFoundError:
+        raise SettingsError(f"{path.parent} is not a run folder: it has no {path.name}") from None
+    except (SettingsError, ScenarioError, PolicyError):
+        raise
+    except (OSError, TypeError, ValueError) as error:
+        raise SettingsError(f"{path} is damaged: {error}") from error
+
+
+def _refuse_code(path: Path, values: Any) -> None:
+    """Raise if a settings file names a policy that is neither shipped nor a policy file."""
+    if not isinstance(values, Mapping):
+        return
+    named = [(name, values.get(name)) for name in ("advise", "imitate", "beside")]
+    against = values.get("against")
+    several = opponents_of(against) if isinstance(against, str) else {}
+    for name, policy in (*named, *(("against", each) for each in several)):
+        if policy is not None and not ships_or_is_file(policy) and policy not in target_names():
+            raise SettingsError(
+                f"{path} names {policy!r:.80} as {name!r}, which is neither a shipped policy nor a "
+                "policy file. To load it would import code that a file asks for. If you trust the "
+                "file, resume with --trust-code"
+            )

@@ -1,0 +1,89 @@
+"""What a run is judged and normalised by: validation scores and first input statistics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from posse_baselines import Policy, PolicyError, Target
+from posse_training.evaluation.evaluation import evaluate
+from posse_training.evaluation.results import Results
+from posse_training.evaluation.statistics import mean
+from posse_training.train.display import Display
+from posse_training.train.networks import RunningStatistics
+from posse_training.train.settings import TrainSettings
+from posse_training.train.worlds import TARGET, load_own, make_env, pairings
+
+VALIDATION_SEED: Final = 0
+_WARM_WORLDS: Final = 32
+_WARM_REACH: Final = 0.1  # of random outputs that are added to an adviser's proposals
+_HELD: Final = 20  # steps for which a random action is held, so that trackers move somewhere
+
+
+def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> None:
+    """Gather input statistics from one episode of random actions in a few worlds."""
+    few = replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings))))
+    warm = make_env(few)
+    generator = np.random.default_rng(settings.seed)
+    statistics.add(warm.reset())
+    shape = (warm.num_envs, *warm.action_shape)
+    reach = 1.0 if settings.advise is None else _WARM_REACH
+    for step in range(max(batch.scenario.horizon for batch in warm.batches)):
+        if step % _HELD == 0:
+            actions = generator.uniform(-reach, reach, shape).astype(np.float32)
+        statistics.add(np.asarray(warm.step(actions)[0]))
+
+
+def score_beside(settings: TrainSettings, display: Display) -> float | None:
+    """Return the safe score of ``settings.beside`` on the validation worlds; ``None``: none."""
+    if settings.beside is None:
+        return None
+    display.note(f"evaluating {settings.beside} on the validation worlds")
+    try:
+        return validate(settings, load_own(settings, settings.beside))["safe_score"]
+    except PolicyError as error:
+        display.note(f"no score of {settings.beside}: {error}")
+        return None
+
+
+def validate(settings: TrainSettings, policy: Any) -> dict[str, float]:
+    """Return a policy's results on the validation worlds.
+
+    ``safe_score`` with its 95 % interval ``low``, ``high``; ``score``; and ``contact_free``, the
+    share of episodes.
+    """
+    results = play_all(settings, policy, VALIDATION_SEED, "validation")
+    safe = mean(np.concatenate([r["safe_score"] for r in results]))
+    return {
+        "safe_score": float(safe.value),
+        "low": float(safe.low),
+        "high": float(safe.high),
+        **{name: float(np.mean(np.concatenate([r[name] for r in results]))) for name in ("score", "contact_free")},
+    }
+
+
+def play_all(settings: TrainSettings, policy: Any, seed: int, split: str) -> list[Results]:
+    """Play the learning side's policy on worlds of every pairing.
+
+    For a target, ``score`` and ``safe_score`` are what it denies the team: 1 less the team's score.
+    """
+    found = []
+    for pair in pairings(settings):
+        if settings.side != TARGET:
+            opponent = pair.opponent if isinstance(pair.opponent, Target) else None
+            found.append(
+                evaluate(
+                    policy, pair.scenario, settings.evaluate_worlds, seed, target=opponent, split=split, progress=False
+                )
+            )
+            continue
+        assert isinstance(pair.opponent, Policy)
+        target = policy if isinstance(policy, Target) else Target(policy.name, "agent", policy)
+        played = evaluate(
+            pair.opponent, pair.scenario, settings.evaluate_worlds, seed, target=target, split=split, progress=False
+        )
+        denied = {"score": 1 - played["score"], "safe_score": 1 - played["score"]}
+        found.append(replace(played, columns={**played.columns, **denied}))
+    return found

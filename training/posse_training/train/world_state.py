@@ -1,0 +1,83 @@
+"""The state of a world as a centralized critic reads it, whatever the trackers can observe.
+
+All vectors are in the target's slot frame (ahead, left), so that the state does not depend on the
+position in the plane. The tracker whose value is estimated comes first, the others by number.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from posse import Batch
+from posse.numeric import FloatArray, Records, kernel
+from posse.rules import NEVER, config_record, place
+
+_ZERO: Final = np.float32(0.0)
+_ONE: Final = np.float32(1.0)
+
+TARGET_SIZE: Final = 6
+TRACKER_SIZE: Final = 11
+OBSTACLE_SIZE: Final = 3
+
+
+@kernel
+def _write(config: Records, world: Records, tracker: Records, obstacle: Records, places: int, out: FloatArray) -> None:
+    c = config[0]
+    n = c.num_trackers
+    for e in range(len(world)):
+        w = world[e]
+        for i in range(n):
+            o = out[e * n + i]
+            for k in range(len(o)):
+                o[k] = _ZERO
+            o[0] = w.speed
+            o[1] = w.turn_rate
+            o[2] = w.heading_cos * w.frame_cos + w.heading_sin * w.frame_sin
+            o[3] = w.heading_sin * w.frame_cos - w.heading_cos * w.frame_sin
+            o[4] = w.score
+            o[5] = np.float32(c.horizon - w.step) * c.control_step
+            for j in range(n):
+                t = tracker[e, (i + j) % n]
+                k = TARGET_SIZE + j * TRACKER_SIZE
+                o[k], o[k + 1] = place(c, w, t)
+                o[k + 2] = t.heading_cos * w.frame_cos + t.heading_sin * w.frame_sin
+                o[k + 3] = t.heading_sin * w.frame_cos - t.heading_cos * w.frame_sin
+                o[k + 4] = t.speed
+                o[k + 5] = t.turn_rate
+                o[k + 6] = _ONE if t.broken_at == NEVER else _ZERO
+                o[k + 7] = _ONE if t.slot >= 0 else _ZERO
+                o[k + 8] = t.slot_distance
+                o[k + 9] = np.float32(t.sees)
+                o[k + 10] = np.float32(t.touching)
+            for m in range(c.num_obstacles):
+                k = TARGET_SIZE + places * TRACKER_SIZE + m * OBSTACLE_SIZE
+                o[k], o[k + 1] = place(c, w, obstacle[e, m])
+                o[k + 2] = obstacle[e, m].radius
+
+
+class StateWriter:
+    """Writes the state of a batch's worlds, once for each tracker.
+
+    Args:
+        batch: The worlds.
+        places: Number of trackers in a state; missing ones are zeros.
+        obstacles: Number of obstacles in a state; missing ones are zeros.
+    """
+
+    def __init__(self, batch: Batch, places: int, obstacles: int) -> None:
+        self._batch = batch
+        self._config = config_record(batch.scenario)
+        self._places = places
+        self.size = TARGET_SIZE + places * TRACKER_SIZE + obstacles * OBSTACLE_SIZE
+        """Numbers in a state."""
+
+    def write(self, out: FloatArray, worlds: Any = slice(None)) -> None:
+        """Write the state of each world, or of some, for each of its trackers.
+
+        ``out`` is (trackers of these worlds, size).
+        """
+        arrays = self._batch.arrays
+        world, tracker, obstacle = (a[worlds] for a in (arrays.world, arrays.tracker, arrays.obstacle))
+        _write(self._config, world, tracker, obstacle, self._places, out)

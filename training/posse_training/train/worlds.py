@@ -1,0 +1,154 @@
+"""The worlds of a training run: what learns in them, and what it plays against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import posse
+from posse import ObservationLayout, Scenario
+from posse_baselines import Policy, PolicyError, Target, load, load_target
+from posse_baselines.learned import Encoding
+from posse_baselines.learned.advice import Adviser, Advising, check_adviser
+from posse_training.errors import SettingsError
+from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.settings import TrainSettings, opponents_of
+from posse_training.train.vec_env import TeamVecEnv
+
+TARGET = "target"
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """A scenario and an opponent.
+
+    Attributes:
+        scenario: With the opponent's target, or messages.
+        opponent: A team's policy where the target learns, else a target; ``None``: the scenario's
+            own target.
+        share: How many parts of the worlds it gets.
+    """
+
+    scenario: Scenario
+    opponent: Policy | Target | None
+    share: int = 1
+
+
+def check_opponents(settings: TrainSettings) -> None:
+    """Raise if an opponent is unknown, or its memory cannot be saved, as resuming requires.
+
+    Raises:
+        PolicyError: The message names it.
+    """
+    for pairing in pairings(settings):
+        moved = pairing.opponent
+        policy = moved.policy if isinstance(moved, Target) else moved
+        if policy is None:
+            continue
+        if getattr(policy, "reads_state", False) or not hasattr(policy, "arrays"):
+            name = getattr(moved, "name", "")
+            raise PolicyError(
+                f"{name!r} cannot be trained against: it reads the state of the worlds, or its "
+                "memory cannot be saved (it has no method arrays)"
+            )
+
+
+def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
+    """Return every scenario with every opponent.
+
+    Raises:
+        PolicyError: An unknown opponent, or one that does not move the other side.
+    """
+    found: list[Pairing] = []
+    for scenario in settings.scenarios:
+        if settings.against is None:
+            found.append(Pairing(scenario, None))
+        for name, share in opponents_of(settings.against).items():
+            if settings.side == TARGET:
+                policy = load(name)
+                size = max(scenario.message_size, policy.message_size)
+                faced = scenario.replace(target_motion="agent", message_size=size)
+                found.append(Pairing(faced, policy, share))
+            else:
+                target = load_target(name)
+                found.append(Pairing(target.fit(scenario), target, share))
+    return tuple(found)
+
+
+def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVecEnv:
+    """Return the training worlds, of the split ``"train"``, stepped by so many threads.
+
+    Raises:
+        SettingsError: Fewer worlds than scenarios and opponents.
+    """
+    batches = _make_batches(settings, num_threads)
+    encoding = _encoding_of(settings, batches)
+    adviser = make_adviser(settings)
+    return TeamVecEnv(
+        batches,
+        encoding,
+        advising=(Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None),
+        see_state=ALGORITHMS[settings.algorithm].reads_state,
+    )
+
+
+def make_adviser(settings: TrainSettings) -> Adviser | None:
+    """Return the adviser of a run, if any.
+
+    Raises:
+        PolicyError: A policy that cannot be an adviser.
+    """
+    if settings.advise is None:
+        return None
+    return check_adviser(
+        settings.advise, load(settings.advise), settings.correction, believes=settings.encoding == "belief"
+    )
+
+
+def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
+    """Return batches of worlds, divided among the pairings by their shares."""
+    pairs = pairings(settings)
+    ends = [0]
+    for pair in pairs:
+        ends.append(ends[-1] + pair.share)
+    edges = [settings.num_worlds * end // ends[-1] for end in ends]
+    if settings.num_worlds < len(pairs):
+        raise SettingsError(
+            f"num_worlds={settings.num_worlds} is less than one for each of {len(pairs)} scenarios and opponents"
+        )
+    batches = []
+    for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
+        inside: dict[str, Any] = {}
+        if settings.side == TARGET:
+            inside = {"team_policy": pair.opponent}
+        elif isinstance(pair.opponent, Target) and pair.opponent.policy is not None:
+            inside = {"target_policy": pair.opponent.policy}
+        batches.append(
+            posse.batch(
+                pair.scenario,
+                last - first,
+                seed=settings.seed,
+                first_world=first,
+                autoreset="disabled",
+                num_threads=num_threads,
+                **inside,
+            )
+        )
+    return batches
+
+
+def _encoding_of(settings: TrainSettings, batches: list[posse.Batch]) -> Encoding:
+    """Return what the networks read; a target hears no messages."""
+    layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
+    if settings.side == TARGET:
+        layout = ObservationLayout(layout.scenario.replace(message_size=0))
+    return Encoding.of(layout, settings.encoding, settings.num_neighbours)
+
+
+def load_own(settings: TrainSettings, name: str) -> Any:
+    """Return a policy of the learning side by name: a team's, or a target.
+
+    Raises:
+        PolicyError: It is unknown.
+    """
+    return load_target(name) if settings.side == TARGET else load(name)
