@@ -102,23 +102,12 @@ def test_a_world_plays_alike_alone_and_in_a_batch(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
-def test_what_it_does_follows_from_what_it_is_given_alone(name: str) -> None:
-    policy = load(name)
-    seen, done = trace(policy, batch_for(policy, "field", 4), 30)
-    layout = batch_for(policy, "field", 4).layout
-    again = load(name)
-    memory = again.begin(layout, 4)
-    for observations, actions in zip(seen, done, strict=True):
-        repeated, memory = again.act(observations.copy(), memory)
-        np.testing.assert_array_equal(repeated, actions)
-
-
-@pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
 def test_trackers_know_only_their_own_observation(name: str) -> None:
     # Tracker 0 acts independently of the observations of others.
     policy = load(name)
-    seen, done = trace(policy, batch_for(policy, "constant", 2), 20)
-    memory = policy.begin(batch_for(policy, "constant", 2).layout, 2)
+    seen, done = trace(policy, batch := batch_for(policy, "constant", 2), 20)
+    policy = load(name)  # nothing is remembered outside of the memory
+    memory = policy.begin(batch.layout, 2)
     for observations, actions in zip(seen, done, strict=True):
         changed = observations.copy()
         changed[:, 1:] = observations[:, :1]
@@ -129,8 +118,8 @@ def test_trackers_know_only_their_own_observation(name: str) -> None:
 @pytest.mark.parametrize("name", PLAYS_BY_THE_RULES)
 def test_a_restarted_world_plays_as_a_new_one(name: str) -> None:
     policy = load(name)
-    seen, done = trace(policy, batch_for(policy, "field", 2), 25)
-    memory = policy.begin(batch_for(policy, "field", 2).layout, 2)
+    seen, done = trace(policy, batch := batch_for(policy, "field", 2), 25)
+    memory = policy.begin(batch.layout, 2)
     for observations in seen:
         actions, memory = policy.act(observations, memory)
     memory = policy.restart(memory, np.array([False, True]))
@@ -248,17 +237,6 @@ def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
     assert not np.array_equal(other.act(batch.reset(seed=0), begin(other, batch))[0], done[0])
     with pytest.raises(ValueError, match="seed=-1"):
         Random(seed=-1)
-
-
-def test_idle_trackers_stay() -> None:
-    batch = posse.batch("constant", 4)
-    before = batch.reset()
-    x = batch.state["tracker_x"].copy()
-    memory = begin(load("idle"), batch)
-    for _ in range(10):
-        actions, memory = load("idle").act(before, memory)
-        before, *_ = batch.step(actions)
-    np.testing.assert_array_equal(batch.state["tracker_x"], x)
 
 
 def test_pursuers_close_in_without_running_into_each_other_at_once() -> None:

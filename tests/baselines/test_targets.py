@@ -10,7 +10,7 @@ import pytest
 from tests.support.learned import any_policy, target_for
 
 import posse
-from posse_baselines import BasePolicy, Match, PolicyError, against, load, load_target, play, target_names
+from posse_baselines import Match, PolicyError, against, load, load_target, play, target_names
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 
@@ -98,14 +98,7 @@ class Broken(Straight):
 def test_wrong_actions_of_a_target_are_named() -> None:
     target = load_target(f"{__name__}:Broken")
     with pytest.raises(PolicyError, match=r"Broken.*shape \(1, 1\)"):
-        play(posse.Batch(target.fit(SHORT), 2), against(BasePolicyIdle(), target))
-
-
-class BasePolicyIdle(BasePolicy):
-    name = "still"
-
-    def act(self, observations: Any, memory: Any) -> Any:
-        return np.zeros((*observations.shape[:2], 2), np.float32), memory
+        play(posse.Batch(target.fit(SHORT), 2), against(load("idle"), target))
 
 
 @pytest.mark.parametrize(
@@ -113,9 +106,7 @@ class BasePolicyIdle(BasePolicy):
     [
         ("smrat", "did you mean 'smart'"),
         ("agent", "unknown target 'agent'"),
-        ("missing.safetensors", "there is no policy file"),
         (__file__, r"must end in .safetensors"),
-        ("no_such_module:Target", "cannot import"),
         ("posse_baselines:load", "lacks begin, act, restart"),
         ("a\0b", "unknown target"),
     ],

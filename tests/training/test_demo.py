@@ -7,30 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PIL import Image
+from tests.support.learned import any_policy
 
 import posse
 import posse_baselines
 import posse_training
-from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training import demo
 from posse_training.replay.page import read_replay
-
-
-def ship(folder: Path) -> None:
-    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "slots")
-    network = Network(
-        np.zeros(encoding.size, np.float32),
-        np.ones(encoding.size, np.float32),
-        5.0,
-        (np.zeros((2, encoding.size), np.float32),),
-        (np.ones(2, np.float32),),
-        "tanh",
-        "clip",
-    )
-    LearnedPolicy(network, encoding, {"name": demo.LEARNED}).save(folder / f"{demo.LEARNED}.safetensors")
 
 
 @pytest.mark.parametrize("learned", [False, True])
@@ -44,7 +29,7 @@ def test_it_ends_with_scripted_beside_learned_where_one_is_shipped(
     monkeypatch.setattr(demo, "SCENARIOS", ("constant", "smart"))
     monkeypatch.setattr(demo, "POLICIES", ("idle", "pursuit"))
     if learned:
-        ship(shipped)
+        any_policy().with_card({"name": demo.LEARNED}).save(shipped / f"{demo.LEARNED}.safetensors")
     demo.main(episodes=2, seconds=0.5)
     shown = capsys.readouterr().out
     assert (demo.LEARNED in shown) == learned

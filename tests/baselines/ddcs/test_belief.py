@@ -1,110 +1,66 @@
-"""The belief that a network reads: recomputed from the memory and the observation."""
+"""The belief that a network reads says what the world is like, where the team can know it."""
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import numpy as np
-import pytest
+import numpy.typing as npt
 
 import posse
-from posse_baselines.ddcs import DDCS
-from posse_baselines.ddcs.belief import (
-    BELIEF_SIZE,
-    LOOKS,
-    LOOKS_AT,
-    MATES,
-    MATES_AT,
-    SEARCH_AT,
-    SLOT_AT,
-    TARGET_AT,
-    TASK_AT,
-)
-from posse_baselines.ddcs.memory import GRID
-from posse_baselines.ddcs.settings import SEARCHING
+from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
+from posse_baselines.ddcs.belief import LOOKS_AT, MATES_AT, SEARCH_AT, SLOT_AT, TARGET_AT, TASK_AT
+
+Complexes = npt.NDArray[np.complex128]
 
 
-def soft(x: float, y: float, scale: float) -> list[float]:
-    d = math.hypot(x, y)
-    return [x / (d + scale), y / (d + scale)]
+def way(belief: npt.NDArray[np.float32], at: int, scale: float) -> Complexes:
+    """The vector (m) that stands at a place of beliefs with its length as d / (d + scale)."""
+    soft = belief[..., at] + 1j * belief[..., at + 1]
+    return np.asarray(soft * scale / (1.0 - np.abs(soft)))
 
 
-def expected(batch: posse.Batch, ddcs: DDCS, memory: Any, o: Any, e: int, i: int) -> Any:
-    """Recompute a belief in float64 from the memory's fields and an observation."""
-    at, dt = batch.layout.offsets, batch.scenario.control_step
-    d = {name: memory.minds[name][e, i].item() for name in memory.minds.dtype.names}
-    x, y, c, s = o[at["position"]], o[at["position"] + 1], o[at["heading"]], o[at["heading"] + 1]
-
-    def own(vx: float, vy: float) -> tuple[float, float]:
-        return vx * c + vy * s, vy * c - vx * s
-
-    b = np.zeros(BELIEF_SIZE)
-    if d["known"]:
-        b[TARGET_AT : TARGET_AT + 9] = [
-            1.0,
-            *soft(*own(d["target_x"] - x, d["target_y"] - y), 3.0),
-            *own(d["target_vx"], d["target_vy"]),
-            *own(d["frame_cos"], d["frame_sin"]),
-            d["psi_rate"],
-            d["fix_age"] / (d["fix_age"] + 1.0),
-        ]
-    b[TASK_AT + d["task"]] = 1.0
-    if d["slot"] >= 0:
-        slot = memory.team.slots[d["slot"]]
-        arm = complex(slot.x, slot.y) * complex(d["frame_cos"], d["frame_sin"])
-        to = own(d["target_x"] + arm.real - x, d["target_y"] + arm.imag - y)
-        speed = complex(d["target_vx"], d["target_vy"]) + 1j * d["psi_rate"] * arm
-        b[SLOT_AT : SLOT_AT + 7] = [1.0, *soft(*to, 0.3), *soft(*to, 3.0), *own(speed.real, speed.imag)]
-    if d["task"] == SEARCHING:
-        lost = (d["step"] - max(0, d["lost_step"])) * dt
-        b[SEARCH_AT] = lost / (lost + 10.0)
-        if d["goal_step"] >= 0:
-            b[SEARCH_AT + 1 : SEARCH_AT + 3] = soft(*own(d["goal_x"] - x, d["goal_y"] - y), 3.0)
-    settings = memory.team.settings[0]
-    patience = min(settings.lost_after, settings.least_patience + 2.0 * d["usual_gap"])
-    around = []
-    for j, mate in enumerate(memory.mates[e, i]):
-        age = (d["step"] - mate.step) * dt
-        # The policy compares in float32, and both are often equal.
-        if j != i and mate.step >= 0 and age <= patience - 1e-4:
-            around.append(own(mate.x + age * mate.speed_x - x, mate.y + age * mate.speed_y - y))
-    b[MATES_AT] = len(around) / (len(memory.mates[e, i]) - 1)
-    around.sort(key=lambda way: math.hypot(*way))
-    for k, way in enumerate(around[:MATES]):
-        b[MATES_AT + 1 + 2 * k : MATES_AT + 3 + 2 * k] = soft(*way, 1.0)
-    half = batch.scenario.arena / 2
-    cell = 2.0 * half / GRID
-    for k in range(LOOKS):
-        angle = math.atan2(s, c) + 2.0 * math.pi * k / LOOKS
-        reach = batch.scenario.sensing_range
-        column = math.floor((x + reach * math.cos(angle) + half) / cell)
-        row = math.floor((y + reach * math.sin(angle) + half) / cell)
-        if 0 <= column < GRID and 0 <= row < GRID:
-            looked = int(memory.seen[e, i, column * GRID + row]) - 1
-            age = (d["step"] - looked) * dt if looked >= 0 else math.inf
-            b[LOOKS_AT + k] = min(1.0, age / settings.stale_after)
-    return b
-
-
-@pytest.mark.parametrize("scenario", ["search", "field"])
-def test_a_belief_is_what_the_memory_holds(scenario: str) -> None:
+def test_a_team_in_formation_believes_what_is_so() -> None:
     ddcs = DDCS()
-    batch = posse.batch(scenario, 3, message_size=ddcs.message_size, autoreset="disabled")
-    observations = batch.reset(seed=2)
-    memory = ddcs.begin(batch.layout, 3)
-    seen: list[Any] = []
-    for step in range(240):
-        _, memory = ddcs.propose(observations, memory)
-        beliefs = ddcs.belief(observations, memory)
-        assert beliefs.shape == (3, 5, ddcs.belief_size)
-        if step % 20 == 0:
-            for e in range(3):
-                for i in range(5):
-                    wanted = expected(batch, ddcs, memory, observations[e, i], e, i)
-                    np.testing.assert_allclose(beliefs[e, i], wanted, rtol=1e-4, atol=2e-4)
-                    seen.append(wanted)
-        actions, memory = ddcs.carry_out(observations, memory, np.zeros((3, 5, 2), np.float32))
+    batch = posse.batch("constant", 8, message_size=ddcs.message_size, split="train")
+    observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
+    for _ in range(250):
+        proposals, memory = ddcs.propose(observations, memory)
+        belief, state = ddcs.belief(observations, memory), {k: v.copy() for k, v in batch.state.items()}
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
         observations = batch.step(actions)[0]
-    # The worlds were such that every part of a belief was in use.
-    assert (np.ptp(np.array(seen), axis=0) > 0).sum() > BELIEF_SIZE - 4
+    assert belief.shape == (8, 5, ddcs.belief_size)
+    x = {who: state[f"{who}_x"] + 1j * state[f"{who}_y"] for who in ("tracker", "world")}
+    ahead = {who: state[f"{who}_heading_cos"] + 1j * state[f"{who}_heading_sin"] for who in x}
+    to_target = (x["world"][:, None] - x["tracker"]) / ahead["tracker"]
+    assert (belief[..., TARGET_AT] == 1.0).all()
+    np.testing.assert_allclose(way(belief, TARGET_AT + 1, 3.0), to_target, rtol=0, atol=0.02)
+    velocity = belief[..., TARGET_AT + 3] + 1j * belief[..., TARGET_AT + 4]
+    moving = batch.scenario.target_speed * ahead["world"][:, None] / ahead["tracker"]
+    np.testing.assert_allclose(velocity, moving, rtol=0, atol=0.05)
+    np.testing.assert_array_equal(belief[..., TASK_AT : TASK_AT + 4].sum(-1), 1.0)
+    assert (belief[..., TASK_AT + FLOCKING] == 1.0).mean() > 0.9
+    flocking = belief[..., TASK_AT + FLOCKING] == 1.0
+    assert (np.abs(way(belief, SLOT_AT + 1, 0.3))[flocking] < 0.6).all()
+    assert not belief[..., SEARCH_AT : SEARCH_AT + 3].any()
+    np.testing.assert_array_equal(belief[..., MATES_AT], 1.0)
+    to_mates = (x["tracker"][:, None, :] - x["tracker"][:, :, None]) / ahead["tracker"][..., None]
+    nearest = np.sort(np.abs(to_mates), axis=-1)[..., 1]
+    np.testing.assert_allclose(np.abs(way(belief, MATES_AT + 1, 1.0)), nearest, rtol=0, atol=0.05)
+    assert ((belief[..., LOOKS_AT:] >= 0.0) & (belief[..., LOOKS_AT:] <= 1.0)).all()
+
+
+def test_who_searches_believes_nothing_of_the_target() -> None:
+    ddcs = DDCS()
+    batch = posse.batch("search", 8, message_size=ddcs.message_size)
+    observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
+    lost = []
+    for _ in range(20):
+        proposals, memory = ddcs.propose(observations, memory)
+        belief = ddcs.belief(observations, memory)
+        searching = belief[..., TASK_AT + SEARCHING] == 1.0
+        assert searching.any()
+        assert not belief[searching][:, TARGET_AT : TARGET_AT + 9].any()
+        assert not belief[searching][:, SLOT_AT : SLOT_AT + 7].any()
+        lost.append(belief[searching][:, SEARCH_AT].max())
+        actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
+        observations = batch.step(actions)[0]
+    np.testing.assert_allclose(lost, [t / (t + 10.0) for t in 0.1 * np.arange(20)], rtol=1e-4, atol=1e-4)

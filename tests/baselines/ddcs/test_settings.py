@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -19,14 +18,9 @@ from posse_baselines.ddcs.baseline import FAMILY
     ("setting", "message"),
     [
         ({"model": "central"}, "model='central' is unknown; known: distributed, centralized"),
-        ({"guidance": "pn"}, "guidance='pn' is unknown"),
         ({"gain": math.nan}, r"gain=nan must lie in \[0.2, 6\] 1/s"),
-        ({"time_lag": -1.0}, "time_lag=-1.0 must lie in"),
         ({"near": 1.5, "far": 1.2}, "near=1.5 must be below far=1.2"),
-        ({"near": 1.2}, "near=1.2 must be below far=1.2"),
         ({"range_near": 1.0}, "range_near=1.0 must be below range_far=0.8"),
-        ({"fix_trust": 0.0}, "fix_trust=0.0 must lie in"),
-        ({"spread": 0.2}, "spread=0.2 must lie in"),
         ({"navigation_constant": 1.2}, r"navigation_constant=1.2 must lie in \[0.9, 1.1\]"),
         ({"follower_law": "l-psi"}, "follower_law='l-psi' is unknown; known: l-phi, l-l"),
     ],
@@ -34,15 +28,6 @@ from posse_baselines.ddcs.baseline import FAMILY
 def test_impossible_settings_are_refused(setting: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Settings(**setting)
-
-
-def test_each_number_declares_unit_and_range() -> None:
-    for field in dataclasses.fields(Settings):
-        if isinstance(field.default, float):
-            meta = field.metadata
-            assert meta["low"] <= field.default <= meta["high"], field.name
-            assert meta["low"] < meta["high"]
-            assert isinstance(meta["unit"], str)
 
 
 @pytest.mark.parametrize("name", FAMILY)

@@ -58,11 +58,6 @@ def test_line_of_sight_points_from_tracker_to_target() -> None:
     assert geometry.line_of_sight(1.0, 2.0, 1.0, 2.0) == (0.0, 0.0)
 
 
-def test_lengths_and_bounds() -> None:
-    assert geometry.length(3.0, -4.0) == 5.0
-    assert [geometry.clip(x, -1.0, 2.0) for x in (-3.0, 0.5, 9.0)] == [-1.0, 0.5, 2.0]
-
-
 @PROPERTY
 @given(st.floats(0.5, 9.0), ANGLES, ANGLES, ANGLES, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_bearing_rate_is_the_derivative_of_the_bearing(

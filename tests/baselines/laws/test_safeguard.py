@@ -9,17 +9,7 @@ import numpy as np
 import pytest
 
 from posse_baselines.laws.heading import BODY, regulate
-from posse_baselines.laws.safeguard import (
-    DISC,
-    LOOK_AHEAD,
-    PLAYS,
-    begin_plays,
-    cost_of,
-    play_all,
-    put_disc,
-    put_wall,
-    safe_velocity,
-)
+from posse_baselines.laws.safeguard import DISC, PLAYS, put_disc, put_wall, safe_velocity
 
 DT = 0.1
 WORK = np.zeros(1, PLAYS)[0]
@@ -154,26 +144,3 @@ def test_a_full_list_of_discs_stays_as_it_is() -> None:
     count = put_disc(discs, 0, 1.0, 2.0, 0.0, 0.0, 0.3, 0.1)
     assert put_disc(discs, count, 5.0, 5.0, 0.0, 0.0, 0.3, 0.1) == 1
     assert discs[0].x == 1.0
-
-
-@pytest.mark.parametrize("limits", LIMITS)
-@pytest.mark.parametrize("error", [-3.0, -0.4, 0.1, 1.2])
-def test_all_plays_at_once_end_as_one_at_a_time(limits: tuple[float, float], error: float) -> None:
-    body, discs = body_of(0.7, 0.6, limits), np.zeros(8, DISC)
-    count = put_disc(discs, 0, 0.9, 0.4, -0.3, 0.1, 0.3, 0.15)
-    count = put_disc(discs, count, -0.5, 0.6, 0.4, 0.0, 0.3, 0.2)
-    count = put_disc(discs, count, 0.1, -0.7, 0.0, 0.5, 0.4, 0.25)
-    count = put_wall(discs, count, 1.0, 0.0, 1.0, 0.15, 0.15)
-    begin_plays(body, error, WORK)
-    headings = np.arctan2(WORK.goal_sin, WORK.goal_cos)
-    play_all(body, discs, count, WORK)
-    for m in range(len(WORK.danger)):
-        k, speed = m % len(headings), 1.0 if m < len(headings) else 0.5
-        turn = math.remainder(headings[k] - 0.7, math.tau)
-        cost, danger = cost_of(body, discs, count, speed, turn, 0.0, 0.0, 1e9)
-        assert WORK.danger[m] == pytest.approx(danger, abs=1e-9)
-        if WORK.going[m] == 1.0:
-            way = math.hypot(WORK.x[m], WORK.y[m]) / sum(LOOK_AHEAD)
-            assert cost == pytest.approx(danger + way, abs=1e-9)
-        else:
-            assert cost == pytest.approx(danger + 2.0, abs=1e-9)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.learned import policy_for
+from tests.support.learned import network_for, policy_for
 
 import posse
 from posse_baselines import Policy, PolicyError, load
-from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_baselines.learned import Encoding, LearnedPolicy
 from posse_baselines.learned.advice import Advice, Advising, BelievingAdviser, advised, check_adviser
 from posse_baselines.playing import play
 
@@ -25,15 +25,7 @@ def listener(
     encoding = Encoding.of(layout, kind)
     adviser = check_adviser(DDCS, load(DDCS))
     size = encoding.size + Advising(adviser, correction, believes=encoding.believes).inputs
-    network = Network(
-        mean=np.zeros(size, np.float32),
-        scale=np.ones(size, np.float32),
-        limit=10.0,
-        weights=(np.zeros((2, size), np.float32),),
-        biases=(np.array(answer, np.float32),),
-        activation="tanh",
-        output="clip",
-    )
+    network = network_for(size, weights=(np.zeros((2, size), np.float32),), biases=(np.array(answer, np.float32),))
     return LearnedPolicy(network, encoding, {"name": "mine"}, adviser, correction)
 
 
@@ -120,33 +112,21 @@ def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was(correct
 
 
 def test_who_cannot_advise() -> None:
-    with pytest.raises(PolicyError, match="no tracker observes"):
-        check_adviser("planner", load("planner"))
-
     class Mute:
         name, message_size, reads_state = "mute", 0, False
         begin = act = restart = annotations = None
 
     mute: Policy = Mute()  # type: ignore[assignment]
-    with pytest.raises(PolicyError, match="arrays"):
-        check_adviser("mute", mute)
     pursuit = load("pursuit")
     check_adviser("pursuit", pursuit)
-    with pytest.raises(PolicyError, match="propose and carry_out"):
-        check_adviser("pursuit", pursuit, "velocity")
-    with pytest.raises(PolicyError, match="offers no belief"):
-        check_adviser("pursuit", pursuit, believes=True)
-    with pytest.raises(PolicyError, match="motion, velocity"):
-        check_adviser("pursuit", pursuit, "speed")
-    layout = worlds().layout
+    for policy, settings, message in (
+        (load("planner"), {}, "no tracker observes"),
+        (mute, {}, "arrays"),
+        (pursuit, {"correction": "velocity"}, "propose and carry_out"),
+        (pursuit, {"believes": True}, "offers no belief"),
+        (pursuit, {"correction": "speed"}, "motion, velocity"),
+    ):
+        with pytest.raises(PolicyError, match=message):
+            check_adviser(policy.name, policy, **settings)  # type: ignore[arg-type]
     with pytest.raises(PolicyError, match="needs an adviser"):
-        policy_for(layout, "belief")
-
-
-def test_a_file_that_listens_to_unknown_code_is_refused(tmp_path: Path) -> None:
-    policy = listener(worlds().layout, (0.0, 0.0))
-    assert policy.adviser is not None
-    policy.adviser.name = "os:system"
-    policy.save(tmp_path / "mine.safetensors")
-    with pytest.raises(PolicyError, match="os:system"):
-        LearnedPolicy.from_file(tmp_path / "mine.safetensors")
+        policy_for(worlds().layout, "belief")

@@ -39,10 +39,8 @@ def test_longer_messages_than_it_uses_change_nothing() -> None:
 @pytest.mark.parametrize("trackers", [1, 2, 3, 12])
 def test_teams_of_another_size(trackers: int) -> None:
     policy = policy_for(posse.ObservationLayout(posse.get_scenario("smart")))
-    batch = posse.batch("smart", 3, num_trackers=trackers)
-    metrics = play(posse.batch("smart", 3, num_trackers=trackers, horizon=30), policy)
-    assert np.isfinite(metrics["score"]).all()
-    assert batch.layout.neighbours != 4 or trackers == 5
+    batch = posse.batch("smart", 3, num_trackers=trackers, horizon=30)
+    assert np.isfinite(play(batch, policy)["score"]).all()
 
 
 def test_places_that_a_small_team_lacks_are_unknown() -> None:

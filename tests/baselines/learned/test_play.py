@@ -35,14 +35,6 @@ def test_actions_are_the_networks_output(kind: str, activation: str, output: str
     assert np.ptp(actions) > 0.5  # the networks say something
 
 
-def test_a_world_plays_alike_alone_and_in_a_batch() -> None:
-    batch, observations = observations_of("smart", worlds=600)
-    policy = policy_for(batch.layout)
-    together, _ = policy.act(observations, policy.begin(batch.layout, 600))
-    alone, _ = policy.act(observations[433:434], policy.begin(batch.layout, 1))
-    np.testing.assert_array_equal(together[433], alone[0])
-
-
 def test_returned_actions_are_never_overwritten() -> None:
     batch, observations = observations_of("smart")
     policy = policy_for(batch.layout)

@@ -1,50 +1,158 @@
-"""Policy files are read back unchanged, and refused if damaged."""
+"""Policy files give back the policy; damaged and forged ones are refused by name, and reading one runs no code."""
 
 from __future__ import annotations
 
+import json
 import pickle
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from safetensors import safe_open
 from safetensors.numpy import save_file
-from tests.support.learned import observations_of, policy_for
+from tests.support.learned import any_policy, observations_of
 
 import posse
-from posse_baselines import PolicyError
+from posse_baselines import Policy, PolicyError, load, play
 from posse_baselines.learned import LearnedPolicy
+from posse_baselines.learned.policy_file import write_policy_file
+
+POLICY = any_policy()
+TENSORS = POLICY.network.tensors()
+PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
+FORBIDDEN = (
+    "exec",
+    "compile",
+    "import",
+    "os.system",
+    "os.exec",
+    "os.posix_spawn",
+    "subprocess.Popen",
+    "pickle.find_class",
+)
+_seen: list[str] | None = None
 
 
-def test_a_file_gives_back_the_policy(tmp_path: Path) -> None:
-    batch, observations = observations_of("smart")
-    policy = policy_for(batch.layout)
+def _watch(event: str, arguments: tuple[Any, ...]) -> None:
+    writes = event == "open" and any(letter in str(arguments[1] or "r") for letter in "wax+")
+    if _seen is not None and (event in FORBIDDEN or writes):
+        _seen.append(f"{event} {arguments!r:.200}")
+
+
+sys.addaudithook(_watch)  # there is no way to remove one
+
+
+def actions_of(policy: Policy) -> Any:
+    batch, observations = observations_of("smart", 2, message_size=policy.message_size)
+    return policy.act(observations, policy.begin(batch.layout, 2))[0].copy()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("policy") / "mine.safetensors"
+    POLICY.save(path)
+    assert list(path.parent.iterdir()) == [path]
+    assert actions_of(load(path)).any()  # all modules are imported and all kernels compiled before anything is watched
+    return path.read_bytes()
+
+
+@pytest.fixture
+def described(tmp_path: Path, whole: bytes) -> dict[str, Any]:
+    """The description in a policy file."""
+    (tmp_path / "plain.safetensors").write_bytes(whole)
+    with safe_open(tmp_path / "plain.safetensors", framework="numpy") as file:
+        found: dict[str, Any] = json.loads(file.metadata()["posse-policy"])
+    return found
+
+
+def forged(folder: Path, description: Any, tensors: dict[str, Any] = TENSORS) -> Path:
+    """Write a file of these contents with the digest that belongs to them."""
+    path = folder / "forged.safetensors"
+    write_policy_file(path, tensors, description)
+    return path
+
+
+def test_a_file_gives_back_the_policy(tmp_path: Path, described: dict[str, Any]) -> None:
+    again = LearnedPolicy.from_file(forged(tmp_path, described))
+    assert (again.name, again.trained_splits, again.card) == ("mine", ("train",), POLICY.card)
+    assert again.encoding == POLICY.encoding
+    np.testing.assert_array_equal(actions_of(again), actions_of(POLICY))
+
+
+def test_playing_a_file_needs_no_torch(tmp_path: Path, whole: bytes) -> None:
     path = tmp_path / "policy.safetensors"
-    policy.save(path)
-    again = LearnedPolicy.from_file(path)
-    assert again.name == "mine"
-    assert again.trained_splits == ("train",)
-    assert again.encoding == policy.encoding
-    mine, _ = policy.act(observations, policy.begin(batch.layout, 6))
-    theirs, _ = again.act(observations, again.begin(batch.layout, 6))
-    np.testing.assert_array_equal(mine, theirs)
-    assert again.card == policy.card
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_playing_a_file_needs_no_torch(tmp_path: Path) -> None:
-    path = tmp_path / "policy.safetensors"
-    policy_for(posse.ObservationLayout(posse.get_scenario("smart"))).save(path)
+    path.write_bytes(whole)
     code = (
         "import sys, posse; from posse_baselines.learned import LearnedPolicy;"
         f"p = LearnedPolicy.from_file({str(path)!r}); b = posse.batch('smart', 2);"
         "p.act(b.reset(), p.begin(b.layout, 2)); print('torch' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "False"
+    assert done.stdout.strip() == "False", done.stderr
+
+
+# --- any bytes -----------------------------------------------------------------------------------
+
+
+def read(content: bytes) -> Policy | None:
+    """Return the policy in a file of these bytes, or None where it is refused; nothing runs and nothing is written."""
+    global _seen
+    message = ""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.safetensors"
+        path.write_bytes(content)
+        _seen = []
+        try:
+            policy = load(path)
+        except PolicyError as error:
+            policy, message = None, str(error)
+        finally:
+            found, _seen = _seen, None
+        assert found == []
+        assert [each.name for each in Path(folder).iterdir()] == [path.name]
+    assert policy is not None or (str(path) in message and len(message) < 2000)
+    return policy
+
+
+@PROPERTY
+@given(st.binary(max_size=300))
+def test_random_bytes_are_refused(content: bytes) -> None:
+    assert read(content) is None
+    assert read(len(content).to_bytes(8, "little") + content) is None  # as the header of safetensors begins
+
+
+@PROPERTY
+@given(data=st.data())
+def test_changed_bytes_are_refused_or_play_the_same(whole: bytes, data: st.DataObject) -> None:
+    first = data.draw(st.integers(0, len(whole)) | st.integers(0, 3000))
+    length = data.draw(st.sampled_from((0, 1, 1, 64)))
+    changed = whole[:first] + data.draw(st.binary(max_size=length)) + whole[first + length :]
+    assume(changed != whole)
+    policy = read(changed)
+    assert policy is None or np.array_equal(actions_of(policy), actions_of(POLICY))
+
+
+@PROPERTY
+@given(where=st.floats(0, 0.999999), bit=st.integers(0, 7))
+def test_a_flipped_bit_is_refused_or_plays_the_same(whole: bytes, where: float, bit: int) -> None:
+    flipped = bytearray(whole)
+    flipped[int(where * len(whole))] ^= 1 << bit
+    policy = read(bytes(flipped))
+    assert policy is None or np.array_equal(actions_of(policy), actions_of(POLICY))
+
+
+def test_the_watch_notices_a_file_that_is_written(tmp_path: Path) -> None:
+    global _seen
+    _seen = []
+    (tmp_path / "other").write_bytes(b"")
+    found, _seen = _seen, None
+    assert len(found) == 1
 
 
 class _Planted:
@@ -57,33 +165,107 @@ class _Planted:
         return Path.touch, (self._file,)
 
 
-class TestDamage:
-    @pytest.fixture
-    def path(self, tmp_path: Path) -> Path:
-        path = tmp_path / "policy.safetensors"
-        policy_for(posse.ObservationLayout(posse.get_scenario("smart"))).save(path)
-        return path
-
-    @pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
-    def test_a_file_cut_short(self, path: Path, share: float) -> None:
-        content = path.read_bytes()
-        path.write_bytes(content[: int(share * len(content))])
+def test_other_files_are_refused_and_not_run(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "other.safetensors"
+    with pytest.raises(PolicyError, match="there is no policy file"):
+        LearnedPolicy.from_file(path)
+    save_file({"a": np.zeros(3)}, path)
+    with pytest.raises(PolicyError, match="holds no policy"):
+        LearnedPolicy.from_file(path)
+    path.write_bytes(pickle.dumps(_Planted(tmp_path / "it_ran")))
+    with pytest.raises(PolicyError, match="not a policy file"):
+        LearnedPolicy.from_file(path)
+    for share in (0.0, 0.001, 0.5, 0.999):
+        path.write_bytes(whole[: int(share * len(whole))])
         with pytest.raises(PolicyError, match="truncated"):
             LearnedPolicy.from_file(path)
+    assert list(tmp_path.iterdir()) == [path]
 
-    def test_a_file_of_something_else(self, tmp_path: Path) -> None:
-        path = tmp_path / "other.safetensors"
-        save_file({"a": np.zeros(3)}, path)
-        with pytest.raises(PolicyError, match="holds no policy"):
-            LearnedPolicy.from_file(path)
 
-    def test_a_pickle_is_refused_and_not_run(self, tmp_path: Path) -> None:
-        path = tmp_path / "pickled.safetensors"
-        path.write_bytes(pickle.dumps(_Planted(tmp_path / "it_ran")))
-        with pytest.raises(PolicyError, match="not a policy file"):
-            LearnedPolicy.from_file(path)
-        assert list(tmp_path.iterdir()) == [path]
+# --- forged contents with a correct digest -------------------------------------------------------
 
-    def test_no_file(self, tmp_path: Path) -> None:
-        with pytest.raises(PolicyError, match="there is no policy file"):
-            LearnedPolicy.from_file(tmp_path / "none.safetensors")
+ENCODING = {"kind": "plain", "neighbours": 0, "fields": []}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"format": 2}, "its format is 2, this version reads 1"),
+        ({"limit": "wide"}, "damaged"),
+        ({"limit": 1e300}, "limit=1e\\+300"),
+        ({"limit": float("nan")}, "limit=nan"),
+        ({"activation": "x" * 5000}, "unknown activation"),
+        ({"output": []}, "unknown activation"),
+        ({"adviser": "os:system"}, "its adviser 'os:system' is none of"),
+        ({"adviser": "planner"}, "cannot be an adviser"),
+        ({"adviser": ["pursuit"]}, "damaged"),
+        ({"adviser": "ddcs-distributed"}, "the network takes"),
+        ({"encoding": None}, "inputs is damaged"),
+        ({"encoding": {**ENCODING, "neighbours": 10**9}}, "inputs is damaged"),
+        ({"encoding": {**ENCODING, "fields": [["speed", 10**9, "m/s", 0, False]]}}, "takes"),
+        ({"encoding": {**ENCODING, "fields": [["x", 1, "", float("nan"), False]]}}, "damaged"),
+        ({"card": "name"}, "card must be a mapping"),
+        ({"card": {"name": 3}}, "name on its card, 3"),
+        ({"card": {"name": "x" * 400}}, "1 to 100 printable"),
+        ({"card": {"name": "a\nb"}}, "printable"),
+        ({"card": {"trained_splits": ["trian"]}}, "trained_splits="),
+        ({"card": {"trained_splits": 3}}, "trained_splits=3"),
+    ],
+)
+def test_descriptions_that_make_no_policy(
+    tmp_path: Path, described: dict[str, Any], changes: dict[str, Any], message: str
+) -> None:
+    path = forged(tmp_path, {**described, **changes})
+    with pytest.raises(PolicyError, match=message) as caught:
+        LearnedPolicy.from_file(path)
+    assert str(path) in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_descriptions_that_lack_something_or_are_of_another_kind(
+    tmp_path: Path, described: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for missing in described:
+        with pytest.raises(PolicyError, match=f"damaged: KeyError.*{missing}"):
+            LearnedPolicy.from_file(forged(tmp_path, {k: v for k, v in described.items() if k != missing}))
+    for other in (None, 3, "text", [[]], {}):
+        with pytest.raises(PolicyError, match="damaged"):
+            LearnedPolicy.from_file(forged(tmp_path, other))
+    monkeypatch.setattr("posse_baselines.learned.policy_file.json.dumps", lambda *_, **__: "[" * 200_000)
+    with pytest.raises(PolicyError, match="nested too deeply"):
+        LearnedPolicy.from_file(forged(tmp_path, None))
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("normaliser.mean", np.zeros((3, 3), np.float32)),
+        ("normaliser.scale", np.zeros(0, np.float32)),
+        ("layers.0.weight", TENSORS["layers.0.weight"].astype(np.float64)),
+        ("layers.1.weight", np.full_like(TENSORS["layers.1.weight"], 1e38)),
+        ("layers.2.bias", np.full_like(TENSORS["layers.2.bias"], np.nan)),
+        ("layers.2.weight", TENSORS["layers.2.weight"][:1]),
+        ("layers.7.weight", TENSORS["layers.2.weight"]),
+    ],
+)
+def test_arrays_that_make_no_network(tmp_path: Path, described: dict[str, Any], name: str, array: Any) -> None:
+    with pytest.raises(PolicyError, match=r"forged\.safetensors"):
+        LearnedPolicy.from_file(forged(tmp_path, described, {**TENSORS, name: array}))
+
+
+@settings(derandomize=True, database=None, deadline=None, max_examples=40)
+@given(exponents=st.lists(st.floats(0, 38), min_size=4, max_size=4), activation=st.sampled_from(["tanh", "relu"]))
+def test_whatever_is_accepted_acts_in_the_box(exponents: list[float], activation: str) -> None:
+    """Finite weights that could overflow are refused; all others give finite actions."""
+    described = {"format": 1, "limit": 5.0, "activation": activation, "output": "clip", "adviser": None}
+    described |= {"correction": "motion", "encoding": POLICY.encoding.to_dict(), "card": {}}
+    scaled = dict(TENSORS)
+    for (name, array), exponent in zip(list(TENSORS.items())[1:5], exponents, strict=True):
+        with np.errstate(over="ignore"):
+            scaled[name] = np.clip(array * np.float32(10**exponent), -3e38, 3e38)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            policy = LearnedPolicy.from_file(forged(Path(folder), described, scaled))
+        except PolicyError:
+            return
+        assert np.isfinite(play(posse.batch("smart", 4, horizon=5, settle_time=0.5), policy)["score"]).all()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import pickle
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ from numpy.typing import NDArray
 from tests.support.reference.state import snapshot
 
 import posse
-from posse_baselines import PolicyError, begin, load, play, rollout, split_agents
+from posse_baselines import PolicyError, begin, load, play, rollout
 from posse_baselines.policies.planner import Planner, PlannerSettings
 
 QUICK = PlannerSettings(look_ahead=0.8, keep=0.4, rounds=1)
@@ -124,46 +122,21 @@ def test_it_sends_every_tracker_to_a_slot_of_its_own() -> None:
     assert np.sort(slots, axis=1).tolist() == [[0, 1, 2]] * 4
 
 
-def test_a_single_world_is_played_with_actions_by_agent() -> None:
-    batch, planner = posse.batch("radio", 1, message_size=2), Planner(QUICK)
-    memory, observations = begin(planner, batch), batch.reset()
-    actions, memory = planner.act(observations, memory)
-    by_name = split_agents(actions, [f"tracker_{i}" for i in range(5)])
-    assert all(action.shape == (4,) for action in by_name.values())
-
-
-def test_it_can_be_pickled_before_it_plays() -> None:
-    planner = pickle.loads(pickle.dumps(Planner(QUICK)))  # noqa: S301
-    assert planner.settings == QUICK
-
-
-def test_it_has_to_be_shown_the_batch() -> None:
-    batch = posse.batch("constant", 2)
+def test_it_reads_only_the_batch_that_it_was_shown() -> None:
+    planner, other = load("planner"), posse.batch("smart", 3, num_trackers=3)
     with pytest.raises(PolicyError, match=r"do not hold their state: show it the batch"):
-        load("planner").begin(batch.layout, 2)
-
-
-def test_it_refuses_a_batch_other_than_the_one_it_watches() -> None:
-    planner = load("planner")
+        planner.begin(other.layout, 3)
     begin(planner, posse.batch("constant", 2))
     with pytest.raises(PolicyError, match="watches 2 worlds of 'constant', not 3 of 'smart'"):
-        planner.begin(posse.batch("smart", 3, num_trackers=3).layout, 3)
-
-
-def test_each_setting_has_a_unit_and_a_range_that_holds_its_default() -> None:
-    for field in dataclasses.fields(PlannerSettings):
-        assert isinstance(field.metadata["unit"], str)
-        assert field.metadata["low"] <= field.default <= field.metadata["high"]
+        planner.begin(other.layout, 3)
 
 
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
         ("look_ahead", 0.0, r"look_ahead=0.0 must lie in \[0.1, 20\] s"),
-        ("look_ahead", float("nan"), "look_ahead=nan must lie"),
         ("look_ahead", "4", "look_ahead='4' must be a number"),
         ("rounds", 1.5, "rounds=1.5 must be a whole number"),
-        ("rounds", True, "rounds=True must be a whole number"),
         ("keep", 5.0, "keep=5.0 must be at most look_ahead=4.0"),
     ],
 )

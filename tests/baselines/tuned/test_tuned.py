@@ -25,10 +25,6 @@ SHIPPED = {
 }
 
 
-def scenario_of(path: Path, **overrides: Any) -> posse.Scenario:
-    return posse.get_scenario(path.stem, message_size=5, **overrides)
-
-
 def batch_of(name: str, **overrides: Any) -> posse.Batch:
     return posse.batch(name, num_worlds=6, seed=5, message_size=5, horizon=150, **overrides)
 
@@ -80,12 +76,13 @@ def test_a_tuned_policy_plays_the_settings_of_its_scenario(name: str, path: Path
 
 
 @pytest.mark.parametrize("name", TUNED)
-def test_without_a_file_the_untuned_policy_is_played(name: str) -> None:
+def test_without_a_file_the_untuned_policy_is_played_and_the_split_of_tuning_is_refused(name: str) -> None:
     scenario = "paper-distributed"
     assert scenario not in tuned_files(name)
-    np.testing.assert_array_equal(
-        play(batch_of(scenario), load(name))["score"], play(batch_of(scenario), load(TUNED[name]))["score"]
-    )
+    scores = [play(batch_of(scenario), load(each))["score"] for each in (name, TUNED[name])]
+    np.testing.assert_array_equal(*scores)
+    with pytest.raises(ValueError, match="was trained on the split 'train'"):
+        evaluate(name, "constant", 1, split="train", progress=False)
 
 
 def test_one_object_plays_several_scenarios() -> None:
@@ -100,12 +97,6 @@ def test_one_object_plays_several_scenarios() -> None:
             seen[k], _, _, ended, infos = batch.step(actions)
             if ended.all():
                 np.testing.assert_array_equal(infos["metrics/score"], apart[k])
-
-
-@pytest.mark.parametrize("name", TUNED)
-def test_worlds_that_it_was_tuned_on_are_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="was trained on the split 'train'"):
-        evaluate(name, "constant", 1, split="train", progress=False)
 
 
 def write(path: Path, **changes: Any) -> Path:
@@ -126,17 +117,12 @@ def test_a_file_of_settings_is_a_policy(tmp_path: Path) -> None:
     [
         ({"format": "other"}, "holds no tuned settings: it must have format='posse-tuned-1'"),
         ({"policy": "idle"}, "has settings of policy='idle'; policies with settings are: pngl-l"),
-        ({"policy": ["pngl"]}, "has settings of policy="),
         ({"scenario": ""}, "has scenario='': it must be a text"),
-        ({"scenario": 3}, "has scenario=3: it must be a text"),
         ({"settings": [1]}, r"has settings=\[1\]: they must map names to numbers"),
         ({"settings": {"gian": 1.0}}, "has a setting 'gian' that is not a tunable one of pngl"),
         ({"settings": {"spread": 0.1}}, "has a setting 'spread' that is not a tunable one"),
         ({"settings": {"gain": 7.0}}, r"has gain=7.0: it must be a number in \[0.2, 6\] 1/s"),
         ({"settings": {"gain": math.nan}}, "has gain=nan: it must be a number in"),
-        ({"settings": {"gain": math.inf}}, "has gain=inf: it must be a number in"),
-        ({"settings": {"gain": "1"}}, "has gain='1': it must be a number in"),
-        ({"settings": {"gain": True}}, "has gain=True: it must be a number in"),
         ({"settings": {"gain": 10**400}}, "has gain=1000.*: it must be a number in"),
         ({"settings": {"near": 1.4}}, "has impossible settings: near=1.4 must be below far=1.2"),
     ],

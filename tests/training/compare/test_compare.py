@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.learned import policy_for
 
 import posse
 from posse.scenarios.named import SCENARIOS
 from posse_baselines import PolicyError
-from posse_baselines.learned import Encoding, LearnedPolicy, Network
+from posse_baselines.learned import LearnedPolicy
 from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
 from posse_training.compare.contenders import read_contenders
@@ -88,18 +89,8 @@ def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
 
 def learned(seed: int, trained: str = "train") -> LearnedPolicy:
     """A network of any numbers, for the layout of ``constant``."""
-    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("constant")), "plain")
-    weight = np.random.default_rng(seed).normal(size=(2, encoding.size)).astype(np.float32)
-    network = Network(
-        np.zeros(encoding.size, np.float32),
-        np.ones(encoding.size, np.float32),
-        5.0,
-        (weight / np.float32(8),),
-        (np.array([0.5, 0], np.float32),),
-        "tanh",
-        "clip",
-    )
-    return LearnedPolicy(network, encoding, {"name": f"any-{seed}", "trained_splits": [trained]})
+    policy = policy_for(posse.ObservationLayout(posse.get_scenario("constant")), "plain", seed=seed)
+    return policy.with_card({"name": f"any-{seed}", "trained_splits": [trained]})
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from tests.support.learned import any_policy
 
 import posse
-from posse_baselines.learned import Encoding, LearnedPolicy, Network
 from posse_training.compare import figures
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
@@ -118,16 +118,6 @@ def test_figures_say_what_was_played() -> None:
 
 
 def learned(curve: object) -> Contender:
-    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario("smart")), "plain")
-    network = Network(
-        np.zeros(encoding.size, np.float32),
-        np.ones(encoding.size, np.float32),
-        5.0,
-        (np.zeros((2, encoding.size), np.float32),),
-        (np.zeros(2, np.float32),),
-        "tanh",
-        "clip",
-    )
     card = {
         "name": "mine",
         "curve": curve,
@@ -135,7 +125,7 @@ def learned(curve: object) -> Contender:
         "settings": {"evaluate_worlds": 64},
         "scenarios": [posse.get_scenario("smart").to_dict()],
     }
-    return Contender("mine", (LearnedPolicy(network, encoding, card),))
+    return Contender("mine", (any_policy().with_card(card),))
 
 
 def test_learning_curves_are_those_of_the_cards() -> None:
