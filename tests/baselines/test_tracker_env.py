@@ -112,7 +112,7 @@ def test_many_worlds_agree_with_gymnasiums_own_vector_of_single_ones(
 ) -> None:
     settings = {**SETTINGS, **kind}
     ours = vector(autoreset=mode, **settings)
-    makes = [lambda i=i: gymnasium.make(NAME, first_world=i, **settings) for i in range(E)]  # type: ignore[misc]
+    makes = [lambda i=i: gymnasium.make(NAME, first_world=i, **settings) for i in range(E)]
     theirs: Any = SyncVectorEnv(makes, autoreset_mode=mode)
     assert ours.observation_space == theirs.observation_space
     assert ours.action_space == theirs.action_space

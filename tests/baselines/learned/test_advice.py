@@ -127,6 +127,6 @@ def test_who_cannot_advise() -> None:
         (pursuit, {"correction": "speed"}, "motion, velocity"),
     ):
         with pytest.raises(PolicyError, match=message):
-            check_adviser(policy.name, policy, **settings)  # type: ignore[arg-type]
+            check_adviser(policy.name, policy, **settings)
     with pytest.raises(PolicyError, match="needs an adviser"):
         policy_for(worlds().layout, "belief")

@@ -228,7 +228,8 @@ def test_descriptions_that_lack_something_or_are_of_another_kind(
     for missing in described:
         with pytest.raises(PolicyError, match=f"damaged: KeyError.*{missing}"):
             LearnedPolicy.from_file(forged(tmp_path, {k: v for k, v in described.items() if k != missing}))
-    for other in (None, 3, "text", [[]], {}):
+    others: tuple[Any, ...] = (None, 3, "text", [[]], {})
+    for other in others:
         with pytest.raises(PolicyError, match="damaged"):
             LearnedPolicy.from_file(forged(tmp_path, other))
     monkeypatch.setattr("posse_baselines.learned.policy_file.json.dumps", lambda *_, **__: "[" * 200_000)

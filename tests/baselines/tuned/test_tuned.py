@@ -79,8 +79,8 @@ def test_a_tuned_policy_plays_the_settings_of_its_scenario(name: str, path: Path
 def test_without_a_file_the_untuned_policy_is_played_and_the_split_of_tuning_is_refused(name: str) -> None:
     scenario = "paper-distributed"
     assert scenario not in tuned_files(name)
-    scores = [play(batch_of(scenario), load(each))["score"] for each in (name, TUNED[name])]
-    np.testing.assert_array_equal(*scores)
+    played, untuned = (play(batch_of(scenario), load(each))["score"] for each in (name, TUNED[name]))
+    np.testing.assert_array_equal(played, untuned)
     with pytest.raises(ValueError, match="was trained on the split 'train'"):
         evaluate(name, "constant", 1, split="train", progress=False)
 
