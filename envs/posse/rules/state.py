@@ -229,7 +229,7 @@ FIX_RECORD: Final = _record(
     ("frame_sin", _F),  # the slot frame ψ; a bearing: 0
 )
 """A fix of the target, in the common frame: a position or a bearing, depending on the sensor
-(:mod:`posse.rules.senses.declaring`). Its control step stands beside it (``fix_step``)."""
+(:mod:`posse.rules.senses.declaration`). Its control step stands beside it (``fix_step``)."""
 
 TRACKER: Final = _record(
     ("x", _F),
