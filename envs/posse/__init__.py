@@ -12,10 +12,10 @@ from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
 from posse.rules.senses import Sensor, sensor
 from posse.rules.targets import Memory, TargetMotion, target_motion
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
+from posse.signals.fields import Field, field
 from posse.signals.generate import declarations_for, source_of
+from posse.signals.layout import ObservationLayout
 from posse.signals.metrics import METRICS, Metric, metric
-from posse.signals.observation.fields import Field, field
-from posse.signals.observation.layout import ObservationLayout
 from posse.signals.reward import REWARD_TERMS, RewardTerm, reward_term
 
 __version__ = "0.1.0"

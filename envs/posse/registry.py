@@ -9,24 +9,34 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import hashlib
 import inspect
 import keyword
 import math
 import os
+import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from types import CodeType, FunctionType, ModuleType
+from types import FunctionType
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 
-from posse.numeric import compiled
+from posse.numeric import compiled, stamp
 
 Function = Callable[..., Any]
 Parameters = tuple[str, ...]
+Bound = float | Callable[[Any], float]
+"""A number, or a function of the scenario that returns one."""
 
 _PACKAGE: Final = __name__.partition(".")[0]
+
+
+def unknown(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return the message for a name that is none of the known ones, with those most like it."""
+    names, text = tuple(known), name if isinstance(name, str) else reprlib.repr(name)
+    near = difflib.get_close_matches(text[:100], names, n=3, cutoff=0.5)
+    hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+    return f"unknown {kind} {reprlib.repr(name)}{hint}; known: {', '.join(names) or 'none'}"
 
 
 class DeclarationError(ValueError):
@@ -82,13 +92,14 @@ class Declaration:
         """Whether posse itself declares it."""
         return str(plain(self.function).__module__).partition(".")[0] == _PACKAGE
 
+    @property
+    def parameters(self) -> Parameters:
+        """Names of the function's parameters."""
+        return parameters_of(self.function)
+
     def fingerprint(self) -> str:
-        """Return a hash of the options and of the code of all functions that they reach."""
-        digest = hashlib.sha256()
-        values = [getattr(self, field.name) for field in dataclasses.fields(self)]
-        for part in _parts(values, set()):
-            digest.update(part.encode())
-        return digest.hexdigest()[:16]
+        """Return a hash of the options and of all that its functions reach."""
+        return stamp(*(getattr(self, field.name) for field in dataclasses.fields(self)))
 
 
 D = TypeVar("D", bound=Declaration)
@@ -108,7 +119,14 @@ class Registry(Mapping[str, D], Generic[D]):
         self._declared: dict[str, D] = {}
 
     def declare(
-        self, make: type[D], function: Any, *, name: Any = None, parameters: Parameters | None = None, **options: Any
+        self,
+        make: type[D],
+        function: Any,
+        *,
+        name: Any = None,
+        meaning: str | None = None,
+        parameters: Parameters | None = None,
+        **options: Any,
     ) -> Function:
         """Add the declaration that is made on a function, and return the function, compiled.
 
@@ -118,7 +136,8 @@ class Registry(Mapping[str, D], Generic[D]):
             make: The class of the declaration.
             function: The function.
             name: The declaration's name; default: that of the function.
-            parameters: Those of a function that is called from Python, and not compiled.
+            meaning: Its meaning; default: the function's docstring.
+            parameters: Those of a function that is returned as it is, and not compiled here.
             **options: Further attributes of the declaration.
 
         Raises:
@@ -132,7 +151,7 @@ class Registry(Mapping[str, D], Generic[D]):
         taken = self._declared.get(name)
         if taken is not None and _home(taken.function) != _home(function):
             raise self.error(function, f"the name {name!r} is taken by {place_of(taken.function)}")
-        meaning = inspect.getdoc(plain(function)) or ""
+        meaning = meaning or inspect.getdoc(plain(function)) or ""
         if not meaning.strip():
             raise self.error(function, "its docstring, which must state its meaning, is missing")
         unit = options.get("unit", "-")
@@ -160,13 +179,30 @@ class Registry(Mapping[str, D], Generic[D]):
         return names
 
     def check_argument(self, argument: object, usage: str) -> None:
-        """Raise if a decorator was used without its arguments.
-
-        Raises:
-            DeclarationError: The first argument is the function itself.
-        """
+        """Raise if a decorator was used without its arguments, on the function itself."""
         if callable(argument):
             raise self.error(argument, f"the decorator needs arguments: {usage}")
+
+    def check_bounds(self, function: Function, low: object, high: object, of: str = "") -> None:
+        """Raise unless the bounds ``of`` a value are numbers, or functions of the scenario."""
+        for name, bound in (("low", low), ("high", high)):
+            if not callable(bound) and not is_number(bound):
+                raise self.error(function, f"{name}={bound!r}{of} is neither a finite number nor a function")
+
+    def bounds_of(self, function: Function, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
+        """Return the bounds ``of`` a value in a scenario; raise unless they are finite and in order."""
+        values = []
+        for name, bound in (("low", low), ("high", high)):
+            try:
+                value = bound(scenario) if callable(bound) else bound
+            except Exception as error:  # a user's function
+                raise self.error(function, f"{name}{of} in {scenario.name!r}: {error!r}") from error
+            if not is_number(value):
+                raise self.error(function, f"{name}={value!r}{of} in {scenario.name!r} is not a finite number")
+            values.append(float(value))
+        if values[0] > values[1]:
+            raise self.error(function, f"low={values[0]:g}{of} is above high={values[1]:g} in {scenario.name!r}")
+        return values
 
     def error(self, function: Function, reason: str) -> DeclarationError:
         """Return the error for an invalid declaration."""
@@ -191,13 +227,7 @@ class Registry(Mapping[str, D], Generic[D]):
 
     def unknown(self, name: object) -> str:
         """Return the message for an unknown name."""
-        near = difflib.get_close_matches(repr(name), self._declared, n=3)
-        hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-        known = ", ".join(self._declared) or "none"
-        return (
-            f"unknown {self.kind} {name!r}{hint}; known: {known}. "
-            "To use a declaration of your own, import its module first"
-        )
+        return f"{unknown(self.kind, name, self)}. To use a declaration of your own, import its module first"
 
     def __getitem__(self, name: str) -> D:
         if name not in self._declared:
@@ -227,51 +257,12 @@ def _home(function: Function) -> tuple[str, str]:
     return plain(function).__module__, plain(function).__qualname__
 
 
-def _parts(value: Any, seen: set[int]) -> Iterator[str]:
-    """Yield texts that differ if a value, or the code of a function that it reaches, does."""
-    value = plain(value)
-    if isinstance(value, FunctionType):
-        if id(value) not in seen and value.__module__.partition(".")[0] not in (_PACKAGE, "numpy", "numba"):
-            seen.add(id(value))
-            yield from _parts([value.__code__, value.__defaults__], seen)
-            yield from _parts([cell.cell_contents for cell in value.__closure__ or ()], seen)
-            yield from _reached(value.__code__, value.__globals__, seen)
-        yield f"{value.__module__}.{value.__qualname__}"
-    elif isinstance(value, CodeType):
-        yield f"{value.co_code.hex()} {value.co_names} {value.co_varnames}"
-        yield from _parts(value.co_consts, seen)
-    elif isinstance(value, (tuple, list, frozenset)):
-        for each in sorted(value, key=repr) if isinstance(value, frozenset) else value:
-            yield from _parts(each, seen)
-    elif isinstance(value, (np.ndarray, np.generic)):
-        yield f"{value.dtype} {np.shape(value)} {np.asarray(value).tobytes().hex()}"
-    elif value is None or isinstance(value, (bool, int, float, str, bytes)):
-        yield repr(value)
-    else:
-        yield type(value).__name__
-
-
-def _reached(code: CodeType, scope: Mapping[str, Any], seen: set[int]) -> Iterator[str]:
-    """Yield the texts of the globals, and of the attributes of modules, that code names."""
-    for name in code.co_names:
-        value = scope.get(name)
-        if isinstance(value, ModuleType):
-            if value.__name__.partition(".")[0] not in (_PACKAGE, "numpy", "numba", "math"):
-                yield from _reached(code, vars(value), seen)
-        elif value is not None:
-            yield from _parts(value, seen)
-
-
 FIELDS: Final[Registry[Any]] = Registry("observation field", ("c",), ("c", "v"), ("c", "v", "m"))
-"""Values are :class:`posse.signals.observation.fields.FieldDeclaration`."""
 METRICS: Final[Registry[Any]] = Registry(
     "metric", ("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots")
 )
-"""Values are :class:`posse.signals.metrics.Metric`."""
 REWARD_TERMS: Final[Registry[Any]] = Registry("reward term", ("c", "w", "t"), ("c", "w"))
-"""Values are :class:`posse.signals.reward.RewardTerm`."""
 SENSORS: Final[Registry[Any]] = Registry("sensor", ("c", "w", "t", "dx", "dy"), ("c", "w", "t", "dx", "dy", "s"))
-"""Values are :class:`posse.rules.senses.declaring.Sensor`."""
 TARGET_MOTIONS: Final[Registry[Any]] = Registry(
     "target motion",
     ("c", "w"),
@@ -279,4 +270,3 @@ TARGET_MOTIONS: Final[Registry[Any]] = Registry(
     ("c", "w", "trackers", "obstacles"),
     ("c", "w", "trackers", "obstacles", "s"),
 )
-"""Values are :class:`posse.rules.targets.declaring.TargetMotion`."""

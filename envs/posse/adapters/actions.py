@@ -18,7 +18,7 @@ from posse.engine.arguments import as_float32, in_box, real_numbers
 from posse.engine.kernels import IN_BOX, bad_action
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
-from posse.signals.observation.layout import ObservationLayout
+from posse.signals.layout import ObservationLayout
 
 SPEEDS: Final = (-1.0, 0.0, 1.0)
 """Discrete speeds: at rest, half, full."""

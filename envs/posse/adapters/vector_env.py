@@ -19,7 +19,7 @@ from posse.engine.infos import Infos
 from posse.engine.opponent import TargetPolicy, batch_with
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
-from posse.signals.observation.layout import ObservationLayout
+from posse.signals.layout import ObservationLayout
 
 _Info = dict[str, Any]
 _Rewards = npt.NDArray[np.float64]

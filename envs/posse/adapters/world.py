@@ -19,7 +19,7 @@ from posse.engine.opponent import batch_with
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.global_state import StateLayout
-from posse.signals.observation.layout import ObservationLayout
+from posse.signals.layout import ObservationLayout
 
 RENDER_MODES: Final = ("human", "rgb_array")
 

@@ -28,8 +28,8 @@ from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
 from posse.scenarios import Scenario, ScenarioError
 from posse.signals.generate import declarations_for
-from posse.signals.metrics import episode_metrics
-from posse.signals.observation.layout import ObservationLayout
+from posse.signals.layout import ObservationLayout
+from posse.signals.reward import check_terms
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
@@ -128,6 +128,7 @@ class Batch:
         """Set the attributes that are not pickled."""
         worlds, rows, size = self.observation_shape
         self._declared = declarations_for(self.scenario)
+        self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
         self._tables = tables_of(self.scenario)
         self._untyped: Callable[..., int] = kernel_of(self._declared)
         self._kernel: Callable[..., int] = direct(self._untyped)
@@ -200,7 +201,7 @@ class Batch:
 
     def metrics(self) -> dict[str, npt.NDArray[np.float64]]:
         """Return the metrics of the current episodes by name, (E,) each."""
-        return episode_metrics(self._declared.metrics, self.scenario, self._arrays.world)
+        return {each.name: each.of(self.scenario, self._arrays.world) for each in self._declared.metrics}
 
     def save(self) -> Snapshot:
         """Return the current state of the worlds, for :meth:`restore`.
@@ -402,7 +403,10 @@ class Batch:
 
     def _advance(self, actions: FloatArray, results: Results) -> int:
         """Advance every world by valid actions; return how many episodes are over, none of which starts anew."""
-        return self._run(self._orders, actions, results)
+        over = self._run(self._orders, actions, results)
+        if self._own_terms:
+            check_terms(self._declared.reward_terms, results.rewards, results.terms)
+        return over
 
     def _run(self, orders: npt.NDArray[np.uint8], actions: FloatArray, results: Results) -> int:
         """Execute the order of each world in several threads; return how many episodes are over."""

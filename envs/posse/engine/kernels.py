@@ -47,8 +47,8 @@ from posse.rules.start import draw_start, rest
 from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, Generated, generated_for
-from posse.signals.observation.observing import TOGETHER, observe_sonar, observe_together
-from posse.signals.reward import target_weights_for, weights_for
+from posse.signals.reward import weights_for
+from posse.signals.rows import TOGETHER, observe_sonar, observe_together
 from posse.signals.user_functions import check_functions
 
 
@@ -241,8 +241,8 @@ def tables_of(scenario: Scenario) -> Tables:
         config_record(scenario),
         slot_records(scenario),
         beam_directions(scenario),
-        weights_for(scenario),
-        target_weights_for(scenario),
+        weights_for(scenario, dict(scenario.reward_weights)),
+        weights_for(scenario, dict(scenario.target_reward_weights)),
     )
 
 

@@ -14,7 +14,7 @@ from posse.engine.batch import Batch, Snapshot, Step
 from posse.engine.kernels import Results
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
-from posse.signals.observation.layout import ObservationLayout
+from posse.signals.layout import ObservationLayout
 
 _OF_THE_BATCH: Final = (
     *("scenario", "num_worlds", "layout", "term_names", "autoreset", "seed", "split", "first_world", "clip_actions"),

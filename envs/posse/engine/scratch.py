@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from posse.rules.scratch import MOVING, SENSING, WORLD_FIELDS, scratch_record
-from posse.signals.scratch import OBSERVING
+from posse.signals.views import OBSERVING
 
 _KEPT: Final = (
     ("prepared", 8),  # not 0 once the values common to all worlds are written

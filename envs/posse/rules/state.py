@@ -248,7 +248,7 @@ class Heard(NamedTuple):
 
 
 FIX_RECORD: Final = _record(*((name.removeprefix("fix_"), _F) for name in Fix._fields[:6]))
-"""A fix of the target: a position or a bearing, depending on the sensor (:mod:`posse.rules.senses.declaring`)."""
+"""A fix of the target: a position or a bearing, depending on the sensor (:mod:`posse.rules.senses.declaration`)."""
 
 TRACKER: Final = _record(
     *((name, _F) for name in Pose._fields),

@@ -6,8 +6,9 @@ import functools
 import reprlib
 from typing import Any, Final
 
+from posse.registry import unknown
 from posse.scenarios.scenario import Scenario
-from posse.scenarios.setting import ScenarioError, unknown
+from posse.scenarios.setting import ScenarioError
 
 _PAPER: Final[dict[str, Any]] = {
     "meaning": "Section 4 of the paper: 8 s from near starts, fast trackers, a slow target that runs straight.",

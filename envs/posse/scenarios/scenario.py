@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS
+from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, unknown
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
     BREAK_CHOICES,
@@ -29,7 +29,7 @@ from posse.scenarios.limits import (
     SMALL,
     WIDE,
 )
-from posse.scenarios.setting import ScenarioError, Setting, UnknownSettingError, fail, setting, unknown
+from posse.scenarios.setting import ScenarioError, Setting, UnknownSettingError, fail, setting
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import reprlib
 from collections.abc import Callable, Iterable
@@ -12,6 +11,8 @@ from numbers import Integral, Real
 from typing import Any, NoReturn
 
 import numpy as np
+
+from posse.registry import unknown
 
 
 class ScenarioError(ValueError):
@@ -25,14 +26,6 @@ class UnknownSettingError(ScenarioError, TypeError):
 def fail(name: str, value: object, allowed: str) -> NoReturn:
     """Raise the error for an invalid value, with what is allowed."""
     raise ScenarioError(f"{name}={reprlib.repr(value)} is refused: {allowed}")
-
-
-def unknown(kind: str, name: object, known: Iterable[str]) -> str:
-    """Return the message for a name that is none of the known ones, with those most like it."""
-    names, text = tuple(known), name if isinstance(name, str) else reprlib.repr(name)
-    near = difflib.get_close_matches(text[:100], names, n=3, cutoff=0.5)
-    hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-    return f"unknown {kind} {reprlib.repr(name)}{hint}; known: {', '.join(names) or 'none'}"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 numba cannot loop over a tuple of functions, since each function has a type of its own. So the
 functions below are written out, with one line for each declared function that they call.
-:func:`kernel_source` returns the text.
+:func:`posse.kernel_source` returns the text.
 """
 
 from __future__ import annotations
@@ -10,13 +10,10 @@ from __future__ import annotations
 import functools
 import linecache
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-# Imported for their declarations of the built-in fields and metrics.
-import posse.signals.metrics
-import posse.signals.observation.mate_fields
-import posse.signals.observation.own_fields  # noqa: F401
+import posse.signals.own_fields  # noqa: F401  (declares the built-in fields)
 from posse.numeric import WIDTH
 from posse.registry import (
     FIELDS,
@@ -35,8 +32,8 @@ from posse.registry import (
 from posse.rules.senses import Sensor
 from posse.rules.targets import TargetMotion
 from posse.scenarios import Scenario
+from posse.signals.fields import FieldDeclaration, limited
 from posse.signals.metrics import Metric
-from posse.signals.observation.fields import FieldDeclaration
 from posse.signals.reward import RewardTerm, terms_for
 
 
@@ -82,34 +79,39 @@ class Declarations(NamedTuple):
 
 
 class Generated(NamedTuple):
-    """The generated functions, for compiled code, and the lengths of what they write."""
+    """The generated functions, for compiled code (:data:`_FUNCTIONS`), and the lengths of what they write."""
 
     write_own: Any
-    """(c, v, s, rows): writes the own fields of eight observers."""
     write_mate: Any
-    """(c, v, m, s, rows): writes the fields of a team-mate of each."""
     write_empty: Any
-    """(o, k): writes an empty place of a team-mate."""
     reward: Any
-    """(c, w, t, weights (K,), values (K,)) -> reward of a tracker; writes the terms' values."""
     target_reward: Any
-    """(c, w, weights (K,), values (K,)) -> the same of a target that is an agent."""
     draw_motion: Any
-    """(c, w): draws the parameters of the target's motion for an episode."""
     set_goal: Any
-    """(c, w, trackers, obstacles, s): sets a scripted target's goal heading."""
     sees: Any
-    """(c, w, t, dx, dy, s) -> whether the target is in sight of a tracker."""
     measure: Any
-    """(c, w, number, dx, dy) -> the measured position."""
     clear_sums: Any
-    """(w): sets the sums of the metrics to zero."""
     add_to_sums: Any
-    """(c, w, trackers, slots): adds a control step to the sums."""
     width: int
     """Length of the observation before the sonar."""
     mate_width: int
     """Length of a team-mate's part, without its message."""
+
+
+_FUNCTIONS: Final = {
+    "write_own": ("c, v, s, rows", "Write the own fields of eight observers."),
+    "write_mate": ("c, v, m, s, rows", "Write the fields of a team-mate of each of eight observers."),
+    "write_empty": ("o, k", "Write an empty place of a team-mate to an observation, from number k on."),
+    "reward": ("c, w, t, weights, values", "Return the reward of a tracker; write the values of its terms, (K,)."),
+    "target_reward": ("c, w, weights, values", "Return the same of a target that is an agent."),
+    "draw_motion": ("c, w", "Clear the memories of the target's motion, and draw its parameters for an episode."),
+    "set_goal": ("c, w, trackers, obstacles, s", "Set the goal heading of a scripted target."),
+    "sees": ("c, w, t, dx, dy, s", "Return whether the target, (dx, dy) away, is in sight of a tracker."),
+    "measure": ("c, w, number, dx, dy", "Return the vector to the target as measured."),
+    "clear_sums": ("w", "Set the sums of the metrics to zero."),
+    "add_to_sums": ("c, w, trackers, slots", "Add a control step to the sums of the metrics."),
+}
+"""Parameters and meaning of the generated functions."""
 
 
 def declarations_for(scenario: Scenario) -> Declarations:
@@ -121,8 +123,8 @@ def declarations_for(scenario: Scenario) -> Declarations:
     fields = FIELDS.with_added(*scenario.extra_fields)
     TARGET_MOTIONS[scenario.target_motion].check(scenario)
     return Declarations(
-        tuple(field for field in fields if field.subject != "mate"),
-        tuple(field for field in fields if field.subject == "mate"),
+        tuple(field for field in fields if not field.of_mate),
+        tuple(field for field in fields if field.of_mate),
         TARGET_MOTIONS.with_added(scenario.target_motion),
         SENSORS.with_added(scenario.sensor),
         METRICS.with_added(*scenario.metrics),
@@ -134,18 +136,19 @@ def declarations_for(scenario: Scenario) -> Declarations:
 def generated_for(declarations: Declarations) -> Generated:
     """Return the compiled functions for declarations."""
     module = _Module(declarations)
-    file = f"<posse kernel source {id(module):x}>"
     text = module.text()
+    file = f"<posse kernel source {id(module):x}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # for tracebacks
     # The declared functions themselves, not what their modules hold under these names now.
     scope: dict[str, Any] = {"__name__": __name__, **module.functions}
-    exec(compile(module.text(imported=False), file, "exec"), scope)
+    exec(compile(text, file, "exec"), scope)
     return Generated(**{name: scope[name] for name in Generated._fields})
 
 
 def source_of(declarations: Declarations) -> str:
     """Return the source text of the functions for declarations, a module that can be run."""
-    return _Module(declarations).text()
+    module = _Module(declarations)
+    return module.text(module.imports())
 
 
 _FEW: Final = 2
@@ -154,11 +157,10 @@ _HEAD: Final = '''"""Functions that posse compiles for the declarations of a sce
 
 from numpy import float32
 
-from posse.numeric import compiled, eight
+from posse.numeric import ZERO, compiled, eight
 from posse.rules.senses import add_noise
 from posse.rules.state import NEVER
-from posse.signals.observation.rows import write_block, write_column'''
-_TAIL: Final = "\nZERO = float32(0)"
+from posse.signals.rows import write_block, write_column'''
 
 
 class _Module:
@@ -166,25 +168,29 @@ class _Module:
 
     def __init__(self, declarations: Declarations) -> None:
         self.functions: dict[str, Function] = {}
-        d = declarations
+        d, summed = declarations, [metric for metric in declarations.metrics if metric.per]
         self._body = [
+            "",
             f"width = {sum(field.size for field in d.fields)}",
             f"mate_width = {sum(field.size for field in d.mate_fields)}",
-            *self._rows("write_own", "own fields of eight observers", ("c", "v"), d.fields),
-            *self._rows("write_mate", "fields of a team-mate of each", ("c", "v", "m"), d.mate_fields),
-            *self._empty_place(d.mate_fields),
-            *self._rewards(d.reward_terms),
-            *self._motions(d.motions),
-            *self._sensors(d.sensors),
-            *self._sums(d.metrics),
+            *_function("write_own", self._rows(d.fields)),
+            *_function("write_mate", self._rows(d.mate_fields)),
+            *_function("write_empty", self._empty_place(d.mate_fields)),
+            *_function("reward", self._reward("term", {t.name: t.function for t in d.reward_terms})),
+            *_function("target_reward", self._reward("target_term", {t.name: t.of_target for t in d.reward_terms})),
+            *_function("draw_motion", self._draw(d.motions)),
+            *_function("set_goal", self._goal(d.motions)),
+            *_function("sees", self._sight(d.sensors)),
+            *_function("measure", self._measure(d.sensors)),
+            *_function("clear_sums", [*(f"w.{metric.sum_name} = ZERO" for metric in summed), "w.tracker_steps = ZERO"]),
+            *_function("add_to_sums", self._sums(summed)),
         ]
 
-    def text(self, *, imported: bool = True) -> str:
-        """Return the text; without the imports of declared functions, blank lines in their place."""
-        imports = self._imports()
-        return "\n".join([_HEAD, *(imports if imported else [""] * len(imports)), _TAIL, *self._body]) + "\n"
+    def text(self, imports: Iterable[str] = ()) -> str:
+        """Return the text, with lines that import the declared functions."""
+        return "\n".join([_HEAD, *imports, *self._body]) + "\n"
 
-    def _imports(self) -> list[str]:
+    def imports(self) -> list[str]:
         """Return lines that import the declared functions, and compile those that their modules hold plain."""
         modules: dict[str, list[str]] = {}
         after = []
@@ -200,101 +206,84 @@ class _Module:
         groups = [[f"from {module} import (", *lines, ")"] for module, lines in modules.items()]
         return [*(line for group in groups for line in group), *after]
 
-    def _call(self, prefix: str, name: str, function: Function, *arguments: str) -> str:
+    def _call(self, alias: str, function: Function, *arguments: str) -> str:
         """Return the call of a declared function, by default with its parameters as arguments."""
-        alias = f"{prefix}_{name.replace('-', '_')}"
+        alias = alias.replace("-", "_")
         while self.functions.setdefault(alias, function) is not function:
             alias += "_"
         return f"{alias}({', '.join(arguments or parameters_of(function))})"
 
-    def _rows(
-        self, name: str, what: str, parameters: Sequence[str], fields: Sequence[FieldDeclaration]
-    ) -> Iterator[str]:
+    def _rows(self, fields: Sequence[FieldDeclaration]) -> Iterator[str]:
         columns: list[str] = []
-        lines: list[str] = []
         width, written = sum(field.size for field in fields), 0
         few = width % WIDTH if width % WIDTH <= _FEW else 0
         for field in fields:
             mine = [f"{field.name}_{q}" for q in range(field.size)]
-            lines.append(f"{', '.join(mine)} = {self._call('field', field.name, field.function)}")
-            if field.subject == "setting":
-                lines += [f"{column} = eight(float32({column}))" for column in mine]
+            if field.function is limited:
+                yield f"{mine[0]} = {self._call('limited', limited, f'c.{field.name}')}"
+            else:
+                yield f"{', '.join(mine)} = {self._call(f'field_{field.name}', field.function)}"
+            if "v" not in field.parameters:  # a constant
+                yield from (f"{column} = eight(float32({column}))" for column in mine)
             columns += mine
             # As soon as there are eight, so that few have to be kept at a time.
             while len(columns) - written >= WIDTH or few < width - written == len(columns) - written:
                 first = min(written, width - WIDTH)  # the last block repeats columns of the one before
                 block = columns[first : first + WIDTH]
                 halves = (f"    {', '.join(half)}," for half in (block[: WIDTH // 2], block[WIDTH // 2 :]))
-                lines += ["write_block(", *halves, f"    {first}, rows,", ")"]
+                yield from ("write_block(", *halves, f"    {first}, rows,", ")")
                 written = first + WIDTH
-        lines += [f"write_column({columns[q]}, {q}, s, rows)" for q in range(written, width)]
-        yield from _function(name, (*parameters, "s", "rows"), f"Write the {what}.", lines)
+        yield from (f"write_column({columns[q]}, {q}, s, rows)" for q in range(written, width))
 
     def _empty_place(self, fields: Sequence[FieldDeclaration]) -> Iterator[str]:
         values = [float(field.unknown or 0.0) for field in fields for _ in range(field.size)]
-        lines = [f"o[k + {q}] = float32({value})" for q, value in enumerate(values)]
-        yield from _function("write_empty", ("o", "k"), "Write an empty place of a team-mate.", lines)
+        yield from (f"o[k + {q}] = float32({value})" for q, value in enumerate(values))
 
-    def _rewards(self, terms: Sequence[RewardTerm]) -> Iterator[str]:
+    def _reward(self, prefix: str, terms: Mapping[str, Function | None]) -> Iterator[str]:
+        for k, (name, function) in enumerate(terms.items()):
+            yield f"values[{k}] = " + ("ZERO" if function is None else self._call(f"{prefix}_{name}", function))
+        yield "reward = ZERO"
         # From last to first: another order would round differently and change results.
-        sums = [f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in reversed(range(len(terms)))]
-        ending = ["reward = ZERO", *sums, "return reward"]
-        lines = [f"values[{k}] = {self._call('term', t.name, t.function)}" for k, t in enumerate(terms)]
-        what = "Return the reward of a tracker; write the values of its terms."
-        yield from _function("reward", ("c", "w", "t", "weights", "values"), what, [*lines, *ending])
-        lines = [
-            f"values[{k}] = " + ("ZERO" if t.of_target is None else self._call("target_term", t.name, t.of_target))
-            for k, t in enumerate(terms)
-        ]
-        what = "Return the reward of a target that is an agent; write the values of its terms."
-        yield from _function("target_reward", ("c", "w", "weights", "values"), what, [*lines, *ending])
+        yield from (f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in reversed(range(len(terms))))
+        yield "return reward"
 
-    def _motions(self, motions: Sequence[TargetMotion]) -> Iterator[str]:
-        lines = [f"w.{memory.name} = ZERO" for motion in motions for memory in motion.memory]
+    def _draw(self, motions: Sequence[TargetMotion]) -> Iterator[str]:
+        yield from (f"w.{memory.name} = ZERO" for motion in motions for memory in motion.memory)
         for k, motion in enumerate(motions):
             if motion.draw is not None:
-                lines += [f"if c.motion == {k}:", f"    {self._call('draw', motion.name, motion.draw)}"]
-        yield from _function("draw_motion", ("c", "w"), "Clear the memories, and draw the motion's parameters.", lines)
-        lines = []
-        for k, motion in enumerate(motions):
-            call = self._call("goal", motion.name, motion.function)
-            lines += [f"{'elif' if lines else 'if'} c.motion == {k}:", f"    {call}"]
-        parameters = ("c", "w", "trackers", "obstacles", "s")
-        yield from _function("set_goal", parameters, "Set the goal heading of a scripted target.", lines)
+                yield from (f"if c.motion == {k}:", f"    {self._call(f'draw_{motion.name}', motion.draw)}")
 
-    def _sensors(self, sensors: Sequence[Sensor]) -> Iterator[str]:
-        calls = [f"bool({self._call('sight', each.name, each.function)})" for each in sensors]
-        lines = [line for k, call in enumerate(calls[:-1]) for line in (f"if c.sensor == {k}:", f"    return {call}")]
-        lines.append(f"return {calls[-1]}")
-        what = "Return whether the target, (dx, dy) away, is in sight."
-        yield from _function("sees", ("c", "w", "t", "dx", "dy", "s"), what, lines)
-        lines = []
-        for k, each in enumerate(sensors):
-            if each.measure is not None:
-                call = self._call("measure", each.name, each.measure)
-                lines += [f"if c.sensor == {k}:", f"    x, y = {call}", "    return float32(x), float32(y)"]
-        lines.append("return add_noise(c, w, number, dx, dy)")
-        what = "Return the vector to the target as measured."
-        yield from _function("measure", ("c", "w", "number", "dx", "dy"), what, lines)
+    def _goal(self, motions: Sequence[TargetMotion]) -> Iterator[str]:
+        for k, motion in enumerate(motions):
+            yield from (f"if c.motion == {k}:", f"    {self._call(f'goal_{motion.name}', motion.function)}")
+
+    def _sight(self, sensors: Sequence[Sensor]) -> Iterator[str]:
+        for k, sensor in enumerate(sensors):
+            call = self._call(f"sight_{sensor.name}", sensor.function)
+            yield from (f"if c.sensor == {k}:", f"    return bool({call})")
+        yield "return False"
+
+    def _measure(self, sensors: Sequence[Sensor]) -> Iterator[str]:
+        for k, sensor in enumerate(sensors):
+            if sensor.measure is not None:
+                call = self._call(f"measure_{sensor.name}", sensor.measure)
+                yield from (f"if c.sensor == {k}:", f"    x, y = {call}", "    return float32(x), float32(y)")
+        yield "return add_noise(c, w, number, dx, dy)"
 
     def _sums(self, metrics: Sequence[Metric]) -> Iterator[str]:
-        summed = [metric for metric in metrics if metric.per is not None]
-        lines = [f"w.{metric.sum_name} = ZERO" for metric in summed]
-        yield from _function("clear_sums", ("w",), "Set the sums to zero.", [*lines, "w.tracker_steps = ZERO"])
-        before, loop, after = [], [], ["w.tracker_steps += float32(w.working)"]
-        for metric in summed:
-            value = self._call("metric", metric.name, metric.function)
-            if "t" in parameters_of(metric.function):
-                before.append(f"{metric.name}_total = ZERO")
-                loop.append(f"        {metric.name}_total += {value}")
+        loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += float32(w.working)"]
+        for metric in metrics:
+            value = self._call(f"metric_{metric.name}", metric.function)
+            if "t" in metric.parameters:
+                yield f"{metric.name}_total = ZERO"
+                loop.append(f"    {metric.name}_total += {value}")
                 value = f"{metric.name}_total"
             after.append(f"w.{metric.sum_name} += {value}")
-        head = ["for i in range(c.num_trackers):", "    t = trackers[i]", "    if t.broken_at == NEVER:"]
-        what = "Add a control step to the sums."
-        yield from _function("add_to_sums", ("c", "w", "trackers", "slots"), what, [*before, *head, *loop, *after])
+        yield from ("for i in range(c.num_trackers):", *(f"    {line}" for line in loop), *after)
 
 
-def _function(name: str, parameters: Sequence[str], meaning: str, lines: Sequence[str]) -> Iterator[str]:
+def _function(name: str, lines: Iterable[str]) -> Iterator[str]:
     """Yield the lines of a compiled function."""
-    yield from ("", "", "@compiled", f"def {name}({', '.join(parameters)}):", f'    """{meaning}"""')
+    parameters, meaning = _FUNCTIONS[name]
+    yield from ("", "", "@compiled", f"def {name}({parameters}):", f'    """{meaning}"""')
     yield from (f"    {line}" for line in lines)

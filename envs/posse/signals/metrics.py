@@ -18,7 +18,7 @@ reports the built-in metrics at the end of every episode, and others if the scen
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -26,15 +26,12 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import registry
-from posse.numeric import Record, Records
-from posse.registry import TARGET_MOTIONS, Declaration, Function, check_memory_name
+from posse.numeric import ONE, ZERO, Record, Records
+from posse.registry import TARGET_MOTIONS, Declaration, Function, check_memory_name, plain
 from posse.rules.score import could_arrive
 from posse.rules.senses.radio import connected
 from posse.rules.state import NEVER, WORLD_NAMES
 from posse.scenarios import Scenario
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 
 Column = npt.NDArray[np.float64]
 Figure = Callable[[Scenario, Records], Column]
@@ -98,10 +95,8 @@ def metric(unit: str, *, per: str = "step") -> Callable[[Function], Function]:
         if per not in tuple(_STEPS):
             raise registry.METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
         registry.METRICS.check_function(function, *registry.METRICS.allowed)
-        memory = (each.name for motion in TARGET_MOTIONS.values() for each in motion.memory)
-        check_memory_name(
-            registry.METRICS, function, f"{registry.plain(function).__name__}_sum", (*WORLD_NAMES, *memory)
-        )
+        memories = [each.name for motion in TARGET_MOTIONS.values() for each in motion.memory]
+        check_memory_name(registry.METRICS, function, f"{plain(function).__name__}_sum", (*WORLD_NAMES, *memories))
         return registry.METRICS.declare(Metric, function, unit=unit, per=per)
 
     return declare
@@ -130,7 +125,7 @@ def score(c: Record, w: Record) -> np.float32:
 def safe_score(c: Record, w: Record) -> np.float32:
     """The score, where every step from the team's first contact on counts 0."""
     contacts = w.contacts_tracker + w.contacts_obstacle + w.contacts_target
-    return np.float32(w.score) if contacts == 0 else _ZERO
+    return np.float32(w.score) if contacts == 0 else ZERO
 
 
 @metric("1")
@@ -143,7 +138,7 @@ def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32
             if t.could_arrive == 0:
                 t.could_arrive = could_arrive(c, w, t, slots)
             count += t.could_arrive
-    return np.float32(count) / np.float32(w.working) if w.working > 0 else _ZERO
+    return np.float32(count) / np.float32(w.working) if w.working > 0 else ZERO
 
 
 @figure("s")
@@ -217,7 +212,7 @@ def control_effort(c: Record, w: Record, t: Record) -> np.float32:
 @metric("1")
 def time_connected(c: Record, w: Record, trackers: Records) -> np.float32:
     """Share of the time in which the radio graph of the working trackers was connected."""
-    return _ONE if c.perfect_radio or connected(c, w, trackers) else _ZERO
+    return ONE if c.perfect_radio or connected(c, w, trackers) else ZERO
 
 
 @figure("s")
@@ -228,8 +223,3 @@ def duration(s: Scenario, w: Records) -> Column:
 
 METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
 """Every built-in metric, in the order in which they are reported."""
-
-
-def episode_metrics(metrics: Sequence[Metric], scenario: Scenario, worlds: Records) -> dict[str, Column]:
-    """Return the metrics of the current episodes by name, (E,) float64."""
-    return {metric.name: metric.of(scenario, worlds) for metric in metrics}

@@ -6,19 +6,16 @@ and reported in every scenario, others in scenarios that give them a weight.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from posse.numeric import FloatArray, Record, compiled
+from posse.numeric import ONE, ZERO, FloatArray, Record, compiled
 from posse.registry import REWARD_TERMS as TERMS
 from posse.registry import Declaration, Function, plain
 from posse.scenarios import Scenario
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,7 +69,7 @@ def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Funct
 @reward_term("1")
 def slot(c: Record, w: Record, t: Record) -> np.float32:
     """1 while the tracker occupies a slot (within tolerance, touching nothing), else 0."""
-    return _ONE if t.slot >= 0 else _ZERO
+    return ONE if t.slot >= 0 else ZERO
 
 
 @reward_term("m")
@@ -90,7 +87,7 @@ def distance(c: Record, w: Record, t: Record) -> np.float32:
 @reward_term("1")
 def sight(c: Record, w: Record, t: Record) -> np.float32:
     """1 while the tracker's own sensor sees the target, else 0."""
-    return _ONE if t.sees else _ZERO
+    return ONE if t.sees else ZERO
 
 
 def _contact_of_target(c: Record, w: Record) -> np.float32:
@@ -130,15 +127,20 @@ def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
     return TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
 
 
-def weights_for(scenario: Scenario) -> FloatArray:
-    """Return the weights of a scenario's terms, (K,) float32."""
-    return _in_order(scenario, dict(scenario.reward_weights))
-
-
-def target_weights_for(scenario: Scenario) -> FloatArray:
-    """Return the weights of a scenario's terms for a target that is an agent, (K,) float32."""
-    return _in_order(scenario, dict(scenario.target_reward_weights))
-
-
-def _in_order(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
+def weights_for(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
+    """Return weights in the order of a scenario's terms, (K,) float32; those not given are 0."""
     return np.array([weights.get(term.name, 0.0) for term in terms_for(scenario)], np.float32)
+
+
+def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatArray) -> None:
+    """Check the rewards of a step and the values of its terms (..., K).
+
+    Raises:
+        DeclarationError: A term returned a value that is not finite.
+    """
+    if np.isfinite(rewards).all():
+        return
+    for k, term in enumerate(terms):
+        wrong = values[..., k][~np.isfinite(values[..., k])]
+        if wrong.size:
+            raise TERMS.error(term.function, f"it returned {wrong[0]:g}, and a reward must be finite")

@@ -17,7 +17,7 @@ from posse.numeric.lane_code import LanesType, tuple_of_lanes
 from posse.registry import Function, parameters_of, plain
 from posse.rules.state import CONFIG, OBSTACLE, SLOT, TRACKER, world_record_of
 from posse.signals.generate import Declarations
-from posse.signals.observation.views import Mate, View
+from posse.signals.views import Mate, View
 
 _njit: Final[Any] = numba.njit  # Any: its types lack _nrt
 _typeof: Final[Any] = numba.typeof

@@ -49,7 +49,7 @@ def as_it_is(tmp_path_factory: pytest.TempPathFactory) -> str:
     return done.stdout
 
 
-STATE, VIEWS = "rules/state.py", "signals/observation/views.py"
+STATE, VIEWS = "rules/state.py", "signals/views.py"
 
 
 @pytest.mark.parametrize(

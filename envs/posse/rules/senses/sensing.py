@@ -27,7 +27,7 @@ from posse.numeric import (
 )
 from posse.rules.discs import blocks, columns, natural, store_rows
 from posse.rules.randomness import SENSOR_NOISE, normal_pair
-from posse.rules.senses.declaring import sensor
+from posse.rules.senses.declaration import sensor
 from posse.rules.state import FIX, NEVER, Fix
 
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; older fixes give no velocity

@@ -10,7 +10,7 @@ import numpy as np
 from posse.numeric import ZERO, Record, compiled
 from posse.rules.kinematics import arc
 from posse.rules.randomness import TARGET, TWO_PI, between, uniform
-from posse.rules.targets.declaring import Memory, target_motion
+from posse.rules.targets.declaration import Memory, target_motion
 
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _LEAST_RATE: Final = 0.2  # rad/s

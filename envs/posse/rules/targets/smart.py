@@ -14,7 +14,7 @@ import numpy as np
 from posse.numeric import HALF, ONE, WIDTH, ZERO, Record, Records, choose, compiled, eight, lesser, load, root, store
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
-from posse.rules.targets.declaring import Memory, target_motion
+from posse.rules.targets.declaration import Memory, target_motion
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""

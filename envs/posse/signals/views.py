@@ -1,6 +1,7 @@
 """Inputs of observation fields: views of the same robot of eight worlds, one per lane.
 
-Unused parts of a view are removed by the compiler.
+With fewer than eight worlds the last one is repeated. Unused parts of a view are removed by the
+compiler.
 """
 
 from __future__ import annotations
@@ -10,7 +11,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posse.numeric import (
+    ONE,
     WIDTH,
+    ZERO,
+    FloatArray,
     Lanes,
     Mask,
     Record,
@@ -27,14 +31,71 @@ from posse.numeric import (
 )
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import natural
-from posse.rules.state import CONDITION, FIX, NEVER, POSE, Condition, Fix, Pose, WorldArrays
-from posse.signals.observation.rows import Observers, world_of
+from posse.rules.scratch import TEAM, Fields
+from posse.rules.state import CONDITION, FIX, NEVER, NO_BITS, POSE, Condition, Fix, Pose, WorldArrays
 
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_MINUS_ONE: Final = np.float32(-1.0)
-_TINY: Final = np.float32(1e-9)
-_NOBODY: Final = np.uint64(0)
+OBSERVING: Final[Fields] = (
+    # Eight numbers, one for each of eight worlds.
+    ("column", WIDTH),  # of observations
+    ("steps", WIDTH),  # control steps
+    ("target_x", WIDTH),
+    ("target_y", WIDTH),
+    ("target_cos", WIDTH),
+    ("target_sin", WIDTH),
+    ("target_speed", WIDTH),
+    ("target_turn_rate", WIDTH),
+    ("target_touching", WIDTH),
+    # Eight numbers for each tracker.
+    ("team_x", WIDTH * TEAM),
+    ("team_y", WIDTH * TEAM),
+    # Eight numbers for each place of a team-mate.
+    ("placed", WIDTH * TEAM),  # number of the team-mate; -1: none
+    ("placed_at", WIDTH * TEAM),  # its distance, m
+)
+"""Fields of a thread's scratch memory used by observations (:mod:`posse.rules.scratch`)."""
+
+
+class Observers(NamedTuple):
+    """Robot i of ``number`` worlds, at most eight, from world e on."""
+
+    e: int
+    i: int
+    number: int
+
+
+class Rows(NamedTuple):
+    """Where to write in the observations of eight robots."""
+
+    observers: Observers
+    observations: FloatArray
+    """(E, rows, F)."""
+    start: int
+    """Place in an observation that the first column goes to."""
+
+
+@compiled
+def world_of(observers: Observers, lane: int) -> int:
+    """Return the world of a lane."""
+    return natural(observers.e + min(lane, observers.number - 1))
+
+
+@compiled
+def columns(records: Records, observers: Observers, j: int, at: int) -> tuple[Lanes, ...]:
+    """Return a block of fields, ``at`` bytes into record j of the observers' worlds, field by field.
+
+    ``records`` is (E, N); see :func:`posse.rules.state.block_at`.
+    """
+    k = natural(j)
+    return transpose(
+        load_fields(records[world_of(observers, 0), k], at),
+        load_fields(records[world_of(observers, 1), k], at),
+        load_fields(records[world_of(observers, 2), k], at),
+        load_fields(records[world_of(observers, 3), k], at),
+        load_fields(records[world_of(observers, 4), k], at),
+        load_fields(records[world_of(observers, 5), k], at),
+        load_fields(records[world_of(observers, 6), k], at),
+        load_fields(records[world_of(observers, 7), k], at),
+    )
 
 
 class View(NamedTuple):
@@ -119,46 +180,31 @@ class Mate(NamedTuple):
 
 @compiled
 def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s: Record) -> None:
-    """Write the rows of ``count`` worlds, at most eight: positions, control steps, target agents."""
+    """Write what all agents of ``count`` worlds, at most eight, need: positions, control steps, target agents."""
     n = natural(c.num_trackers)
+    observers = Observers(first, n, count)
     for i in range(n):
-        pose = Pose(*_columns(worlds.tracker, Observers(first, i, count), POSE))
+        pose = Pose(*columns(worlds.tracker, observers, i, POSE))
         store(s.team_x, WIDTH * i, pose.x)
         store(s.team_y, WIDTH * i, pose.y)
     for lane in range(WIDTH):
-        e = world_of(Observers(first, n, count), lane)
+        e = world_of(observers, lane)
         w = worlds.world[e]
         s.steps[lane] = np.float32(w.step)
         if c.target_agent != 0:
             s.target_x[lane], s.target_y[lane] = w.x, w.y
             s.target_cos[lane], s.target_sin[lane] = w.heading_cos, w.heading_sin
             s.target_speed[lane], s.target_turn_rate[lane] = w.speed, w.turn_rate
-            touching = w.touching != _NOBODY or touches_surroundings(c, w, worlds.obstacle[e])
+            touching = w.touching != NO_BITS or touches_surroundings(c, w, worlds.obstacle[e])
             s.target_touching[lane] = np.float32(touching)
-
-
-@compiled
-def _columns(tracker: Records, observers: Observers, offset: int) -> tuple[Lanes, ...]:
-    """Return a block of fields of eight trackers, field by field; see :func:`posse.rules.discs.columns`."""
-    i = natural(observers.i)
-    return transpose(
-        load_fields(tracker[world_of(observers, 0), i], offset),
-        load_fields(tracker[world_of(observers, 1), i], offset),
-        load_fields(tracker[world_of(observers, 2), i], offset),
-        load_fields(tracker[world_of(observers, 3), i], offset),
-        load_fields(tracker[world_of(observers, 4), i], offset),
-        load_fields(tracker[world_of(observers, 5), i], offset),
-        load_fields(tracker[world_of(observers, 6), i], offset),
-        load_fields(tracker[world_of(observers, 7), i], offset),
-    )
 
 
 @compiled
 def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
     """Return the view of a tracker of eight worlds; requires :func:`lay_out_observers`."""
-    own = Pose(*_columns(worlds.tracker, observers, POSE))
-    fix = Fix(*_columns(worlds.tracker, observers, FIX))
-    condition = Condition(*_columns(worlds.tracker, observers, CONDITION))
+    own = Pose(*columns(worlds.tracker, observers, observers.i, POSE))
+    fix = Fix(*columns(worlds.tracker, observers, observers.i, FIX))
+    condition = Condition(*columns(worlds.tracker, observers, observers.i, CONDITION))
     dx, dy, fixed_at = fix.fix_x, fix.fix_y, counts(condition.fix_step)
     if c.fix_bearing == 0:
         dx, dy = dx - own.x, dy - own.y
@@ -171,13 +217,13 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
         speed=own.speed,
         turn_rate=own.turn_rate,
         touching=counts(condition.touching),
-        working=choose(counts(condition.broken_at) == np.float32(NEVER), _ONE, _ZERO),
+        working=choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO),
         step=load(s.steps, 0),
         max_speed=own.max_speed,
         max_turn_rate=own.max_turn_rate,
         acceleration_time=own.max_speed * c.per_acceleration,
         turn_acceleration_time=own.max_turn_rate * c.per_turn_acceleration,
-        target_known=fixed_at >= _ZERO,
+        target_known=fixed_at >= ZERO,
         target_seen=counts(condition.sees),
         target_step=fixed_at,
         target_dx=dx,
@@ -198,9 +244,9 @@ def view_of_targets(c: Record, s: Record) -> View:
 
     Requires :func:`lay_out_observers`.
     """
-    zero, never = eight(_ZERO), eight(_MINUS_ONE)
+    zero, never = eight(ZERO), eight(-ONE)
     return View(
-        number=eight(_MINUS_ONE),
+        number=eight(-ONE),
         x=load(s.target_x, 0),
         y=load(s.target_y, 0),
         heading_cos=load(s.target_cos, 0),
@@ -208,13 +254,13 @@ def view_of_targets(c: Record, s: Record) -> View:
         speed=load(s.target_speed, 0),
         turn_rate=load(s.target_turn_rate, 0),
         touching=load(s.target_touching, 0),
-        working=eight(_ONE),
+        working=eight(ONE),
         step=load(s.steps, 0),
         max_speed=eight(c.target_speed),
         max_turn_rate=eight(c.target_turn_rate),
         acceleration_time=zero,
         turn_acceleration_time=zero,
-        target_known=never >= _ZERO,
+        target_known=never >= ZERO,
         target_seen=zero,
         target_step=never,
         target_dx=zero,

@@ -7,12 +7,13 @@ now, otherwise as last heard.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from posse.numeric import (
+    ONE,
+    TINY,
     WIDTH,
+    ZERO,
     FloatArray,
     Lanes,
     Mask,
@@ -33,13 +34,7 @@ from posse.numeric import (
 from posse.rules.discs import FAR, natural
 from posse.rules.state import MESSAGE, POSE, Heard, Pose, WorldArrays
 from posse.signals.generate import Generated
-from posse.signals.observation.rows import Observers, Rows, world_of
-from posse.signals.observation.views import Mate, View, ego
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_MINUS_ONE: Final = np.float32(-1.0)
-_TINY: Final = np.float32(1e-9)
+from posse.signals.views import Mate, Observers, Rows, View, columns, ego, world_of
 
 
 @compiled
@@ -64,11 +59,11 @@ def observe_mates(
     start, size = natural(made.width + c.sonar_beams), natural(made.mate_width + c.message_size)
     for p in range(places):
         number = load(s.placed, WIDTH * p)
-        if bits(number >= _ZERO) == 0:
+        if bits(number >= ZERO) == 0:
             break
         mate = _mate_in_place(c, worlds, observers, v, p, now, s)
         made.write_mate(c, v, mate, s, Rows(observers, observations, natural(start + p * size)))
-    if c.message_size > 0 or bits(load(s.placed, WIDTH * (places - 1)) < _ZERO) != 0:
+    if c.message_size > 0 or bits(load(s.placed, WIDTH * (places - 1)) < ZERO) != 0:
         _write_the_rest(c, worlds, observers, made, s, observations)
 
 
@@ -77,19 +72,18 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
     n, places = natural(c.num_trackers), natural(c.neighbours)
     for p in range(places):
-        store(s.placed, WIDTH * p, eight(_MINUS_ONE))
+        store(s.placed, WIDTH * p, eight(-ONE))
         store(s.placed_at, WIDTH * p, eight(FAR))
     for j in range(n - 1, -1, -1):  # so that a mate comes before equally near ones in the list
         if j == observers.i:
             continue
         if now:
-            x, y, known = load(s.team_x, WIDTH * j), load(s.team_y, WIDTH * j), v.step >= _ZERO
+            x, y, known = load(s.team_x, WIDTH * j), load(s.team_y, WIDTH * j), v.step >= ZERO
         else:
             x, y, known = _heard(c, worlds, observers, v, j)
-        number, distance = (
-            choose(known, np.float32(j), _MINUS_ONE),
-            choose(known, _length(ego(v, x - v.x, y - v.y)), FAR),
-        )
+        ahead, left = ego(v, x - v.x, y - v.y)
+        number = choose(known, np.float32(j), -ONE)
+        distance = choose(known, root(ahead * ahead + left * left), FAR)
         if bits(distance <= load(s.placed_at, WIDTH * (places - 1))) == 0:
             continue
         for p in range(min(n - j, places)):
@@ -101,33 +95,11 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
 
 
 @compiled
-def _length(vector: tuple[Lanes, Lanes]) -> Lanes:
-    x, y = vector
-    return root(x * x + y * y)
-
-
-@compiled
 def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int) -> tuple[Lanes, Lanes, Mask]:
     """Return where mate j was when last heard, and whether that is not forgotten."""
-    heard = Heard(
-        *transpose(
-            _message(worlds, observers, j, 0),
-            _message(worlds, observers, j, 1),
-            _message(worlds, observers, j, 2),
-            _message(worlds, observers, j, 3),
-            _message(worlds, observers, j, 4),
-            _message(worlds, observers, j, 5),
-            _message(worlds, observers, j, 6),
-            _message(worlds, observers, j, 7),
-        )
-    )
+    heard = Heard(*columns(worlds.heard[:, natural(observers.i)], observers, j, MESSAGE))
     sent = counts(heard.step)
-    return heard.x, heard.y, (sent >= _ZERO) & (v.step - sent <= np.float32(c.forget_steps))
-
-
-@compiled
-def _message(worlds: WorldArrays, observers: Observers, j: int, lane: int) -> Lanes:
-    return load_fields(worlds.heard[world_of(observers, lane), natural(observers.i), natural(j)], MESSAGE)
+    return heard.x, heard.y, (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
 
 
 @compiled
@@ -143,53 +115,38 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
         _fields_of(worlds, observers, p, now, 6, s),
         _fields_of(worlds, observers, p, now, 7, s),
     )
-    number, distance = load(s.placed, WIDTH * p), load(s.placed_at, WIDTH * p)
     if now:
-        t = Pose(*fields)
-        return _mate(v, number, distance, eight(_ZERO), t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate)
-    h = Heard(*fields)
-    age = (v.step - counts(h.step)) * c.control_step
-    return _mate(v, number, distance, age, h.x, h.y, h.heading_cos, h.heading_sin, h.speed, h.turn_rate)
+        t, age = Pose(*fields), eight(ZERO)
+        x, y, cos, sin, speed, turn_rate = t.x, t.y, t.heading_cos, t.heading_sin, t.speed, t.turn_rate
+    else:
+        h = Heard(*fields)
+        x, y, cos, sin, speed, turn_rate = h.x, h.y, h.heading_cos, h.heading_sin, h.speed, h.turn_rate
+        age = (v.step - counts(h.step)) * c.control_step
+    distance, dx, dy = load(s.placed_at, WIDTH * p), x - v.x, y - v.y
+    ahead, left = ego(v, dx, dy)
+    apart, per_metre = distance > ZERO, ONE / greater(distance, TINY)
+    return Mate(
+        number=load(s.placed, WIDTH * p),
+        age=age,
+        dx=dx,
+        dy=dy,
+        distance=distance,
+        ahead=choose(apart, ahead * per_metre, ONE),
+        left=choose(apart, left * per_metre, ZERO),
+        heading_cos=cos,
+        heading_sin=sin,
+        speed=speed,
+        turn_rate=turn_rate,
+    )
 
 
 @compiled
 def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lane: int, s: Record) -> Lanes:
     """Return eight fields of a lane's mate in a place: now, or as last heard."""
-    number = natural(max(int(s.placed[WIDTH * p + lane]), 0))
+    e, j = world_of(observers, lane), natural(max(int(s.placed[WIDTH * p + lane]), 0))
     if now:
-        return load_fields(worlds.tracker[world_of(observers, lane), number], POSE)
-    return _message(worlds, observers, number, lane)
-
-
-@compiled
-def _mate(
-    v: View,
-    number: Lanes,
-    distance: Lanes,
-    age: Lanes,
-    x: Lanes,
-    y: Lanes,
-    heading_cos: Lanes,
-    heading_sin: Lanes,
-    speed: Lanes,
-    turn_rate: Lanes,
-) -> Mate:
-    dx, dy = x - v.x, y - v.y
-    ahead, left = ego(v, dx, dy)
-    apart, per_metre = distance > _ZERO, _ONE / greater(distance, _TINY)
-    return Mate(
-        number=number,
-        age=age,
-        dx=dx,
-        dy=dy,
-        distance=distance,
-        ahead=choose(apart, ahead * per_metre, _ONE),
-        left=choose(apart, left * per_metre, _ZERO),
-        heading_cos=heading_cos,
-        heading_sin=heading_sin,
-        speed=speed,
-        turn_rate=turn_rate,
-    )
+        return load_fields(worlds.tracker[e, j], POSE)
+    return load_fields(worlds.heard[e, natural(observers.i), j], MESSAGE)
 
 
 @compiled(out_of_line=True)
@@ -206,7 +163,7 @@ def _write_the_rest(
             if number < 0:
                 made.write_empty(o, start)
             for q in range(natural(c.message_size)):
-                said = _ZERO
+                said = ZERO
                 if number >= 0 and i < c.num_trackers:
                     j = natural(number)
                     said = worlds.message[e, 0, j, q] if c.perfect_radio != 0 else worlds.heard_message[e, i, j, q]

@@ -18,20 +18,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from typing import Final
 
-from posse.registry import FIELDS, Declaration, Function, is_number, parameters_of
+import numpy as np
+
+from posse.numeric import compiled
+from posse.registry import FIELDS, Bound, Declaration, Function, is_number
 from posse.scenarios import Scenario
-
-Bound = float | Callable[[Scenario], float]
+from posse.scenarios.limits import FAR
 
 SLACK: Final = 1.001
 """Factor by which bounds are widened to allow for float32 rounding."""
 
 MOST_NUMBERS: Final = 256
 """Most values of one field."""
-
-_SUBJECTS: Final = {1: "setting", 2: "self", 3: "mate"}
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,9 @@ class FieldDeclaration(Declaration):
     unknown: float | None
 
     @property
-    def subject(self) -> str:
-        """``"setting"``, ``"self"`` or ``"mate"``."""
-        return _SUBJECTS[len(parameters_of(self.function))]
+    def of_mate(self) -> bool:
+        """Whether it describes a team-mate."""
+        return "m" in self.parameters
 
     @property
     def functions(self) -> tuple[tuple[Function, str], ...]:
@@ -76,26 +77,13 @@ class FieldDeclaration(Declaration):
             DeclarationError: Its bounds are not finite, low is above high, or the value for
                 "unknown" is not between them.
         """
-        low, high = (self._bound(name, scenario) for name in ("low", "high"))
-        if not low <= high:
-            raise FIELDS.error(self.function, f"low={low:g} is above high={high:g} in {scenario.name!r}")
-        mate = self.subject == "mate"
-        empty = 0.0 if self.unknown is None and mate else self.unknown
+        low, high = FIELDS.bounds_of(self.function, self.low, self.high, scenario)
+        empty = 0.0 if self.unknown is None and self.of_mate else self.unknown
         if empty is not None and not low <= empty <= high:
             raise FIELDS.error(
                 self.function, f"unknown={empty:g} is not between low={low:g} and high={high:g} in {scenario.name!r}"
             )
-        return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, of_neighbour=mate)
-
-    def _bound(self, name: str, scenario: Scenario) -> float:
-        bound: Any = getattr(self, name)
-        try:
-            value = bound(scenario) if callable(bound) else bound
-        except Exception as error:  # a user's function
-            raise FIELDS.error(self.function, f"{name} of {scenario.name!r}: {error!r}") from error
-        if not is_number(value):
-            raise FIELDS.error(self.function, f"{name}={value!r} in {scenario.name!r} is not a finite number")
-        return float(value)
+        return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
 
 
 def field(
@@ -120,24 +108,44 @@ def field(
             raise FIELDS.error(function, f"size={size!r} must be a whole number from 1 to {MOST_NUMBERS}")
         if unknown is not None and not is_number(unknown):
             raise FIELDS.error(function, f"unknown={unknown!r} is not a finite number")
-        for name, bound in (("low", low), ("high", high)):
-            if not callable(bound) and not is_number(bound):
-                raise FIELDS.error(function, f"{name}={bound!r} is neither a finite number nor a function")
+        FIELDS.check_bounds(function, low, high)
         return FIELDS.declare(FieldDeclaration, function, unit=unit, low=low, high=high, unknown=unknown, size=size)
 
     return declare
 
 
-def setting(unit: str, value: Callable[[Scenario], float]) -> Callable[[Function], Function]:
-    """Declare a function (c) as a field that holds a setting; -1 stands for an unlimited one.
+def settings(*names: str) -> None:
+    """Declare settings of the scenario as fields of their names, with its units and meanings.
 
-    Its range holds the value, 0 and 1: wrappers of other libraries pad observations with 0 and 1.
+    -1 stands for an unlimited one. The range holds the value, 0 and 1: wrappers of other libraries
+    pad observations with 0 and 1.
     """
+    for name in names:
+        declared = Scenario.settings()[name]
+        FIELDS.declare(
+            FieldDeclaration,
+            limited,
+            name=name,
+            meaning=f"{declared.meaning[0].upper()}{declared.meaning[1:]}.".replace("inf:", "-1:"),
+            parameters=("value",),
+            unit=declared.unit,
+            low=partial(_least, name),
+            high=partial(_greatest, name),
+            unknown=None,
+            size=1,
+        )
 
-    def low(s: Scenario) -> float:
-        return -1.0 if math.isinf(value(s)) else 0.0
 
-    def high(s: Scenario) -> float:
-        return 1.0 if math.isinf(value(s)) else max(1.0, value(s) * SLACK)
+@compiled
+def limited(value: float) -> np.float32:
+    """Return a setting as it is observed: -1 for an unlimited one."""
+    return np.float32(value if value < FAR else -1.0)
 
-    return field(unit, low, high)
+
+def _least(name: str, s: Scenario) -> float:
+    return -1.0 if math.isinf(getattr(s, name)) else 0.0
+
+
+def _greatest(name: str, s: Scenario) -> float:
+    value: float = getattr(s, name)
+    return 1.0 if math.isinf(value) else max(1.0, value * SLACK)

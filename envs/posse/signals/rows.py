@@ -1,24 +1,24 @@
-"""Writes the observations: one robot of eight worlds at once, one world per lane (:mod:`~.views`)."""
+"""Writes the rows of the observations, for one robot of eight worlds at once, one world per lane.
+
+The generated functions (:mod:`posse.signals.generate`) compute the fields of a view
+(:mod:`.views`); each gives a *column* of eight numbers, one for each world, which are transposed
+and written to the worlds' rows.
+"""
 
 from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
-from posse.numeric import WIDTH, FloatArray, Record, Records, compiled
+from posse.numeric import WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled, store, transpose
 from posse.rules.discs import natural
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
 from posse.signals.generate import Generated
-from posse.signals.observation.mates import observe_mates
-from posse.signals.observation.rows import Observers, Rows
-from posse.signals.observation.views import lay_out_observers, view_of_targets, view_of_trackers
+from posse.signals.mates import observe_mates
+from posse.signals.views import Observers, Rows, lay_out_observers, view_of_targets, view_of_trackers
 
 TOGETHER: Final = WIDTH
 """Worlds processed together."""
-
-_ZERO: Final = np.float32(0.0)
 
 
 @compiled
@@ -58,4 +58,37 @@ def observe_sonar(c: Record, w: Record, trackers: Records, s: Record, observatio
         pose = (t.x, t.y, t.heading_cos, t.heading_sin)
         ping(c, pose, i, s.gap[i], s, observations[i], first)
     if c.target_agent != 0:
-        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, _ZERO, s, observations[n], first)
+        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, ZERO, s, observations[n], first)
+
+
+@compiled
+def write_block(
+    a: Lanes, b: Lanes, c: Lanes, d: Lanes, f: Lanes, g: Lanes, h: Lanes, j: Lanes, first: int, rows: Rows
+) -> None:
+    """Write eight columns, the first of them column ``first``."""
+    a, b, c, d, f, g, h, j = transpose(a, b, c, d, f, g, h, j)
+    # Not in a loop: which of a tuple is meant would be looked up at run time.
+    _write_row(a, 0, first, rows)
+    _write_row(b, 1, first, rows)
+    _write_row(c, 2, first, rows)
+    _write_row(d, 3, first, rows)
+    _write_row(f, 4, first, rows)
+    _write_row(g, 5, first, rows)
+    _write_row(h, 6, first, rows)
+    _write_row(j, 7, first, rows)
+
+
+@compiled
+def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
+    if lane < rows.observers.number:
+        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
+        store(o, natural(rows.start) + first, row)
+
+
+@compiled
+def write_column(column: Lanes, number: int, s: Record, rows: Rows) -> None:
+    """Write one column."""
+    store(s.column, 0, column)
+    for lane in range(rows.observers.number):
+        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
+        o[natural(rows.start) + number] = s.column[lane]

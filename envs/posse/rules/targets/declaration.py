@@ -11,12 +11,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from posse.numeric import compiled
-from posse.registry import METRICS, TARGET_MOTIONS, Declaration, Function, is_number, plain
-from posse.registry import check_memory_name as check_name
+from posse.registry import METRICS, TARGET_MOTIONS, Bound, Declaration, Function, check_memory_name, plain
 from posse.rules.state import WORLD_NAMES
 from posse.scenarios import Scenario
-
-Bound = float | Callable[[Scenario], float]
 
 
 class Memory(NamedTuple):
@@ -30,11 +27,6 @@ class Memory(NamedTuple):
     low: Bound
     high: Bound
     meaning: str
-
-    def bound(self, name: str, scenario: Scenario) -> float:
-        """Return the bound ``"low"`` or ``"high"`` in a scenario."""
-        bound: Any = getattr(self, name)
-        return float(bound(scenario) if callable(bound) else bound)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,20 +50,9 @@ class TargetMotion(Declaration):
         return (self.function, "nothing"), *draw
 
     def check(self, scenario: Scenario) -> None:
-        """Check the bounds of its memory in a scenario.
-
-        Raises:
-            DeclarationError: One is not a finite number, or low is above high.
-        """
+        """Raise DeclarationError unless the bounds of its memory are finite and in order in a scenario."""
         for each in self.memory:
-            try:
-                low, high = each.bound("low", scenario), each.bound("high", scenario)
-            except Exception as error:  # a user's function
-                raise TARGET_MOTIONS.error(self.function, f"bounds of memory {each.name!r}: {error!r}") from error
-            if not (is_number(low) and is_number(high) and low <= high):
-                raise TARGET_MOTIONS.error(
-                    self.function, f"memory {each.name!r} has low={low}, high={high} in {scenario.name!r}"
-                )
+            TARGET_MOTIONS.bounds_of(self.function, each.low, each.high, scenario, f" of memory {each.name!r}")
 
 
 def target_motion(
@@ -115,9 +96,6 @@ def _check_memory(function: Function, memory: Any) -> None:
     taken = {each.name for motion in TARGET_MOTIONS.built_in() for each in motion.memory}
     taken.update(WORLD_NAMES, (f"{name}_sum" for name in METRICS))
     for each in memory:
-        check_name(TARGET_MOTIONS, function, each.name, taken)
-        for side in ("low", "high"):
-            bound = getattr(each, side)
-            if not callable(bound) and not is_number(bound):
-                raise TARGET_MOTIONS.error(function, f"{side}={bound!r} of memory {each.name!r} is not a finite number")
+        check_memory_name(TARGET_MOTIONS, function, each.name, taken)
+        TARGET_MOTIONS.check_bounds(function, each.low, each.high, f" of memory {each.name!r}")
         taken.add(each.name)

@@ -1,35 +1,31 @@
-"""The built-in observation fields of the robot itself, its task and its target, in order.
+"""The built-in observation fields, in order: the robot itself, its task, its target, each team-mate.
 
 *Ego* means the robot's own frame, x ahead and y to the left; the *common frame* is a fixed frame
-shared by the team. Directions are given as cosine and sine. To add a field, declare it here, or in
-a module of your own (:mod:`posse.signals.observation.fields`).
+shared by the team. Directions are given as cosine and sine. Team-mates are described as they are
+now if the radio is perfect, else as in the last message received. To add a field, declare it here,
+or in a module of your own (:mod:`posse.signals.fields`).
 """
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
-from posse.numeric import Lanes, Record, choose, compiled, eight, greater
+from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.scenarios.limits import FAR
-from posse.signals.observation.fields import SLACK, field, setting
-from posse.signals.observation.views import View, ego
-
-_ZERO: Final = np.float32(0.0)
-_ONE: Final = np.float32(1.0)
-_MINUS_ONE: Final = np.float32(-1.0)
-_TINY: Final = np.float32(1e-9)
+from posse.signals.fields import SLACK, field, settings
+from posse.signals.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]
 
 
-def most_turn(s: Scenario) -> float:
-    """Return an upper bound of every robot's turn rate, rad/s."""
+def _most_turn(s: Scenario) -> float:
     return max(*s.tracker_turn_rates, s.target_turn_rate) * SLACK
+
+
+def _most_turn_of_mate(s: Scenario) -> float:
+    return max(s.tracker_turn_rates) * SLACK
 
 
 def _place(s: Scenario) -> float:
@@ -61,7 +57,7 @@ def speed(c: Record, v: View) -> Lanes:
     return v.speed
 
 
-@field("rad/s", lambda s: -most_turn(s), most_turn)
+@field("rad/s", lambda s: -_most_turn(s), _most_turn)
 def turn_rate(c: Record, v: View) -> Lanes:
     """Own turn rate, positive to the left."""
     return v.turn_rate
@@ -82,15 +78,10 @@ def working(c: Record, v: View) -> Lanes:
 # The task
 
 
-@compiled
-def _one_if(truth: bool) -> np.float32:
-    return _ONE if truth else _ZERO
-
-
 @field("1", 0, 1, size=len(FORMATIONS))
 def formation(c: Record) -> tuple[np.float32, np.float32, np.float32]:
     """Required formation, one-hot: wedge, ring, rows."""
-    return _one_if(c.formation == 0), _one_if(c.formation == 1), _one_if(c.formation == 2)
+    return np.float32(c.formation == 0), np.float32(c.formation == 1), np.float32(c.formation == 2)
 
 
 @field("1", -1, lambda s: s.num_trackers - 1, unknown=-1)
@@ -105,16 +96,7 @@ def team_size(c: Record) -> np.float32:
     return np.float32(c.num_trackers)
 
 
-@setting("m", lambda s: s.formation_distance)
-def formation_distance(c: Record) -> np.float32:
-    """Required distance from the target to the nearest slot."""
-    return np.float32(c.formation_distance)
-
-
-@setting("m", lambda s: s.formation_spacing)
-def formation_spacing(c: Record) -> np.float32:
-    """Required distance between neighbouring slots."""
-    return np.float32(c.formation_spacing)
+settings("formation_distance", "formation_spacing")
 
 
 @field("m/s", 0, _fast)
@@ -123,7 +105,7 @@ def max_speed(c: Record, v: View) -> Lanes:
     return v.max_speed
 
 
-@field("rad/s", 0, most_turn)
+@field("rad/s", 0, _most_turn)
 def max_turn_rate(c: Record, v: View) -> Lanes:
     """Own greatest turn rate."""
     return v.max_turn_rate
@@ -141,40 +123,7 @@ def turn_acceleration_time(c: Record, v: View) -> Lanes:
     return v.turn_acceleration_time
 
 
-@setting("m", lambda s: s.tolerance)
-def tolerance(c: Record) -> np.float32:
-    """Greatest distance from a slot at which a robot occupies it."""
-    return np.float32(c.tolerance)
-
-
-@setting("m", lambda s: s.robot_radius)
-def robot_radius(c: Record) -> np.float32:
-    """Radius of every robot's disc."""
-    return np.float32(c.robot_radius)
-
-
-@setting("s", lambda s: s.control_step)
-def control_step(c: Record) -> np.float32:
-    """Time between two actions."""
-    return np.float32(c.control_step)
-
-
-@setting("m", lambda s: s.sensing_range)
-def sensing_range(c: Record) -> np.float32:
-    """Range of its target sensor; -1: unlimited."""
-    return np.float32(c.sensing_range) if c.sensing_range < FAR else _MINUS_ONE
-
-
-@setting("m", lambda s: s.sonar_range)
-def sonar_range(c: Record) -> np.float32:
-    """Range of its sonar."""
-    return np.float32(c.sonar_range)
-
-
-@setting("m", lambda s: s.arena)
-def arena(c: Record) -> np.float32:
-    """Side of the walled square around the origin; -1: no walls."""
-    return np.float32(c.arena) if c.walled else _MINUS_ONE
+settings("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range", "arena")
 
 
 @field("s", 0, lambda s: s.duration * SLACK)
@@ -188,7 +137,7 @@ def time_left(c: Record, v: View) -> Lanes:
 
 @compiled
 def _if_known(v: View, value: Lanes) -> Lanes:
-    return choose(v.target_known, value, _ZERO)
+    return choose(v.target_known, value, ZERO)
 
 
 @compiled
@@ -201,7 +150,7 @@ def _direction(v: View, x: Lanes, y: Lanes) -> Pair:
 @field("1", 0, 1)
 def target_known(c: Record, v: View) -> Lanes:
     """1 once it has a fix of the target, from its sensor or by radio."""
-    return choose(v.target_known, _ONE, _ZERO)
+    return choose(v.target_known, ONE, ZERO)
 
 
 @field("1", 0, 1)
@@ -213,7 +162,7 @@ def target_seen(c: Record, v: View) -> Lanes:
 @field("s", -1, lambda s: s.duration * SLACK, unknown=-1)
 def target_age(c: Record, v: View) -> Lanes:
     """Age of the fix described by the following fields."""
-    return choose(v.target_known, (v.step - v.target_step) * c.control_step, _MINUS_ONE)
+    return choose(v.target_known, (v.step - v.target_step) * c.control_step, -ONE)
 
 
 def _farthest_fix(s: Scenario) -> float:
@@ -224,16 +173,16 @@ def _farthest_fix(s: Scenario) -> float:
 def target_range(c: Record, v: View) -> Lanes:
     """Distance from the robot to the fix."""
     if c.fix_bearing != 0:
-        return eight(_MINUS_ONE)
-    return choose(v.target_known, v.target_distance, _MINUS_ONE)
+        return eight(-ONE)
+    return choose(v.target_known, v.target_distance, -ONE)
 
 
 @field("1", -1, 1, unknown=0, size=2)
 def target_bearing(c: Record, v: View) -> Pair:
     """Direction from the robot to the fix, ego."""
-    per_metre = _ONE / greater(v.target_distance, _TINY)
+    per_metre = ONE / greater(v.target_distance, TINY)
     ahead, left = ego(v, v.target_dx * per_metre, v.target_dy * per_metre)
-    ahead = choose(v.target_distance > _ZERO, within_one(ahead), _ONE)
+    ahead = choose(v.target_distance > ZERO, within_one(ahead), ONE)
     return _if_known(v, ahead), _if_known(v, within_one(left))
 
 
@@ -254,3 +203,49 @@ def target_velocity(c: Record, v: View) -> Pair:
     """Velocity of the target, estimated from successive fixes, ego."""
     ahead, left = ego(v, v.target_vx, v.target_vy)
     return _if_known(v, ahead), _if_known(v, left)
+
+
+# Each team-mate
+
+
+@field("1", -1, lambda s: s.num_trackers - 1, unknown=-1)
+def neighbour_number(c: Record, v: View, m: Mate) -> Lanes:
+    """The team-mate's number."""
+    return m.number
+
+
+@field("s", -1, lambda s: s.forget_after * SLACK, unknown=-1)
+def neighbour_age(c: Record, v: View, m: Mate) -> Lanes:
+    """Age of the last message received."""
+    return m.age
+
+
+@field("m", -1, lambda s: s.range_bound * SLACK, unknown=-1)
+def neighbour_range(c: Record, v: View, m: Mate) -> Lanes:
+    """Distance from the robot to the team-mate's position."""
+    return m.distance
+
+
+@field("1", -1, 1, unknown=0, size=2)
+def neighbour_bearing(c: Record, v: View, m: Mate) -> Pair:
+    """Direction from the robot to the team-mate's position, ego."""
+    return within_one(m.ahead), within_one(m.left)
+
+
+@field("1", -1, 1, unknown=0, size=2)
+def neighbour_heading(c: Record, v: View, m: Mate) -> Pair:
+    """The team-mate's heading, ego."""
+    ahead, left = ego(v, m.heading_cos, m.heading_sin)
+    return within_one(ahead), within_one(left)
+
+
+@field("m/s", 0, _fast, unknown=0)
+def neighbour_speed(c: Record, v: View, m: Mate) -> Lanes:
+    """The team-mate's speed."""
+    return m.speed
+
+
+@field("rad/s", lambda s: -_most_turn_of_mate(s), _most_turn_of_mate, unknown=0)
+def neighbour_turn_rate(c: Record, v: View, m: Mate) -> Lanes:
+    """The team-mate's turn rate."""
+    return m.turn_rate

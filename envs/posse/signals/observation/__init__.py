@@ -1,1 +1,0 @@
-"""Observations: declared fields, and how they are written to the rows of a batch."""
