@@ -162,7 +162,7 @@ def test_the_other_pieces_of_code_run(tmp_path: Path) -> None:
 
 
 UNKNOWN = {
-    "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'?)",
+    "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'",
     "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
     "extra_fields=['speed']": "'speed' is in every observation: leave it out",
     "extra_fields=['wall_distance'] * 2": "it must be a tuple of names, each once",

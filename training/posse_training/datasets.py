@@ -104,7 +104,7 @@ def record_dataset(
         "env": env,
         "data_format": "hdf5",
         "author": "posse",
-        "requirements": [f"posse=={posse.__version__}"],
+        "requirements": [f"posse-rl=={posse.__version__}"],
         "description": f"episodes of posse's scenario {scenario!r}, played by {name}",
         "algorithm_name": name,
         "code_permalink": f"posse {posse.__version__} {about['commit'] or ''}",
