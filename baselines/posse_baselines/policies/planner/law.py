@@ -1,7 +1,7 @@
 """The law that the planner plays: slots by least total time, courses that meet them, the safeguard.
 
-It reads the state: poses, the slot frame, obstacles; the path on which the target was foreseen.
-What it leaves open for each tracker is a :data:`WAY`.
+It reads the state of the worlds (poses, the slot frame, obstacles) and the path on which the target was foreseen. What
+it leaves open for each tracker is a :data:`WAY`. :func:`drive` plays it in any batch of worlds.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel
-from posse.rules import NEVER
+from posse import Batch, Scenario
+from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds
+from posse.rules import NEVER, config_record, slot_records
+from posse.rules.state import WorldArrays
 from posse_baselines.laws.assignment import WORK_ROWS, assign
 from posse_baselines.laws.geometry import length, wrap
 from posse_baselines.laws.heading import BODY, regulate
@@ -40,15 +42,12 @@ _MOST_STEPS: Final = 40
 WAY: Final[np.dtype[Any]] = np.dtype(
     (
         np.record,
-        np.dtype(
-            [
-                ("ahead", np.float64),  # shift of the slot along the target's heading, m
-                ("left", np.float64),  # shift of the slot to its left, m
-                ("gain", np.float64),  # of the slot law, 1/s
-                ("foresees", np.float64),  # 1: the target is met on the path that it was foreseen
-            ],
-            align=True,
-        ),
+        [
+            ("ahead", np.float64),  # shift of the slot along the target's heading, m
+            ("left", np.float64),  # shift of the slot to its left, m
+            ("gain", np.float64),  # of the slot law, 1/s
+            ("foresees", np.float64),  # 1: the target is met on the path that it was foreseen
+        ],
     )
 )
 """How one tracker plays."""
@@ -56,39 +55,14 @@ WAY: Final[np.dtype[Any]] = np.dtype(
 PLAN: Final[np.dtype[Any]] = np.dtype(
     (
         np.record,
-        np.dtype(
-            [
-                ("slot", np.int32),  # -1: none yet
-                ("mean_x", np.float32),  # running mean of the target's velocity, m/s; used only in
-                ("mean_y", np.float32),  # the first record
-            ],
-            align=True,
-        ),
+        [
+            ("slot", np.int32),  # -1: none yet
+            ("mean_x", np.float32),  # running mean of the target's velocity, m/s; used only in the first record
+            ("mean_y", np.float32),
+        ],
     )
 )
 """Memory of one tracker."""
-
-
-class Scene(NamedTuple):
-    """One world as the law reads it."""
-
-    config: Record
-    """The scenario as kernels read it."""
-    slots: Records
-    """(N,) position of each slot in the slot frame, m."""
-    world: Record
-    trackers: Records
-    obstacles: Records
-    ways: Records
-    """(N,) :data:`WAY`."""
-    plans: Records
-    """(N,) :data:`PLAN`."""
-    path: FloatArray
-    """(T, 4) x, y of the target, cosine and sine of the slot frame, where it was foreseen."""
-    since: int
-    """Control steps since the path began; -1: there is none."""
-    frame_rate: float
-    """Turn rate of the slot frame, rad/s."""
 
 
 class Work(NamedTuple):
@@ -106,16 +80,61 @@ class Work(NamedTuple):
     """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
 
 
-def work_for(num_trackers: int) -> Work:
-    """Return the arrays of all threads."""
-    n, threads = num_trackers, MOST_THREADS
-    return Work(
-        np.zeros((threads, n, n), np.float32),
-        np.zeros((threads, WORK_ROWS, n + 1), np.float32),
-        np.zeros((threads, _MOST_DISCS), DISC),
-        np.zeros(threads, BODY),
-        np.zeros(threads, PLAYS),
+class Teams(NamedTuple):
+    """What the law knows of the teams in E worlds beside the state of these; made by :func:`teams_of`."""
+
+    config: Records
+    """(1,) the scenario as kernels read it."""
+    slots: Records
+    """(N,) position of each slot in the slot frame, m."""
+    ways: Records
+    """(E, N) :data:`WAY`."""
+    plans: Records
+    """(E, N) :data:`PLAN`, brought up to date by :func:`drive`."""
+    paths: FloatArray
+    """(P, T, 4) x, y of the target, cosine and sine of the slot frame at each step, where it was foreseen. The E / P
+    copies of a world share a path."""
+    begun: npt.NDArray[np.int64]
+    """(P,) control step at which each path begins; -1: there is none."""
+    work: Work
+
+
+class Scene(NamedTuple):
+    """One world as the law reads it."""
+
+    config: Record
+    slots: Records
+    world: Record
+    trackers: Records
+    obstacles: Records
+    ways: Records
+    plans: Records
+    path: FloatArray
+    since: int
+    """Control steps since the path began; -1: there is none."""
+    frame_rate: float
+    """Turn rate of the slot frame, rad/s."""
+
+
+def teams_of(scenario: Scenario, ways: Records, path_length: int) -> Teams:
+    """Return teams that play ways (E, N) and have no slots yet and no path foreseen, of up to so many positions."""
+    num_worlds, n = ways.shape
+    plans = np.zeros((num_worlds, n), PLAN)
+    plans["slot"] = -1
+    work = Work(
+        np.zeros((MOST_THREADS, n, n), np.float32),
+        np.zeros((MOST_THREADS, WORK_ROWS, n + 1), np.float32),
+        np.zeros((MOST_THREADS, _MOST_DISCS), DISC),
+        np.zeros(MOST_THREADS, BODY),
+        np.zeros(MOST_THREADS, PLAYS),
     )
+    paths, begun = np.zeros((num_worlds, path_length, 4), np.float32), np.full(num_worlds, -1, np.int64)
+    return Teams(config_record(scenario), slot_records(scenario), ways, plans, paths, begun, work)
+
+
+def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
+    """Write actions (E, rows, 2 + m) for the trackers of those worlds that are ``going`` (E,)."""
+    over_worlds(drive_all, (teams, batch.arrays, going, actions), batch.num_worlds, batch.scenario.num_trackers)
 
 
 @compiled
@@ -137,16 +156,18 @@ def foreseen(path: FloatArray, at: float, slot: Record) -> tuple[float, float]:
 
 
 @compiled
-def arrival_time(path: FloatArray, at: float, slot: Record, x: float, y: float, max_speed: float, dt: float) -> float:
-    """Return when a tracker at (x, y) can be in a slot, straight on at full speed, s from now.
+def arrival_time(scene: Scene, i: int, slot: Record) -> float:
+    """Return when tracker i can be in a slot on the foreseen path, straight on at full speed, s from now.
 
     A slot never closes in faster than about ``max_speed`` itself, so the gap that is left bounds
     the time that is left from below.
     """
+    t, dt = scene.trackers[i], scene.config.control_step
+    max_speed = float(t.max_speed)
     time = 0.0
     for _ in range(_MOST_STEPS):
-        slot_x, slot_y = foreseen(path, at + time / dt, slot)
-        gap = length(slot_x - x, slot_y - y) - max_speed * time
+        slot_x, slot_y = foreseen(scene.path, float(scene.since) + time / dt, slot)
+        gap = length(slot_x - t.x, slot_y - t.y) - max_speed * time
         if gap <= _MET or time > _FARTHEST:
             break
         time += max(0.5 * gap / max_speed, _LEAST_STEP)
@@ -169,7 +190,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
             arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
             x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, scene.config.control_step)
+                time = arrival_time(scene, i, slot)
             else:
                 time = time_to_slot(x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, _WEAVE_TIME, speed)
             # Time for turning towards it.
@@ -223,7 +244,7 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> tuple[float, f
     shift_x, shift_y = rotate(way.ahead, way.left, w.heading_cos, w.heading_sin)
     from_x, from_y = t.x - w.x, t.y - w.y
     if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene.path, float(scene.since), slot, t.x, t.y, speed, dt)
+        time = arrival_time(scene, i, slot)
         if time > _SOON:
             to_x, to_y = foreseen(scene.path, scene.since + time / dt, slot)
             slot_vx, slot_vy = (to_x - w.x - arm_x) / time, (to_y - w.y - arm_y) / time
@@ -258,7 +279,7 @@ def frame_rate_of(c: Record, w: Record) -> float:
 
 
 @compiled
-def drive(scene: Scene, work: Work, actions: FloatArray) -> None:
+def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
     """Write the actions (N, 2 + m) of one world's team."""
     c, w, body = scene.config, scene.world, work.body
     body.dt, body.acceleration, body.turn_acceleration = float(c.control_step), _UNLIMITED, _UNLIMITED
@@ -287,46 +308,28 @@ def drive(scene: Scene, work: Work, actions: FloatArray) -> None:
         write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
 
 
-class Played(NamedTuple):
-    """The worlds that the law drives, and what it knows of them."""
-
-    config: Records
-    slots: Records
-    world: Records
-    tracker: Records
-    obstacle: Records
-    going: BoolArray
-    """(E,) the worlds to drive."""
-    ways: Records
-    """(E, N) :data:`WAY`."""
-    plans: Records
-    """(E, N) :data:`PLAN`, brought up to date."""
-    paths: FloatArray
-    """(E / worlds_per_path, T, 4) where the target was foreseen."""
-    begun: npt.NDArray[np.int64]
-    """(E / worlds_per_path,) control step at which each path begins; -1: there is none."""
-
-
 @kernel
 def drive_all(
-    played: Played, work: Work, worlds_per_path: int, actions: FloatArray, thread: int, first: int, end: int
+    teams: Teams, worlds: WorldArrays, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
-    """Write the actions (E, rows, 2 + m) of those of a share of the worlds that are going on."""
-    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.body[thread], work.plays[thread])
+    """Write the actions of those of a share of the worlds that are going on."""
+    w = teams.work
+    work = Work(w.cost[thread], w.assigning[thread], w.discs[thread], w.body[thread], w.plays[thread])
+    copies = len(going) // len(teams.begun)
     for e in range(first, end):
-        if played.going[e]:
-            c, w, shared = played.config[0], played.world[e], e // worlds_per_path
-            begun = played.begun[shared]
+        if going[e]:
+            config, world, shared = teams.config[0], worlds.world[e], e // copies
+            begun = teams.begun[shared]
             scene = Scene(
-                c,
-                played.slots,
-                w,
-                played.tracker[e],
-                played.obstacle[e],
-                played.ways[e],
-                played.plans[e],
-                played.paths[shared],
-                w.step - begun if 0 <= begun <= w.step else -1,
-                frame_rate_of(c, w),
+                config,
+                teams.slots,
+                world,
+                worlds.tracker[e],
+                worlds.obstacle[e],
+                teams.ways[e],
+                teams.plans[e],
+                teams.paths[shared],
+                world.step - begun if 0 <= begun <= world.step else -1,
+                frame_rate_of(config, world),
             )
-            drive(scene, mine, actions[e])
+            drive_team(scene, work, actions[e])

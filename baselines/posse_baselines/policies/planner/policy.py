@@ -11,10 +11,27 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
 from posse_baselines.fields import check, number
-from posse_baselines.policies.planner.law import PLAN
-from posse_baselines.policies.planner.model import RANGES, TRIES, Foresight, Law, play_ahead, standard_ways
-from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations, message_size_of
+from posse_baselines.policies.planner.law import PLAN, WAY, Teams, drive, teams_of
+from posse_baselines.policy import BasePolicy, Memory, PolicyError, check_fits, check_observations
 
+_CONTACTS: Final = ("contacts_tracker", "contacts_obstacle", "contacts_target")
+_STANDARD: Final = np.array(
+    [
+        # ahead, left, gain, foresees
+        (0.0, 0.0, 1.5, 0.0),
+        (-0.2, 0.0, 1.5, 0.0),
+        (0.2, 0.0, 1.5, 0.0),
+        (0.0, 0.0, 0.7, 0.0),
+        (0.0, 0.0, 3.0, 0.0),
+        (0.0, 0.0, 1.5, 1.0),
+        (0.0, 0.0, 3.0, 1.0),
+    ],
+    WAY,
+)
+"""Ways that whole teams play alike; the first one is played until the first planning."""
+_RANGES: Final = {"ahead": (-0.25, 0.25), "left": (-0.2, 0.2), "gain": (0.7, 4.0)}
+_TRIES: Final = len(_STANDARD) + 1
+"""Tries in each round: the standard ways and what was kept; or the best so far, and variations."""
 _REPEAT: Final = 64  # plannings after which the variations repeat
 
 
@@ -50,52 +67,118 @@ class PlannerSettings:
             )
 
 
-class Variations:
-    """Changes to try on the ways of a team, the same for all worlds at the same planning.
+class Search(OwnArrays):
+    """Plans in a batch of worlds: plays the law ahead in copies of them, in several ways, and keeps the best.
 
-    They are drawn once, so that what is tried in a world does not depend on the others.
+    Args:
+        settings: How far it looks ahead, and what it tries.
+        batch: E worlds. Planning leaves them as they are.
+
+    Attributes:
+        teams: The ways that are kept until the next planning, and the law's memory.
     """
 
-    def __init__(self, settings: PlannerSettings, num_trackers: int) -> None:
+    def __init__(self, settings: PlannerSettings, batch: Batch) -> None:
+        self.settings, self.batch = settings, batch
+        dt, n = batch.scenario.control_step, batch.scenario.num_trackers
+        self._steps, self._keep = (max(1, round(time / dt)) for time in (settings.look_ahead, settings.keep))
+        self.teams = teams_of(batch.scenario, np.full((batch.num_worlds, n), _STANDARD[0]), self._steps + 1)
+        self._copies: Batch | None = None
+        # Variations are drawn once, so that what is tried in a world does not depend on the others.
         rng = np.random.default_rng(settings.seed)
-        shape = (_REPEAT, settings.rounds, TRIES - 1, num_trackers)
+        shape = (_REPEAT, settings.rounds, _TRIES - 1, n)
         self._changed = rng.random(shape) < settings.varied
         self._shifts = {
-            name: settings.spread * (high - low) * rng.normal(size=shape) for name, (low, high) in RANGES.items()
+            name: settings.spread * (high - low) * rng.normal(size=shape) for name, (low, high) in _RANGES.items()
         }
         self._foresees = rng.random(shape) < 0.5
 
-    def of(self, best: Records, planning: npt.NDArray[np.int64], turn: int) -> Records:
-        """Return the best ways (E, N) and variations on them, (E, TRIES, N).
+    def restart(self, mask: BoolArray) -> None:
+        """Forget what was planned for the worlds of a mask (E,)."""
+        self.teams.ways[mask] = _STANDARD[0]
+        self.teams.plans[mask] = np.array((-1, 0, 0), PLAN)
+        self.teams.begun[mask] = -1
 
-        Args:
-            best: (E, N) :data:`WAY`.
-            planning: (E,) number of the planning in each world's episode.
-            turn: Which round of it.
+    def actions(self) -> FloatArray:
+        """Plan in the worlds where it is due; return the trackers' actions (E, N, 2 + m) for the present state."""
+        step = self.batch.worlds["step"]
+        due = np.asarray(step % self._keep == 0)
+        if due.any():
+            self._plan(due, np.asarray(step // self._keep, np.int64))
+        scenario = self.batch.scenario
+        actions = np.zeros((len(step), scenario.num_trackers, 2 + scenario.message_size), np.float32)
+        drive(self.teams, self.batch, np.ones(len(step), np.bool_), actions)
+        return actions
+
+    def _plan(self, due: BoolArray, planning: npt.NDArray[np.int64]) -> None:
+        """Try ways to play, and keep the best in the worlds that are ``due``."""
+        teams, num_worlds = self.teams, self.batch.num_worlds
+        standard = np.broadcast_to(_STANDARD[:, None], (num_worlds, _TRIES - 1, teams.ways.shape[1]))
+        tries = np.concatenate([standard, teams.ways[:, None]], axis=1)
+        everyone = np.arange(num_worlds)
+        for turn in range(self.settings.rounds + 1):
+            self._copies = self.batch.copies(_TRIES, seed=self.settings.seed, alike=True, into=self._copies)
+            plans = np.repeat(teams.plans, _TRIES, axis=0)
+            trying = teams._replace(ways=np.ascontiguousarray(tries.reshape(-1, tries.shape[2])), plans=plans)
+            worth, paths = play_ahead(trying, self._copies, self._steps, self.settings.distance_cost)
+            best = worth.reshape(num_worlds, _TRIES).argmax(axis=1)
+            ways = tries[everyone, best]
+            if turn < self.settings.rounds:
+                tries = self._vary(ways, planning, turn)
+        teams.ways[due] = ways[due]
+        teams.paths[due] = paths[everyone * _TRIES + best][due]
+        teams.begun[due] = self.batch.worlds["step"][due]
+
+    def _vary(self, best: Records, planning: npt.NDArray[np.int64], turn: int) -> Records:
+        """Return the best ways (E, N) and variations on them, (E, tries, N).
+
+        ``planning`` (E,) is the number of the planning in each world's episode, ``turn`` the round of it.
         """
-        tries = np.repeat(best[:, None], TRIES, axis=1)
+        tries = np.repeat(best[:, None], _TRIES, axis=1)
         drawn = planning % _REPEAT, turn
         varied, changed = tries[:, 1:], self._changed[drawn]
-        for name, (low, high) in RANGES.items():
+        for name, (low, high) in _RANGES.items():
             new = np.clip(varied[name] + self._shifts[name][drawn], low, high)
             varied[name] = np.where(changed, new, varied[name])
         varied["foresees"] = np.where(changed, self._foresees[drawn], varied["foresees"])
         return tries
 
 
-@dataclass
-class _Memory(OwnArrays):
-    batch: Batch
-    law: Law
-    variations: Variations
-    standard: Records
-    """(TRIES - 1, N) :data:`~posse_baselines.policies.planner.law.WAY`."""
-    ways: Records
-    """(E, N) what is kept until the next planning."""
-    plans: Records
-    """(E, N) :data:`~posse_baselines.policies.planner.law.PLAN`."""
-    seen: Foresight
-    copies: Batch | None = None
+def play_ahead(
+    teams: Teams, copies: Batch, steps: int, distance_cost: float
+) -> tuple[npt.NDArray[np.float64], FloatArray]:
+    """Play copies ahead; return what each is worth, (C,), and the target's path, (C, steps + 1, 4).
+
+    The worth is the sum of the scores up to the first contact from now on, less a price for that
+    contact that no score outweighs, less ``distance_cost`` for each metre of the trackers' mean
+    distance from free slots in the end.
+    """
+    s: Any = copies.scenario
+    world = copies.arrays.world
+    for name in _CONTACTS:
+        world[name] = 0  # those before now are the same for all
+    worth = np.zeros(copies.num_worlds)
+    paths = np.empty((copies.num_worlds, steps + 1, 4), np.float32)
+    actions = np.zeros(copies.action_shape, np.float32)
+    if s.num_agents > s.num_trackers:  # a target that is an agent goes on as it moves now
+        actions[:, -1, 0] = np.clip(2.0 * world["speed"] / s.target_speed - 1.0, -1.0, 1.0)
+        actions[:, -1, 1] = np.clip(world["turn_rate"] / s.target_turn_rate, -1.0, 1.0)
+    going = np.asarray(world["over"] == 0)
+    paths[:, 0] = _pose_of_target(world)
+    for step in range(1, steps + 1):
+        drive(teams, copies, going, actions)
+        _, _, terminated, truncated, infos = copies.step(actions)
+        paths[:, step] = _pose_of_target(world)
+        touched = going & (world[_CONTACTS[0]] + world[_CONTACTS[1]] + world[_CONTACTS[2]] > 0)
+        going &= ~touched
+        worth += np.where(going, infos["score"], 0.0) - 2.0 * steps * touched
+        going &= ~(terminated | truncated)
+    away = copies.arrays.tracker["slot_distance"].mean(axis=1)
+    return worth - np.where(going, distance_cost * away, 0.0), paths
+
+
+def _pose_of_target(world: Records) -> FloatArray:
+    return np.stack([world["x"], world["y"], world["frame_cos"], world["frame_sin"]], axis=-1)
 
 
 class Planner(BasePolicy):
@@ -139,73 +222,19 @@ class Planner(BasePolicy):
                 f"policy 'planner' watches {batch.num_worlds} worlds of {batch.scenario.name!r}, "
                 f"not {num_worlds} of {layout.scenario.name!r}: call watch(batch) before begin()"
             )
-        n = layout.scenario.num_trackers
-        standard = standard_ways(n)
-        steps = self._steps(batch, self.settings.look_ahead)
-        memory = _Memory(
-            batch,
-            Law(layout.scenario),
-            Variations(self.settings, n),
-            standard,
-            np.repeat(standard[:1], num_worlds, axis=0),
-            np.zeros((num_worlds, n), PLAN),
-            Foresight(np.zeros((num_worlds, steps + 1, 4), np.float32), np.zeros(num_worlds, np.int64)),
-        )
-        return self.restart(memory, np.ones(num_worlds, np.bool_))
+        return Search(self.settings, batch)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return actions for the state that the watched batch is in; observations are not read."""
-        m: _Memory = memory
-        layout, num_worlds = m.batch.layout, m.batch.num_worlds
-        check_observations(self, observations, num_worlds, layout)
-        keep, step = self._steps(m.batch, self.settings.keep), m.batch.worlds["step"]
-        due = np.asarray(step % keep == 0)
-        if due.any():
-            self._plan(m, due, np.asarray(step // keep, np.int64))
-        actions = np.zeros((*m.plans.shape, 2 + message_size_of(layout)), np.float32)
-        m.law.drive(m.batch, np.ones(num_worlds, np.bool_), m.ways, m.plans, m.seen, actions)
-        return actions, m
+        search: Search = memory
+        check_observations(self, observations, search.batch.num_worlds, search.batch.layout)
+        return search.actions(), search
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Forget the plans of the worlds of a mask (E,)."""
-        m: _Memory = memory
-        m.ways[mask] = m.standard[0]
-        m.plans[mask] = np.zeros((), PLAN)
-        m.plans["slot"][mask] = -1
-        m.seen.begun[mask] = -1
-        return m
+        memory.restart(mask)
+        return memory
 
     def annotations(self, memory: Memory) -> dict[str, Any]:
         """Return ``slot`` (E, N), the slot that each tracker is sent to; -1: none."""
-        return {"slot": memory.plans["slot"].copy()}
-
-    def _plan(self, m: _Memory, due: BoolArray, planning: npt.NDArray[np.int64]) -> None:
-        """Try ways to play, and keep the best in the worlds that are ``due``."""
-        s, num_worlds = self.settings, m.batch.num_worlds
-        steps = self._steps(m.batch, s.look_ahead)
-        standard = np.broadcast_to(m.standard, (num_worlds, *m.standard.shape))
-        tries = np.concatenate([standard, m.ways[:, None]], axis=1)
-        everyone = np.arange(num_worlds)
-        for turn in range(s.rounds + 1):
-            m.copies = m.batch.copies(TRIES, seed=s.seed, alike=True, into=m.copies)
-            worth, paths = play_ahead(
-                m.law,
-                m.copies,
-                np.ascontiguousarray(tries.reshape(-1, tries.shape[2])),
-                np.repeat(m.plans, TRIES, axis=0),
-                m.seen,
-                steps,
-                s.distance_cost,
-            )
-            best = worth.reshape(num_worlds, TRIES).argmax(axis=1)
-            ways = tries[everyone, best]
-            if turn < s.rounds:
-                tries = m.variations.of(ways, planning, turn)
-        m.ways[due] = ways[due]
-        m.seen.paths[due] = paths[everyone * TRIES + best][due]
-        m.seen.begun[due] = m.batch.worlds["step"][due]
-
-    @staticmethod
-    def _steps(batch: Batch, time: float) -> int:
-        """Return a time (s) in control steps, at least one."""
-        return max(1, round(time / batch.scenario.control_step))
+        return {"slot": memory.teams.plans["slot"].copy()}
