@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from posse_baselines.learned.encoder import Encoder
-from posse_baselines.learned.encoding import Encoding
+from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network
 from posse_baselines.learned.policy import LearnedPolicy
 

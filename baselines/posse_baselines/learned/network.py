@@ -1,23 +1,20 @@
-"""A network as plain arrays."""
+"""A network as plain arrays, and its forward pass."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import FloatArray, OwnArrays
+from posse.numeric import MOST_THREADS, ONE, ZERO, FloatArray, OwnArrays, compiled, kernel, over_worlds
 from posse_baselines.policy import PolicyError
 
 ACTIVATIONS: Final = ("tanh", "relu")
 OUTPUTS: Final = ("clip", "tanh")
 """Functions that bring the output into [-1, 1]."""
-LARGEST: Final = 1e30
-"""Largest absolute value of an input statistic or of ``limit``: differences stay finite."""
-
-_FLOAT_MAX: Final = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -46,22 +43,11 @@ class Network(OwnArrays):
         """Numbers of an action."""
         return len(self.weights[-1])
 
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        """Numbers that the first layer reads, and that each layer computes."""
-        return (self.inputs, *(weight.shape[0] for weight in self.weights))
-
-    @property
-    def widest(self) -> int:
-        """Most numbers that any layer reads or computes."""
-        return max(self.sizes)
-
     def check(self) -> None:
-        """Raise unless the network returns finite actions for every observation.
+        """Raise unless the network can be computed.
 
         Raises:
-            PolicyError: Shapes that do not chain, numbers that are not finite or whose sums can
-                overflow float32, unknown functions.
+            PolicyError: Shapes that do not chain, numbers that are not finite, unknown functions.
         """
         if self.activation not in ACTIVATIONS or self.output not in OUTPUTS:
             raise PolicyError(
@@ -70,17 +56,6 @@ class Network(OwnArrays):
             )
         if not self.weights or len(self.weights) != len(self.biases):
             raise PolicyError("a network needs as many biases as weights, at least one of each")
-        self._check_shapes()
-        for array in self.tensors().values():
-            if array.dtype != np.float32 or not np.isfinite(array).all():
-                raise PolicyError("a network's numbers must be finite float32")
-        if not 0 < self.limit <= LARGEST:
-            raise PolicyError(f"limit={self.limit} of the normalised inputs must be above 0, at most {LARGEST:g}")
-        if (np.abs(self.mean) > LARGEST).any():
-            raise PolicyError(f"the input means must lie within ±{LARGEST:g}")
-        self._check_reach()
-
-    def _check_shapes(self) -> None:
         if self.mean.ndim != 1 or self.scale.shape != self.mean.shape:
             raise PolicyError(
                 f"input statistics of shapes {self.mean.shape} and {self.scale.shape}: both must be (inputs,)"
@@ -93,20 +68,11 @@ class Network(OwnArrays):
                     f"that gives {size} numbers"
                 )
             size = weight.shape[0]
-
-    def _check_reach(self) -> None:
-        """Raise if a sum of the largest possible terms exceeds float32 in some layer."""
-        reach: npt.NDArray[Any] = np.full(self.inputs, float(self.limit))
-        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            terms = np.abs(weight.astype(np.float64)) @ reach
-            reach = terms + np.abs(bias.astype(np.float64))
-            if (reach > _FLOAT_MAX).any():
-                raise PolicyError(
-                    f"the weights of layer {k} are so large (up to {np.abs(weight).max():g}) that "
-                    "its sums can overflow float32: train with smaller weights"
-                )
-            if self.activation == "tanh":
-                reach = np.ones(len(reach))
+        for array in self.tensors().values():
+            if array.dtype != np.float32 or not np.isfinite(array).all():
+                raise PolicyError("a network's numbers must be finite float32")
+        if not 0 < self.limit < math.inf:
+            raise PolicyError(f"limit={self.limit} of the normalised inputs must be a finite number above 0")
 
     def tensors(self) -> dict[str, FloatArray]:
         """Return the arrays by their names in a policy file."""
@@ -116,19 +82,80 @@ class Network(OwnArrays):
             named[f"layers.{k}.bias"] = bias
         return {name: np.ascontiguousarray(array) for name, array in named.items()}
 
-    def flat(self) -> tuple[Any, ...]:
-        """Return the network as :func:`posse_baselines.learned.forward.act` reads it.
-
-        Weights lie input by input, so that the kernel's inner loop vectorises.
-        """
-        weights = [np.ascontiguousarray(weight.T).reshape(-1) for weight in self.weights]
-        return (
+    def flat(self) -> Flat:
+        """Return the network as :func:`forward` reads it."""
+        return Flat(
             np.ascontiguousarray(self.mean),
             np.ascontiguousarray(self.scale),
             np.float32(self.limit),
-            np.array(self.sizes, np.int64),
-            np.concatenate(weights),
+            np.array([self.inputs, *map(len, self.weights)], np.int64),
+            np.concatenate([weight.T.reshape(-1) for weight in self.weights]),
             np.concatenate(self.biases),
             int(self.activation == "tanh"),
             int(self.output == "tanh"),
         )
+
+
+class Flat(NamedTuple):
+    """A network as the kernel reads it."""
+
+    mean: FloatArray
+    scale: FloatArray
+    limit: np.float32
+    sizes: npt.NDArray[np.int64]
+    """Numbers that the first layer reads, and that each layer computes."""
+    weights: FloatArray
+    """Of all layers, input by input, so that the inner loop vectorises."""
+    biases: FloatArray
+    hyperbolic: int
+    squashed: int
+
+
+def forward(network: Flat, inputs: FloatArray) -> FloatArray:
+    """Return the outputs (rows, outputs) for inputs (rows, inputs).
+
+    Each row is computed alone, so that it never depends on the others: the rounding of a matrix library does.
+    """
+    outputs = np.empty((len(inputs), network.sizes[-1]), np.float32)
+    scratch = np.empty((MOST_THREADS, 2, network.sizes.max()), np.float32)
+    # The threads share out rows as if each were a world of one tracker.
+    over_worlds(_forward_rows, (network, inputs, scratch, outputs), len(inputs), 1)
+    return outputs
+
+
+@kernel
+def _forward_rows(
+    network: Flat, inputs: FloatArray, scratch: FloatArray, outputs: FloatArray, thread: int, first: int, end: int
+) -> None:
+    sizes = network.sizes
+    for r in range(first, end):
+        x, y = scratch[thread, 0], scratch[thread, 1]
+        for k in range(sizes[0]):
+            normalised = (inputs[r, k] - network.mean[k]) * network.scale[k]
+            x[k] = min(max(normalised, -network.limit), network.limit)
+        at_weight, at_bias = 0, 0
+        for layer in range(len(sizes) - 1):
+            size, count = sizes[layer], sizes[layer + 1]
+            _add_products(x[:size], network.weights[at_weight:], network.biases[at_bias : at_bias + count], y)
+            at_weight += size * count
+            at_bias += count
+            if layer < len(sizes) - 2:
+                for j in range(count):
+                    y[j] = np.float32(math.tanh(y[j])) if network.hyperbolic else max(y[j], ZERO)
+            x, y = y, x
+        for j in range(sizes[-1]):
+            out = np.float32(math.tanh(x[j])) if network.squashed else x[j]
+            outputs[r, j] = min(max(out, -ONE), ONE)
+
+
+@compiled
+def _add_products(x: FloatArray, weights: FloatArray, biases: FloatArray, y: FloatArray) -> None:
+    """Write biases + weights x to y; weights lie input by input."""
+    count = len(biases)
+    for j in range(count):
+        y[j] = biases[j]
+    for i in range(len(x)):
+        xi = x[i]
+        row = weights[i * count : (i + 1) * count]
+        for j in range(count):
+            y[j] += xi * row[j]

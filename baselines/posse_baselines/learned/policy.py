@@ -1,36 +1,42 @@
-"""Learned policies: a network, its encoding, and a card that says where it comes from."""
+"""Learned policies: a network, its encoding, and a card that says where it comes from.
+
+A policy file is one safetensors file of tensors and JSON, protected by a digest. Reading one
+interprets numbers and JSON and never runs code.
+"""
 
 from __future__ import annotations
 
 import copy
+import hashlib
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
 
 from posse import ObservationLayout
-from posse.numeric import MOST_THREADS, BoolArray, FloatArray, OwnArrays, over_worlds
+from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse.rules import SPLITS
+from posse_baselines.files import write_atomically
 from posse_baselines.learned.advice import MOTION, Adviser, Advising, check_adviser
-from posse_baselines.learned.card import check_card, side_of
-from posse_baselines.learned.encoder import Encoder
-from posse_baselines.learned.encoding import Encoding
-from posse_baselines.learned.features import SCRATCH
-from posse_baselines.learned.forward import act
-from posse_baselines.learned.network import Network
-from posse_baselines.learned.policy_file import read_policy_file, write_policy_file
+from posse_baselines.learned.inputs import Encoder, Encoding
+from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
-from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations, message_size_of
+from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
+SIDES: Final = ("trackers", "target")
+"""What a policy moves."""
+_KEY: Final = "posse-policy"
 
 
-@dataclass
-class _Memory(OwnArrays):
-    """What a learned policy remembers of its worlds; changed in place."""
+class _Memory(NamedTuple):
+    """What a learned policy remembers of its worlds."""
 
     layout: ObservationLayout
     num_worlds: int
@@ -45,7 +51,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
     Args:
         network: Computes the actions.
         encoding: The network's inputs.
-        card: Describes the policy: ``name``, ``trained_splits``, and anything else on record.
+        card: Describes the policy: ``name``, ``side``, ``trained_splits``, and anything else on record.
         adviser: Scripted policy whose proposals the network refines, if any
             (:mod:`posse_baselines.learned.advice`).
         correction: What the network's output corrects: ``"motion"`` or ``"velocity"``.
@@ -75,24 +81,32 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             raise PolicyError(f"the network takes {network.inputs} numbers, its encoding gives {size}")
         if network.outputs < MOTION:
             raise PolicyError(f"the network gives {network.outputs} numbers, an action has {MOTION} or more")
+        if adviser is not None and network.outputs != MOTION:
+            raise PolicyError(
+                f"a network with an adviser gives {MOTION} numbers, this one gives "
+                f"{network.outputs}: the adviser sends the messages"
+            )
         self.network = network
         self.encoding = encoding
-        self._set_card(card)
-        self.message_size = max(network.outputs - MOTION, encoding.message_size)
         self.adviser = adviser
-        if adviser is not None:
-            if network.outputs != MOTION:
-                raise PolicyError(
-                    f"a network with an adviser gives {MOTION} numbers, this one gives "
-                    f"{network.outputs}: the adviser sends the messages"
-                )
-            self.message_size = max(self.message_size, adviser.message_size)
-        self._numbers = network.flat()
+        self.message_size = max(
+            network.outputs - MOTION, encoding.message_size, adviser.message_size if adviser is not None else 0
+        )
+        self._flat = network.flat()
+        self._set_card(card)
 
     def _set_card(self, card: Mapping[str, Any]) -> None:
-        self.name, self.trained_splits = check_card(card)
-        self.side = side_of(card)
-        self.card = dict(card)
+        if not isinstance(card, Mapping):
+            raise PolicyError(f"its card must be a mapping of names to values, not {card!r:.80}")
+        name, side = card.get("name", "learned"), card.get("side", "trackers")
+        splits = card.get("trained_splits", ("train",))
+        if not isinstance(name, str) or not name:
+            raise PolicyError(f"the name on its card, {name!r:.80}, must be a text")
+        if side not in SIDES:
+            raise PolicyError(f"side={side!r:.80} on its card must be {' or '.join(SIDES)}")
+        if not isinstance(splits, (list, tuple)) or any(split not in SPLITS for split in splits):
+            raise PolicyError(f"trained_splits={splits!r:.80} on its card must be a list of {', '.join(SPLITS)}")
+        self.name, self.side, self.trained_splits, self.card = name, side, tuple(splits), dict(card)
 
     def with_card(self, card: Mapping[str, Any]) -> LearnedPolicy:
         """Return the same policy with another card.
@@ -105,16 +119,15 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         return other
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory of ``num_worlds`` worlds: the adviser's.
+        """Return the memory of ``num_worlds`` worlds.
 
         Raises:
             PolicyError: The layout lacks a field that the network reads, or has another size of it.
         """
         super().begin(layout, num_worlds)
-        encoder = Encoder(self.encoding, layout)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
         adviser_memory = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        return _Memory(layout, num_worlds, robots, encoder, adviser_memory)
+        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), adviser_memory)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -123,28 +136,23 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """
         m: _Memory = memory
         observations = check_observations(self, observations, m.num_worlds, m.layout, m.robots)
-        length = MOTION + message_size_of(m.layout)
-        actions = np.empty((m.num_worlds, m.robots, length), np.float32)
-        scratch = np.empty((MOST_THREADS, SCRATCH + 2 * self.network.widest), np.float32)
-        proposals = inputs = actions[..., :0]
-        if self._advising is not None:
-            proposals, inputs, m.adviser = self._advising.ask(observations, m.adviser)
-        over_worlds(
-            act,
-            (observations, *m.encoder.tables, np.ascontiguousarray(inputs), *self._numbers, scratch, actions),
-            m.num_worlds,
-            m.robots,
-        )
-        if self._advising is not None:
-            actions, m.adviser = self._advising.answer(observations, proposals, actions[..., :MOTION], m.adviser)
-        return actions, m
+        team = observations.shape[:2]
+        if self._advising is None:
+            outputs = forward(self._flat, m.encoder.encode(observations))
+            actions = np.zeros((*team, MOTION + m.layout.scenario.message_size), np.float32)
+            actions[..., : outputs.shape[1]] = outputs.reshape(*team, -1)
+            return actions, m
+        proposals, further, advised = self._advising.ask(observations, m.adviser)
+        inputs = np.concatenate([m.encoder.encode(observations), further.reshape(-1, further.shape[-1])], axis=1)
+        corrections = forward(self._flat, inputs).reshape(*team, MOTION)
+        actions, advised = self._advising.answer(observations, proposals, corrections, advised)
+        return actions, m._replace(adviser=advised)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Return the memory with the adviser restarted in the worlds of a mask (E,)."""
-        m: _Memory = memory
-        if self.adviser is not None:
-            m.adviser = self.adviser.restart(m.adviser, mask)
-        return m
+        if self.adviser is None:
+            return memory
+        return memory._replace(adviser=self.adviser.restart(memory.adviser, mask))
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the adviser's memory as arrays by name; views, not copies."""
@@ -181,35 +189,31 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             PolicyError: There is no such file, or it is damaged, truncated, or not a policy file.
         """
         path = Path(path)
-        tensors, description = read_policy_file(path)
+        tensors, text = _read(path)
         try:
-            return cls._from_parts(tensors, description)
+            description = json.loads(text)
+            if description["format"] != FORMAT:
+                raise PolicyError(
+                    f"its format is {description['format']!r:.80}, this version reads {FORMAT}: "
+                    "install the version that wrote it"
+                )
+            count = sum(name.endswith(".weight") for name in tensors)
+            network = Network(
+                mean=tensors["normaliser.mean"],
+                scale=tensors["normaliser.scale"],
+                limit=float(description["limit"]),
+                weights=tuple(tensors[f"layers.{k}.weight"] for k in range(count)),
+                biases=tuple(tensors[f"layers.{k}.bias"] for k in range(count)),
+                activation=str(description["activation"]),
+                output=str(description["output"]),
+            )
+            adviser = _adviser(description["adviser"])
+            encoding = Encoding.from_dict(description["encoding"])
+            return cls(network, encoding, description["card"], adviser, str(description["correction"]))
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
             raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
-
-    @classmethod
-    def _from_parts(cls, tensors: Mapping[str, FloatArray], description: Mapping[str, Any]) -> LearnedPolicy:
-        if description["format"] != FORMAT:
-            raise PolicyError(
-                f"its format is {description['format']!r:.80}, this version reads {FORMAT}: "
-                "install the version that wrote it"
-            )
-        count = sum(name.endswith(".weight") for name in tensors)
-        network = Network(
-            mean=tensors["normaliser.mean"],
-            scale=tensors["normaliser.scale"],
-            limit=float(description["limit"]),
-            weights=tuple(tensors[f"layers.{k}.weight"] for k in range(count)),
-            biases=tuple(tensors[f"layers.{k}.bias"] for k in range(count)),
-            activation=str(description["activation"]),
-            output=str(description["output"]),
-        )
-        encoding = Encoding.from_dict(description["encoding"])
-        return cls(
-            network, encoding, description["card"], _adviser(description["adviser"]), str(description["correction"])
-        )
 
 
 def _adviser(name: str | None) -> Adviser | None:
@@ -221,3 +225,36 @@ def _adviser(name: str | None) -> Adviser | None:
             f"its adviser {name!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
         )
     return check_adviser(name, SCRIPTED[name]())
+
+
+def write_policy_file(path: Path, tensors: Mapping[str, FloatArray], description: Any) -> None:
+    """Write a policy file; its description is any JSON."""
+    text = json.dumps(description, sort_keys=True)
+    write_atomically(path, save(dict(tensors), {_KEY: text, "digest": _digest(tensors, text)}))
+
+
+def _read(path: Path) -> tuple[dict[str, FloatArray], str]:
+    """Return the tensors and the description of a policy file."""
+    if not path.is_file():
+        raise PolicyError(f"there is no policy file {path}")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+            metadata = file.metadata() or {}
+    except (SafetensorError, OSError, TypeError, ValueError) as error:
+        raise PolicyError(f"{path} is damaged, truncated, or not a policy file: {error!s:.200}") from error
+    text = metadata.get(_KEY)
+    if text is None:
+        raise PolicyError(f"{path} is a safetensors file, but holds no policy of posse")
+    if metadata.get("digest") != _digest(tensors, text):
+        raise PolicyError(f"{path} is damaged: its digest does not match its contents")
+    return tensors, text
+
+
+def _digest(tensors: Mapping[str, FloatArray], text: str) -> str:
+    """Return a hash over all that a file says."""
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(tensors):
+        digest.update(f"{name} {tensors[name].dtype} {tensors[name].shape}".encode())
+        digest.update(np.ascontiguousarray(tensors[name]).tobytes())
+    return digest.hexdigest()

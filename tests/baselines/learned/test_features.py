@@ -11,8 +11,7 @@ from tests.support.learned import observations_of
 import posse
 from posse.scenarios.formation import FORMATIONS
 from posse_baselines.learned import Encoder, Encoding
-from posse_baselines.learned.features import NUM_FEATURES
-from posse_baselines.learned.team import match_slots
+from posse_baselines.learned.features import NUM_FEATURES, match_slots
 
 
 def test_own_slot_is_where_the_state_says() -> None:
@@ -52,7 +51,7 @@ def test_nothing_known_of_the_target_is_zeros() -> None:
 def test_no_swap_shortens_an_assignment(robots: int, slots: int, seed: int) -> None:
     ways = np.random.default_rng(seed).uniform(0, 10, (robots, slots)).astype(np.float32)
     chosen = np.empty(robots, np.float32)
-    match_slots(robots, slots, ways.reshape(-1), chosen)
+    match_slots(robots, slots, ways.T, chosen)
     given_out = [int(s) for s in chosen if s >= 0]
     assert len(given_out) == len(set(given_out)) == min(robots, slots)
     if robots <= slots:

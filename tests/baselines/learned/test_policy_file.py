@@ -1,4 +1,4 @@
-"""Policy files give back the policy; damaged and forged ones are refused by name, and reading one runs no code."""
+"""Policy files give back the policy; other and damaged ones are refused by name, and reading one runs no code."""
 
 from __future__ import annotations
 
@@ -12,36 +12,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors import safe_open
 from safetensors.numpy import save_file
 from tests.support.learned import any_policy, observations_of
 
-import posse
-from posse_baselines import Policy, PolicyError, load, play
+from posse_baselines import Policy, PolicyError, load
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.learned.policy_file import write_policy_file
+from posse_baselines.learned.policy import write_policy_file
 
 POLICY = any_policy()
 TENSORS = POLICY.network.tensors()
 PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
-FORBIDDEN = (
-    "exec",
-    "compile",
-    "import",
-    "os.system",
-    "os.exec",
-    "os.posix_spawn",
-    "subprocess.Popen",
-    "pickle.find_class",
-)
+RUNS_CODE = ("exec", "compile", "import", "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen")
 _seen: list[str] | None = None
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
     writes = event == "open" and any(letter in str(arguments[1] or "r") for letter in "wax+")
-    if _seen is not None and (event in FORBIDDEN or writes):
+    if _seen is not None and (event in (*RUNS_CODE, "pickle.find_class") or writes):
         _seen.append(f"{event} {arguments!r:.200}")
 
 
@@ -62,24 +52,19 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@pytest.fixture
-def described(tmp_path: Path, whole: bytes) -> dict[str, Any]:
-    """The description in a policy file."""
-    (tmp_path / "plain.safetensors").write_bytes(whole)
-    with safe_open(tmp_path / "plain.safetensors", framework="numpy") as file:
+@pytest.fixture(scope="module")
+def described(whole: bytes, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    path = tmp_path_factory.mktemp("described") / "mine.safetensors"
+    path.write_bytes(whole)
+    with safe_open(path, framework="numpy") as file:
         found: dict[str, Any] = json.loads(file.metadata()["posse-policy"])
     return found
 
 
-def forged(folder: Path, description: Any, tensors: dict[str, Any] = TENSORS) -> Path:
-    """Write a file of these contents with the digest that belongs to them."""
-    path = folder / "forged.safetensors"
-    write_policy_file(path, tensors, description)
-    return path
-
-
-def test_a_file_gives_back_the_policy(tmp_path: Path, described: dict[str, Any]) -> None:
-    again = LearnedPolicy.from_file(forged(tmp_path, described))
+def test_a_file_gives_back_the_policy(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "policy.safetensors"
+    path.write_bytes(whole)
+    again = LearnedPolicy.from_file(path)
     assert (again.name, again.trained_splits, again.card) == ("mine", ("train",), POLICY.card)
     assert again.encoding == POLICY.encoding
     np.testing.assert_array_equal(actions_of(again), actions_of(POLICY))
@@ -97,9 +82,6 @@ def test_playing_a_file_needs_no_torch(tmp_path: Path, whole: bytes) -> None:
     assert done.stdout.strip() == "False", done.stderr
 
 
-# --- any bytes -----------------------------------------------------------------------------------
-
-
 def read(content: bytes) -> Policy | None:
     """Return the policy in a file of these bytes, or None where it is refused; nothing runs and nothing is written."""
     global _seen
@@ -115,7 +97,6 @@ def read(content: bytes) -> Policy | None:
         finally:
             found, _seen = _seen, None
         assert found == []
-        assert [each.name for each in Path(folder).iterdir()] == [path.name]
     assert policy is not None or (str(path) in message and len(message) < 2000)
     return policy
 
@@ -128,31 +109,13 @@ def test_random_bytes_are_refused(content: bytes) -> None:
 
 
 @PROPERTY
-@given(data=st.data())
-def test_changed_bytes_are_refused_or_play_the_same(whole: bytes, data: st.DataObject) -> None:
-    first = data.draw(st.integers(0, len(whole)) | st.integers(0, 3000))
-    length = data.draw(st.sampled_from((0, 1, 1, 64)))
-    changed = whole[:first] + data.draw(st.binary(max_size=length)) + whole[first + length :]
-    assume(changed != whole)
-    policy = read(changed)
-    assert policy is None or np.array_equal(actions_of(policy), actions_of(POLICY))
-
-
-@PROPERTY
-@given(where=st.floats(0, 0.999999), bit=st.integers(0, 7))
-def test_a_flipped_bit_is_refused_or_plays_the_same(whole: bytes, where: float, bit: int) -> None:
+@given(where=st.floats(0, 0.999999) | st.floats(0, 0.01), bit=st.integers(0, 7), kept=st.floats(0, 1))
+def test_a_damaged_file_is_refused_or_plays_the_same(whole: bytes, where: float, bit: int, kept: float) -> None:
     flipped = bytearray(whole)
     flipped[int(where * len(whole))] ^= 1 << bit
     policy = read(bytes(flipped))
     assert policy is None or np.array_equal(actions_of(policy), actions_of(POLICY))
-
-
-def test_the_watch_notices_a_file_that_is_written(tmp_path: Path) -> None:
-    global _seen
-    _seen = []
-    (tmp_path / "other").write_bytes(b"")
-    found, _seen = _seen, None
-    assert len(found) == 1
+    assert kept == 1 or read(whole[: int(kept * len(whole))]) is None
 
 
 class _Planted:
@@ -165,7 +128,7 @@ class _Planted:
         return Path.touch, (self._file,)
 
 
-def test_other_files_are_refused_and_not_run(tmp_path: Path, whole: bytes) -> None:
+def test_other_files_are_refused_and_not_run(tmp_path: Path) -> None:
     path = tmp_path / "other.safetensors"
     with pytest.raises(PolicyError, match="there is no policy file"):
         LearnedPolicy.from_file(path)
@@ -175,16 +138,11 @@ def test_other_files_are_refused_and_not_run(tmp_path: Path, whole: bytes) -> No
     path.write_bytes(pickle.dumps(_Planted(tmp_path / "it_ran")))
     with pytest.raises(PolicyError, match="not a policy file"):
         LearnedPolicy.from_file(path)
-    for share in (0.0, 0.001, 0.5, 0.999):
-        path.write_bytes(whole[: int(share * len(whole))])
-        with pytest.raises(PolicyError, match="truncated"):
-            LearnedPolicy.from_file(path)
     assert list(tmp_path.iterdir()) == [path]
 
 
-# --- forged contents with a correct digest -------------------------------------------------------
-
-ENCODING = {"kind": "plain", "neighbours": 0, "fields": []}
+MANY = {"kind": "plain", "neighbours": 10**9, "fields": []}
+LONG = {"kind": "plain", "neighbours": 0, "fields": [["speed", 10**9, "m/s", 0, False]]}
 
 
 @pytest.mark.parametrize(
@@ -192,49 +150,39 @@ ENCODING = {"kind": "plain", "neighbours": 0, "fields": []}
     [
         ({"format": 2}, "its format is 2, this version reads 1"),
         ({"limit": "wide"}, "damaged"),
-        ({"limit": 1e300}, "limit=1e\\+300"),
         ({"limit": float("nan")}, "limit=nan"),
         ({"activation": "x" * 5000}, "unknown activation"),
-        ({"output": []}, "unknown activation"),
         ({"adviser": "os:system"}, "its adviser 'os:system' is none of"),
         ({"adviser": "planner"}, "cannot be an adviser"),
-        ({"adviser": ["pursuit"]}, "damaged"),
         ({"adviser": "ddcs-distributed"}, "the network takes"),
-        ({"encoding": None}, "inputs is damaged"),
-        ({"encoding": {**ENCODING, "neighbours": 10**9}}, "inputs is damaged"),
-        ({"encoding": {**ENCODING, "fields": [["speed", 10**9, "m/s", 0, False]]}}, "takes"),
-        ({"encoding": {**ENCODING, "fields": [["x", 1, "", float("nan"), False]]}}, "damaged"),
+        ({"encoding": None}, "damaged"),
+        ({"encoding": {**MANY, "kind": "fancy"}}, "encodings are: plain"),
+        ({"encoding": MANY}, "neighbours=1000000000 must lie in"),
+        ({"encoding": LONG}, "takes"),
         ({"card": "name"}, "card must be a mapping"),
         ({"card": {"name": 3}}, "name on its card, 3"),
-        ({"card": {"name": "x" * 400}}, "1 to 100 printable"),
-        ({"card": {"name": "a\nb"}}, "printable"),
+        ({"card": {"side": "both"}}, "side='both'"),
         ({"card": {"trained_splits": ["trian"]}}, "trained_splits="),
-        ({"card": {"trained_splits": 3}}, "trained_splits=3"),
     ],
 )
 def test_descriptions_that_make_no_policy(
     tmp_path: Path, described: dict[str, Any], changes: dict[str, Any], message: str
 ) -> None:
-    path = forged(tmp_path, {**described, **changes})
+    path = tmp_path / "forged.safetensors"
+    write_policy_file(path, TENSORS, {**described, **changes})
     with pytest.raises(PolicyError, match=message) as caught:
         LearnedPolicy.from_file(path)
     assert str(path) in str(caught.value)
     assert len(str(caught.value)) < 1000
 
 
-def test_descriptions_that_lack_something_or_are_of_another_kind(
-    tmp_path: Path, described: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for missing in described:
-        with pytest.raises(PolicyError, match=f"damaged: KeyError.*{missing}"):
-            LearnedPolicy.from_file(forged(tmp_path, {k: v for k, v in described.items() if k != missing}))
-    others: tuple[Any, ...] = (None, 3, "text", [[]], {})
-    for other in others:
+def test_descriptions_that_lack_something_or_are_of_another_kind(tmp_path: Path, described: dict[str, Any]) -> None:
+    path = tmp_path / "forged.safetensors"
+    lacking = [{k: v for k, v in described.items() if k != missing} for missing in described]
+    for description in (*lacking, None, 3, "text", [[]]):
+        write_policy_file(path, TENSORS, description)
         with pytest.raises(PolicyError, match="damaged"):
-            LearnedPolicy.from_file(forged(tmp_path, other))
-    monkeypatch.setattr("posse_baselines.learned.policy_file.json.dumps", lambda *_, **__: "[" * 200_000)
-    with pytest.raises(PolicyError, match="nested too deeply"):
-        LearnedPolicy.from_file(forged(tmp_path, None))
+            LearnedPolicy.from_file(path)
 
 
 @pytest.mark.parametrize(
@@ -243,30 +191,13 @@ def test_descriptions_that_lack_something_or_are_of_another_kind(
         ("normaliser.mean", np.zeros((3, 3), np.float32)),
         ("normaliser.scale", np.zeros(0, np.float32)),
         ("layers.0.weight", TENSORS["layers.0.weight"].astype(np.float64)),
-        ("layers.1.weight", np.full_like(TENSORS["layers.1.weight"], 1e38)),
         ("layers.2.bias", np.full_like(TENSORS["layers.2.bias"], np.nan)),
         ("layers.2.weight", TENSORS["layers.2.weight"][:1]),
         ("layers.7.weight", TENSORS["layers.2.weight"]),
     ],
 )
 def test_arrays_that_make_no_network(tmp_path: Path, described: dict[str, Any], name: str, array: Any) -> None:
+    path = tmp_path / "forged.safetensors"
+    write_policy_file(path, {**TENSORS, name: array}, described)
     with pytest.raises(PolicyError, match=r"forged\.safetensors"):
-        LearnedPolicy.from_file(forged(tmp_path, described, {**TENSORS, name: array}))
-
-
-@settings(derandomize=True, database=None, deadline=None, max_examples=40)
-@given(exponents=st.lists(st.floats(0, 38), min_size=4, max_size=4), activation=st.sampled_from(["tanh", "relu"]))
-def test_whatever_is_accepted_acts_in_the_box(exponents: list[float], activation: str) -> None:
-    """Finite weights that could overflow are refused; all others give finite actions."""
-    described = {"format": 1, "limit": 5.0, "activation": activation, "output": "clip", "adviser": None}
-    described |= {"correction": "motion", "encoding": POLICY.encoding.to_dict(), "card": {}}
-    scaled = dict(TENSORS)
-    for (name, array), exponent in zip(list(TENSORS.items())[1:5], exponents, strict=True):
-        with np.errstate(over="ignore"):
-            scaled[name] = np.clip(array * np.float32(10**exponent), -3e38, 3e38)
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            policy = LearnedPolicy.from_file(forged(Path(folder), described, scaled))
-        except PolicyError:
-            return
-        assert np.isfinite(play(posse.batch("smart", 4, horizon=5, settle_time=0.5), policy)["score"]).all()
+        LearnedPolicy.from_file(path)

@@ -68,9 +68,7 @@ def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
     return tensor.detach().cpu().numpy().astype(np.float32)
 
 
-def make_card(
-    settings: TrainSettings, encoding: Encoding, *, steps: int, curve: list[dict[str, float]]
-) -> dict[str, Any]:
+def make_card(settings: TrainSettings, *, steps: int, curve: list[dict[str, float]]) -> dict[str, Any]:
     """Return a policy's card: its training scenarios, settings, software and scores."""
     scenarios = settings.scenarios
     return {
@@ -80,8 +78,6 @@ def make_card(
         "trained_splits": ["train"],
         "chosen_on": "validation",
         "message_size": settings.message_size,
-        "encoding": encoding.to_dict(),
-        "encoding_hash": encoding.digest,
         "command": " ".join(["posse", *sys.argv[1:]]),
         "settings": settings.to_dict(),
         "seed": settings.seed,

@@ -1,0 +1,200 @@
+"""What a learned policy's network reads of an observation.
+
+A network has inputs of a fixed meaning, while a scenario's observation depends on its team size and
+message length. An :class:`Encoding` lists the fields that the network reads and the number of
+team-mates, and finds them in any layout that has them: surplus team-mates are left out, missing
+ones are filled with the field's value for "unknown". An :class:`Encoder` applies it to a layout.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import ObservationLayout
+from posse.numeric import MOST_THREADS, FloatArray, OwnArrays, Records, kernel, over_worlds
+from posse_baselines.laws.offsets import offsets_of
+from posse_baselines.learned.features import NUM_FEATURES, scratch_for, write_features
+from posse_baselines.policy import PolicyError
+
+KINDS: Final = ("plain", "slots", "belief")
+"""``plain``: the observation; ``slots``: :mod:`posse_baselines.learned.features`, then the
+observation; ``belief``: the same, and behind the adviser's proposal what the adviser believes
+(:mod:`posse_baselines.learned.advice`), which is no part of the encoding's ``size``."""
+MOST_NEIGHBOURS: Final = 4096
+"""Team-mates that an encoding reads, at most."""
+
+
+@dataclass(frozen=True)
+class EncodedField:
+    """One field that a network reads; ``unknown`` replaces it where it is missing."""
+
+    name: str
+    size: int
+    unit: str
+    unknown: float
+    of_neighbour: bool
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """Which numbers a network reads, in order.
+
+    Attributes:
+        kind: One of :data:`KINDS`.
+        neighbours: Number of team-mates that it reads, nearest first.
+        fields: The fields that it reads; a team-mate's fields are listed once.
+
+    Raises:
+        PolicyError: An unknown kind, or a number out of its range.
+    """
+
+    kind: str
+    neighbours: int
+    fields: tuple[EncodedField, ...]
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise PolicyError(f"unknown encoding {self.kind!r:.80}; encodings are: {', '.join(KINDS)}")
+        if not 0 <= self.neighbours <= MOST_NEIGHBOURS:
+            raise PolicyError(f"neighbours={self.neighbours} must lie in [0, {MOST_NEIGHBOURS}]")
+        for field in self.fields:
+            if field.size < 1 or not math.isfinite(field.unknown):
+                raise PolicyError(f"the field {field!r:.200} must have a size above 0 and a finite value for unknown")
+
+    @classmethod
+    def of(cls, layout: ObservationLayout, kind: str = "plain", neighbours: int | None = None) -> Encoding:
+        """Return the encoding that reads every field of a layout.
+
+        Args:
+            layout: Layout of the training scenario.
+            kind: One of :data:`KINDS`.
+            neighbours: Number of team-mates to read; default: as many as the layout has.
+        """
+        fields = tuple(
+            EncodedField(f.name, f.size, f.unit, float(f.unknown or 0), f.of_neighbour) for f in layout.fields
+        )
+        return cls(kind, layout.neighbours if neighbours is None else neighbours, fields)
+
+    @property
+    def message_size(self) -> int:
+        """Numbers of a team-mate's message that it reads."""
+        return sum(f.size for f in self.fields if f.name == "neighbour_message")
+
+    @property
+    def size(self) -> int:
+        """Number of network inputs."""
+        read = sum(f.size * (self.neighbours if f.of_neighbour else 1) for f in self.fields)
+        return read + (NUM_FEATURES if self.with_features else 0)
+
+    @property
+    def with_features(self) -> bool:
+        """Whether derived features precede the observation."""
+        return self.kind != "plain"
+
+    @property
+    def believes(self) -> bool:
+        """Whether the network also reads the adviser's belief."""
+        return self.kind == "belief"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the encoding as plain values."""
+        return {"kind": self.kind, "neighbours": self.neighbours, "fields": [list(astuple(f)) for f in self.fields]}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Encoding:
+        """Return the encoding of :meth:`to_dict`.
+
+        Raises:
+            PolicyError, KeyError, TypeError, ValueError: The values do not describe an encoding.
+        """
+        fields = tuple(
+            EncodedField(str(name), int(size), str(unit), float(unknown), bool(of_neighbour))
+            for name, size, unit, unknown, of_neighbour in values["fields"]
+        )
+        return cls(str(values["kind"]), int(values["neighbours"]), fields)
+
+    def columns(self, layout: ObservationLayout) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """Return the column of each number in an observation, -1 where it is missing, and its value there.
+
+        Raises:
+            PolicyError: The layout lacks a field, or has it in another size or unit.
+        """
+        known = {f.name: f for f in layout.fields}
+        for mine in self.fields:
+            theirs = known.get(mine.name)
+            size = theirs.size if theirs else 0
+            if mine.name == "neighbour_message":  # surplus numbers of messages are left out
+                size = min(size, mine.size)
+            if theirs and (size, theirs.unit) == (mine.size, mine.unit):
+                continue
+            found = f"{theirs.size} x {theirs.unit!r}" if theirs else "no such field"
+            raise PolicyError(
+                f"the observations of scenario {layout.scenario.name!r} do not fit: the policy "
+                f"reads {mine.name!r:.80} as {mine.size} x {mine.unit!r:.80}, the scenario has "
+                f"{found}; play it with the settings on its card"
+            )
+        own = [(f, 0) for f in self.fields if not f.of_neighbour]
+        mates = [(f, place) for place in range(self.neighbours) for f in self.fields if f.of_neighbour]
+        columns: list[int] = []
+        unknown: list[float] = []
+        for field, place in own + mates:
+            start = layout.offsets[field.name] + place * layout.stride
+            there = not field.of_neighbour or place < layout.neighbours
+            columns += range(start, start + field.size) if there else [-1] * field.size
+            unknown += [field.unknown] * field.size
+        return np.array(columns, np.int64), np.array(unknown, np.float32)
+
+
+class _Tables(NamedTuple):
+    """An encoding for one layout, as the kernel reads it."""
+
+    columns: npt.NDArray[np.int64]
+    unknown: FloatArray
+    offsets: Records
+    """(1,) of the fields in the observation."""
+    slots: FloatArray
+    """(N, 2) positions in the slot frame, m."""
+    num_features: int
+
+
+class Encoder(OwnArrays):
+    """An encoding applied to the observations of one layout.
+
+    Raises:
+        PolicyError: The layout does not fit.
+    """
+
+    def __init__(self, encoding: Encoding, layout: ObservationLayout) -> None:
+        self.encoding = encoding
+        slots = np.array(layout.scenario.slot_offsets, np.float32)
+        num_features = NUM_FEATURES if encoding.with_features else 0
+        self._tables = _Tables(*encoding.columns(layout), offsets_of(layout), slots, num_features)
+        self._scratch = np.empty((MOST_THREADS, *scratch_for(len(slots))), np.float32)
+
+    def encode(self, observations: FloatArray, out: FloatArray | None = None) -> FloatArray:
+        """Return (..., F) observations as (rows, size), written to ``out`` if given."""
+        rows = np.ascontiguousarray(observations).reshape(-1, observations.shape[-1])
+        if out is None:
+            out = np.empty((len(rows), self.encoding.size), np.float32)
+        # The threads share out rows as if each were a world of one tracker.
+        over_worlds(_encode_rows, (rows, self._tables, self._scratch, out), len(rows), 1)
+        return out
+
+
+@kernel
+def _encode_rows(
+    rows: FloatArray, tables: _Tables, scratch: FloatArray, out: FloatArray, thread: int, first: int, end: int
+) -> None:
+    n = tables.num_features
+    for r in range(first, end):
+        if n:
+            write_features(rows[r], tables.offsets[0], tables.slots, scratch[thread], out[r, :n])
+        for k in range(len(tables.columns)):
+            c = tables.columns[k]
+            out[r, n + k] = rows[r, c] if c >= 0 else tables.unknown[k]
