@@ -25,8 +25,7 @@ import tyro
 from posse import Scenario, get_scenario
 from posse_baselines import Target, load_target
 from posse_baselines.learned import LearnedPolicy
-from posse_baselines.registry import LEARNED, SHIPPED
-from posse_baselines.targets import SHIPPED_TARGETS
+from posse_baselines.registry import LEARNED, SHIPPED, SHIPPED_TARGETS
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import difference, mean

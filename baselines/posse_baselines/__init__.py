@@ -16,8 +16,7 @@ from posse_baselines.playing import (
 )
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin, from_function
-from posse_baselines.registry import load, policy_names
-from posse_baselines.targets import Target, load_target, target_names
+from posse_baselines.registry import Target, load, load_target, policy_names, target_names
 from posse_baselines.tracker_env import register
 
 register()

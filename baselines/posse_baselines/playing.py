@@ -12,7 +12,7 @@ import numpy.typing as npt
 from posse import Batch, ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, StateReader, begin
-from posse_baselines.targets import Target
+from posse_baselines.registry import Target
 
 Array = npt.NDArray[Any]
 
@@ -187,12 +187,10 @@ class Played:
 
     Attributes:
         running: (E,) whether the first episode of each world was in play.
-        ended: (E,) whether an episode has ended.
         memory: The policy's memory, before it acts on the next frame.
     """
 
     running: BoolArray
-    ended: BoolArray
     memory: Memory
 
 
@@ -256,7 +254,7 @@ def rollout(
             memory = policy.restart(memory, begins)
         begins = ended
         if after_step is not None:
-            after_step(Played(running, ended, memory))
+            after_step(Played(running, memory))
         if batch.autoreset == "disabled" and ended.any() and not ended.all():
             raise PolicyError("episodes of this batch end at different steps: play it with an autoreset mode")
     return recorder.trajectory()
@@ -340,12 +338,6 @@ class Match(BasePolicy):
     def annotations(self, memory: Memory) -> Annotations:
         """Return those of the trackers' policy."""
         return self.policy.annotations(memory[0])
-
-    def leaders(self, memory: Memory) -> npt.NDArray[Any] | None:
-        """Return the leader of each tracker, as the trackers' policy says."""
-        if isinstance(self.policy, BasePolicy):
-            return self.policy.leaders(memory[0])
-        return super().leaders(memory)
 
 
 def against(policy: Policy, target: Target | None) -> Policy:

@@ -100,10 +100,6 @@ class BasePolicy:
         """Return internal quantities of the trackers."""
         return {}
 
-    def leaders(self, memory: Memory) -> npt.NDArray[Any] | None:
-        """Return the leader of each tracker, (E, N), -1: none; ``None``: no leaders."""
-        return self.annotations(memory).get("leader")
-
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the memory as arrays (E, ...) by name; views, not copies."""
         return {}
@@ -112,18 +108,13 @@ class BasePolicy:
         return f"<policy {self.name!r}>"
 
 
-def message_size_of(layout: ObservationLayout) -> int:
-    """Return m, the numbers that a policy may add to each broadcast."""
-    return layout.scenario.message_size
-
-
 def check_fits(policy: Policy | BasePolicy, layout: ObservationLayout) -> None:
     """Raise if a policy's messages are longer than the scenario's.
 
     Raises:
         PolicyError: ``message_size`` of the scenario is too small.
     """
-    available = message_size_of(layout)
+    available = layout.scenario.message_size
     if available < policy.message_size:
         raise PolicyError(
             f"policy {policy.name!r} adds {policy.message_size} numbers to each broadcast, but "

@@ -1,14 +1,19 @@
-"""Policies by name, by file, or by the module and class that defines them."""
+"""Policies and targets by name, by file, or by the module and class that defines them.
+
+A target is a scripted motion of the scenario, or a policy that moves it: learned, or your own.
+"""
 
 from __future__ import annotations
 
 import difflib
 import importlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
+from posse import TARGET_MOTIONS, Scenario, TargetPolicy
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
@@ -18,11 +23,41 @@ _FILES: Final[dict[str, Callable[[Path], Policy]]] = {".safetensors": LearnedPol
 """Readers of policy files, by suffix."""
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """The folder of the learned policies that come with the package."""
+SHIPPED_TARGETS: Final = SHIPPED / "targets"
+"""The folder of the learned targets that come with the package."""
 LEARNED: Final = "learned-"
 """Prefix of the names of learned policies."""
-_LONGEST: Final = 4096  # characters of a name
-_SHOWN: Final = 100  # characters of a name in a message
+AGENT: Final = "agent"
+"""The motion of a target that a policy moves."""
 _MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target, however it is moved.
+
+    Attributes:
+        name: Its name in results.
+        motion: The scenario's ``target_motion``; ``"agent"`` where a policy moves it.
+        policy: That policy; ``None`` for a scripted motion.
+    """
+
+    name: str
+    motion: str
+    policy: TargetPolicy | None = None
+
+    @property
+    def trained_splits(self) -> tuple[str, ...]:
+        """Splits whose worlds it was trained on."""
+        return tuple(getattr(self.policy, "trained_splits", ()))
+
+    def fit(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with this target.
+
+        Raises:
+            ScenarioError: The scenario's settings do not fit the motion.
+        """
+        return scenario.replace(target_motion=self.motion)
 
 
 def policy_names() -> tuple[str, ...]:
@@ -33,6 +68,16 @@ def policy_names() -> tuple[str, ...]:
 def shipped() -> dict[str, Path]:
     """Return the files of the learned policies that come with the package, by name."""
     return {path.stem: path for path in sorted(SHIPPED.glob(f"{LEARNED}*.safetensors"))}
+
+
+def target_names() -> tuple[str, ...]:
+    """Return the names of all targets: the motions that are declared, then the learned ones."""
+    return (*(name for name in TARGET_MOTIONS if name != AGENT), *shipped_targets())
+
+
+def shipped_targets() -> dict[str, Path]:
+    """Return the files of the learned targets that come with the package, by name."""
+    return {path.stem: path for path in sorted(SHIPPED_TARGETS.glob("*.safetensors"))}
 
 
 def load(policy: str | Path) -> Policy:
@@ -48,53 +93,67 @@ def load(policy: str | Path) -> Policy:
             or of an unknown kind, a module or class that cannot be found or fails, or one that is
             not a policy, or moves the target.
     """
-    found = load_any(policy)
-    if getattr(found, "side", "trackers") == "target":
-        raise PolicyError(f"{_short(str(policy))} is the policy of a target: give it as target=, or --target")
-    return found
-
-
-def load_any(policy: str | Path) -> Policy:
-    """Return a policy as :func:`load` does, also one that moves the target.
-
-    Raises:
-        PolicyError: As :func:`load`.
-    """
     text = str(policy)
-    if not 0 < len(text) <= _LONGEST or "\0" in text:
-        raise PolicyError(
-            f"{_short(text)} cannot be a policy: a name or path has 1 to {_LONGEST} characters and no NUL"
-        )
     if text in SCRIPTED:
         return SCRIPTED[text]()
-    learned = shipped()
-    if text in learned:
-        return _from_file(learned[text])
-    path = Path(text)
+    path = shipped().get(text, Path(text))
     if path.suffix in _FILES or is_file(path):
-        return _from_file(path)
+        if path.suffix not in _FILES:
+            raise PolicyError(f"{path} is not a policy file: known suffixes are {', '.join(_FILES)}")
+        found = _FILES[path.suffix](path)
+        if getattr(found, "side", "trackers") == "target":
+            raise PolicyError(f"{text!r} is the policy of a target: give it as target=, or --target")
+        return found
     if ":" in text:
-        return _from_module(text)
-    if text.startswith(LEARNED):
-        raise PolicyError(
-            f"no policy {_short(text)} is shipped; shipped learned ones are: "
-            f"{', '.join(learned) or 'none yet'}. Train one with posse train, and pass its file"
-        )
+        made = _from_module(text)
+        if not isinstance(made, Policy):
+            raise PolicyError(
+                f"{text!r:.120} is not a policy: it must have name, message_size, reads_state, begin, "
+                "act, restart and annotations, as posse_baselines.Policy says"
+            )
+        return made
     if is_file(path / "best.safetensors"):
         raise PolicyError(f"{text!r} is a run folder: its policy is {path / 'best.safetensors'}")
-    near = difflib.get_close_matches(text[:_SHOWN], policy_names(), n=3, cutoff=0.5)
-    hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-    raise PolicyError(
-        f"unknown policy {_short(text)}{hint}; policies are: {', '.join(policy_names())}, a file, "
-        'or "package.module:Class"'
-    )
+    raise _unknown("policy", "policies", text, policy_names())
+
+
+def load_target(target: str | Path | Target) -> Target:
+    """Return a target by name, from a policy file, or from ``"package.module:Class"``.
+
+    ``"package.module:Class"`` **runs code**, as with :func:`posse_baselines.load`; the object needs
+    the methods of :class:`posse.TargetPolicy`. A target is returned as it is.
+
+    Raises:
+        PolicyError: An unknown name (the message has similar ones), a file that is missing, damaged
+            or the policy of a team, a module or class that cannot be found, fails or lacks a
+            method.
+    """
+    if isinstance(target, Target):
+        return target
+    text = str(target)
+    if text in TARGET_MOTIONS and text != AGENT:
+        return Target(text, text)
+    path = shipped_targets().get(text, Path(text))
+    if path.suffix == ".safetensors" or is_file(path):
+        policy = LearnedPolicy.from_file(path)
+        if policy.side != "target":
+            raise PolicyError(f"{path} is the policy of a team, {policy.name!r}, not of a target")
+        return Target(policy.name, AGENT, policy)
+    if ":" in text:
+        made = _from_module(text)
+        missing = [name for name in ("begin", "act", "restart") if not callable(getattr(made, name, None))]
+        if missing:
+            raise PolicyError(
+                f"{text!r:.120} is not the policy of a target: it lacks {', '.join(missing)}, "
+                "as posse.TargetPolicy says"
+            )
+        return Target(getattr(made, "name", text), AGENT, made)
+    raise _unknown("target", "targets", text, target_names())
 
 
 def ships_or_is_file(policy: Any) -> bool:
     """Return whether this is the name of a shipped policy or the path of a policy file."""
-    if not isinstance(policy, str) or "\0" in policy:
-        return False
-    return policy in SCRIPTED or policy in shipped() or Path(policy).suffix in _FILES
+    return isinstance(policy, str) and (policy in policy_names() or Path(policy).suffix in _FILES)
 
 
 def is_code(policy: str) -> bool:
@@ -102,76 +161,41 @@ def is_code(policy: str) -> bool:
     return ":" in policy and not ships_or_is_file(policy) and not is_file(policy)
 
 
-def _short(text: str) -> str:
-    """Return a name as a message shows it."""
-    if len(text) <= _SHOWN:
-        return repr(text)
-    return f"{text[: _SHOWN - 40]!r}... ({len(text):,} characters)"
-
-
 def is_file(path: str | Path) -> bool:
     """Return whether a path is a file; ``False`` also for a path that no file can have."""
     try:
         return Path(path).is_file()
-    except (OSError, ValueError):  # a name that no file can have
+    except (OSError, ValueError):
         return False
 
 
-def _from_file(path: Path) -> Policy:
-    if path.suffix not in _FILES:
-        raise PolicyError(f"{path} is not a policy file: known suffixes are {', '.join(_FILES)}")
-    if not is_file(path):
-        raise PolicyError(f"there is no policy file {_short(str(path))}")
-    return _FILES[path.suffix](path)
-
-
-def _from_module(text: str) -> Policy:
-    made = from_module(text)
-    try:
-        complete = isinstance(made, Policy)
-    except Exception as error:  # whatever an attribute raises
-        raise _cannot_be_created(text, error) from error
-    if not complete:
-        raise PolicyError(
-            f"{_short(text)} is not a policy: it must have name, message_size, reads_state, begin, "
-            "act, restart and annotations, as posse_baselines.Policy says"
-        )
-    if type(made.name) is not str or type(made.message_size) is not int or made.message_size < 0:
-        raise PolicyError(
-            f"{_short(text)} is not a policy: name={made.name!r:.80} must be a str, and "
-            f"message_size={made.message_size!r:.80} an int of at least 0"
-        )
-    return cast("Policy", made)
-
-
-def from_module(text: str) -> Any:
-    """Return what ``"package.module:Class"`` makes, or an attribute that is no class.
-
-    Raises:
-        PolicyError: The module or the attribute cannot be found, or fails.
-    """
+def _from_module(text: str) -> Any:
+    """Return what ``"package.module:Class"`` makes, or an attribute that is no class."""
     if not _MODULE.fullmatch(text):
-        raise PolicyError(f"{_short(text)} names no class: write package.module:Class, for example my_policies:Circle")
+        raise PolicyError(f"{text!r:.120} names no class: write package.module:Class, for example my_policies:Circle")
     module_name, _, attribute = text.partition(":")
     try:
         module = importlib.import_module(module_name)
     except Exception as error:  # whatever the module's code raises
-        raise PolicyError(f"cannot import {module_name!r} of policy {_short(text)}: {_describe(error)}") from error
+        why = f"{error}" if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
+        raise PolicyError(f"cannot import {module_name!r:.120}: {why}") from error
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
-        near = difflib.get_close_matches(attribute, names, n=3)
-        hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-        raise PolicyError(f"module {module_name!r} has no {attribute!r}{hint}")
+        raise PolicyError(f"module {module_name!r} has no {attribute!r}{_similar(attribute, names)}")
     found: Any = getattr(module, attribute)
     try:
         return found() if isinstance(found, type) else found
     except Exception as error:  # whatever the class raises
-        raise _cannot_be_created(text, error) from error
+        raise PolicyError(f"{text!r} cannot be created without arguments: {type(error).__name__}: {error}") from error
 
 
-def _cannot_be_created(text: str, error: Exception) -> PolicyError:
-    return PolicyError(f"{_short(text)} cannot be created without arguments: {_describe(error)}")
+def _unknown(kind: str, kinds: str, text: str, names: Iterable[str]) -> PolicyError:
+    return PolicyError(
+        f"unknown {kind} {text!r:.120}{_similar(text[:100], names)}; {kinds} are: "
+        f'{", ".join(names)}, a file, or "package.module:Class"'
+    )
 
 
-def _describe(error: Exception) -> str:
-    return f"{error}" if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
+def _similar(text: str, names: Iterable[str]) -> str:
+    near = difflib.get_close_matches(text, names, n=3, cutoff=0.5)
+    return f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""

@@ -1,4 +1,4 @@
-"""``posse/Tracker-v0``: the agent controls one tracker, its team-mates run a policy."""
+"""``posse/Tracker-v0``: the agent controls one tracker, its team-mates run a policy. One world, or many."""
 
 from __future__ import annotations
 
@@ -7,15 +7,47 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
+from gymnasium.vector import AutoresetMode
 
-from posse import Scenario, ScenarioError, get_scenario
+from posse import Batch, Scenario, ScenarioError, get_scenario
 from posse.adapters.gymnasium_env import TeamEnv
-from posse.numeric import FloatArray, OwnArrays
+from posse.adapters.vector_env import TeamVectorEnv
+from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
 
-class TrackerEnv(OwnArrays, TeamEnv):
+class _WithTeammates:
+    """The team-mates of one tracker in every world of a batch."""
+
+    batch: Batch
+    _rows: Any
+    _fit: Any
+
+    def _join(self, number: int, teammates: str | Policy, silent: bool) -> None:
+        self.teammates = load(teammates) if isinstance(teammates, str) else teammates
+        self.number = self._rows = number
+        self._silent = silent
+        self._fit = functools.partial(_fitting, self.teammates, number)
+        self._memory: Any = None
+        self._team: FloatArray = np.zeros(0, np.float32)
+        """(E, N, F) what the team observes; kept, since policies may keep observations."""
+
+    def _with_teammates(self, own: FloatArray) -> FloatArray:
+        """Return the teams' actions (E, N, 2 + m), given those of one tracker (E, 2 or 2 + m)."""
+        self.batch.check_running()
+        team = np.zeros(self.batch.action_shape, np.float32)
+        team[:, self.number, : own.shape[1]] = own
+        own = self.batch.check_actions(team)[:, self.number]  # refused before the team-mates' memory changes
+        actions, memory = self.teammates.act(self._team, self._memory)
+        team = self.batch.check_actions(actions).copy()
+        team[:, self.number] = own
+        self._memory = memory
+        return team
+
+
+class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
     """``posse/Tracker-v0``, after ``import posse_baselines``: one tracker whose team-mates run a policy.
 
     **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages
@@ -49,12 +81,7 @@ class TrackerEnv(OwnArrays, TeamEnv):
         silent: bool = True,
         **settings: Any,
     ) -> None:
-        self.teammates = load(teammates) if isinstance(teammates, str) else teammates
-        self.number = self._rows = number
-        self._silent = silent
-        self._fit = functools.partial(fitting, self.teammates, number)
-        self._memory: Any = None
-        self._team: FloatArray = np.zeros(0, np.float32)
+        self._join(number, teammates, silent)
         super().__init__(scenario, **settings)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -73,30 +100,62 @@ class TrackerEnv(OwnArrays, TeamEnv):
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step; see :class:`posse.adapters.gymnasium_env.TeamEnv`."""
         result = super().step(action)
-        self._team = self._observations[None].copy()  # policies may keep observations
+        self._team = self._observations[None].copy()
         return result
 
     def _of_team(self, own: FloatArray) -> FloatArray:
-        actions, memory = self.teammates.act(self._team, self._memory)
-        team = self.batch.check_actions(actions).copy()
-        self._memory = memory
-        return insert(team, self.number, own[:, 0])
+        return self._with_teammates(own[:, 0])
 
 
-def insert(team: FloatArray, number: int, own: FloatArray) -> FloatArray:
-    """Write a tracker's actions (E, 2 or 2 + m) into those of the teams (E, N, 2 + m), and return these."""
-    team[:, number] = 0
-    team[:, number, : own.shape[1]] = own
-    return team
+class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
+    """:class:`TrackerEnv` in E worlds, stepped together; arguments as there and for :class:`TeamVectorEnv`."""
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "constant",
+        num_envs: int = 1,
+        *,
+        number: int = 0,
+        teammates: str | Policy = "ddcs-distributed",
+        silent: bool = True,
+        **settings: Any,
+    ) -> None:
+        self._join(number, teammates, silent)
+        super().__init__(scenario, num_envs, **settings)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start episodes; see :meth:`TeamVectorEnv.reset`."""
+        result = super().reset(seed=seed, options=options)
+        mask = (options or {}).get("reset_mask")
+        if mask is None or self._memory is None:
+            self._memory = begin(self.teammates, self.batch)
+        else:
+            self._memory = self.teammates.restart(self._memory, np.array(mask, np.bool_))
+        return result
+
+    def step(self, actions: Any) -> tuple[FloatArray, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
+        """Advance every world by one control step; see :meth:`TeamVectorEnv.step`."""
+        result = super().step(actions)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            begins = result[2] | result[3]
+        else:
+            begins = self.batch.worlds["step"] == 0
+        if begins.any():
+            self._memory = self.teammates.restart(self._memory, begins)
+        return result
+
+    def _of_teams(self, motions: FloatArray) -> npt.NDArray[Any]:
+        return self._with_teammates(motions)
+
+    def _observed(self, observations: FloatArray) -> FloatArray:
+        self._team = observations
+        return super()._observed(observations)
 
 
-def fitting(teammates: Policy, number: int, scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
-    """Return the scenario with messages as long as the team-mates need.
-
-    Raises:
-        ScenarioError: Its target is an agent, or the team has one tracker.
-        ValueError: ``number`` is not in the team.
-    """
+def _fitting(teammates: Policy, number: int, scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+    """Return the scenario with messages as long as the team-mates need."""
     found = get_scenario(scenario, **overrides)
     if found.target_motion == "agent":
         raise ScenarioError(
@@ -116,5 +175,5 @@ def register() -> None:
         gymnasium.register(
             "posse/Tracker-v0",
             entry_point="posse_baselines.tracker_env:TrackerEnv",
-            vector_entry_point="posse_baselines.tracker_vector_env:TrackerVectorEnv",
+            vector_entry_point="posse_baselines.tracker_env:TrackerVectorEnv",
         )

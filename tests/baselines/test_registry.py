@@ -1,14 +1,20 @@
-"""Policies by name, and errors for unknown names."""
+"""Policies and targets by name, file and code; errors for those that are not there; matches with a target."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from tests.support.learned import any_policy, target_for
 
-from posse_baselines import Policy, PolicyError, load, policy_names
+import posse
+from posse_baselines import Match, Policy, PolicyError, against, load, load_target, play, policy_names, target_names
 from posse_baselines.ddcs import DDCS
 from posse_baselines.registry import is_code, ships_or_is_file
+
+SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 
 
 @pytest.mark.parametrize("name", policy_names())
@@ -16,6 +22,7 @@ def test_a_name_loads_the_policy_that_bears_it(name: str) -> None:
     policy = load(name)
     assert isinstance(policy, Policy)
     assert policy.name == name
+    assert policy.reads_state == (name == "planner")
 
 
 def test_a_class_is_loaded_by_where_it_is() -> None:
@@ -23,50 +30,24 @@ def test_a_class_is_loaded_by_where_it_is() -> None:
     assert isinstance(policy, DDCS)
 
 
-def test_only_the_planner_reads_the_state() -> None:
-    assert [name for name in policy_names() if load(name).reads_state] == ["planner"]
-
-
 @pytest.mark.parametrize(
     ("name", "message"),
     [
         ("ddcs-distribute", "did you mean 'ddcs-distributed'"),
-        ("plannner", "did you mean 'planner'"),
         ("nothing-like-it", "policies are: random, idle, pursuit"),
         ("no_such_module:Team", "cannot import 'no_such_module'"),
         ("posse_baselines.ddcs:DDSC", "has no 'DDSC' .did you mean 'DDCS'"),
         ("posse_baselines.ddcs:Settings", "is not a policy: it must have name"),
+        *((text, "names no class: write") for text in (":x", "x:", "a..b:C", "a b:C", "a\0b:c")),
+        ("x" * 5000, "unknown policy"),
+        ("none.safetensors", "there is no policy file none"),
+        (__file__, "is not a policy file: known suffixes are"),
     ],
 )
 def test_a_policy_that_is_not_there_is_named_with_what_is(name: str, message: str) -> None:
-    with pytest.raises(PolicyError, match=message):
+    with pytest.raises(PolicyError, match=message) as caught:
         load(name)
-
-
-def test_a_file_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "policy.pkl"
-    path.write_bytes(b"")
-    with pytest.raises(PolicyError, match="is not a policy file: known suffixes are"):
-        load(path)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        *((text, "names no class: write") for text in (":x", "x:", "a..b:C", "a:b:c", "a b:C", "a:1")),
-        ("", "a name or path has 1 to 4096 characters"),
-        ("x" * 5000, r"\.\.\. \(5,000 characters\) cannot be a policy"),
-        ("x" * 4000, r"unknown policy 'x{60}'\.\.\. \(4,000 characters\)"),
-        ("x" * 4000 + ":y", "cannot import"),
-        ("learned-" + "x" * 4000, r"\(4,008 characters\) is shipped"),
-        ("x" * 4000 + ".safetensors", r"there is no policy file .*\(4,012 characters\)"),
-        ("a\0b.safetensors", "no NUL"),
-        ("a\0b:c", "no NUL"),
-    ],
-)
-def test_text_that_names_nothing(text: str, message: str) -> None:
-    with pytest.raises(PolicyError, match=message):
-        load(text)
+    assert len(str(caught.value)) < 1000
 
 
 MODULE = """
@@ -78,40 +59,21 @@ class Failing(Whole):
     def __init__(self): raise LookupError("no weights")
 class Asking(Whole):
     def __init__(self, weights): ...
-class Nameless(Whole):
-    name = 3
-class Wordy(Whole):
-    message_size = -1
-class Grudging(Whole):
-    @property
-    def name(self): raise OSError("not today")
 """
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("Failing", "cannot be created without arguments: LookupError: no weights"),
-        ("Asking", "cannot be created without arguments: TypeError"),
-        ("Nameless", "name=3 must be a str"),
-        ("Wordy", "message_size=-1 an int of at least 0"),
-        ("Grudging", "OSError: not today"),
-    ],
-)
-def test_a_class_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, message: str) -> None:
+def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "made_up_policies.py").write_text(MODULE)
+    (tmp_path / "failing_policies.py").write_text("1 / 0")
     monkeypatch.syspath_prepend(str(tmp_path))
     assert load("made_up_policies:Whole").name == "whole"
-    with pytest.raises(PolicyError, match=message):
-        load(f"made_up_policies:{name}")
-
-
-@pytest.mark.parametrize("code", ["1 / 0", "x = (", "import nothing_at_all"])
-def test_a_module_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str) -> None:
-    (tmp_path / "failing_policies.py").write_text(code)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(PolicyError, match="cannot import 'failing_policies'"):
-        load("failing_policies:Any")
+    for name, message in (
+        ("made_up_policies:Failing", "cannot be created without arguments: LookupError: no weights"),
+        ("made_up_policies:Asking", "cannot be created without arguments: TypeError"),
+        ("failing_policies:Any", "cannot import 'failing_policies': ZeroDivisionError"),
+    ):
+        with pytest.raises(PolicyError, match=message):
+            load(name)
 
 
 def test_what_counts_as_code(tmp_path: Path) -> None:
@@ -123,5 +85,94 @@ def test_what_counts_as_code(tmp_path: Path) -> None:
         assert is_code(text)
         assert not ships_or_is_file(text)
     assert not is_code(str(tmp_path / "a:b"))
-    for other in ("nobody", 3, None, ["pursuit"], "a\0.safetensors"):
-        assert not ships_or_is_file(other)
+    assert not any(map(ships_or_is_file, ("nobody", 3, None, ["pursuit"])))
+
+
+# --- targets -------------------------------------------------------------------------------------
+
+
+class Straight:
+    """A target of one's own, which drives straight on."""
+
+    def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
+        return None
+
+    def act(self, observations: Any, memory: Any) -> Any:
+        return np.tile(np.array([1, 0], np.float32), (*observations.shape[:2], 1)), memory
+
+    def restart(self, memory: Any, mask: Any) -> Any:
+        return memory
+
+
+class Broken(Straight):
+    def act(self, observations: Any, memory: Any) -> Any:
+        return np.zeros((1, 1)), memory
+
+
+CODE = f"{__name__}:Straight"
+
+
+def test_a_scripted_target_is_the_scenarios_motion() -> None:
+    assert set(target_names()) >= {"constant", "accelerating", "smart"}
+    assert "agent" not in target_names()
+    target = load_target("accelerating")
+    assert target.fit(SHORT) == SHORT.replace(target_motion="accelerating")
+    assert load_target(target) is target
+    policy = load("pursuit")
+    assert against(policy, target) is policy
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "evader.safetensors"
+    target_for(SHORT).save(path)
+    return path
+
+
+def test_a_target_plays_the_same_inside_a_batch_and_in_a_match(file: Path) -> None:
+    for text in (str(file), CODE):
+        target = load_target(text)
+        assert target.policy is not None
+        inside = posse.batch(SHORT, 4, seed=2, target_policy=target.policy)
+        match = against(load("pursuit"), target)
+        beside = play(posse.Batch(target.fit(SHORT), 4, seed=2), match)
+        for name, column in play(inside, load("pursuit")).items():
+            np.testing.assert_array_equal(column, beside[name], name)
+    assert match.name == "pursuit"
+
+
+def test_the_sides_are_not_mixed_up(file: Path, tmp_path: Path) -> None:
+    with pytest.raises(PolicyError, match=r"policy of a target: give it as target="):
+        load(file)
+    team = tmp_path / "team.safetensors"
+    any_policy().save(team)
+    with pytest.raises(PolicyError, match="policy of a team, 'mine'"):
+        load_target(team)
+    evader = load_target(file)
+    with pytest.raises(PolicyError, match="plays the target's motion ahead"):
+        Match(load("planner"), evader)
+    with pytest.raises(PolicyError, match="a motion of the scenario"):
+        Match(load("pursuit"), load_target("smart"))
+    with pytest.raises(PolicyError, match="give a target too"):
+        play(posse.Batch(evader.fit(SHORT), 1), load("pursuit"))
+
+
+def test_wrong_actions_of_a_target_are_named() -> None:
+    target = load_target(f"{__name__}:Broken")
+    with pytest.raises(PolicyError, match=r"Broken.*shape \(1, 1\)"):
+        play(posse.Batch(target.fit(SHORT), 2), against(load("idle"), target))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("smrat", "did you mean 'smart'"),
+        ("agent", "unknown target 'agent'"),
+        (__file__, "not a policy file"),
+        ("posse_baselines:load", "lacks begin, act, restart"),
+        ("a\0b", "unknown target"),
+    ],
+)
+def test_an_unknown_target_is_refused(text: str, message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        load_target(text)

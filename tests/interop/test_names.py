@@ -12,8 +12,7 @@ import posse
 from posse.adapters.gymnasium_env import SoloEnv, TeamEnv
 from posse.adapters.pettingzoo_env import TeamParallelEnv
 from posse.adapters.vector_env import SoloVectorEnv, TeamVectorEnv
-from posse_baselines.tracker_env import TrackerEnv
-from posse_baselines.tracker_vector_env import TrackerVectorEnv
+from posse_baselines.tracker_env import TrackerEnv, TrackerVectorEnv
 from posse_training.torchrl import PosseEnv
 
 SINGLE = (TeamEnv, SoloEnv, TeamParallelEnv, TrackerEnv)

@@ -197,7 +197,7 @@ def test_every_scenario_has_its_own_training() -> None:
 
 
 def test_tuning_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("posse_baselines.tuned.files", "posse_training.tune"):
+    for module in ("posse_baselines.tuned", "posse_training.tune"):
         monkeypatch.setattr(f"{module}.SHIPPED_TUNED", tmp_path / "shipped")
     settings = small_tuning(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1, ship=True)
     card = json.loads(tune(settings, console=quiet()).read_text())

@@ -25,8 +25,7 @@ from posse_baselines import Policy, PolicyError, Tunable, load, play
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import tunables
 from posse_baselines.files import write_atomically
-from posse_baselines.tuned import TUNED
-from posse_baselines.tuned.files import FORMAT, SHIPPED_TUNED
+from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError, require
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean

@@ -16,7 +16,7 @@ from posse_baselines.ddcs.memory import GRID, MATE, MATE_AT_START, MIND, MIND_AT
 from posse_baselines.ddcs.messages import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.ddcs.step import carry_out_all, propose_all, write_beliefs
-from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of
+from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations
 
 
 @dataclass
@@ -114,7 +114,7 @@ class DDCS(OwnArrays, BasePolicy):
         num_worlds, n = m.minds.shape
         observations = check_observations(self, observations, num_worlds, m.layout)
         corrections = np.ascontiguousarray(corrections, np.float32)
-        actions = np.zeros((num_worlds, n, 2 + message_size_of(m.layout)), np.float32)
+        actions = np.zeros((num_worlds, n, 2 + m.layout.scenario.message_size), np.float32)
         over_worlds(
             carry_out_all, (m.team, m.minds, m.mates, observations, work_for(n), corrections, actions), num_worlds, n
         )
@@ -154,11 +154,6 @@ class DDCS(OwnArrays, BasePolicy):
         notes["estimate"] = estimate
         notes["estimate_age"] = np.where(minds["known"] != 0, minds["fix_age"], np.float32(-1.0))
         return notes
-
-    def leaders(self, memory: Memory) -> npt.NDArray[Any]:
-        """Return the leader of each tracker, (E, N), -1 for none, as a view."""
-        leaders: npt.NDArray[Any] = memory.minds["leader"]
-        return leaders
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""

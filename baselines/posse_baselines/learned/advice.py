@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from posse import Batch, ObservationLayout
 from posse.numeric import BoolArray, FloatArray
-from posse_baselines.policy import Memory, Policy, PolicyError, begin, message_size_of
+from posse_baselines.policy import Memory, Policy, PolicyError, begin
 
 REACH: Final = np.float32(2.0)
 """Factor of the network's output: spans the whole of [-1, 1] from either end."""
@@ -138,7 +138,7 @@ class Advising:
 
     def proposal_size(self, layout: ObservationLayout) -> int:
         """Return the length of a proposal."""
-        return MOTION if self.correction == "velocity" else MOTION + message_size_of(layout)
+        return MOTION if self.correction == "velocity" else MOTION + layout.scenario.message_size
 
     def ask(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, FloatArray, Memory]:
         """Return proposals (E, N, p), the network's further inputs (E, N, k), and the memory."""

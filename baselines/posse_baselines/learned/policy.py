@@ -235,12 +235,12 @@ def write_policy_file(path: Path, tensors: Mapping[str, FloatArray], description
 
 def _read(path: Path) -> tuple[dict[str, FloatArray], str]:
     """Return the tensors and the description of a policy file."""
-    if not path.is_file():
-        raise PolicyError(f"there is no policy file {path}")
     try:
         with safe_open(path, framework="numpy") as file:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
             metadata = file.metadata() or {}
+    except FileNotFoundError:
+        raise PolicyError(f"there is no policy file {path}") from None
     except (SafetensorError, OSError, TypeError, ValueError) as error:
         raise PolicyError(f"{path} is damaged, truncated, or not a policy file: {error!s:.200}") from error
     text = metadata.get(_KEY)

@@ -11,7 +11,7 @@ import numpy as np
 from posse import ObservationLayout
 from posse.numeric import FloatArray, OwnArrays, Record, Records, compiled, kernel, over_worlds
 from posse_baselines.laws.offsets import constants_of, offsets_of
-from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
+from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations
 
 _KEEP_AWAY: Final = 0.5  # free width that a tracker keeps to anything, m
 _STOP: Final = 0.9  # distance from the target at which it stops, m
@@ -40,7 +40,7 @@ class Pursuit(BasePolicy):
         m: _PursuitMemory = memory
         observations = check_observations(self, observations, m.num_worlds, m.layout)
         num_worlds, num_trackers = observations.shape[:2]
-        actions = np.zeros((num_worlds, num_trackers, 2 + message_size_of(m.layout)), np.float32)
+        actions = np.zeros((num_worlds, num_trackers, 2 + m.layout.scenario.message_size), np.float32)
         over_worlds(pursue_all, (m.offsets, m.constants, observations, actions), num_worlds, num_trackers)
         return actions, memory
 

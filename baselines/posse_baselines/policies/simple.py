@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from posse import ObservationLayout
-from posse.numeric import FloatArray, kernel
+from posse.numeric import ONE, FloatArray, kernel
 from posse.rules import mix
-from posse_baselines.policy import BasePolicy, Memory, check_fits, check_observations, message_size_of
+from posse_baselines.policy import BasePolicy, Memory
 
-_ONE: Final = np.float32(1.0)
 _SHIFT: Final = np.uint64(40)
 _TO_BOTH_SIDES: Final = np.float32(2.0**-23)
 
@@ -23,16 +22,9 @@ class Idle(BasePolicy):
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return V = 0 and ω = 0 for everyone."""
-        layout, num_worlds = memory
-        observations = check_observations(self, observations, num_worlds, layout)
-        actions = np.zeros((*observations.shape[:2], 2 + message_size_of(layout)), np.float32)
+        actions = np.zeros((*observations.shape[:2], 2 + memory.scenario.message_size), np.float32)
         actions[:, :, 0] = -1.0
         return actions, memory
-
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory: the layout and the number of worlds."""
-        check_fits(self, layout)
-        return layout, num_worlds
 
 
 class Random(BasePolicy):
@@ -52,22 +44,16 @@ class Random(BasePolicy):
             raise ValueError(f"seed={seed!r} must be a whole number in [0, 2**63)")
         self.seed = seed
 
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memory: the layout and the number of worlds."""
-        check_fits(self, layout)
-        return layout, num_worlds
-
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return random speeds, turn rates and messages."""
-        layout, num_worlds = memory
-        observations = check_observations(self, observations, num_worlds, layout)
-        actions = np.empty((*observations.shape[:2], 2 + message_size_of(layout)), np.float32)
-        draw_from_observations(observations.view(np.uint32), np.uint64(self.seed), actions)
+        words = np.ascontiguousarray(observations, np.float32).view(np.uint32)
+        actions = np.empty((*words.shape[:2], 2 + memory.scenario.message_size), np.float32)
+        draw_from_observations(words, np.uint64(self.seed), actions)
         return actions, memory
 
 
 @kernel
-def draw_from_observations(words: FloatArray, seed: np.uint64, actions: FloatArray) -> None:
+def draw_from_observations(words: npt.NDArray[np.uint32], seed: np.uint64, actions: FloatArray) -> None:
     """Fill actions (E, N, A) with draws keyed by the seed and observations (E, N, F) as words."""
     for e in range(words.shape[0]):
         for i in range(words.shape[1]):
@@ -76,4 +62,4 @@ def draw_from_observations(words: FloatArray, seed: np.uint64, actions: FloatArr
                 key = mix(key, np.uint64(words[e, i, k]))
             for k in range(actions.shape[2]):
                 draw = mix(key, np.uint64(k)) >> _SHIFT
-                actions[e, i, k] = np.float32(draw) * _TO_BOTH_SIDES - _ONE
+                actions[e, i, k] = np.float32(draw) * _TO_BOTH_SIDES - ONE

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 import posse
 from posse import Scenario
-from posse_baselines import BasePolicy, Played, Policy, Target, rollout
-from posse_baselines.policy import Memory
+from posse_baselines import Played, Policy, Target, rollout
 from posse_training.errors import TimeLimitError, TrainedSplitError
 from posse_training.evaluation.results import Column
 
@@ -67,17 +66,10 @@ def play_episode(
     exchanges = ExchangeCounter(batch.num_worlds)
 
     def note(step: Played) -> None:
-        exchanges.count(leaders_of(policy, step.memory), step.running)
+        exchanges.count(policy.annotations(step.memory).get("leader"), step.running)
         advance(1)
 
     return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}
-
-
-def leaders_of(policy: Policy, memory: Memory) -> npt.NDArray[Any] | None:
-    """Return the leader of each tracker, (E, N); ``None``: the policy has none."""
-    if isinstance(policy, BasePolicy):
-        return policy.leaders(memory)
-    return policy.annotations(memory).get("leader")
 
 
 class ExchangeCounter:

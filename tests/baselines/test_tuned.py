@@ -13,8 +13,7 @@ import pytest
 
 import posse
 from posse_baselines import PolicyError, load, play, policy_names, settings_of, with_settings
-from posse_baselines.tuned import TUNED, read_tuned, tuned_files
-from posse_baselines.tuned.files import FORMAT, SHIPPED_TUNED
+from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED, read_tuned, tuned_files
 from posse_training import evaluate
 
 FILES = [(name, path) for name in TUNED for path in tuned_files(name).values()]
@@ -117,13 +116,11 @@ def test_a_file_of_settings_is_a_policy(tmp_path: Path) -> None:
     [
         ({"format": "other"}, "holds no tuned settings: it must have format='posse-tuned-1'"),
         ({"policy": "idle"}, "has settings of policy='idle'; policies with settings are: pngl-l"),
-        ({"scenario": ""}, "has scenario='': it must be a text"),
-        ({"settings": [1]}, r"has settings=\[1\]: they must map names to numbers"),
+        ({"settings": [1]}, "must have the name of a scenario, and settings by name"),
         ({"settings": {"gian": 1.0}}, "has a setting 'gian' that is not a tunable one of pngl"),
-        ({"settings": {"spread": 0.1}}, "has a setting 'spread' that is not a tunable one"),
-        ({"settings": {"gain": 7.0}}, r"has gain=7.0: it must be a number in \[0.2, 6\] 1/s"),
-        ({"settings": {"gain": math.nan}}, "has gain=nan: it must be a number in"),
-        ({"settings": {"gain": 10**400}}, "has gain=1000.*: it must be a number in"),
+        ({"settings": {"gain": "high"}}, "has impossible settings: could not convert"),
+        ({"settings": {"gain": 7.0}}, r"has impossible settings: gain=7.0 must lie in \[0.2, 6\] 1/s"),
+        ({"settings": {"gain": math.nan}}, "has impossible settings: gain=nan"),
         ({"settings": {"near": 1.4}}, "has impossible settings: near=1.4 must be below far=1.2"),
     ],
 )
@@ -132,7 +129,7 @@ def test_a_damaged_file_is_refused(tmp_path: Path, changes: dict[str, Any], mess
         load(write(tmp_path / "x.json", **changes))
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"[" * 100_000, b"\xff\xfe", b"[]", b"null"])
+@pytest.mark.parametrize("content", [b"{", b"[" * 100_000, b"\xff\xfe", b"null"])
 def test_what_is_no_json_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.json"
     path.write_bytes(content)
@@ -145,7 +142,7 @@ def test_what_is_no_json_is_refused(tmp_path: Path, content: bytes) -> None:
 def test_a_damaged_shipped_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "ddcs-tuned").mkdir()
     (tmp_path / "ddcs-tuned/smart.json").write_text("{}")
-    monkeypatch.setattr("posse_baselines.tuned.files.SHIPPED_TUNED", tmp_path)
+    monkeypatch.setattr("posse_baselines.tuned.SHIPPED_TUNED", tmp_path)
     batch = batch_of("smart")
     with pytest.raises(PolicyError, match=r"smart\.json holds no tuned settings"):
         load("ddcs-tuned").begin(batch.layout, 6)

@@ -1,0 +1,123 @@
+"""Scripted teams with settings that a search found, by scenario (``posse tune``).
+
+Their files are JSON, checked when read; they never run code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from posse import Scenario
+from posse_baselines.ddcs import DDCS, Settings
+from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.fields import tunables
+from posse_baselines.files import read_json
+from posse_baselines.policy import PolicyError
+
+TUNED: Final = {"ddcs-tuned": "ddcs-distributed", "pngl-l-phi-tuned": "pngl-l-phi"}
+"""The tuned policies that come with the package, and the policies that were tuned."""
+SHIPPED_TUNED: Final = Path(__file__).parent / "shipped" / "tuned"
+"""The folder of the tuned settings that come with the package: POLICY/SCENARIO.json."""
+FORMAT: Final = "posse-tuned-1"
+
+
+class TunedDDCS(DDCS):
+    """A DDCS policy that plays the settings tuned for the scenario that it is given.
+
+    On a scenario without a file of its own it plays the policy that was tuned, unchanged. Which
+    file is played depends on the scenario's name alone, whatever else is overridden.
+
+    Args:
+        name: One of :data:`TUNED`.
+    """
+
+    trained_splits = ("train",)
+
+    def __init__(self, name: str) -> None:
+        super().__init__(FAMILY[TUNED[name]], name)
+
+    def settings_for(self, scenario: Scenario) -> Settings:
+        """Return the settings tuned for a scenario, or the untuned ones.
+
+        Raises:
+            PolicyError: The file of the settings is damaged.
+        """
+        path = tuned_files(self.name).get(scenario.name)
+        return self.settings if path is None else read_tuned(path).settings
+
+
+class _FromFile(DDCS):
+    """The settings of one file, played on every scenario."""
+
+    trained_splits = ("train",)
+
+
+def from_file(path: Path) -> DDCS:
+    """Return the policy of a file of tuned settings; it plays them on every scenario.
+
+    Raises:
+        PolicyError: The file is missing or damaged.
+    """
+    found = read_tuned(path)
+    return _FromFile(found.settings, f"{found.policy}-tuned-{found.scenario}")
+
+
+@dataclass(frozen=True)
+class TunedFile:
+    """What ``posse tune`` found.
+
+    Attributes:
+        policy: The policy whose settings were tuned.
+        scenario: Name of the scenario that they were tuned for.
+        settings: All settings of the tuned policy.
+        card: Everything that the file says.
+    """
+
+    policy: str
+    scenario: str
+    settings: Settings
+    card: Mapping[str, Any] = field(repr=False)
+
+
+def tuned_files(name: str) -> dict[str, Path]:
+    """Return the shipped files of a tuned policy, by scenario."""
+    return {path.stem: path for path in sorted((SHIPPED_TUNED / name).glob("*.json"))}
+
+
+def read_tuned(path: Path) -> TunedFile:
+    """Return a file of tuned settings.
+
+    Raises:
+        PolicyError: It is missing, damaged, of an unknown policy, or has a setting that is not
+            tunable or out of its range.
+    """
+    try:
+        card = read_json(path)
+    except FileNotFoundError:
+        raise PolicyError(f"there is no policy file {path}") from None
+    except (OSError, ValueError) as error:
+        raise PolicyError(f"{path} is damaged or cannot be read: {error}") from error
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise PolicyError(f"{path} holds no tuned settings: it must have format={FORMAT!r}")
+    policy, scenario, values = card.get("policy"), card.get("scenario"), card.get("settings")
+    if not isinstance(policy, str) or policy not in FAMILY:
+        raise PolicyError(
+            f"{path} has settings of policy={policy!r:.80}; policies with settings are: {', '.join(FAMILY)}"
+        )
+    if not isinstance(scenario, str) or not isinstance(values, dict):
+        raise PolicyError(f"{path} is damaged: it must have the name of a scenario, and settings by name")
+    known = [tunable.name for tunable in tunables(FAMILY[policy])]
+    for name in values:
+        if name not in known:
+            raise PolicyError(
+                f"{path} has a setting {name!r:.80} that is not a tunable one of {policy}; these "
+                f"are: {', '.join(known)}"
+            )
+    try:
+        settings = FAMILY[policy].replace(**{name: float(value) for name, value in values.items()})
+    except (TypeError, ValueError, OverflowError) as error:
+        raise PolicyError(f"{path} has impossible settings: {error}") from error
+    return TunedFile(policy, scenario, settings, card)
