@@ -19,12 +19,11 @@ from posse_training.compare.contenders import read_contenders
         ("a\nb=idle", "printable characters"),
         ("\x1b[31mred=idle", "printable characters"),
         ("x" * 400 + "=idle", r"400 characters\) must have at most 100"),
-        ("x" * 400, r"unknown policy 'x.*400 characters"),
-        ("x" * 5000, r"5,000 characters\) cannot be a policy"),
-        ("a\0b", "no NUL"),
-        ("", "cannot be a policy"),
+        ("x" * 5000, "unknown policy 'x"),
+        ("a\0b", "unknown policy"),
+        ("", "unknown policy ''"),
         ("/" + "d" * 3000 + ".safetensors", "there is no policy file"),
-        ("mine=" + "x" * 5000, "cannot be a policy"),
+        ("mine=" + "x" * 5000, "unknown policy 'x"),
     ],
 )
 def test_labels_that_no_report_can_show(text: str, message: str) -> None:

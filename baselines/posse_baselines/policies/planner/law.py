@@ -15,7 +15,6 @@ import numpy.typing as npt
 from posse import Batch, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds
 from posse.rules import NEVER, config_record, slot_records
-from posse.rules.state import WorldArrays
 from posse_baselines.laws.assignment import WORK_ROWS, assign
 from posse_baselines.laws.geometry import length, wrap
 from posse_baselines.laws.heading import BODY, regulate
@@ -310,9 +309,9 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
 
 @kernel
 def drive_all(
-    teams: Teams, worlds: WorldArrays, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
+    teams: Teams, worlds: Any, going: BoolArray, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
-    """Write the actions of those of a share of the worlds that are going on."""
+    """Write the actions of those of a share of the worlds that are going on; ``worlds`` are the arrays of a batch."""
     w = teams.work
     work = Work(w.cost[thread], w.assigning[thread], w.discs[thread], w.body[thread], w.plays[thread])
     copies = len(going) // len(teams.begun)
