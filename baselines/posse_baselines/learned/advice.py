@@ -10,19 +10,19 @@ observation, and its output corrects the proposal. Two things can be corrected:
 (:class:`GuardedAdviser`). Whatever the network does, the safeguard comes after it.
 
 An output of zero reproduces the adviser, and every motion stays reachable. The adviser's messages
-are sent unchanged, and its memory is its own, so the network needs no memory. With ``belief`` the
-network also reads what the adviser believes (:class:`BelievingAdviser`). References: Silver et al.
-2018, Johannink et al. 2019; Alshiekh et al. 2018 (safeguard).
+are sent unchanged, and its memory is its own, so the network needs no memory. With ``believes`` the
+network also reads what the adviser believes. References: Silver et al. 2018, Johannink et al. 2019;
+Alshiekh et al. 2018 (safeguard).
 """
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch, ObservationLayout
+from posse import Batch
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Memory, Policy, PolicyError, begin
 
@@ -45,7 +45,12 @@ class Adviser(Policy, Protocol):
 
 @runtime_checkable
 class GuardedAdviser(Adviser, Protocol):
-    """An adviser whose control step has two halves, with its safeguard in the second."""
+    """An adviser whose control step has two halves, with its safeguard in the second, and which tells its belief."""
+
+    @property
+    def belief_size(self) -> int:
+        """Numbers in a belief."""
+        ...
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return wanted velocities (E, N, 2) for observations (E, N, F), and the memory.
@@ -54,22 +59,12 @@ class GuardedAdviser(Adviser, Protocol):
         """
         ...
 
-    def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
-        """Return actions (E, N, 2 + m) for wanted velocities plus corrections (E, N, 2)."""
-        ...
-
-
-@runtime_checkable
-class BelievingAdviser(GuardedAdviser, Protocol):
-    """An adviser that offers what it believes."""
-
-    @property
-    def belief_size(self) -> int:
-        """Numbers in a belief."""
-        ...
-
     def belief(self, observations: FloatArray, memory: Memory) -> FloatArray:
         """Return what each tracker believes, (E, N, belief_size), after ``propose``."""
+        ...
+
+    def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
+        """Return actions (E, N, 2 + m) for wanted velocities plus corrections (E, N, 2)."""
         ...
 
 
@@ -80,7 +75,7 @@ def check_adviser(name: str, policy: Policy, correction: str = "motion", *, beli
         name: Its name in messages.
         policy: The policy.
         correction: One of :data:`CORRECTIONS`.
-        believes: Whether the network reads its belief.
+        believes: Whether the network reads its belief, as only one that corrects a velocity can.
 
     Raises:
         PolicyError: It reads the state of the worlds, its memory cannot be saved, or it lacks what
@@ -92,24 +87,14 @@ def check_adviser(name: str, policy: Policy, correction: str = "motion", *, beli
         raise PolicyError(f"{name!r} cannot be an adviser: it reads the state of the worlds, which no tracker observes")
     if not isinstance(policy, Adviser):
         raise PolicyError(f"{name!r} cannot be an adviser: it has no method arrays(memory)")
+    if believes and correction == "motion":
+        raise PolicyError('the encoding "belief" goes with correction="velocity": use that, or another encoding')
     if correction == "velocity" and not isinstance(policy, GuardedAdviser):
         raise PolicyError(
-            f"{name!r} has no methods propose and carry_out, so that its velocity cannot be "
+            f"{name!r} has no methods propose, belief and carry_out, so that its velocity cannot be "
             'corrected before its safeguard: use correction="motion", or a policy of the DDCS'
         )
-    if believes and not (correction == "velocity" and isinstance(policy, BelievingAdviser)):
-        raise PolicyError(
-            f"{name!r} with correction={correction!r} offers no belief: use another encoding than "
-            '"belief", or correction="velocity" with a policy of the DDCS'
-        )
     return policy
-
-
-def advised(proposals: FloatArray, outputs: FloatArray) -> FloatArray:
-    """Return actions (..., 2 + m) for proposals (..., 2 + m) and network outputs (..., 2)."""
-    actions = proposals.copy()
-    actions[..., :MOTION] += REACH * outputs
-    return np.clip(actions, np.float32(-1.0), np.float32(1.0))
 
 
 class Advising:
@@ -127,74 +112,61 @@ class Advising:
         PolicyError: An adviser without what the correction or the belief needs.
     """
 
-    def __init__(self, adviser: Adviser, correction: str = "motion", *, believes: bool = False) -> None:
-        self.adviser = check_adviser(adviser.name, adviser, correction, believes=believes)
+    def __init__(self, adviser: Policy, correction: str = "motion", *, believes: bool = False) -> None:
+        self.adviser = cast("GuardedAdviser", check_adviser(adviser.name, adviser, correction, believes=believes))
         self.correction = correction
-        self.inputs = MOTION
-        self._guarded = adviser if isinstance(adviser, GuardedAdviser) else None
-        self._believing = adviser if believes and isinstance(adviser, BelievingAdviser) else None
-        if self._believing is not None:
-            self.inputs += self._believing.belief_size
-
-    def proposal_size(self, layout: ObservationLayout) -> int:
-        """Return the length of a proposal."""
-        return MOTION if self.correction == "velocity" else MOTION + layout.scenario.message_size
+        self.inputs = MOTION + (self.adviser.belief_size if believes else 0)
+        self._believes = believes
 
     def ask(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, FloatArray, Memory]:
-        """Return proposals (E, N, p), the network's further inputs (E, N, k), and the memory."""
-        if self._guarded is None or self.correction == "motion":
-            proposals, memory = self.adviser.act(observations, memory)
-            return proposals, proposals[..., :MOTION], memory
-        proposals, memory = self._guarded.propose(observations, memory)
-        if self._believing is None:
-            return proposals, proposals, memory
-        belief = self._believing.belief(observations, memory)
-        return proposals, np.concatenate([proposals, belief], axis=-1), memory
+        """Return the network's further inputs (E, N, k), what :meth:`answer` needs (E, N, ...), and the memory."""
+        if self.correction == "motion":
+            actions, memory = self.adviser.act(observations, memory)
+            return actions[..., :MOTION], actions, memory
+        proposals, memory = self.adviser.propose(observations, memory)
+        if self._believes:
+            proposals = np.concatenate([proposals, self.adviser.belief(observations, memory)], axis=-1)
+        return proposals, observations, memory
 
-    def answer(
-        self, observations: FloatArray, proposals: FloatArray, outputs: FloatArray, memory: Memory
-    ) -> tuple[FloatArray, Memory]:
-        """Return actions (E, N, 2 + m) for the network's outputs (E, N, 2), and the memory."""
-        if self._guarded is None or self.correction == "motion":
-            return advised(proposals, outputs), memory
-        return self._guarded.carry_out(observations, memory, REACH * outputs)
+    def answer(self, asked: FloatArray, outputs: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return actions (E, N, 2 + m) for what :meth:`ask` returned and the network's outputs (E, N, 2)."""
+        if self.correction == "velocity":
+            return self.adviser.carry_out(asked, memory, REACH * outputs)
+        actions = asked.copy()
+        actions[..., :MOTION] += REACH * outputs
+        return np.clip(actions, np.float32(-1.0), np.float32(1.0)), memory
 
 
 class Advice:
-    """The adviser's memory, latest proposals and the network's further inputs for one batch.
+    """The adviser's memory and its answers to the latest observations, in the worlds of one batch.
 
     Args:
         advising: How actions are made.
         batch: The worlds; their episodes may begin at different times.
 
     Attributes:
-        proposals: (E, N, p), for the latest observations.
         inputs: (E, N, k), what the network reads in addition to its encoding.
     """
 
     def __init__(self, advising: Advising, batch: Batch) -> None:
         self._advising = advising
         self._memory = begin(advising.adviser, batch)
-        team = (batch.num_worlds, batch.scenario.num_trackers)
-        self.proposals = np.zeros((*team, advising.proposal_size(batch.layout)), np.float32)
-        self.inputs = np.zeros((*team, advising.inputs), np.float32)
-        # What a velocity is carried out with; an action needs none.
-        size = batch.layout.size if advising.correction == "velocity" else 0
-        self._observations = np.zeros((*team, size), np.float32)
+        worlds, trackers = batch.num_worlds, batch.scenario.num_trackers
+        size = batch.layout.size if advising.correction == "velocity" else MOTION + batch.scenario.message_size
+        self.inputs = np.zeros((worlds, trackers, advising.inputs), np.float32)
+        self._asked = np.zeros((worlds, trackers, size), np.float32)
 
     def follow(self, observations: FloatArray) -> None:
-        """Compute proposals for the observations (E, N, F) after a step."""
-        proposals, inputs, self._memory = self._advising.ask(observations, self._memory)
-        self.proposals[...], self.inputs[...] = proposals, inputs
-        self._observations[...] = observations[..., : self._observations.shape[-1]]
+        """Ask for advice on the observations (E, N, F) after a step."""
+        self.inputs[...], self._asked[...], self._memory = self._advising.ask(observations, self._memory)
 
     def actions(self, outputs: FloatArray) -> FloatArray:
         """Return the actions (E, N, 2 + m) for the network's outputs (E, N, 2)."""
-        actions, self._memory = self._advising.answer(self._observations, self.proposals, outputs, self._memory)
+        actions, self._memory = self._advising.answer(self._asked, outputs, self._memory)
         return actions
 
     def restart(self, observations: FloatArray, mask: BoolArray) -> None:
-        """Compute proposals for the first observations of the worlds in a mask (E,)."""
+        """Ask for advice on the first observations of the worlds in a mask (E,)."""
         others = ~mask
         kept = {name: array[others] for name, array in self.arrays().items()}
         self._memory = self._advising.adviser.restart(self._memory, mask)
@@ -203,10 +175,6 @@ class Advice:
             array[others] = kept[name]
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory, the proposals and the inputs as arrays by name; views, not copies."""
-        return {
-            **self._advising.adviser.arrays(self._memory),
-            "proposals": self.proposals,
-            "inputs": self.inputs,
-            "observations": self._observations,
-        }
+        """Return the memory and the answers as arrays by name; views, not copies."""
+        memory = self._advising.adviser.arrays(self._memory)
+        return {**memory, "inputs": self.inputs, "asked": self._asked}

@@ -22,11 +22,11 @@ from posse import ObservationLayout
 from posse.numeric import BoolArray, FloatArray, OwnArrays
 from posse.rules import SPLITS
 from posse_baselines.files import write_atomically
-from posse_baselines.learned.advice import MOTION, Adviser, Advising, check_adviser
+from posse_baselines.learned.advice import MOTION, Advising
 from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
-from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
@@ -69,7 +69,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         network: Network,
         encoding: Encoding,
         card: Mapping[str, Any],
-        adviser: Adviser | None = None,
+        adviser: Policy | None = None,
         correction: str = "motion",
     ) -> None:
         network.check()
@@ -142,10 +142,10 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             actions = np.zeros((*team, MOTION + m.layout.scenario.message_size), np.float32)
             actions[..., : outputs.shape[1]] = outputs.reshape(*team, -1)
             return actions, m
-        proposals, further, advised = self._advising.ask(observations, m.adviser)
+        further, asked, advised = self._advising.ask(observations, m.adviser)
         inputs = np.concatenate([m.encoder.encode(observations), further.reshape(-1, further.shape[-1])], axis=1)
         corrections = forward(self._flat, inputs).reshape(*team, MOTION)
-        actions, advised = self._advising.answer(observations, proposals, corrections, advised)
+        actions, advised = self._advising.answer(asked, corrections, advised)
         return actions, m._replace(adviser=advised)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
@@ -156,7 +156,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the adviser's memory as arrays by name; views, not copies."""
-        return {} if self.adviser is None else self.adviser.arrays(memory.adviser)
+        return {} if self._advising is None else self._advising.adviser.arrays(memory.adviser)
 
     def annotations(self, memory: Memory) -> Annotations:
         """Return the adviser's annotations."""
@@ -207,24 +207,23 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 activation=str(description["activation"]),
                 output=str(description["output"]),
             )
-            adviser = _adviser(description["adviser"])
+            adviser = description["adviser"]  # a scripted policy of this package: a file never names other code
+            if adviser is not None and adviser not in SCRIPTED:
+                raise PolicyError(
+                    f"its adviser {adviser!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
+                )
             encoding = Encoding.from_dict(description["encoding"])
-            return cls(network, encoding, description["card"], adviser, str(description["correction"]))
+            return cls(
+                network,
+                encoding,
+                description["card"],
+                None if adviser is None else SCRIPTED[adviser](),
+                str(description["correction"]),
+            )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error
         except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
             raise PolicyError(f"{path} is damaged: {error!r:.200}") from error
-
-
-def _adviser(name: str | None) -> Adviser | None:
-    """Return a scripted policy of this package as adviser; a file never names other code."""
-    if name is None:
-        return None
-    if name not in SCRIPTED:
-        raise PolicyError(
-            f"its adviser {name!r:.80} is none of {', '.join(SCRIPTED)}: install the version that wrote it"
-        )
-    return check_adviser(name, SCRIPTED[name]())
 
 
 def write_policy_file(path: Path, tensors: Mapping[str, FloatArray], description: Any) -> None:

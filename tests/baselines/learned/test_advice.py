@@ -9,21 +9,17 @@ import pytest
 from tests.support.learned import network_for, policy_for
 
 import posse
-from posse_baselines import Policy, PolicyError, load
+from posse_baselines import Policy, PolicyError, load, play
 from posse_baselines.learned import Encoding, LearnedPolicy
-from posse_baselines.learned.advice import Advice, Advising, BelievingAdviser, advised, check_adviser
-from posse_baselines.playing import play
+from posse_baselines.learned.advice import Advice, Advising, check_adviser
 
 DDCS = "ddcs-distributed"
 SAID = load(DDCS).message_size
 
 
-def listener(
-    layout: posse.ObservationLayout, answer: tuple[float, float], correction: str = "motion", kind: str = "slots"
-) -> LearnedPolicy:
+def listener(answer: tuple[float, float], correction: str = "motion", kind: str = "slots") -> LearnedPolicy:
     """Return a policy whose network has a constant output."""
-    encoding = Encoding.of(layout, kind)
-    adviser = check_adviser(DDCS, load(DDCS))
+    encoding, adviser = Encoding.of(worlds().layout, kind), load(DDCS)
     size = encoding.size + Advising(adviser, correction, believes=encoding.believes).inputs
     network = network_for(size, weights=(np.zeros((2, size), np.float32),), biases=(np.array(answer, np.float32),))
     return LearnedPolicy(network, encoding, {"name": "mine"}, adviser, correction)
@@ -40,49 +36,36 @@ KINDS = pytest.mark.parametrize(
 
 @KINDS
 def test_an_answer_of_zero_is_the_adviser_itself(correction: str, kind: str) -> None:
-    mine = play(worlds(), listener(worlds().layout, (0.0, 0.0), correction, kind), seed=3)
+    mine = play(worlds(), listener((0.0, 0.0), correction, kind), seed=3)
     ddcs = play(worlds(), load(DDCS), seed=3)
     for name, values in ddcs.items():
         np.testing.assert_array_equal(mine[name], values, err_msg=name)
 
 
-def test_an_answer_reaches_from_one_end_to_the_other_and_leaves_the_message() -> None:
-    proposals = np.array([[-1.0, 1.0, 0.3], [0.5, -0.25, -1.0]], np.float32)
-    answers = np.array([[1.0, -1.0], [0.125, 0.125]], np.float32)
-    expected = [[1.0, -1.0, 0.3], [0.75, 0.0, -1.0]]
-    np.testing.assert_array_equal(advised(proposals, answers), np.array(expected, np.float32))
-    np.testing.assert_array_equal(proposals[0], np.array([-1.0, 1.0, 0.3], np.float32))
+def test_an_answer_is_twice_as_large_a_correction_and_leaves_the_message() -> None:
+    batch, ddcs = worlds(), load(DDCS)
+    observations = batch.reset(seed=3)
+    actions, _ = ddcs.act(observations, ddcs.begin(batch.layout, 6))
+    for answer in ((1.0, -1.0), (0.125, -0.25)):
+        policy = listener(answer)
+        corrected, _ = policy.act(observations, policy.begin(batch.layout, 6))
+        np.testing.assert_array_equal(
+            corrected[..., :2], np.clip(actions[..., :2] + 2 * np.array(answer, np.float32), -1, 1)
+        )
+        np.testing.assert_array_equal(corrected[..., 2:], actions[..., 2:])
 
 
 def test_the_safeguard_comes_after_a_corrected_velocity() -> None:
     def contacts(correction: str) -> float:
-        policy = listener(worlds().layout, (0.3, 0.0), correction)
-        return 1.0 - float(play(worlds(40), policy, seed=3)["contact_free"].mean())
+        return 1.0 - float(play(worlds(40), listener((0.3, 0.0), correction), seed=3)["contact_free"].mean())
 
     # Always faster, come what may: without the safeguard, most teams touch something.
     assert contacts("velocity") < 0.5 * contacts("motion")
 
 
-def test_a_velocity_is_corrected_in_the_trackers_own_directions() -> None:
-    batch = posse.batch("smart", 8, message_size=SAID)
-    ddcs = load(DDCS)
-    assert isinstance(ddcs, BelievingAdviser)
-    observations = batch.reset(seed=1)
-    proposals, memory = ddcs.propose(observations, ddcs.begin(batch.layout, 8))
-    halt, _ = ddcs.carry_out(observations, memory, -proposals)
-    np.testing.assert_array_equal(halt[..., 0], -1.0)
-    proposals, memory = ddcs.propose(observations, ddcs.begin(batch.layout, 8))
-    ahead = np.zeros_like(proposals)
-    ahead[..., 0] = 1.0
-    straight, _ = ddcs.carry_out(observations, memory, ahead - proposals)
-    # The safeguard has to do with two trackers that start near each other, and no others.
-    alone = (straight[..., 0] > 1.0 - 1e-6) & (np.abs(straight[..., 1]) < 1e-5)
-    assert alone.mean() > 0.9
-
-
 @KINDS
 def test_a_file_keeps_the_adviser(tmp_path: Path, correction: str, kind: str) -> None:
-    policy = listener(worlds().layout, (0.1, -0.2), correction, kind)
+    policy = listener((0.1, -0.2), correction, kind)
     policy.save(tmp_path / "mine.safetensors")
     again = LearnedPolicy.from_file(tmp_path / "mine.safetensors")
     assert again.adviser is not None
@@ -96,7 +79,7 @@ def test_a_file_keeps_the_adviser(tmp_path: Path, correction: str, kind: str) ->
 def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was(correction: str, believes: bool) -> None:
     rng = np.random.default_rng(0)
     batch, alone = worlds(4), worlds(1, first=2)
-    advising = Advising(check_adviser(DDCS, load(DDCS)), correction, believes=believes)
+    advising = Advising(load(DDCS), correction, believes=believes)
     advice, other = Advice(advising, batch), Advice(advising, alone)
     advice.restart(batch.reset(seed=5), np.ones(4, np.bool_))
     other.restart(alone.reset(seed=5), np.ones(1, np.bool_))
@@ -122,8 +105,8 @@ def test_who_cannot_advise() -> None:
     for policy, settings, message in (
         (load("planner"), {}, "no tracker observes"),
         (mute, {}, "arrays"),
-        (pursuit, {"correction": "velocity"}, "propose and carry_out"),
-        (pursuit, {"believes": True}, "offers no belief"),
+        (pursuit, {"correction": "velocity"}, "propose, belief and carry_out"),
+        (pursuit, {"believes": True}, '"belief" goes with correction="velocity"'),
         (pursuit, {"correction": "speed"}, "motion, velocity"),
     ):
         with pytest.raises(PolicyError, match=message):
