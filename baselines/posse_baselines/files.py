@@ -5,20 +5,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
-import os
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 _PREFIX = ".posse-"
-_NEW_FILE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
 
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file such that at any moment either the old or the whole new one exists.
-
-    The new file has the permissions that any new file has (the umask).
 
     Raises:
         OSError: ``path`` is a symbolic link, or it could not be written, for example because the
@@ -40,7 +36,7 @@ def replacing(path: Path) -> Iterator[Path]:
     partial = path.with_name(f"{_PREFIX}{secrets.token_hex(8)}{path.suffix}")
     try:
         refuse_link(path)
-        os.close(os.open(partial, _NEW_FILE, 0o666))
+        partial.touch(exist_ok=False)
         try:
             yield partial
             partial.replace(path)

@@ -171,26 +171,20 @@ class FunctionPolicy(BasePolicy):
         Raises:
             PolicyError: The function returns something of another shape.
         """
-        chosen = np.asarray(self._function(observations))
-        leading = observations.shape[:2]
-        if self._discrete:
-            if chosen.shape != leading or chosen.dtype.kind not in "iu":
-                raise self._wrong(chosen, f"{leading} of whole numbers")
-            chosen = MOTIONS[chosen]
-        if chosen.ndim != 3 or chosen.shape[:2] != leading:
-            raise self._wrong(chosen, f"{leading} + (2 + message_size,)")
-        spoken = memory.scenario.message_size
-        silent = 2 + spoken - chosen.shape[2]
-        if silent < 0:
-            raise self._wrong(chosen, f"{(*leading, 2 + spoken)}")
-        actions = np.pad(chosen.astype(np.float32), ((0, 0), (0, 0), (0, silent)))
+        found = np.asarray(self._function(observations))
+        numbered = self._discrete and found.dtype.kind in "iu"
+        chosen = MOTIONS[found] if numbered else found
+        team, length = observations.shape[:2], 2 + memory.scenario.message_size
+        fits = chosen.ndim == 3 and chosen.shape[:2] == team and 2 <= chosen.shape[2] <= length
+        if numbered != self._discrete or not fits:
+            wanted = f"{team} of whole numbers" if self._discrete else f"{(*team, length)}, or without the message"
+            raise PolicyError(
+                f"the function of policy {self.name!r} returned actions of shape {found.shape} "
+                f"({found.dtype}), wanted {wanted}"
+            )
+        actions = np.zeros((*team, length), np.float32)
+        actions[..., : chosen.shape[2]] = chosen
         return actions, memory
-
-    def _wrong(self, chosen: npt.NDArray[np.generic], wanted: str) -> PolicyError:
-        return PolicyError(
-            f"the function of policy {self.name!r} returned actions of shape {chosen.shape} "
-            f"({chosen.dtype}), wanted {wanted}"
-        )
 
 
 def from_function(
@@ -205,11 +199,6 @@ def from_function(
         message_size: Numbers that it adds to each broadcast, m.
         discrete_actions: Whether it returns numbers (E, N) of
             :data:`posse.adapters.actions.MOTIONS`.
-
-    Raises:
-        TypeError: ``function`` cannot be called.
     """
-    if not callable(function):
-        raise TypeError(f"function={function!r:.80} cannot be called")
     named: str = getattr(function, "__name__", "function") if name is None else name
     return FunctionPolicy(function, named, message_size, discrete_actions)

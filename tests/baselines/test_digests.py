@@ -4,8 +4,6 @@ Of each world one number is compared: the mean of its actions under drawn weight
 rounding grow with time. After a change that is meant, write the file again::
 
     PYTHONPATH=envs:baselines python tests/baselines/test_digests.py
-
-The planner, which plays copies of the world, has tests of its own.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ import posse
 from posse_baselines import begin, load, policy_names
 
 FILE = Path(__file__).with_name("digests.json")
-POLICIES = [name for name in policy_names() if name != "planner"]
+POLICIES = list(policy_names())
 WORLDS, STEPS = 4, 12
 TEAMS: tuple[dict[str, Any], ...] = (
     {},

@@ -16,7 +16,6 @@ from posse_baselines import (
     PolicyError,
     begin,
     load,
-    play,
     policy_names,
     rollout,
     split_agents,
@@ -24,6 +23,7 @@ from posse_baselines import (
 )
 from posse_baselines.ddcs import DDCS
 from posse_baselines.learned import LearnedPolicy
+from posse_baselines.policies.simple import Random
 
 NAMES = policy_names()
 PLAYS_BY_THE_RULES = [name for name in NAMES if not load(name).reads_state]
@@ -215,16 +215,7 @@ def test_what_cannot_be_recorded_is_named() -> None:
         rollout(posse.batch("constant", 1), load("idle"), steps=0)
 
 
-def test_play_returns_the_metrics_of_one_episode_a_world() -> None:
-    for autoreset in ("next_step", "same_step", "disabled"):
-        metrics = play(posse.batch("constant", 5, horizon=40, autoreset=autoreset), load("pursuit"))
-        assert set(metrics) == {metric.name for metric in posse.METRICS}
-        np.testing.assert_allclose(metrics["duration"], 4.0)
-
-
 def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
-    from posse_baselines.policies.simple import Random
-
     batch = posse.batch("constant", 200)
     _, done = trace(Random(seed=1), batch, 10)
     draws = np.stack(done)
@@ -237,17 +228,6 @@ def test_random_draws_are_uniform_and_differ_by_seed_tracker_and_step() -> None:
     assert not np.array_equal(other.act(batch.reset(seed=0), begin(other, batch))[0], done[0])
     with pytest.raises(ValueError, match="seed=-1"):
         Random(seed=-1)
-
-
-def test_pursuers_close_in_without_running_into_each_other_at_once() -> None:
-    batch = posse.batch("constant", 50, horizon=200)
-    metrics = play(batch, load("pursuit"))
-    distance = np.hypot(
-        batch.state["tracker_x"] - batch.state["world_x"][:, None],
-        batch.state["tracker_y"] - batch.state["world_y"][:, None],
-    )
-    assert np.median(distance) < 2.0
-    assert metrics["tracker_contacts"].mean() < 5.0
 
 
 # --- refusals ------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import PolicyError, load, play, policy_names, settings_of, with_settings
+from posse_baselines import PolicyError, load, play, policy_names, with_settings
 from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED, read_tuned, tuned_files
 from posse_training import evaluate
 
@@ -84,31 +84,10 @@ def test_without_a_file_the_untuned_policy_is_played_and_the_split_of_tuning_is_
         evaluate(name, "constant", 1, split="train", progress=False)
 
 
-def test_one_object_plays_several_scenarios() -> None:
-    policy = load("ddcs-tuned")
-    apart = [play(batch_of(name), load("ddcs-tuned"))["score"] for name in ("smart", "radio")]
-    batches = [batch_of("smart"), batch_of("radio")]
-    memories = [policy.begin(batch.layout, batch.num_worlds) for batch in batches]
-    seen = [batch.reset() for batch in batches]
-    for _ in range(150):
-        for k, batch in enumerate(batches):
-            actions, memories[k] = policy.act(seen[k], memories[k])
-            seen[k], _, _, ended, infos = batch.step(actions)
-            if ended.all():
-                np.testing.assert_array_equal(infos["metrics/score"], apart[k])
-
-
 def write(path: Path, **changes: Any) -> Path:
     card = {"format": FORMAT, "policy": "pngl", "scenario": "smart", "settings": {"near": 0.5}}
     path.write_text(json.dumps({**card, **changes}))
     return path
-
-
-def test_a_file_of_settings_is_a_policy(tmp_path: Path) -> None:
-    path = write(tmp_path / "mine.json")
-    policy = load(path)
-    assert policy.name == "pngl-tuned-smart"
-    assert read_tuned(path).settings == settings_of("pngl").replace(near=0.5)
 
 
 @pytest.mark.parametrize(

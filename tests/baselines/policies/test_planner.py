@@ -37,12 +37,6 @@ def test_playing_ahead_is_worth_more_than_the_scripted_team(name: str) -> None:
     assert planned["contact_free"].all()
 
 
-def test_a_world_is_played_alone_as_among_others() -> None:
-    together = actions_of(Planner(QUICK), posse.batch("field", 5, seed=2), 60)
-    alone = actions_of(Planner(QUICK), posse.batch("field", 1, seed=2, first_world=3), 60)
-    np.testing.assert_array_equal(together[:, 3:4], alone)
-
-
 def test_a_new_episode_is_played_as_if_it_were_the_first() -> None:
     planner, batch = Planner(QUICK), posse.batch("radio", 3, seed=5)
     batch.reset()
@@ -103,14 +97,6 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
         assert actions.shape == (2, 5, 2)
         target = np.full((2, 1, 2), 0.5, np.float32)
         observations = batch.step(np.concatenate([actions, target], axis=1))[0][:, :5]
-
-
-@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
-def test_it_plays_past_the_end_of_episodes(autoreset: str) -> None:
-    batch = posse.batch("obstacles", 3, autoreset=autoreset, horizon=25, settle_time=1.0, start_distance=(1.5, 3.0))
-    played = rollout(batch, Planner(QUICK), ["actions"], steps=60)
-    assert played.steps == (25 if autoreset == "disabled" else 60)
-    assert np.isfinite(played["actions"]).all()
 
 
 def test_it_sends_every_tracker_to_a_slot_of_its_own() -> None:
