@@ -23,6 +23,9 @@ class Network(OwnArrays):
 
     x = clip((input - mean) * scale, ±limit), then layers of weight (out, in) and bias (out,) with
     the activation between them; ``output`` brings the result into [-1, 1].
+
+    Raises:
+        PolicyError: Shapes that do not chain, numbers that are not finite, unknown functions.
     """
 
     mean: FloatArray
@@ -33,22 +36,7 @@ class Network(OwnArrays):
     activation: str
     output: str
 
-    @property
-    def inputs(self) -> int:
-        """Numbers that it reads."""
-        return len(self.mean)
-
-    @property
-    def outputs(self) -> int:
-        """Numbers of an action."""
-        return len(self.weights[-1])
-
-    def check(self) -> None:
-        """Raise unless the network can be computed.
-
-        Raises:
-            PolicyError: Shapes that do not chain, numbers that are not finite, unknown functions.
-        """
+    def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS or self.output not in OUTPUTS:
             raise PolicyError(
                 f"unknown activation {self.activation!r:.80} or output {self.output!r:.80}: "
@@ -73,6 +61,16 @@ class Network(OwnArrays):
                 raise PolicyError("a network's numbers must be finite float32")
         if not 0 < self.limit < math.inf:
             raise PolicyError(f"limit={self.limit} of the normalised inputs must be a finite number above 0")
+
+    @property
+    def inputs(self) -> int:
+        """Numbers that it reads."""
+        return len(self.mean)
+
+    @property
+    def outputs(self) -> int:
+        """Numbers of an action."""
+        return len(self.weights[-1])
 
     def tensors(self) -> dict[str, FloatArray]:
         """Return the arrays by their names in a policy file."""

@@ -72,7 +72,6 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Policy | None = None,
         correction: str = "motion",
     ) -> None:
-        network.check()
         if adviser is None and encoding.believes:
             raise PolicyError("a policy that reads an adviser's belief needs an adviser")
         self._advising = None if adviser is None else Advising(adviser, correction, believes=encoding.believes)
