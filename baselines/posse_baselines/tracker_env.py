@@ -31,8 +31,8 @@ class _WithTeammates:
         self._silent = silent
         self._fit = functools.partial(_fitting, self.teammates, number)
         self._memory: Any = None
+        # (E, N, F) what the team observes; never written to, since policies may keep observations.
         self._team: FloatArray = np.zeros(0, np.float32)
-        """(E, N, F) what the team observes; kept, since policies may keep observations."""
 
     def _with_teammates(self, own: FloatArray) -> FloatArray:
         """Return the teams' actions (E, N, 2 + m), given those of one tracker (E, 2 or 2 + m)."""
