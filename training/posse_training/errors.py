@@ -31,10 +31,6 @@ class DivergedError(UserError, RuntimeError):
     """A training whose networks give numbers that are not finite."""
 
 
-class ComparisonError(UserError, RuntimeError):
-    """A comparison that cannot be written to its folder; the message says why and what to do."""
-
-
 class TrainedSplitError(UserError, ValueError):
     """An evaluation on worlds that the policy was trained on."""
 
