@@ -9,35 +9,26 @@ import difflib
 import importlib
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
-from posse_training.errors import OWN
+from posse_training.errors import UserError
 
-
-@dataclass(frozen=True)
-class _Command:
-    """A command: a one-line summary, and the module whose ``main``, or ``:function``, takes its arguments."""
-
-    summary: str
-    module: str
-
-
-COMMANDS: Final[dict[str, _Command]] = {
-    "demo": _Command("a table of scores, films and a replay page", "commands.demo"),
-    "train": _Command("train a team", "commands.train"),
-    "tune": _Command("tune the settings of a scripted team", "tune"),
-    "league": _Command("train teams and targets in turns against each other", "league"),
-    "compare": _Command("score policies on the same worlds", "compare.compare"),
-    "watch": _Command("show policies in a window, as a page or a film", "commands.watch"),
-    "play": _Command("drive the target, or a tracker, in a window", "play"),
-    "replay": _Command("write a replay of teams as a web page", "replay.command"),
-    "submit": _Command("play for the leaderboard and write the claim", "leaderboard:submit_command"),
-    "verify": _Command("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
-    "record": _Command("record episodes as a data set for offline learning", "datasets"),
-    "reproduce": _Command("repeat the paper's experiments", "reproduce.reproduce"),
-    "scenarios": _Command("list the scenarios", "commands.scenarios"),
+COMMANDS: Final = {
+    "demo": ("a table of scores, films and a replay page", "commands.demo"),
+    "train": ("train a team", "commands.train"),
+    "tune": ("tune the settings of a scripted team", "tune"),
+    "league": ("train teams and targets in turns against each other", "league"),
+    "compare": ("score policies on the same worlds", "compare.compare"),
+    "watch": ("show policies in a window, as a page or a film", "commands.watch"),
+    "play": ("drive the target, or a tracker, in a window", "play"),
+    "replay": ("write a replay of teams as a web page", "replay.command"),
+    "submit": ("play for the leaderboard and write the claim", "leaderboard:submit_command"),
+    "verify": ("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
+    "record": ("record episodes as a data set for offline learning", "datasets"),
+    "reproduce": ("repeat the paper's experiments", "reproduce.reproduce"),
+    "scenarios": ("list the scenarios", "commands.scenarios"),
 }
+"""Of each command a summary, and the module whose ``main``, or ``:function``, takes its arguments."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -59,8 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         hint = f": did you mean {near[0]!r}?" if near else ""
         print(f"posse: unknown command {name!r:.80}{hint}\n\n{_usage()}", file=sys.stderr)
         return 2
+    module, _, function = COMMANDS[name][1].partition(":")
     try:
-        module, _, function = COMMANDS[name].module.partition(":")
         run: Callable[[list[str]], Any] = getattr(
             importlib.import_module(f"posse_training.{module}"), function or "main"
         )
@@ -69,23 +60,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"\nposse {name}: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        if not isinstance(error, _user_errors()):
+        from posse import ScenarioError
+        from posse_baselines import PolicyError
+
+        if not isinstance(error, (UserError, ScenarioError, PolicyError, OSError)):
             raise
         print(f"posse {name}: {error}", file=sys.stderr)
         return 2
 
 
 def _usage() -> str:
-    lines = [f"  {name:<11} {command.summary}" for name, command in COMMANDS.items()]
+    lines = [f"  {name:<11} {summary}" for name, (summary, _) in COMMANDS.items()]
     return "\n".join(["usage: posse COMMAND ...", "", *lines, "", "posse COMMAND --help lists its arguments"])
-
-
-def _user_errors() -> tuple[type[Exception], ...]:
-    """Return the errors whose message is for the user; all others keep their traceback."""
-    from posse import ScenarioError
-    from posse_baselines import PolicyError
-
-    return (*OWN, ScenarioError, PolicyError, OSError)
 
 
 if __name__ == "__main__":

@@ -6,69 +6,53 @@ import importlib
 import importlib.util
 import traceback
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 _LONGEST: Final = 300  # characters of an error in a summary
 
 
-class SettingsError(ValueError):
+class UserError(Exception):
+    """An error that the command line shows without a traceback."""
+
+
+class SettingsError(UserError, ValueError):
     """An invalid setting of a command."""
 
 
-class RunFolderError(RuntimeError):
+class RunFolderError(UserError, RuntimeError):
     """A run folder that cannot be used; the message says why and what to do."""
 
 
-class CheckpointError(RuntimeError):
+class CheckpointError(UserError, RuntimeError):
     """A checkpoint that cannot be written or read."""
 
 
-class DivergedError(RuntimeError):
+class DivergedError(UserError, RuntimeError):
     """A training whose networks give numbers that are not finite."""
 
 
-class ComparisonError(RuntimeError):
-    """A comparison that cannot be written to its folder; the message says why and what to do."""
-
-
-class TrainedSplitError(ValueError):
+class TrainedSplitError(UserError, ValueError):
     """An evaluation on worlds that the policy was trained on."""
 
 
-class TimeLimitError(RuntimeError):
+class TimeLimitError(UserError, RuntimeError):
     """An evaluation that exceeded its time limit."""
 
 
-class PlayError(RuntimeError):
+class PlayError(UserError, RuntimeError):
     """A policy that raised, returned invalid actions, exceeded the time limit or crashed."""
 
 
-class ResultFileError(ValueError):
+class ResultFileError(UserError, ValueError):
     """A claim for the leaderboard that is invalid or cannot be checked."""
 
 
-class ClusterError(RuntimeError):
+class ClusterError(UserError, RuntimeError):
     """Work on a cluster that cannot begin or go on; the message says why and what to do."""
 
 
-class MissingExtraError(ImportError):
+class MissingExtraError(UserError, ImportError):
     """A package that only an extra installs; the message says which."""
-
-
-OWN: Final = (
-    SettingsError,
-    RunFolderError,
-    CheckpointError,
-    DivergedError,
-    ComparisonError,
-    TrainedSplitError,
-    TimeLimitError,
-    PlayError,
-    ResultFileError,
-    ClusterError,
-    MissingExtraError,
-)
-"""All errors of this module."""
 
 
 def require(extra: str, *packages: str) -> None:
@@ -85,6 +69,16 @@ def require(extra: str, *packages: str) -> None:
                 f"{package} cannot be imported ({error}). Install the extra {extra!r} of posse-rl; from a clone: "
                 f"pip install '.[{extra}]'"
             ) from error
+
+
+def check_settings(settings: Any) -> None:
+    """Raise a ``SettingsError`` for a field of a settings class that is not as it declares itself."""
+    from posse_baselines.fields import check  # not at the start of the command line
+
+    try:
+        check(settings)
+    except ValueError as error:
+        raise SettingsError(str(error)) from error
 
 
 def describe(error: BaseException) -> str:

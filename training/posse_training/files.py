@@ -1,72 +1,78 @@
-"""Folders that one process at a time may write to."""
+"""Folders of runs: one process at a time writes to one, and resumes only a run with its own settings."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import IO, Final
+from typing import Any, Final
 
-from posse_baselines.files import read_json, refuse_link, remove_unfinished
+from posse_baselines.files import read_json, refuse_link, remove_unfinished, write_atomically
+from posse_training.errors import RunFolderError
 
 try:
     import fcntl
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["LOCK", "InUseError", "locked", "read_json"]
+__all__ = ["LOCK", "InUseError", "hold_settings", "locked", "read_json"]
 
 LOCK: Final = "lock"
 """Name of the lock file in a folder."""
 _LOCK_FLAGS: Final = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 
 
-class InUseError(RuntimeError):
-    """A folder that another process holds.
-
-    Attributes:
-        holder: The process number, or "another process".
-    """
-
-    def __init__(self, folder: Path, holder: str) -> None:
-        super().__init__(f"{folder} is in use by process {holder}")
-        self.holder = holder
+class InUseError(RunFolderError):
+    """A folder that another process holds."""
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Hold a folder, made if missing: no other process can hold it meanwhile.
 
-    The operating system releases the lock when the process ends, however it ends. Unfinished files
-    of a process that was killed are removed. A folder that contains a symbolic link is refused,
-    since what is written to it would land elsewhere.
+    The operating system releases the lock when the process ends, however it ends. Unfinished files of a process that
+    was killed are removed.
 
     Raises:
-        InUseError: Another process holds it.
-        OSError: The folder cannot be written to, or contains a symbolic link; it names the file.
+        InUseError: Another process holds it; the message has its number.
+        OSError: The folder cannot be written to, or contains a symbolic link, through which a write would land
+            elsewhere; it names the file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for inside in folder.iterdir():
         refuse_link(inside)
-    path = folder / LOCK
-    with os.fdopen(os.open(path, _LOCK_FLAGS, 0o666), "r+", encoding="utf-8") as file:
-        _hold(file, folder)
-        try:
-            # Unbuffered, so that closing the file does not fail again on a full disk.
-            os.truncate(file.fileno(), 0)
-            os.write(file.fileno(), f"{os.getpid()}\n".encode())
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(path)) from error
+    with os.fdopen(os.open(folder / LOCK, _LOCK_FLAGS, 0o666), "r+", encoding="utf-8") as file:
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                holder = file.read().strip() or "unknown"
+                raise InUseError(
+                    f"{folder} is in use by process {holder}: wait for it, stop it, or choose another folder"
+                ) from error
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
         remove_unfinished(folder)
         yield
 
 
-def _hold(file: IO[str], folder: Path) -> None:
-    if fcntl is None:
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        file.seek(0)
-        raise InUseError(folder, file.read().strip() or "another process") from error
+def hold_settings(path: Path, settings: Mapping[str, Any]) -> None:
+    """Write the settings that a run depends on, as JSON, or check that the run in the folder has the same.
+
+    Raises:
+        RunFolderError: They differ, or cannot be read.
+    """
+    if path.is_file():
+        try:
+            theirs = read_json(path)
+            differing = {name: theirs[name] for name in settings if theirs[name] != settings[name]}
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise RunFolderError(f"{path} is damaged: {error!r:.200}. Remove it, or choose another folder") from error
+        if differing:
+            shown = ", ".join(f"{name}={value!r:.60}, not {settings[name]!r:.60}" for name, value in differing.items())
+            raise RunFolderError(f"{path.parent} holds a run with {shown}: choose another folder, or remove it")
+    else:
+        write_atomically(path, (json.dumps(settings, indent=2) + "\n").encode())

@@ -21,7 +21,7 @@ from posse_baselines.files import write_atomically
 from posse_baselines.playing import check_moves_all
 from posse_baselines.policy import Annotations, Policy, begin
 from posse_training.errors import SettingsError, require
-from posse_training.replay.colours import PLAYERS, TASK_COLOURS
+from posse_training.replay.page import PLAYERS, TASK_COLOURS
 
 _LARGEST: Final = 4096  # px, of width and height
 _MOST_FRAMES: Final = 2 << 30  # bytes of a GIF's, which are all in memory at once

@@ -35,13 +35,8 @@ WORLDS: Final = 1000
 TOLERANCE: Final = 0.002
 """By how much a claim may differ when its worlds are played again: on another processor they play out differently."""
 CLAIM: Final = "standing.csv"
-_TEXTS: Final = {
-    "label": (r"[A-Za-z0-9._ -]{1,60}", "1 to 60 letters, digits and '._ -'"),
-    "policy": (r"[A-Za-z0-9_][A-Za-z0-9._:-]{0,199}", "a name, a file name of letters, digits and '._-', or code"),
-    "scenario": (r"[a-z0-9-]{1,60}", "the name of a scenario"),
-    "split": (r"train|validation|test", "one of train, validation, test"),
-    "commit": (r"([0-9a-f]{7,40}\+?)?", "a commit's hash"),
-}
+_TEXT: Final = re.compile(r"[A-Za-z0-9._:+ -]{0,100}")
+"""What a text of a table may hold: it is shown on a page, and names a file beside the table."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +63,7 @@ class Standing:
     commit: str
 
     def __post_init__(self) -> None:
-        for name in _TEXTS:
+        for name in ("label", "policy", "scenario", "split", "commit"):
             check_text(name, getattr(self, name))
         ordered = 0 <= self.low <= self.safe_score <= min(self.high, self.score) <= max(self.high, self.score) <= 1
         if not (ordered and 0 <= self.contact_free <= 1 and min(self.version, self.worlds) >= 1 and self.seed >= 0):
@@ -99,10 +94,9 @@ class Verdict:
 
 
 def check_text(name: str, value: str) -> None:
-    """Raise a ``ResultFileError`` for a text that the column ``name`` cannot hold."""
-    pattern, allowed = _TEXTS[name]
-    if not re.fullmatch(pattern, value):
-        raise ResultFileError(f"{name}={value!r:.80} must be {allowed}")
+    """Raise a ``ResultFileError`` for a text that a table cannot hold."""
+    if not _TEXT.fullmatch(value):
+        raise ResultFileError(f"{name}={value!r:.80} must be at most 100 letters, digits and '._:+ -'")
 
 
 def standing_of(label: str, text: str, policy: Policy, results: Results) -> Standing:
@@ -138,19 +132,15 @@ def read_standings(path: str | Path) -> list[Standing]:
     """Read and check a table; it loads no policy.
 
     Raises:
-        ResultFileError: The file is missing, has other columns, or an invalid value; its line is named.
+        ResultFileError: The file or a column is missing, or a value is invalid; its line is named.
     """
-    number = 1
+    rows: list[Standing] = []
     try:
-        header, *lines = csv.reader(Path(path).read_text(encoding="utf-8").splitlines(), strict=True)
-        if header != list(_COLUMNS):
-            raise ValueError(f"the columns must be {','.join(_COLUMNS)}")
-        rows = []
-        for number, line in enumerate(lines, 2):  # noqa: B007 (for the message)
-            values: dict[str, Any] = {n: kind(x) for (n, kind), x in zip(_COLUMNS.items(), line, strict=True)}
+        for row in csv.DictReader(Path(path).read_text(encoding="utf-8").splitlines(), strict=True):
+            values: dict[str, Any] = {name: kind(row[name]) for name, kind in _COLUMNS.items()}
             rows.append(Standing(**values))
-    except (OSError, ValueError, KeyError, csv.Error) as error:
-        raise ResultFileError(f"{path}, line {number}: {error}") from error
+    except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
+        raise ResultFileError(f"{path}, line {len(rows) + 2}: {error}") from error
     return rows
 
 
@@ -176,14 +166,11 @@ def submit(
 
     Raises:
         ResultFileError: An invalid label or name, or a folder that is not empty; nothing is played.
-        PolicyError: An unknown or damaged policy, or one that does not fit the scenario.
-        ScenarioError: An unknown scenario, an invalid seed.
-        TrainedSplitError: The policy was trained on these worlds.
     """
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     text = Path(policy).name if is_file else policy
     content = Path(policy).read_bytes() if is_file else None
-    label = label or (loaded.name if is_file else policy.replace(":", "."))
+    label = label or (loaded.name if is_file else policy)
     check_text("label", label)
     check_text("policy", text)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -218,7 +205,6 @@ def verify(
 
     Raises:
         ResultFileError: An invalid claim, code without ``run_code``, or another version of the scenario.
-        PolicyError: A policy that is missing, damaged, or does not fit.
     """
     path = folder / CLAIM
     rows = read_standings(path)
@@ -250,12 +236,9 @@ def verify_command(arguments: Sequence[str]) -> int:
     """``posse verify``: play, print the verdict and the row for the leaderboard; 1 if the claim does not hold."""
     verdict = tyro.cli(verify, prog="posse verify", args=arguments)
     difference = verdict.claim.safe_score - verdict.repeated.safe_score
-    print(
-        f"claimed:  {_shown(verdict.claim)}\nrepeated: {_shown(verdict.repeated)}\nmeasured: {_shown(verdict.measured)}"
-    )
-    print(
-        "the claim holds" if verdict.holds else "the claim DOES NOT HOLD", f"({difference:+.4f}, allowed {TOLERANCE})"
-    )
+    for name in ("claim", "repeated", "measured"):
+        print(f"{name}: {_shown(getattr(verdict, name))}")
+    print(f"the claim {'holds' if verdict.holds else 'DOES NOT HOLD'} ({difference:+.4f}, allowed {TOLERANCE})")
     print("the measured row:", standings_text([verdict.measured]).splitlines()[1])
     return 0 if verdict.holds else 1
 

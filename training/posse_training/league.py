@@ -6,12 +6,10 @@ Everything is kept in the folder, so that the same command resumes a league that
 from __future__ import annotations
 
 import csv
-import dataclasses
-import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -21,12 +19,13 @@ from rich.table import Table
 
 from posse import get_scenario
 from posse_baselines import load, load_target
+from posse_baselines.fields import number
 from posse_baselines.files import replacing, write_atomically
-from posse_training.errors import RunFolderError, SettingsError, require
+from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
-from posse_training.files import InUseError, locked, read_json
+from posse_training.files import hold_settings, locked, read_json
 from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, default_settings, read_settings
 
 FILE: Final = "league.json"
@@ -38,11 +37,10 @@ OTHER: Final = {TEAM: TARGET, TARGET: TEAM}
 TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
 """Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
-_SHARES: Final = 8
-"""Parts that the worlds are divided into among the opponents, about."""
+_SHARES: Final = 8  # parts that the worlds are divided into among the opponents, about
 _FREE: Final = ("generations", "responses", "response_steps", "episodes", "folder")
 """Settings that the command that resumes a league may change."""
-_ESTIMATES: Final = ("score", "safe_score", "contact_free")
+_STEPS: Final = (1, 10**12)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +53,7 @@ class LeagueSettings:
 
     scenario: str = "duel"
     """Scenario of all plays."""
-    generations: int = 8
+    generations: int = number(8, "", 1, 10_000)
     """Generations in all: in each a target is trained, then a team."""
     opponents: Literal["pfsp", "fictitious"] = "pfsp"
     """How the worlds are divided among the other side's past. fictitious: evenly; pfsp: an opponent
@@ -64,17 +62,17 @@ class LeagueSettings:
     """Teams at the beginning: names or files."""
     targets: tuple[str, ...] = ("smart",)
     """Targets at the beginning: names or files."""
-    target_steps: int = 2_000_000
+    target_steps: int = number(2_000_000, "", *_STEPS)
     """Steps of each target's training."""
-    team_steps: int = 4_000_000
+    team_steps: int = number(4_000_000, "", *_STEPS)
     """Steps of each team's training, of one tracker each."""
     responses: Literal["last", "all", "none"] = "last"
     """For which generations a best response is trained, which says how much it can be exploited."""
-    response_steps: int = 2_000_000
+    response_steps: int = number(2_000_000, "", *_STEPS)
     """Steps of the training of a best response."""
-    episodes: int = 200
+    episodes: int = number(200, "", 2, 10**8)
     """Test worlds of each pair of a team and a target."""
-    seed: int = 1
+    seed: int = number(1, "", 0, 2**32 - 1)
     """Seed of the trainings."""
     overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
     """Settings of the scenario to change, by name."""
@@ -84,10 +82,7 @@ class LeagueSettings:
     """Folder; default: runs/league/SCENARIO."""
 
     def __post_init__(self) -> None:
-        least = dict.fromkeys(("generations", "target_steps", "team_steps", "response_steps"), 1)
-        for name, low in {**least, "episodes": 2, "seed": 0}.items():
-            if getattr(self, name) < low:
-                raise SettingsError(f"{name}={getattr(self, name)!r:.80} must be a whole number of {low} or more")
+        check_settings(self)
         for name in ("teams", "targets"):
             named = getattr(self, name)
             if not named or any("," in each or not each for each in named):
@@ -106,13 +101,14 @@ class LeagueSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as plain values, without the folder."""
-        values = json.loads(json.dumps({**dataclasses.asdict(self), "folder": None}))
-        return {name: value for name, value in values.items() if name != "folder"}
+        values: dict[str, Any] = json.loads(json.dumps({**asdict(self), "folder": None}))
+        del values["folder"]
+        return values
 
 
 @dataclass(frozen=True)
 class Member:
-    """A team or a target: its name in tables, and what loads it.
+    """A team or a target.
 
     Attributes:
         label: Its name in tables.
@@ -144,113 +140,51 @@ class Cell:
     safe_score: Estimate
     contact_free: Estimate
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the cell as plain values."""
-        return {
-            "team": self.team,
-            "target": self.target,
-            **{name: getattr(self, name).to_dict() for name in _ESTIMATES},
-        }
-
 
 @dataclass(frozen=True)
 class Exploited:
-    """What a best response gains against a member.
+    """What a best response gains against a member: by how much it moves the team's score in its own favour.
 
     Attributes:
         side: The member's side.
         label: The member's label.
-        before: Its play against the strongest opponent of the league.
+        gain: Of the best response.
+        before: The member's play against the strongest opponent of the league.
         after: Its play against the best response.
     """
 
     side: str
     label: str
+    gain: float
     before: Cell
     after: Cell
 
-    @property
-    def gain(self) -> float:
-        """By how much the response moves the team's score in its own favour."""
-        change = self.after.score.value - self.before.score.value
-        return -change if self.side == TEAM else change
 
-
-@dataclass(frozen=True)
 class League:
-    """All results of a league."""
+    """A league: its members, and all results once it has been played."""
 
-    settings: LeagueSettings
-    teams: list[Member]
-    targets: list[Member]
-    cells: list[Cell]
-    exploited: list[Exploited]
+    def __init__(self, settings: LeagueSettings, console: Console) -> None:
+        self.settings, self.console = settings, console
+        self.scenario = get_scenario(settings.scenario, **settings.overrides)
+        self.teams, self.targets = (
+            self._members(TEAM, settings.generations),
+            self._members(TARGET, settings.generations),
+        )
+        self.cells: list[Cell] = []
+        self.exploited: list[Exploited] = []
 
     def at(self, team: str, target: str) -> Cell:
         """Return what a team scores against a target, by their labels."""
         return next(c for c in self.cells if (c.team, c.target) == (team, target))
 
-
-def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
-    """Train the generations that are missing, play all against all, train best responses.
-
-    Args:
-        settings: All that the result depends on.
-        console: Where to show progress.
-
-    Raises:
-        PolicyError, ScenarioError: An unknown policy or scenario; nothing is made.
-        RunFolderError: The folder is in use, or has a league of other settings.
-        CheckpointError: A checkpoint cannot be written or read.
-    """
-    get_scenario(settings.scenario, **settings.overrides)
-    for team in settings.teams:
-        load(team)
-    for target in settings.targets:
-        load_target(target)
-    try:
-        with locked(settings.path):
-            _keep(settings)
-            found = _Run(settings, console or Console()).play()
-            write_results(found)
-            return found
-    except InUseError as error:
-        raise RunFolderError(f"league {error}: wait for it, or choose another --folder") from error
-
-
-def _keep(settings: LeagueSettings) -> None:
-    """Write the settings to the league's folder, or check that they are those that it has."""
-    path, mine = settings.path / FILE, settings.to_dict()
-    if path.is_file():
-        try:
-            theirs = read_json(path)
-            differing = [n for n in mine if n not in _FREE and mine[n] != theirs[n]]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise RunFolderError(f"{path} is damaged: {error!r:.200}") from error
-        if differing:
-            shown = ", ".join(f"{n}={theirs[n]!r:.60}" for n in differing)
-            raise RunFolderError(
-                f"{settings.path} has a league with {shown}: go on with these, or choose another --folder"
-            )
-    write_atomically(path, (json.dumps(mine, indent=2) + "\n").encode())
-
-
-class _Run:
-    """A league while it is played."""
-
-    def __init__(self, settings: LeagueSettings, console: Console) -> None:
-        self.settings, self.console = settings, console
-        self.scenario = get_scenario(settings.scenario, **settings.overrides)
-
-    def play(self) -> League:
+    def play(self) -> None:
         """Generations, cross-play, best responses."""
-        s = self.settings
-        for generation in range(1, s.generations + 1):
+        for generation in range(1, self.settings.generations + 1):
             for side in (TARGET, TEAM):
                 self._generation(side, generation)
-        teams, targets = self._members(TEAM, s.generations), self._members(TARGET, s.generations)
-        cells = self._cells([(team, target) for team in teams for target in targets])
-        return League(s, teams, targets, cells, self._exploit(teams, targets))
+        self.cells = [self._cell((team, target)) for team in self.teams for target in self.targets]
+        self._exploit(TARGET, self.teams, self.targets)
+        self._exploit(TEAM, self.targets, self.teams)
 
     def _generation(self, side: str, generation: int) -> None:
         """Train the member of a side, against the other's past and present."""
@@ -266,23 +200,20 @@ class _Run:
         steps = s.target_steps if side == TARGET else s.team_steps
         self._train(side, trained, against(parts), steps, own)
 
-    def _exploit(self, teams: list[Member], targets: list[Member]) -> list[Exploited]:
-        """Train best responses to the last members, or to all, and say what they gain."""
+    def _exploit(self, side: str, of: list[Member], others: list[Member]) -> None:
+        """Train best responses of a side to the last member of the other one, or to all, and note what they gain."""
         s = self.settings
         first = {"none": s.generations, "last": s.generations - 1, "all": 0}[s.responses]
-        found = []
-        for side, of, others in ((TARGET, teams, targets), (TEAM, targets, teams)):
-            for to in [m for m in of if m.run is not None][first:]:
-                run = s.path / "responses" / f"{side}-to-{to.label}"
-                best = Member(f"response to {to.label}", str(run / BEST), run)
-                if not best.trained:
-                    self._train(side, best, to.policy, s.response_steps, others)
-                (after,) = self._cells([_pair(side, to, best)])
-                known = self._cells([_pair(side, to, other) for other in others])
-                # The strongest known opponent: a target's lowest score, a team's highest.
-                pick = min if side == TARGET else max
-                found.append(Exploited(OTHER[side], to.label, pick(known, key=lambda cell: cell.score.value), after))
-        return found
+        sign = -1 if side == TARGET else 1  # the strongest target has the lowest score
+        for to in [m for m in of if m.run is not None][first:]:
+            run = s.path / "responses" / f"{side}-to-{to.label}"
+            best = Member(f"response to {to.label}", str(run / BEST), run)
+            if not best.trained:
+                self._train(side, best, to.policy, s.response_steps, others)
+            after, *known = (self._cell((to, m) if side == TARGET else (m, to)) for m in (best, *others))
+            before = max(known, key=lambda cell: sign * cell.score.value)
+            gain = sign * (after.score.value - before.score.value)
+            self.exploited.append(Exploited(OTHER[side], to.label, gain, before, after))
 
     def _members(self, side: str, generations: int) -> list[Member]:
         """Return those of a side that were there at the beginning, and those of its first generations."""
@@ -294,7 +225,7 @@ class _Run:
         return found
 
     def _train(self, side: str, trained: Member, opponents: str, steps: int, own: Sequence[Member]) -> None:
-        """Train a member, or go on with that; it begins with the networks of its side's latest."""
+        """Train a member, or resume that; it begins with the networks of its side's latest."""
         from posse_training.train.train import train  # torch
 
         s, run = self.settings, trained.run
@@ -333,21 +264,17 @@ class _Run:
             found[other.policy] = score if side == TARGET else 1 - score
         return found
 
-    def _cells(self, pairs: Sequence[Pair]) -> list[Cell]:
-        """Return what the team of each pair scores against its target; those played before are read."""
-        return [self._cell(pair) for pair in pairs]
-
     def _cell(self, pair: Pair) -> Cell:
+        """Return what a team scores against a target; a pair that was played before is read."""
         team, target = pair
         name = f"{team.label}-{target.label}".replace(" ", "-").replace("/", "-")
         path = self.settings.path / "cross-play" / f"{name}-{self.settings.episodes}.json"
         if not path.is_file():
             results = self._play(pair, self.settings.episodes, TEST_SEED, "test")
-            found = Cell(team.label, target.label, *(results.estimate(name) for name in _ESTIMATES))
+            scores = {name: asdict(results.estimate(name)) for name in ("score", "safe_score", "contact_free")}
             path.parent.mkdir(exist_ok=True)
-            write_atomically(path, (json.dumps(found.to_dict(), indent=2) + "\n").encode())
-        values = read_json(path)
-        return Cell(values["team"], values["target"], *(Estimate(**values[name]) for name in _ESTIMATES))
+            write_atomically(path, (json.dumps(scores, indent=2) + "\n").encode())
+        return Cell(team.label, target.label, *(Estimate(**score) for score in read_json(path).values()))
 
     def _play(self, pair: Pair, episodes: int, seed: int, split: str) -> Results:
         team, target = pair
@@ -355,9 +282,25 @@ class _Run:
         return evaluate(team.policy, self.scenario, episodes, seed, target=target.policy, split=split, progress=False)
 
 
-def _pair(side: str, to: Member, other: Member) -> Pair:
-    """Return a member and its opponent, of a side, as a team and a target."""
-    return (to, other) if side == TARGET else (other, to)
+def play_league(settings: LeagueSettings, *, console: Console | None = None) -> League:
+    """Train the generations that are missing, play all against all, train best responses.
+
+    Raises:
+        PolicyError, ScenarioError: An unknown policy or scenario; nothing is made.
+        RunFolderError: The folder is in use, or has a league of other settings.
+        CheckpointError: A checkpoint cannot be written or read.
+    """
+    found = League(settings, console or Console())
+    for team in settings.teams:
+        load(team)
+    for target in settings.targets:
+        load_target(target)
+    held = {name: value for name, value in settings.to_dict().items() if name not in _FREE}
+    with locked(settings.path):
+        hold_settings(settings.path / FILE, held)
+        found.play()
+        write_results(found)
+    return found
 
 
 def label_of(name: str) -> str:
@@ -384,20 +327,17 @@ def against(parts: Mapping[str, int]) -> str:
 def write_results(found: League) -> None:
     """Write matrix and summary to the league's folder."""
     folder = found.settings.path
-    writer = csv.writer(text := io.StringIO(newline=""))
-    writer.writerow(["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"])
-    for c in found.cells:
-        s = c.score
-        values = [s.value, s.low, s.high, c.safe_score.value, c.contact_free.value]
-        writer.writerow([c.team, c.target, *(f"{v:.4f}" for v in values), s.count])
-    write_atomically(folder / MATRIX, text.getvalue().encode())
-    summary: dict[str, Any] = {
+    with replacing(folder / MATRIX) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["team", "target", "score", "low", "high", "safe_score", "contact_free", "episodes"])
+        for c in found.cells:
+            s = c.score
+            values = [s.value, s.low, s.high, c.safe_score.value, c.contact_free.value]
+            writer.writerow([c.team, c.target, *(f"{v:.4f}" for v in values), s.count])
+    summary = {
         "settings": found.settings.to_dict(),
-        "cells": [cell.to_dict() for cell in found.cells],
-        "exploited": [
-            {"side": e.side, "label": e.label, "gain": e.gain, "before": e.before.to_dict(), "after": e.after.to_dict()}
-            for e in found.exploited
-        ],
+        "cells": [asdict(cell) for cell in found.cells],
+        "exploited": [asdict(one) for one in found.exploited],
     }
     write_atomically(folder / SUMMARY, (json.dumps(summary, indent=2) + "\n").encode())
 
@@ -407,15 +347,14 @@ def draw_matrix(found: League) -> list[Path]:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from posse_training.style import RC, WIDTH, note, plain
+    from posse_training.style import RC, WIDTH, note, plain, save
 
     s, teams, targets = found.settings, [t.label for t in found.teams], [t.label for t in found.targets]
     scores = [[found.at(a, b).score for b in targets] for a in teams]
     with mpl.rc_context({**RC, "axes.grid": False}):
         figure = Figure(figsize=(WIDTH, 1.4 + 0.42 * len(teams)), layout="constrained")
         axis = figure.subplots()
-        values = [[score.value for score in row] for row in scores]
-        image = axis.imshow(values, vmin=0, vmax=1, cmap="cividis", aspect="auto")
+        image = axis.imshow([[v.value for v in row] for row in scores], vmin=0, vmax=1, cmap="cividis", aspect="auto")
         axis.set_xticks(range(len(targets)), targets, rotation=35, ha="right")
         axis.set_yticks(range(len(teams)), teams)
         axis.set(xlabel="target", ylabel="team")
@@ -426,13 +365,9 @@ def draw_matrix(found: League) -> list[Path]:
                 axis.text(j, i, text, ha="center", va="center", color=colour, fontsize=7)
         figure.colorbar(image, label="score of the team", shrink=0.8)
         changed = "".join(f", {name}={value}" for name, value in s.overrides.items())
-        played = f"{s.scenario} v{get_scenario(s.scenario).version}{changed}: {s.episodes:,} worlds a pair"
+        played = f"{s.scenario} v{found.scenario.version}{changed}: {s.episodes:,} worlds a pair"
         note(figure, plain(f"{played}, test split, seed {TEST_SEED}; training seed {s.seed}"))
-        files = [s.path / "matrix.png", s.path / "matrix.svg"]
-        for path in files:
-            with replacing(path) as part:
-                figure.savefig(part, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
-    return files
+        return save(figure, s.path, "matrix")
 
 
 def tables(found: League) -> list[Table]:

@@ -248,6 +248,8 @@ def gathered(
         dropped: set[int] = set()
         for call, result in on_ray(_play, [(sent[k], shard) for k, shard in calls], dropped):
             k, shard = calls[call]
+            if isinstance(result, ClusterError):
+                raise result
             if isinstance(result, Exception):
                 failed.setdefault(k, result)
                 dropped |= {other for other, (job_of, _) in enumerate(calls) if job_of == k}

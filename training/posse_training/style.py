@@ -5,10 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+
+from posse_baselines.files import replacing
 
 PAPER: Final = "#ffffff"
 INK: Final = "#1a1a1a"
@@ -92,6 +95,15 @@ def looks_of(policies: Iterable[str]) -> Looks:
     if PLANNER in names:
         looks[PLANNER] = Style(INK, "D", (0, (5, 2)))
     return {**looks, BOUND: Style(INK, "", (0, (1, 1.5)))}
+
+
+def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write a figure as PNG and SVG to a folder; return the files."""
+    files = [folder / f"{name}.png", folder / f"{name}.svg"]
+    for path in files:
+        with replacing(path) as part:
+            figure.savefig(part, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+    return files
 
 
 def note(figure: Figure, text: str) -> None:

@@ -14,7 +14,7 @@ from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
 from posse_training.compare.contenders import read_contenders
 from posse_training.compare.table import ranked
-from posse_training.errors import ComparisonError
+from posse_training.errors import RunFolderError
 from posse_training.evaluation.statistics import difference
 
 
@@ -165,9 +165,9 @@ def test_a_folder_with_any_file_is_refused_before_anything_is_played(
 
     monkeypatch.setattr("posse_training.compare.compare.play", played)
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
-    with pytest.raises(ComparisonError, match="not an empty folder"):
+    with pytest.raises(RunFolderError, match="not an empty folder"):
         compare(Settings(("idle",), ("constant",), out=tmp_path))
-    with pytest.raises(ComparisonError, match="not an empty folder"):
+    with pytest.raises(RunFolderError, match="not an empty folder"):
         compare(Settings(("idle",), ("constant",), out=tmp_path / "mine.txt"))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 

@@ -345,7 +345,11 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
     sees = replay.players[0].columns["tracker_sees"].values.astype(bool)
     with opened(browser, write_replay(replay, tmp_path / "a.html")) as page:
         inside = page.evaluate("""() => {
-            const { app, sightOf, inside } = window.replay;
+            const { app, sightOf } = window.replay;
+            const inside = (corners, x, y) => corners.filter(([ax, ay], k) => {
+                const [bx, by] = corners.at(k - 1);
+                return ay > y !== by > y && x < ((bx - ax) * (y - ay)) / (by - ay) + ax;
+            }).length % 2 === 1;
             const [player] = app.players;
             const at = (name, frame, k) => player.columns.get(name).at(frame, k);
             return Array.from({ length: player.frames }, (_, frame) =>

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
-import math
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -19,12 +18,13 @@ from rich.console import Console
 import posse
 from posse import Batch, Scenario, get_scenario, scenario_names
 from posse_baselines import PolicyError, load_target
+from posse_baselines.fields import number
 from posse_training.compare.contenders import Contender, read_contenders
 from posse_training.compare.marl_eval import write_marl_eval
-from posse_training.compare.playing import Game, Key, Played, check, play, played_on_ray, replay
+from posse_training.compare.playing import Game, Key, Played, play, played_on_ray, replay
 from posse_training.compare.plays import Plays
 from posse_training.compare.table import Row, row_of, table
-from posse_training.errors import ComparisonError, PlayError, SettingsError, TimeLimitError, require
+from posse_training.errors import PlayError, RunFolderError, SettingsError, TimeLimitError, check_settings, require
 from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import Estimate
@@ -49,7 +49,7 @@ class Settings:
     policy; the first is the baseline of differences."""
     scenarios: tuple[str, ...] = ("all",)
     """Names of scenarios, or "all"."""
-    episodes: int = 1000
+    episodes: int = number(1000, "", 1, 10**8)
     """Worlds for each policy and scenario."""
     seed: int = 7
     """Seed of the worlds."""
@@ -60,16 +60,16 @@ class Settings:
     (PNG and SVG); default: the first of runs/compare, runs/compare-2, ... that is free."""
     figures: bool = True
     """Draw figures, and write the report."""
-    replays: int = 3
+    replays: int = number(3, "", 0, 10**8)
     """Largest wins, and as many largest losses, of all policies against the first one that are
     recorded as replays beside the report; 0: none."""
-    planner_episodes: int = 100
+    planner_episodes: int = number(100, "", 0, 10**8)
     """Largest number of the worlds that the planner plays as a reference; 0: none. It takes about
     0.4 s of processor time per world. If named among the policies, it plays all worlds."""
     export: tuple[Literal["marl-eval"], ...] = ()
     """Further files to write beside the summary: "marl-eval" for marl-eval.json, which marl-eval
     and rliable read."""
-    time_limit: float = 1800.0
+    time_limit: float = number(1800.0, "s", 0.001, 10.0**9)
     """Time limit of a policy on one scenario, for each training seed, s (with --ray: of a shard of
     500 worlds); a policy that exceeds it is stopped and skipped on the remaining scenarios."""
     ray: RayOption = None
@@ -111,13 +111,9 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
         console: Where to show progress; default: the standard error output.
 
     Raises:
-        SettingsError: No episodes to play, or an invalid time limit.
-        PolicyError: An unknown policy or target, or no policy; nothing is played.
-        ScenarioError: An unknown scenario or split, an invalid seed; nothing is played.
-        TrainedSplitError: A split that a policy was trained on; nothing is played.
-        ComparisonError: The folder is not empty; nothing is played, nor written.
-        MissingExtraError: Ray is to be used and not installed.
-        ClusterError: There is no such cluster.
+        SettingsError, PolicyError, ScenarioError: An argument that is unknown or out of its range.
+        TrainedSplitError: A split that a policy was trained on.
+        RunFolderError: The folder is not empty.
     """
     scenarios = _checked(settings)
     contenders = read_contenders(settings.policies)
@@ -132,8 +128,6 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     ray = address_of(settings.ray)
     if ray is not False:
         require("cluster", "ray")
-    for contender in contenders:
-        check(contender, settings.time_limit)
     run = _Run(settings, scenarios, contenders, Comparison(contenders[0].label, folder))
     with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
@@ -150,12 +144,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
 
 
 def _checked(settings: Settings) -> list[Scenario]:
-    for name, least in (("episodes", 1), ("planner_episodes", 0), ("replays", 0)):
-        value = getattr(settings, name)
-        if not least <= value <= 10**8:
-            raise SettingsError(f"{name}={value:g} must be at least {least} and at most 10**8")
-    if not (math.isfinite(settings.time_limit) and settings.time_limit > 0):
-        raise SettingsError(f"time_limit={settings.time_limit!r} s must be finite and above 0")
+    check_settings(settings)
     names = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
     found = [get_scenario(name) for name in dict.fromkeys(names)]
     for scenario in found:
@@ -169,7 +158,7 @@ def _free(out: Path | None) -> Path:
         names = itertools.chain(["compare"], (f"compare-{k}" for k in itertools.count(2)))
         return next(path for name in names if not (path := Path("runs", name)).exists())
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ComparisonError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
+        raise RunFolderError(f"{out} exists and is not an empty folder: choose another --out, or empty it")
     return out
 
 
@@ -209,11 +198,17 @@ class _Run:
                 continue
             found.plays[name, contender.label] = plays
             reference = None if contender is self.contenders[0] else found.plays.get((name, found.reference))
-            found.rows.append({**row_of(plays, reference), "files": self._write_rows(name, plays)})
+            files = []
+            for k, results in enumerate(plays.results):
+                member = f"-{k + 1}" if len(plays.results) > 1 else ""
+                files.append(f"{self._stem(f'{name}-{plays.label}{member}')}.csv")
+                results.write(found.folder / files[-1])
+            found.rows.append({**row_of(plays, reference), "files": files})
         best = found.plays.get((name, PLANNER))
         for row in found.rows:
             if row["scenario"] == name and best is not None:
-                row["of_planner"] = found.plays[name, row["policy"]].ratio(best)
+                mine, theirs = found.plays[name, row["policy"]].paired(best)
+                row["of_planner"] = float(mine.mean() / theirs.mean()) if theirs.any() else float("nan")
 
     def write(self) -> None:
         """Write summary, export, figures and report."""
@@ -244,16 +239,6 @@ class _Run:
         except PlayError as error:
             self.found.failed.append({**why, "why": str(error)})
         return None
-
-    def _write_rows(self, scenario: str, plays: Plays) -> list[str]:
-        """Write the rows of a contender, one file for each training seed; return their names."""
-        written = []
-        for k, results in enumerate(plays.results):
-            member = f"-{k + 1}" if len(plays.results) > 1 else ""
-            stem = self._stem(f"{scenario}-{plays.label}{member}")
-            results.write(self.found.folder / f"{stem}.csv")
-            written.append(f"{stem}.csv")
-        return written
 
     def _stem(self, wanted: str) -> str:
         """Return a name of letters, digits and ``._-`` that no other file has, also where case is ignored."""

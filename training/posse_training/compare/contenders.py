@@ -48,9 +48,10 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
         if label in taken:
             raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
-        policies = tuple(name if is_code(name) else load(name) for name in names)
-        if not sign and is_file(text) and not isinstance(policies[0], str):
-            name = policies[0].name
+        loaded = [load(name) for name in names]
+        policies = tuple(name if is_code(name) else policy for name, policy in zip(names, loaded, strict=True))
+        if not sign and is_file(text):
+            name = loaded[0].name
             label = name if name not in taken | stated else label
         _check_label(label)
         found.append(Contender(label, policies))

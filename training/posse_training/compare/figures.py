@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
-from posse_training.evaluation.statistics import share
-from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain
+from posse_training.evaluation.statistics import over_seeds, share
+from posse_training.style import BAND, BOUND, PLANNER, RC, WIDTH, Looks, legend, looks_of, note, plain, save
 
 CAPTIONS: Final = {
     "scenarios": "Mean safe score of every team on every scenario.",
@@ -36,20 +36,15 @@ def draw(folder: Path, plays: Found, contenders: Sequence[Contender]) -> list[Pa
     looks = looks_of([contender.label for contender in contenders])
     curves = curves_of(contenders)
     losses = [found for (name, _), found in plays.items() if name == _BREAKS]
-    files = []
+    drawn: dict[str, Figure] = {}
     with mpl.rc_context(RC):
-        drawn: dict[str, Figure] = (
-            {"scenarios": scores(plays, looks), "profile": profile(plays, looks)} if plays else {}
-        )
+        if plays:
+            drawn = {"scenarios": scores(plays, looks), "profile": profile(plays, looks)}
         if curves:
             drawn["learning"] = learning(curves, looks)
         if losses:
             drawn["recovery"] = recovery(losses, looks)
-        for name, figure in drawn.items():
-            for suffix in (".png", ".svg"):
-                files.append(folder / f"{name}{suffix}")
-                figure.savefig(files[-1], dpi=160, metadata={"Date": None} if suffix == ".svg" else None)
-    return files
+        return [path for name, figure in drawn.items() for path in save(figure, folder, name)]
 
 
 def scores(plays: Found, looks: Looks) -> Figure:
@@ -63,7 +58,7 @@ def scores(plays: Found, looks: Looks) -> Figure:
         for k, policy in enumerate(policies):
             if (name, policy) not in plays:
                 continue
-            score, style = plays[name, policy].mean("safe_score"), looks[policy]
+            score, style = over_seeds(plays[name, policy]["safe_score"]), looks[policy]
             y = row + (k - (len(policies) - 1) / 2) * 0.8 / len(policies)
             axis.plot([score.low, score.high], [y, y], color=style.colour, linewidth=1.4)
             axis.plot(score.value, y, **style.point)

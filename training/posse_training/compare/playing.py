@@ -1,4 +1,4 @@
-"""Plays one contender on one scenario; whatever its policy does costs its own rows only.
+"""Plays one contender on one scenario; a policy that fails costs its own rows only.
 
 Policies of the package and policy files play in this process. One that is code, ``package.module:Class``, plays in a
 process of its own, which is ended at the time limit. That is no sandbox.
@@ -16,27 +16,13 @@ from posse import Scenario
 from posse_baselines import Policy, PolicyError, load
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
-from posse_training.errors import ClusterError, PlayError, TimeLimitError, describe
+from posse_training.errors import PlayError, describe
 from posse_training.evaluation.evaluation import Evaluation, evaluate, gathered_results, played_errors, prepare
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
 from posse_training.replay import Replay, record
 
 Played = Results | Exception
-
-
-def check(contender: Contender, limit: float) -> None:
-    """Load the policies of a contender that are code, each in a process of its own.
-
-    Raises:
-        PolicyError: One cannot be loaded within the limit.
-    """
-    for policy in contender.policies:
-        if isinstance(policy, str):
-            try:
-                apart(limit, _load, policy)
-            except (TimeLimitError, PlayError) as error:
-                raise PolicyError(f"{policy!r} cannot be loaded: {error}") from error
 
 
 Key = tuple[str, str, int]
@@ -52,6 +38,11 @@ class Game:
     target: str | None
     limit: float
     """Time limit of a policy on one scenario, s."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Arguments of an evaluation."""
+        return {"target": self.target, "split": self.split, "time_limit": self.limit}
 
 
 def play(contender: Contender, scenario: Scenario, episodes: int, game: Game, found: Mapping[Key, Played]) -> Plays:
@@ -98,15 +89,12 @@ def played_on_ray(
             key = scenario.name, contender.label, k
             try:
                 with played_errors():
-                    ready[key] = _prepare(policy, scenario, episodes, game)
+                    ready[key] = prepare(policy, scenario, episodes, game.seed, **game.options)
             except (PolicyError, PlayError) as error:
                 found[key] = error
     total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
     with gathered_results(list(ready.values()), ray, lambda: progress(next(done), total)) as results:
         found |= zip(ready, results, strict=True)
-        for one in found.values():
-            if isinstance(one, ClusterError):
-                raise one
         yield found
 
 
@@ -123,22 +111,9 @@ def replay(contender: Contender, member: int, scenario: Scenario, world: int, ga
     return found
 
 
-def _load(policy: str) -> str:
-    try:
-        return load(policy).name
-    except PolicyError as error:
-        raise PolicyError(str(error)) from None  # a subclass may not survive pickling
-
-
-def _prepare(policy: str | Policy, scenario: Scenario, episodes: int, game: Game) -> Evaluation:
-    given: dict[str, Any] = {"target": game.target, "split": game.split, "time_limit": game.limit}
-    return prepare(policy, scenario, episodes, game.seed, **given)
-
-
 def _evaluate(policy: str | Policy, scenario: Scenario, episodes: int, game: Game) -> Results:
-    given: dict[str, Any] = {"target": game.target, "split": game.split, "time_limit": game.limit}
     with played_errors():
-        return evaluate(policy, scenario, episodes, game.seed, progress=False, **given)
+        return evaluate(policy, scenario, episodes, game.seed, progress=False, **game.options)
 
 
 def _record(label: str, policy: str | Policy, scenario: Scenario, world: int, game: Game) -> Replay:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
 from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from posse_training.compare.plays import Plays
-from posse_training.evaluation.statistics import Estimate
+from posse_training.evaluation.statistics import Estimate, difference, improvement, middle_mean, over_seeds, share
 
 Row = dict[str, Any]
 """The estimates of one policy on one scenario."""
@@ -32,20 +34,27 @@ _SHORT: Final = ("safe_score", "of_planner", "contact_free", "difference", "impr
 
 def row_of(plays: Plays, reference: Plays | None) -> Row:
     """Return the estimates of one policy on one scenario; differences are of the safe score, to the reference."""
+    contact_free, settled = plays["contact_free"] == 1, np.stack([result.settled for result in plays.results])
+    gaps = None if reference is None else plays.paired(reference)
     return {
         "scenario": plays.scenario.name,
         "policy": plays.label,
         "seeds": len(plays.results),
-        "safe_score": plays.mean("safe_score"),
+        "safe_score": over_seeds(plays["safe_score"]),
         "of_planner": None,  # filled in once the planner has played
-        "score": plays.mean("score"),
-        "contact_free": plays.share([result["contact_free"] == 1 for result in plays.results]),
-        "interquartile_mean": plays.interquartile_mean("safe_score"),
-        "bound": plays.mean("bound"),
-        "settled": plays.share([result.settled for result in plays.results]),
-        "difference": None if reference is None else plays.difference(reference),
-        "improvement": None if reference is None else plays.improvement(reference),
+        "score": over_seeds(plays["score"]),
+        "contact_free": _share(contact_free),
+        "interquartile_mean": over_seeds(plays["safe_score"], middle_mean),
+        "bound": over_seeds(plays["bound"]),
+        "settled": _share(settled),
+        "difference": None if gaps is None else difference(*gaps),
+        "improvement": None if gaps is None else improvement(*gaps),
     }
+
+
+def _share(happened: npt.NDArray[np.bool_]) -> Estimate:
+    """Return the share of episodes in which something happened, (S, W)."""
+    return share(happened) if len(happened) == 1 else over_seeds(happened)
 
 
 def ranked(rows: Sequence[Row]) -> list[Row]:

@@ -72,6 +72,14 @@ def play_episode(
     return rollout(batch, policy, after_step=note).metrics | {"leader_exchanges": exchanges.total}
 
 
+def majority(leaders: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return whom more than half of a team follow, (E,) of the leader of each tracker, (E, N); -1: there is none."""
+    n = leaders.shape[1]
+    middle = np.sort(leaders, axis=1)[:, n // 2]  # a leader of more than half stands there
+    agreed = np.count_nonzero(leaders == middle[:, None], axis=1) > n / 2
+    return np.where(agreed, middle, -1)
+
+
 class ExchangeCounter:
     """Counts in each world how often the leader of the majority changes."""
 
@@ -85,11 +93,7 @@ class ExchangeCounter:
         if leaders is None or np.array_equal(leaders, self._seen):
             return
         self._seen = leaders.copy()
-        # The leader of more than half is in the middle of the sorted row.
-        n = leaders.shape[1]
-        middle = np.sort(leaders, axis=1)[:, n // 2]
-        agreed = np.count_nonzero(leaders == middle[:, None], axis=1) > n / 2
-        chosen = np.where(agreed, middle, -1)
+        chosen = majority(leaders)
         known = (chosen >= 0) & running
         self.total[known & np.isnan(self.total)] = 0
         self.total[known & (self._leader >= 0) & (chosen != self._leader)] += 1

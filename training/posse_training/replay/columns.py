@@ -41,17 +41,14 @@ import numpy.typing as npt
 from posse import ObservationLayout, Scenario
 from posse_training.replay.episode import Column
 
-_PLACE: Final = 0.001  # m
-_ANGLE: Final = 0.001  # rad
-_FIX: Final = 0.01  # m, of a measured position
+_FINE: Final = 0.001  # of lengths in m, angles in rad, ...
+_DRAWN: Final = 0.05  # of what is only drawn
 _ACTION: Final = 0.002
 _COARSE_ACTION: Final = 0.008
 _MESSAGE: Final = 1 / 512
 _SCORE: Final = 0.0001
-_DRAWN: Final = 0.05  # for quantities that are only drawn
 _BELIEF: Final = 0.01
-_RESOLUTIONS: Final = {"m": 0.001, "m/s": 0.001, "rad": 0.001, "rad/s": 0.001, "s": 0.01}
-_FINE: Final = 0.001
+_FIX: Final = 0.01  # m, of a measured position
 STATES: Final = (
     *("tracker_x", "tracker_y", "tracker_heading_cos", "tracker_heading_sin"),
     *("tracker_sees", "tracker_slot", "tracker_onsets"),
@@ -92,7 +89,7 @@ def columns_of(arrays: Arrays, layout: ObservationLayout, terms: Sequence[str], 
     views = layout.views(arrays["observations"])
     for field in layout.fields:
         if whole or field.name == "sonar":
-            finest = _RESOLUTIONS.get(field.unit, _FINE) if whole else _DRAWN
+            finest = (0.01 if field.unit == "s" else _FINE) if whole else _DRAWN
             finest = _MESSAGE if field.name == "neighbour_message" else finest
             columns[f"observation/{field.name}"] = _number_column(views[field.name], finest, field.unit)
     return columns
@@ -111,7 +108,7 @@ def _number_column(values: npt.NDArray[Any], resolution: float, unit: str = "1")
 
 
 def _angle(arrays: Arrays, cosine: str, sine: str) -> Column:
-    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _ANGLE, "rad")
+    return Column(np.unwrap(np.arctan2(arrays[sine], arrays[cosine]), axis=0), _FINE, "rad")
 
 
 def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
@@ -124,8 +121,8 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
         return Column(((since >= 0) & (since < outage)).astype(np.int8))
 
     columns = {
-        "tracker_x": Column(states["tracker_x"], _PLACE, "m"),
-        "tracker_y": Column(states["tracker_y"], _PLACE, "m"),
+        "tracker_x": Column(states["tracker_x"], _FINE, "m"),
+        "tracker_y": Column(states["tracker_y"], _FINE, "m"),
         "tracker_heading": _angle(states, "tracker_heading_cos", "tracker_heading_sin"),
         "tracker_sees": Column(states["tracker_sees"]),
         "tracker_slot": Column(states["tracker_slot"]),
@@ -137,8 +134,8 @@ def _states(states: Arrays, scenario: Scenario) -> dict[str, Column]:
         "tracker_fix_x": Column(states["tracker_fix_x"], _FIX, "m"),
         "tracker_fix_y": Column(states["tracker_fix_y"], _FIX, "m"),
         "tracker_fix_heading": _angle(states, "tracker_fix_cos", "tracker_fix_sin"),
-        "target_x": Column(states["world_x"], _PLACE, "m"),
-        "target_y": Column(states["world_y"], _PLACE, "m"),
+        "target_x": Column(states["world_x"], _FINE, "m"),
+        "target_y": Column(states["world_y"], _FINE, "m"),
         "target_heading": _angle(states, "world_heading_cos", "world_heading_sin"),
         "target_frame": _angle(states, "world_frame_cos", "world_frame_sin"),
         "target_dart": Column((states["world_pressed"] < 0).astype(np.int8)),

@@ -91,10 +91,8 @@ class Replay:
 
 def _identity(world: dict[str, Any]) -> dict[str, Any]:
     """Return the data that are equal if two episodes are of the same world."""
-    settings = {k: v for k, v in world["settings"].items() if k != "message_size"}
-    return {"settings": settings, "obstacles": world["obstacles"]} | {
-        key: world[key] for key in ("seed", "split", "world", "episode")
-    }
+    own = {key: world[key] for key in ("seed", "split", "world", "episode", "obstacles")}
+    return {**own, **{name: value for name, value in world["settings"].items() if name != "message_size"}}
 
 
 def join(replays: Sequence[Replay]) -> Replay:
@@ -112,10 +110,7 @@ def join(replays: Sequence[Replay]) -> Replay:
     first = _identity(replays[0].world)
     for replay in replays[1:]:
         other = _identity(replay.world)
-        differing = sorted(
-            {k for k in first if first[k] != other[k]} - {"settings"}
-            | {k for k in first["settings"] | other["settings"] if first["settings"].get(k) != other["settings"].get(k)}
-        )
+        differing = sorted(key for key in first | other if first.get(key) != other.get(key))
         if differing:
             raise SettingsError(
                 f"{replays[0].players[0].name!r} and {replay.players[0].name!r} did not play the "

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 import zlib
+from dataclasses import astuple
 from typing import Any, Final
 
 import numpy as np
@@ -41,16 +42,9 @@ def encode(replay: Replay) -> tuple[str, bytes]:
             described, packed = _pack(name, column)
             columns.append(described)
             parts.append(packed)
-        players.append(
-            {
-                "name": player.name,
-                "frames": player.frames,
-                "events": [[e.step, e.kind, e.text, list(e.robots)] for e in player.events],
-                "metrics": player.metrics,
-                "about": player.about,
-                "columns": columns,
-            }
-        )
+        events = [astuple(event) for event in player.events]
+        about = {"name": player.name, "frames": player.frames, "metrics": player.metrics, "about": player.about}
+        players.append({**about, "events": events, "columns": columns})
     header = {"format": FORMAT, "world": replay.world, "players": players}
     text = json.dumps(_to_json(header), separators=(",", ":"), allow_nan=False)
     return text, zlib.compress(b"".join(parts), 9)
@@ -60,21 +54,14 @@ def decode(header: str, data: bytes) -> Replay:
     """Return the argument of :func:`encode`, each number to half its column's resolution.
 
     Raises:
-        SettingsError: Data of another format, or damaged.
+        SettingsError: Data of another format.
+        ValueError, TypeError, KeyError, zlib.error: Damaged data.
     """
-    try:
-        described = _from_json(json.loads(header))
-        if described["format"] != FORMAT:
-            raise SettingsError(f"a replay of format {described['format']!r:.80} cannot be read: known is {FORMAT}")
-        return _decoded(described, zlib.decompress(data))
-    except SettingsError:
-        raise
-    except (ValueError, TypeError, KeyError, AttributeError, zlib.error) as error:
-        raise SettingsError(f"this is not the data of a replay: {error!r:.200}") from error
-
-
-def _decoded(described: Any, raw: bytes) -> Replay:
-    players, start = [], 0
+    described = _from_json(json.loads(header))
+    if described["format"] != FORMAT:
+        raise SettingsError(f"a replay of format {described['format']!r:.80} cannot be read: known is {FORMAT}")
+    raw, start = zlib.decompress(data), 0
+    players = []
     for player in described["players"]:
         columns = {}
         for column in player["columns"]:

@@ -1,9 +1,7 @@
 """The page: one HTML file with style, code and data that loads nothing else.
 
-The code consists of the modules in ``web/``, concatenated to one module, since a page opened from a
-file cannot import other files. Code and data are deflated, for a small file; ``web/loader.js``
-unpacks and runs the code. External text (names, cards, settings) is written as data, never as
-markup or code.
+The code consists of the modules in ``web/``, concatenated to one module, since a page opened from a file cannot import
+other files. Data are deflated. External text (names, cards, settings) is written as data, never as markup or code.
 """
 
 from __future__ import annotations
@@ -20,24 +18,20 @@ from typing import Any, Final
 from posse.rendering import style
 from posse_baselines.files import write_atomically
 from posse_training.errors import SettingsError
-from posse_training.replay.colours import PLAYERS, TASK_COLOURS
 from posse_training.replay.episode import Replay
 from posse_training.replay.format import decode, encode
 
-MODULES: Final = (
-    *(
-        "data.js",
-        "colours.js",
-        "state.js",
-        "geometry.js",
-        "camera.js",
-        "world.js",
-        "sensing.js",
-        "robots.js",
-        "view.js",
-    ),
-    *("events.js", "timeline.js", "values.js", "panel.js", "header.js", "export.js", "legend.js", "controls.js"),
-    "main.js",
+TASK_COLOURS: Final[tuple[style.Colour, ...]] = ((86, 180, 233), (0, 114, 178), (0, 158, 115), (240, 228, 66))
+"""Of the tasks of a tracker, in the order of ``posse_baselines.ddcs.TASKS``. The last is not Okabe and Ito's pink,
+which deuteranopia maps to the grey of a tracker."""
+PLAYERS: Final[tuple[style.Colour, ...]] = ((0, 114, 178), (213, 120, 0), (40, 165, 130), style.INK)
+"""Of the teams compared in one replay or film, left to right."""
+MODULES: Final = tuple(
+    f"{name}.js"
+    for name in (
+        *("data", "state", "drawing", "camera", "ground", "sensing", "robots", "view", "timeline"),
+        *("text", "panel", "export", "legend", "controls", "main"),
+    )
 )
 """Modules of the page's code, each after those that it imports from."""
 _OF_A_WORLD: Final = ("scenario", "settings", "obstacles", "seed", "split", "world", "episode", "fields")
@@ -76,21 +70,17 @@ def read_replay(path: str | Path) -> Replay:
     Raises:
         SettingsError: No such file, or not a replay.
     """
-    path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingsError(f"cannot read a replay from {path}: {error}") from error
-    found = _DATA.search(text)
-    if found is None:
-        raise SettingsError(f"{path} is no replay: posse replay writes one")
-    try:
+        text = Path(path).read_text(encoding="utf-8")
+        found = _DATA.search(text)
+        if found is None:
+            raise SettingsError("it is no replay: posse replay writes one")
         replay = decode(found[1], base64.b64decode(found[2], validate=True))
-    except ValueError as error:  # SettingsError is one
+        missing = [name for name in _OF_A_WORLD if name not in replay.world]
+        if missing:
+            raise SettingsError(f"its description of the world lacks {missing}")
+    except (OSError, ValueError, TypeError, KeyError, zlib.error) as error:
         raise SettingsError(f"cannot read a replay from {path}: {error}") from error
-    missing = [name for name in _OF_A_WORLD if name not in replay.world]
-    if missing:
-        raise SettingsError(f"cannot read a replay from {path}: its description of the world lacks {missing}")
     return replay
 
 
@@ -103,9 +93,8 @@ def page(replay: Replay) -> str:
         "style": _file("style.css"),
         "colours": _as_data(json.dumps(colours(), separators=(",", ":"))),
         "header": _as_data(header),
-        "data": _in_letters(data),
-        "code": _in_letters(zlib.compress(_code().encode(), 9)),
-        "loader": _file("loader.js"),
+        "data": base64.b64encode(data).decode(),
+        "code": _code(),
     }
     # In one pass, so that inserted text is not searched again.
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], _file("index.html"))
@@ -115,10 +104,6 @@ def _code() -> str:
     """Return the modules concatenated, without imports and the keyword "export"."""
     modules = (_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in MODULES)
     return "".join(f"// --- {name} ---\n{text}\n" for name, text in zip(MODULES, modules, strict=True))
-
-
-def _in_letters(data: bytes) -> str:
-    return base64.b64encode(data).decode()
 
 
 def colours() -> dict[str, Any]:

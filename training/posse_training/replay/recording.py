@@ -1,22 +1,28 @@
-"""Plays a world with each policy and makes a replay of the trajectories."""
+"""Plays a world with each policy, and makes a replay of the trajectories: columns, events, and a description."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from posse import Batch, Scenario, get_scenario
+import numpy.typing as npt
+
+import posse
+from posse import REWARD_TERMS, Batch, Field, Scenario, get_scenario, scenario_names
 from posse_baselines import Policy, Target, Trajectory, against, load, load_target, rollout
+from posse_baselines.ddcs import TASKS
 from posse_baselines.playing import check_moves_all
 from posse_training.errors import SettingsError
+from posse_training.provenance import commit
 from posse_training.replay.columns import STATES, columns_of
 from posse_training.replay.episode import MOST_PLAYERS, Player, Replay, join
 from posse_training.replay.events import find_events
-from posse_training.replay.world import PLACES, describe_world
 
-RECORD: Final = (*STATES, *PLACES, "observations", "actions", "terms", "annotations")
+_PLACES: Final = ("world_seed", "world_index", "world_episode", "obstacle_x", "obstacle_y", "obstacle_radius")
+RECORD: Final = (*STATES, *_PLACES, "observations", "actions", "terms", "annotations")
 """Names of the arrays of a trajectory that a replay is made of."""
 _LONGEST_ENTRY: Final = 400  # characters, of a card
+_OWN: Final = ("heading", "position", "speed", "turn_rate", "touching", "working")  # fields of the own motion
 
 
 def record(
@@ -48,8 +54,7 @@ def record(
 
     Raises:
         SettingsError: No policy, more than four, ``seconds`` not above 0.
-        PolicyError: A policy or target that is unknown or does not fit the scenario.
-        ScenarioError: An unknown scenario or split, an invalid setting, seed or world.
+        PolicyError, ScenarioError: An argument that is unknown, invalid, or does not fit the scenario.
     """
     settings = get_scenario(scenario, **overrides)
     opponent = None if target is None else load_target(target)
@@ -93,11 +98,10 @@ def replay_of(
     """
     one = trajectory.episode(world)
     arrays = {key: array[:, 0] for key, array in one.arrays.items()}
-    described = describe_world(arrays, one, observations)
-    events = find_events(arrays)
+    described = _describe_world(arrays, one, observations)
     metrics = {key: float(values[0]) for key, values in one.metrics.items()}
     columns = columns_of(arrays, one.layout, list(described["weights"]), observations)
-    return Replay(described, (Player(name, columns, events, metrics, dict(about or {})),))
+    return Replay(described, (Player(name, columns, find_events(arrays), metrics, dict(about or {})),))
 
 
 def _about(policy: Policy) -> dict[str, Any]:
@@ -109,3 +113,66 @@ def _about(policy: Policy) -> dict[str, Any]:
         if not isinstance(value, Mapping) and len(text) <= _LONGEST_ENTRY:
             about[str(name)] = value if isinstance(value, (int, float)) else text
     return about
+
+
+def _describe_world(
+    arrays: Mapping[str, npt.NDArray[Any]], trajectory: Trajectory, observations: bool
+) -> dict[str, Any]:
+    """Return the common data of all players of a world, as plain JSON with infinite numbers."""
+    scenario = trajectory.scenario
+    start = {name: arrays[name][0] for name in _PLACES}
+    weights = {name: weight for name, weight in dict(scenario.reward_weights).items() if weight}
+    named = _settings(get_scenario(scenario.name if scenario.name in scenario_names() else "constant"))
+    settings = _settings(scenario)
+    return {
+        "posse": posse.__version__,
+        "commit": commit(),
+        "scenario": scenario.name,
+        "version": scenario.version,
+        "settings": settings,
+        # The size of a message is set by the policy.
+        "changed": {
+            name: [named[name], value]
+            for name, value in settings.items()
+            if name not in ("name", "meaning", "message_size") and named[name] != value
+        },
+        "seed": int(start["world_seed"]),
+        "split": trajectory.split,
+        "world": int(start["world_index"]),
+        "episode": int(start["world_episode"]),
+        "agents": scenario.num_agents,
+        "slots": [[float(x), float(y)] for x, y in scenario.slot_offsets],
+        "obstacles": [
+            [float(start[f"obstacle_{name}"][k]) for name in ("x", "y", "radius")]
+            for k in range(scenario.num_obstacles)
+        ],
+        "tasks": list(TASKS),
+        "weights": weights,
+        "terms": [_meaning(term) for term in REWARD_TERMS if term.name in weights],
+        "fields": [_field(field) for field in trajectory.layout.fields if observations or field.name == "sonar"],
+        "metrics": [_meaning(metric) for metric in posse.METRICS],
+    }
+
+
+def _settings(scenario: Scenario) -> dict[str, Any]:
+    """Return every setting by name, with pairs as lists, as JSON has them."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in scenario.to_dict().items()}
+
+
+def _meaning(declared: Any) -> dict[str, str]:
+    return {"name": declared.name, "unit": declared.unit, "meaning": declared.meaning}
+
+
+def _field(field: Field) -> dict[str, Any]:
+    """Return the description of a field, with the block of the panel that lists it."""
+    if field.of_neighbour:
+        block = "team-mates"
+    elif field.name == "sonar":
+        block = "sonar"
+    elif field.name.startswith("target_"):
+        block = "target"
+    else:
+        block = "own motion" if field.name in _OWN else "task"
+    unknown = None if field.unknown is None else float(field.unknown)
+    numbers = {"size": field.size, "low": float(field.low), "high": float(field.high), "unknown": unknown}
+    return {**_meaning(field), **numbers, "block": block}

@@ -27,7 +27,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError, RunFolderError
-from posse_training.files import InUseError, locked
+from posse_training.files import locked
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import SETTINGS, Point, TrainSettings
 
@@ -63,8 +63,6 @@ def locked_run(folder: Path) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         try:
             stack.enter_context(locked(folder))
-        except InUseError as error:
-            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --folder") from error
         except OSError as error:
             raise RunFolderError(f"cannot write to run folder {folder}: {error}") from error
         yield

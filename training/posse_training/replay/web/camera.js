@@ -13,81 +13,63 @@ export const FOOT = 24; // px below it
 // The greatest value within `reach` of each place, then the mean over as much: it lies nowhere
 // below the value, and moves smoothly.
 function envelope(values, reach) {
-  const most = values.map((_, k) =>
-    Math.max(...values.slice(Math.max(0, k - reach), k + reach + 1)),
-  );
+  const around = (all, k) => all.slice(Math.max(0, k - reach), k + reach + 1);
+  const most = values.map((_, k) => Math.max(...around(values, k)));
   return most.map((_, k) => {
-    const part = most.slice(Math.max(0, k - reach), k + reach + 1);
+    const part = around(most, k);
     return part.reduce((sum, value) => sum + value, 0) / part.length;
   });
 }
 
 // The box that holds the working robots, frame by frame: [-left, -bottom, right, top].
 // It reaches no farther than the walls.
-function boxes(player) {
+function boxes({ columns, frames }) {
   const { num_trackers: n, arena, control_step: step } = app.world.settings;
-  const column = (name) => player.columns.get(name);
-  const [xs, ys] = [column("tracker_x"), column("tracker_y")];
   const edges = [[], [], [], []];
-  for (let frame = 0; frame < player.frames; frame++) {
-    let [tx, ty] = [column("target_x").at(frame), column("target_y").at(frame)];
-    const box = [-tx, -ty, tx, ty];
+  for (let frame = 0; frame < frames; frame++) {
+    const places = [[columns.get("target_x").at(frame), columns.get("target_y").at(frame)]];
     for (let i = 0; i < n; i++) {
-      if (column("tracker_broken").at(frame, i)) continue;
-      [tx, ty] = [xs.at(frame, i), ys.at(frame, i)];
-      [-tx, -ty, tx, ty].forEach((value, k) => (box[k] = Math.max(box[k], value)));
+      if (columns.get("tracker_broken").at(frame, i)) continue;
+      places.push([columns.get("tracker_x").at(frame, i), columns.get("tracker_y").at(frame, i)]);
     }
-    box.forEach((value, k) => edges[k].push(Math.min(value + MARGIN, arena / 2 + WALL)));
+    edges.forEach((edge, k) => {
+      const reach = Math.max(...places.map((place) => (k < 2 ? -1 : 1) * place[k % 2]));
+      edge.push(Math.min(reach + MARGIN, arena / 2 + WALL));
+    });
   }
-  const reach = Math.round(CALM / step);
-  return edges.map((values) => envelope(values, reach));
+  return edges.map((values) => envelope(values, Math.round(CALM / step)));
 }
 
 export class Camera {
-  constructor(player) {
+  constructor(player, canvas) {
     this.player = player;
+    this.canvas = canvas;
     this.edges = boxes(player);
-    this.free = null; // {x, y, zoom} once the user has moved it; zoom: as a share of the own one
+    this.free = null; // {x, y, scale} once the user has moved it
     this.width = this.height = 1;
-  }
-
-  resize(width, height) {
-    this.width = width;
-    this.height = height;
   }
 
   // The middle and the scale that show everything.
   own(position) {
     const room = [this.width - 12, this.height - TITLE - FOOT];
-    const at = (k) => {
-      const frame = Math.min(Math.floor(position), this.player.last);
-      const next = Math.min(frame + 1, this.player.last);
-      const share = Math.min(position - frame, 1);
-      return this.edges[k][frame] * (1 - share) + this.edges[k][next] * share;
-    };
-    const [left, bottom, right, top] = [-at(0), -at(1), at(2), at(3)];
+    const frame = Math.min(Math.floor(position), this.player.last);
+    const next = Math.min(frame + 1, this.player.last);
+    const share = Math.min(position - frame, 1);
+    const [left, bottom, right, top] = this.edges.map((e) => e[frame] * (1 - share) + e[next] * share);
     const least = LEAST_SPAN / Math.min(...room);
-    const needed = Math.max(least, (right - left) / room[0], (top - bottom) / room[1]);
-    return { x: (left + right) / 2, y: (bottom + top) / 2, scale: 1 / needed };
+    const needed = Math.max(least, (right + left) / room[0], (top + bottom) / room[1]);
+    return { x: (right - left) / 2, y: (top - bottom) / 2, scale: 1 / needed };
   }
 
   // What to draw with: project and unproject between metres and pixels.
   look(position, others) {
-    const own = this.own(position);
-    let { x, y, scale } = own;
-    if (app.linked) scale = Math.min(...others.map((camera) => camera.own(position).scale));
-    if (this.free) {
-      scale = this.free.scale;
-      [x, y] = [this.free.x, this.free.y];
-    }
+    let { x, y, scale } = this.free ?? this.own(position);
+    if (app.linked && !this.free) scale = Math.min(...others.map((camera) => camera.own(position).scale));
     if (app.follow) {
-      const { columns } = this.player;
       const n = app.world.settings.num_trackers;
       const robot = app.selected ?? n;
-      const at = Math.min(position, this.player.last);
       const name = robot < n ? "tracker" : "target";
-      x = columns.get(`${name}_x`).between(at, robot % n);
-      y = columns.get(`${name}_y`).between(at, robot % n);
+      [x, y] = ["x", "y"].map((part) => this.player.columns.get(`${name}_${part}`).between(position, robot % n));
       if (!this.free) scale = Math.max(scale, Math.min(this.width, this.height) / 12);
     }
     const [cx, cy] = [this.width / 2, (this.height + TITLE - FOOT) / 2];
@@ -119,8 +101,3 @@ export function moveCameras(cameras, moved, factor, about, dx, dy) {
     };
   });
 }
-
-export function fitCameras(cameras) {
-  for (const camera of cameras) camera.free = null;
-}
-

@@ -1,5 +1,5 @@
 // Buttons, keys, pointers.
-import { fitCameras, moveCameras } from "./camera.js";
+import { moveCameras } from "./camera.js";
 import { savePicture, toggleFilm } from "./export.js";
 import { toggleLegend } from "./legend.js";
 import { SPEEDS, app, listen, play, seconds, seek, select, set } from "./state.js";
@@ -26,12 +26,13 @@ function changeSpeed(by) {
   if (next) set({ speed: next });
 }
 
+function fit(cameras) {
+  for (const camera of cameras) camera.free = null;
+  set({ follow: false });
+}
+
 export function connectControls(cameras) {
   const second = Math.max(1, Math.round(1 / seconds(1)));
-  const fit = () => {
-    fitCameras(cameras);
-    set({ follow: false });
-  };
   const actions = {
     start: () => seek(0),
     back: () => seek(app.position - 1),
@@ -39,7 +40,7 @@ export function connectControls(cameras) {
     forth: () => seek(app.position + 1),
     follow: () => set({ follow: !app.follow }),
     linked: () => set({ linked: !app.linked }),
-    fit,
+    fit: () => fit(cameras),
     links: () => toggleLayer("links"),
     sensing: () => toggleLayer("sensing"),
     trails: () => toggleLayer("trails"),
@@ -49,6 +50,7 @@ export function connectControls(cameras) {
     more: () => {
       document.body.classList.toggle("no-panel");
       dispatchEvent(new Event("resize"));
+      set({});
     },
   };
   for (const [id, act] of Object.entries(actions)) by(id).addEventListener("click", act);
@@ -68,7 +70,7 @@ export function connectControls(cameras) {
     b: () => jump(-1),
     f: actions.follow,
     c: actions.linked,
-    r: fit,
+    r: actions.fit,
     l: actions.links,
     s: actions.sensing,
     t: actions.trails,
@@ -78,14 +80,13 @@ export function connectControls(cameras) {
   };
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === "?" || !by("legend").open) {
-      const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-      if (event.target.tagName === "SELECT" && key.startsWith("Arrow")) return;
-      const act = /^\d$/.test(key) ? () => select(Number(key)) : keys[key];
-      if (!act) return;
-      event.preventDefault();
-      act(event.shiftKey);
-    }
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (by("legend").open && key !== "?") return;
+    if (event.target.tagName === "SELECT" && key.startsWith("Arrow")) return;
+    const act = /^\d$/.test(key) ? () => select(Number(key)) : keys[key];
+    if (!act) return;
+    event.preventDefault();
+    act(event.shiftKey);
   });
   listen(() => {
     by("playing").setAttribute("d", app.playing ? PAUSE : PLAY);
@@ -105,6 +106,7 @@ export function connectView(camera, cameras, redraw) {
     const box = canvas.getBoundingClientRect();
     return [event.clientX - box.x, event.clientY - box.y];
   };
+  const robotBelow = (event) => robotAt(camera.player, camera.look(app.position, cameras), ...place(event));
   const spread = () => {
     const [a, b] = [...pointers.values()];
     return { middle: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], apart: Math.hypot(a[0] - b[0], a[1] - b[1]) };
@@ -122,8 +124,7 @@ export function connectView(camera, cameras, redraw) {
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
     if (!before) {
-      const near = robotAt(camera.player, camera.look(app.position, cameras), ...place(event));
-      canvas.style.cursor = near === null ? "grab" : "pointer";
+      canvas.style.cursor = robotBelow(event) === null ? "grab" : "pointer";
       return;
     }
     const now = place(event);
@@ -142,8 +143,7 @@ export function connectView(camera, cameras, redraw) {
     canvas.addEventListener(end, (event) => {
       const tapped = pointers.size === 1 && travelled <= TAP && end === "pointerup";
       pointers.delete(event.pointerId);
-      if (!tapped) return;
-      const found = robotAt(camera.player, camera.look(app.position, cameras), ...place(event));
+      const found = tapped ? robotBelow(event) : null;
       if (found !== null) select(found === app.selected ? null : found);
     });
   }
@@ -151,8 +151,5 @@ export function connectView(camera, cameras, redraw) {
     event.preventDefault();
     move(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0016)), place(event), 0, 0);
   }, { passive: false });
-  canvas.addEventListener("dblclick", () => {
-    fitCameras(cameras);
-    set({ follow: false });
-  });
+  canvas.addEventListener("dblclick", () => fit(cameras));
 }

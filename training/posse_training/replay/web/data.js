@@ -1,17 +1,13 @@
 // Reads the page's data: a JSON header and one deflated stream of whole numbers.
 // posse_training/replay/format.py says how they are written.
 
+const SMOOTHED = 1; // s, over which the present score is averaged
+
 // A quantity over time: frames rows of `size` numbers each.
 class Column {
   constructor(described, frames, series) {
-    this.name = described.name;
-    this.shape = described.shape;
-    this.size = described.shape.reduce((product, n) => product * n, 1);
-    this.scale = described.scale;
-    this.unit = described.unit;
-    this.missing = described.missing;
-    this.frames = frames;
-    this.series = series;
+    Object.assign(this, described, { frames, series });
+    this.size = series.length / frames;
   }
 
   // The k-th number of a frame.
@@ -20,7 +16,7 @@ class Column {
     return whole === this.missing ? NaN : whole * this.scale;
   }
 
-  // Between two frames, for drawing.
+  // Between two frames, for drawing; after the last one, its value.
   between(position, k = 0) {
     const frame = Math.min(Math.floor(position), this.frames - 1);
     const next = Math.min(frame + 1, this.frames - 1);
@@ -29,51 +25,63 @@ class Column {
   }
 }
 
-function unpack(described, frames, bytes, start) {
-  const size = described.shape.reduce((product, n) => product * n, 1);
+function unpack({ shape, width, order }, frames, bytes) {
+  const size = shape.reduce((product, n) => product * n, 1);
   const count = size * frames;
   const series = new Int32Array(count);
-  for (let plane = 0; plane < described.width; plane++) {
-    for (let i = 0; i < count; i++) series[i] |= bytes[start + plane * count + i] << (8 * plane);
+  for (let plane = 0; plane < width; plane++) {
+    for (let i = 0; i < count; i++) series[i] |= bytes[plane * count + i] << (8 * plane);
   }
   for (let i = 0; i < count; i++) series[i] = (series[i] >>> 1) ^ -(series[i] & 1);
-  for (let pass = 0; pass < described.order; pass++) {
-    for (let k = 0; k < size; k++) {
-      for (let i = k * frames + 1; i < (k + 1) * frames; i++) series[i] += series[i - 1];
-    }
+  for (let pass = 0; pass < order; pass++) {
+    for (let i = 0; i < count; i++) if (i % frames) series[i] += series[i - 1];
   }
-  return new Column(described, frames, series);
+  return series;
 }
 
 // JSON knows no infinite numbers: they come as {"number": "inf"}.
 function revive(key, value) {
-  if (value === null || typeof value !== "object" || typeof value.number !== "string") return value;
-  return { inf: Infinity, "-inf": -Infinity, nan: NaN }[value.number] ?? value;
-}
-
-async function inflate(text) {
-  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
+  return { inf: Infinity, "-inf": -Infinity, nan: NaN }[value?.number] ?? value;
 }
 
 export function readJson(id) {
   return JSON.parse(document.getElementById(id).textContent, revive);
 }
 
+// Of each frame: the score of the step, averaged over the last second (the score jumps from step
+// to step), and over the steps so far; `safe`: from the first contact on, every step counts 0.
+function scoresOf(player, step) {
+  const touched = player.events.find((event) => event.kind === "contact")?.step ?? Infinity;
+  const score = player.columns.get("score");
+  const reach = Math.max(1, Math.round(SMOOTHED / step));
+  let [sum, safe, recent] = [0, 0, 0];
+  return Array.from({ length: player.frames }, (_, frame) => {
+    const value = score.at(frame);
+    if (frame) sum += value;
+    if (frame && frame < touched) safe += value;
+    recent += value - (frame >= reach ? score.at(frame - reach) : 0);
+    const steps = frame || 1;
+    return { mean: sum / steps, safe: safe / steps, recent: recent / Math.min(frame + 1, reach) };
+  });
+}
+
 export async function readReplay() {
-  const header = readJson("header");
-  const bytes = await inflate(document.getElementById("data").textContent);
+  const { world, players } = readJson("header");
+  const text = atob(document.getElementById("data").textContent);
+  const packed = Uint8Array.from(text, (character) => character.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   let start = 0;
-  const players = header.players.map((player, number) => {
+  players.forEach((player, number) => {
     const columns = new Map();
     for (const described of player.columns) {
-      const column = unpack(described, player.frames, bytes, start);
-      start += column.size * player.frames * described.width;
+      const column = new Column(described, player.frames, unpack(described, player.frames, bytes.subarray(start)));
+      start += column.series.length * described.width;
       columns.set(described.name, column);
     }
     const events = player.events.map(([step, kind, text, robots]) => ({ step, kind, text, robots }));
-    return { ...player, number, events, columns, last: player.frames - 1 };
+    Object.assign(player, { number, columns, events, last: player.frames - 1 });
+    player.scores = scoresOf(player, world.settings.control_step);
   });
-  return { world: header.world, players };
+  return { world, players, last: Math.max(...players.map((player) => player.last)) };
 }

@@ -1,17 +1,16 @@
 // Pictures and films of what is seen: header, views and timeline on one canvas.
-import { colours } from "./colours.js";
-import { headline } from "./header.js";
+import { colours, write } from "./drawing.js";
 import { app, listen, play, seconds, set } from "./state.js";
+import { headline } from "./text.js";
 import { drawTimeline, timelineHeight } from "./timeline.js";
-import { drawView, font } from "./view.js";
+import { drawView } from "./view.js";
 
 const HEAD = 40;
 const RATE = 30; // frames a second of a film
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 let cameras = [];
-let recorder = null;
-let canvas = null;
+let film = null; // {canvas, recorder} while one is recorded
 
 function compose(target, ratio, note = "") {
   const boxes = cameras.map((camera) => camera.canvas.getBoundingClientRect());
@@ -26,13 +25,8 @@ function compose(target, ratio, note = "") {
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   ctx.fillStyle = colours.PAPER;
   ctx.fillRect(0, 0, width, HEAD + views + strip);
-  ctx.textBaseline = "middle";
-  ctx.textAlign = "left";
-  ctx.fillStyle = colours.INK;
-  ctx.font = font(14, 600);
-  ctx.fillText(headline(), 12, HEAD / 2, width - 120);
-  ctx.textAlign = "right";
-  ctx.fillText(`${note}${seconds().toFixed(1)} s`, width - 12, HEAD / 2);
+  write(ctx, headline(), 12, HEAD / 2, 14, colours.INK, "left", 600);
+  write(ctx, `${note}${seconds().toFixed(1)} s`, width - 12, HEAD / 2, 14, colours.INK, "right", 600);
   cameras.forEach((camera, k) => {
     ctx.save();
     ctx.translate(boxes[k].left - left, HEAD + boxes[k].top - top);
@@ -61,47 +55,41 @@ export function savePicture() {
 
 // Records from the present moment to the end, or until it is asked for again.
 export function toggleFilm() {
-  if (recorder) {
-    recorder.stop();
+  if (film) {
+    film.recorder.stop();
     return;
   }
   const type = globalThis.MediaRecorder && TYPES.find((one) => MediaRecorder.isTypeSupported(one));
   if (!type) {
-    const message = document.getElementById("message");
-    message.textContent = "This browser records no WebM films; use posse watch to write one.";
-    message.hidden = false;
-    setTimeout(() => (message.hidden = true), 6000);
+    alert("This browser records no WebM films; use posse watch to write one.");
     return;
   }
-  canvas = document.createElement("canvas");
+  const canvas = document.createElement("canvas");
   compose(canvas, 1);
   const parts = [];
-  recorder = new MediaRecorder(canvas.captureStream(RATE), {
-    mimeType: type,
-    videoBitsPerSecond: 6e6,
-  });
+  const recorder = new MediaRecorder(canvas.captureStream(RATE), { mimeType: type, videoBitsPerSecond: 6e6 });
   recorder.ondataavailable = (part) => parts.push(part.data);
   recorder.onstop = () => {
     save(new Blob(parts, { type: "video/webm" }), "webm");
-    recorder = canvas = null;
+    film = null;
     set({ recording: false, playing: false });
   };
   recorder.start(500);
+  film = { canvas, recorder };
   set({ recording: true });
   play(true);
 }
 
 // To be called once everything else is drawn.
 export function filmFrame() {
-  if (canvas) compose(canvas, 1, `${app.speed}× speed   `);
+  if (film) compose(film.canvas, 1, `${app.speed}× speed   `);
 }
 
 export function connectExport(all) {
   cameras = all;
   let wasPlaying = false;
   listen(() => {
-    const ended = wasPlaying && !app.playing;
+    if (wasPlaying && !app.playing && film?.recorder.state === "recording") film.recorder.stop();
     wasPlaying = app.playing;
-    if (recorder?.state === "recording" && ended) recorder.stop();
   });
 }

@@ -1,10 +1,8 @@
-// The help: keys, and everything that is drawn.
-import { colours, faded } from "./colours.js";
-import { EVENT_KINDS, eventGlyph } from "./events.js";
-import { cross, leaderMark, wafer } from "./robots.js";
+// The dialog with all keys and all that is drawn.
+import { EVENTS, broken, colours, disc, faded, leader, line, pen, robot, target, tracker } from "./drawing.js";
+import { pale } from "./robots.js";
 import { app } from "./state.js";
-import { button, element } from "./values.js";
-import { disc, line, pen } from "./world.js";
+import { button, element } from "./text.js";
 
 const KEYS = [
   ["Space", "play or pause"],
@@ -20,67 +18,58 @@ const KEYS = [
   ["L, S, T", "links, sensing, trails"],
   ["P, V", "save a picture; record a film"],
 ];
+const NOTE =
+  "Score: slots occupied per working tracker, averaged over the steps so far. Safe score: from " +
+  "the first contact on, every step counts 0. The curves show the last second; lead is the score " +
+  "so far less that of the first player.";
+const [X, Y] = [22, 13]; // the middle of a sample, px
 
-function robot(colour, rim = colours.TRACKER_RIM) {
-  return (ctx) => wafer(ctx, 22, 13, 0, 8, colour, rim);
-}
+const like = (fill, rim) => (ctx) => tracker(ctx, X, Y, 0, 8, fill, rim);
 
-function dashed(colour, dashes, width = 1.6) {
-  return (ctx) => {
-    pen(ctx, colour, width, dashes);
-    line(ctx, 4, 13, 42, 13);
-  };
-}
+const dashed = (colour, dashes) => (ctx) => {
+  pen(ctx, colour, 1.6, dashes);
+  line(ctx, 4, Y, 42, Y);
+};
 
-function ring(colour, fill, dashes = []) {
-  return (ctx) => {
-    pen(ctx, colour, 1.6, dashes);
-    disc(ctx, 22, 13, 9);
-    if (fill) {
-      ctx.fillStyle = fill;
-      ctx.fill();
-    }
-    ctx.stroke();
-  };
-}
+const ring = (colour, fill, dashes) => (ctx) => {
+  pen(ctx, colour, 1.6, dashes);
+  disc(ctx, X, Y, 9);
+  ctx.fillStyle = fill;
+  if (fill) ctx.fill();
+  ctx.stroke();
+};
 
-function entries() {
+const ghost = (colour, dashes) => (ctx) => {
+  pen(ctx, colour, 1.6, dashes);
+  robot(ctx, X, Y, 0, 8);
+};
+
+function samples() {
   const c = colours;
   const told = app.players.some((player) => player.columns.has("belief/task"));
-  const tasks = told ? app.world.tasks.map((task, k) => [robot(c.TASKS[k]), task]) : [];
   return [
-    [robot(c.TRACKER), told ? "tracker whose policy tells no task" : "tracker, its line ahead"],
-    ...tasks,
+    [like(c.TRACKER), told ? "tracker whose policy tells no task" : "tracker, its line ahead"],
+    ...(told ? app.world.tasks.map((task, k) => [like(c.TASKS[k]), task]) : []),
+    [like(pale(c.TRACKER)), "pale: it does not see the target"],
     [(ctx) => {
-      robot(c.TRACKER)(ctx);
-      ctx.globalAlpha = 0.55;
-      ctx.fillStyle = c.PAPER;
-      disc(ctx, 22, 13, 7);
-      ctx.fill();
-      ctx.globalAlpha = 1;
-    }, "pale: it does not see the target"],
-    [(ctx) => {
-      robot(c.BROKEN, c.TRACKER)(ctx);
-      pen(ctx, c.INK, 2);
-      cross(ctx, 22, 13, 7);
+      like(c.BROKEN, c.TRACKER)(ctx);
+      broken(ctx, X, Y, 7);
     }, "broken"],
-    [(ctx) => leaderMark(ctx, 22, 18, 6), "leader"],
-    [robot(c.TARGET, c.TARGET), "target"],
+    [(ctx) => leader(ctx, X, 17), "leader"],
+    [(ctx) => target(ctx, X, Y, 0, 7), "target"],
     [ring(c.SLOT), "slot, as wide as the tolerance"],
     [ring(c.SLOT, c.SLOT_FILLED), "slot that is occupied"],
-    [ring(c.TARGET, null, [4, 3]), "selected: its last fix of the target, where that is off; paler with age"],
-    [ring(c.LINK, null, [1.5, 3]), "selected: where it takes the target to be"],
+    [ghost(c.TARGET, [4, 3]), "selected: its last fix of the target, where that is off; paler with age"],
+    [ghost(c.LINK, [1.5, 3]), "selected: where it takes the target to be"],
     [ring(c.SENSING_RIM, c.SENSING), "selected: where it would see the target"],
-    [dashed(faded(c.INK, 0.6), []), "selected: sonar beam that meets something"],
-    [dashed(c.LINK, []), "radio: heard; selected: dashed and dated if it is old"],
+    [dashed(faded(c.INK, 0.6)), "selected: sonar beam that meets something"],
+    [dashed(c.LINK), "radio: heard; selected: dashed and dated if it is old"],
     [dashed(faded(c.TARGET, 0.7), [2, 4]), "selected: the slot that it is bound for"],
-    ...Object.entries(EVENT_KINDS).map(([kind, text]) => [
-      (ctx) => eventGlyph(ctx, kind, 22, 13), `tick: ${text}`,
-    ]),
+    ...Object.values(EVENTS).map(({ draw, text }) => [(ctx) => draw(ctx, X, Y), `tick: ${text}`]),
   ];
 }
 
-function glyph(draw) {
+function picture(draw) {
   const canvas = element("canvas");
   const ratio = devicePixelRatio || 1;
   [canvas.width, canvas.height] = [46 * ratio, 26 * ratio];
@@ -96,21 +85,15 @@ export function toggleLegend() {
     dialog.close();
     return;
   }
-  const keys = KEYS.map(([key, text]) =>
-    element("tr", [element("th", [element("kbd", key)]), element("td", text)]),
-  );
-  const drawn = entries().map(([draw, text]) =>
-    element("tr", [element("td", [glyph(draw)]), element("td", text)]),
-  );
-  const note =
-    "Score: slots occupied per working tracker, averaged over the steps so far. Safe score: from " +
-    "the first contact on, every step counts 0. The curves show the last second; lead is the score " +
-    "so far less that of the first player.";
+  const rows = (all, tag, made) =>
+    all.map(([first, text]) => element("tr", [element(tag, [made(first)]), element("td", text)]));
   dialog.replaceChildren(
     button("×", () => dialog.close(), "close"),
-    element("h2", "Keys"), element("table", keys),
-    element("h2", "What is drawn"), element("table", drawn, "drawn"),
-    element("p", note, "note"),
+    element("h2", "Keys"),
+    element("table", rows(KEYS, "th", (key) => element("kbd", key))),
+    element("h2", "What is drawn"),
+    element("table", rows(samples(), "td", picture), "drawn"),
+    element("p", NOTE, "note"),
   );
   dialog.showModal();
 }

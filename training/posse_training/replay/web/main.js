@@ -3,11 +3,10 @@ import { Camera } from "./camera.js";
 import { connectControls, connectView } from "./controls.js";
 import { readReplay } from "./data.js";
 import { connectExport, filmFrame } from "./export.js";
-import { inside } from "./geometry.js";
-import { fillHeader } from "./header.js";
 import { connectPanel } from "./panel.js";
 import { sightOf } from "./sensing.js";
 import { app, listen, readHash, seconds, set, writeHash } from "./state.js";
+import { fillHeader } from "./text.js";
 import { connectTimeline, drawTimeline, timelineHeight } from "./timeline.js";
 import { drawView } from "./view.js";
 
@@ -27,14 +26,13 @@ function start() {
   const views = document.getElementById("views");
   const strip = document.getElementById("timeline");
   const cameras = app.players.map((player) => {
-    const camera = new Camera(player);
+    const canvas = document.createElement("canvas");
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `${player.name} at work`);
     const holder = document.createElement("div");
-    camera.canvas = document.createElement("canvas");
-    camera.canvas.setAttribute("role", "img");
-    camera.canvas.setAttribute("aria-label", `${player.name} at work`);
-    holder.append(camera.canvas);
+    holder.append(canvas);
     views.append(holder);
-    return camera;
+    return new Camera(player, canvas);
   });
   views.dataset.players = cameras.length;
   document.body.style.setProperty("--count", cameras.length);
@@ -46,12 +44,10 @@ function start() {
 
   const draw = () => {
     for (const camera of cameras) {
-      const box = camera.canvas.parentElement.getBoundingClientRect();
-      camera.resize(box.width, box.height);
+      ({ width: camera.width, height: camera.height } = camera.canvas.parentElement.getBoundingClientRect());
     }
     for (const camera of cameras) {
-      const ctx = fill(camera.canvas, camera);
-      drawView(ctx, camera.player, camera.look(app.position, cameras));
+      drawView(fill(camera.canvas, camera), camera.player, camera.look(app.position, cameras));
     }
     const box = strip.getBoundingClientRect();
     drawTimeline(fill(strip.firstElementChild, box), box.width, box.height, hover);
@@ -59,13 +55,11 @@ function start() {
   };
   const tick = (now) => {
     waiting = false;
+    const passed = before === null ? 0 : Math.min(0.25, (now - before) / 1000);
+    before = app.playing ? now : null;
     if (app.playing) {
-      const passed = before === null ? 0 : Math.min(0.25, (now - before) / 1000);
-      before = now;
       const position = app.position + (passed * app.speed) / seconds(1);
       set({ position, playing: position < app.last });
-    } else {
-      before = null;
     }
     draw();
     if (app.playing) redraw();
@@ -111,14 +105,13 @@ function start() {
 async function main() {
   try {
     Object.assign(app, await readReplay());
-    app.last = Math.max(...app.players.map((player) => player.last));
     const cameras = start();
     const look = (k) => cameras[k].look(app.position, cameras);
-    globalThis.replay = { app, set, look, inside, sightOf };
+    globalThis.replay = { app, set, look, sightOf };
     document.documentElement.dataset.ready = "yes";
   } catch (error) {
     const message = document.getElementById("message");
-    message.textContent = `This replay cannot be shown: ${error.message}`;
+    message.textContent = `This replay cannot be shown, or needs a newer browser: ${error.message}`;
     message.hidden = false;
     throw error;
   }

@@ -37,13 +37,8 @@ export function frameOf(player, position = app.position) {
   return Math.min(Math.floor(position + 1e-6), player.last);
 }
 
-export function robotName(number) {
-  return number === app.world.settings.num_trackers ? "target" : `tracker ${number}`;
-}
-
 export function select(robot) {
-  const count = app.world.agents;
-  set({ selected: robot !== null && robot >= 0 && robot < count ? robot : null });
+  set({ selected: robot >= 0 && robot < app.world.agents ? robot : null });
 }
 
 // Start over at the end; pausing leaves no half frame behind.
@@ -52,24 +47,17 @@ export function play(playing = !app.playing) {
   set({ playing, position: over ? 0 : playing ? app.position : Math.round(app.position) });
 }
 
-export function seek(position, playing = false) {
-  set({ position: Math.round(position), playing });
+export function seek(position) {
+  set({ position: Math.round(position), playing: false });
 }
 
 // --- the address: #t=12.4&r=3 ---
 
 export function readHash() {
   const asked = new URLSearchParams(location.hash.slice(1));
-  const changes = {};
-  if (asked.has("t")) {
-    const time = Number(asked.get("t"));
-    if (Number.isFinite(time)) changes.position = Math.round(time / seconds(1));
-  }
-  if (asked.has("r")) {
-    const robot = Number.parseInt(asked.get("r"), 10);
-    changes.selected = robot >= 0 && robot < app.world.agents ? robot : null;
-  }
-  if (Object.keys(changes).length) set({ ...changes, playing: false });
+  const time = Number(asked.get("t") ?? NaN);
+  if (Number.isFinite(time)) seek(time / seconds(1));
+  if (asked.has("r")) select(Number.parseInt(asked.get("r"), 10));
 }
 
 export function writeHash() {
