@@ -101,7 +101,7 @@ def trails(d: Drawing) -> None:
     """Draw the trails, fading with age."""
     for (before, _), (after, fresh) in itertools.pairwise(d.history.trail()):
         for i, (start, end) in enumerate(zip(d.camera.project(before), d.camera.project(after), strict=True)):
-            colour = style.TARGET if i == len(before) - 1 else style.TRAIL
+            colour = style.TARGET if i == len(before) - 1 else style.TRACKER
             d.canvas.line(start, end, 1.6 * d.point, style.mix(colour, style.GROUND, 0.12 + 0.68 * fresh**1.5))
 
 

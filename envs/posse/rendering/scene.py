@@ -26,14 +26,7 @@ _FLASH_TIME: Final = 0.8  # s
 class Scene:
     """One world at one time. N trackers, M obstacles; metres, seconds, radians.
 
-    Args:
-        batch: A batch that has been reset.
-        world: Its index in the batch.
-        colours: Red, green, blue of each tracker, 0 to 255; default: grey.
-
-    Raises:
-        ValueError: No such world, or another number of colours.
-        ResetNeeded: The batch has not been reset.
+    Arguments and errors are those of :meth:`posse.rendering.renderer.Renderer.draw`.
     """
 
     def __init__(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> None:
