@@ -5,16 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from posse.rendering import style
 from posse.rendering.camera import Camera
+from posse.rendering.canvas import Canvas
 from posse.rendering.scene import Floats, History, Scene
-
-if TYPE_CHECKING:
-    from posse.rendering.canvas import Canvas
 
 _LEAST_RADIUS: Final = 5.0  # points, of a drawn robot
 _MOST_LINKED: Final = 12  # trackers

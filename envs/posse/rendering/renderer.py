@@ -7,20 +7,18 @@ target has its own colour. :mod:`posse.rendering.layers` lists the layers of a f
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from posse.engine.batch import Batch
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, Window
 from posse.rendering.layers import FOOTER, HEADER, Drawing, draw
 from posse.rendering.scene import History, Scene
 from posse.rendering.style import DESIGN_SIZE, Colour
 from posse.scenarios import Scenario
-
-if TYPE_CHECKING:
-    from posse.engine.batch import Batch
 
 RENDER_MODES: Final = ("human", "rgb_array")
 LEAST_SIZE: Final = 200  # px, of width and height

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.engine.batch import Batch
 from posse.rendering.style import TRACKER, Colour
 from posse.rules.state import NEVER
-
-if TYPE_CHECKING:
-    from posse.engine.batch import Batch
 
 Floats = npt.NDArray[np.float64]
 
