@@ -89,10 +89,9 @@ def direct(function: F) -> F:
 # What a kernel depends on.
 
 _POSSE: Final = Path(__file__).resolve().parents[1]
-_BASIS: Final = (
-    *(sys.version, numba.__version__, llvmlite_version, np.__version__, _CONFIG.OPT, _CONFIG.BOUNDSCHECK),
-    *(hashlib.sha256(path.read_bytes()).digest() for path in sorted(_POSSE.rglob("*.py"))),
-)
+_SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).hexdigest()
+_VERSIONS: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__)
+_DEBUGGING: Final = (_CONFIG.OPT, _CONFIG.BOUNDSCHECK)  # options that change the machine code
 _PROCESS: Final = os.urandom(16)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
@@ -105,7 +104,7 @@ def stamp(*values: Any) -> str:
     of modules that they name, recursively.
     """
     _known.clear()
-    return _hash(_BASIS, list(map(_digest, values))).hex()
+    return _hash(_VERSIONS, _DEBUGGING, _SOURCES, list(map(_digest, values))).hex()
 
 
 def _hash(*parts: object) -> bytes:
