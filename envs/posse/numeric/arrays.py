@@ -36,6 +36,6 @@ class OwnArrays:
 def _own(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.copy()
-    if type(value) is tuple:
-        return tuple(map(_own, value))
-    return type(value)(*map(_own, value)) if isinstance(value, tuple) else value  # a named tuple
+    if isinstance(value, tuple):
+        return getattr(value, "_make", tuple)(map(_own, value))  # _make: of a named tuple
+    return value

@@ -4,33 +4,30 @@
 each compiled together with all that it calls. There is no fast-math, since a result must not depend on a world's
 position in its batch. With ``NUMBA_DISABLE_JIT=1`` both return the plain function, for debugging.
 
-Two of numba's inner parts are overridden, ``JITCodeLibrary`` and ``CompilerBase``, and its type of functions; the
-classes at the end say what each gains. ``tests/envs/numeric/test_compile.py`` fails if a new numba lacks them.
+Three of numba's inner parts are overridden; the classes at the end say what each gains.
+``tests/envs/numeric/test_compile.py`` fails if a new numba lacks what is used of them.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dis
-import enum
 import functools
 import hashlib
 import os
 import pickle
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType, SimpleNamespace
+from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Final, TypeVar, cast, overload
 
-import llvmlite
 import numba
 import numpy as np
+from llvmlite import __version__ as llvmlite_version
+from llvmlite import binding
 from numba.core import caching, codegen, compiler, extending, imputils, serialize, types
 from numba.core.registry import CPUDispatcher
-
-import posse.numeric.lane_code  # noqa: F401 (registers lanes with numba)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -56,11 +53,11 @@ def compiled(function: F | None = None, *, out_of_line: bool = False) -> F | Cal
     """Compile a function that kernels and other compiled functions call.
 
     ``@compiled`` inlines it into its callers, since passing arrays takes longer than most functions.
-    ``out_of_line=True`` leaves that to LLVM: long and rarely called functions would crowd the instruction cache.
+    ``out_of_line=True`` never does: long and rarely called functions would crowd the instruction cache.
     """
     if function is None:
         return functools.partial(compiled, out_of_line=out_of_line)
-    return function if UNCOMPILED else cast("F", _Function(function, forceinline=not out_of_line))
+    return function if UNCOMPILED else cast("F", _Function(function, out_of_line))
 
 
 def kernel(function: F) -> F:
@@ -71,7 +68,7 @@ def kernel(function: F) -> F:
     """
     if UNCOMPILED:
         return function
-    dispatcher: Any = CPUDispatcher(function, {}, _OPTIONS, _KernelCompiler)
+    dispatcher: Any = CPUDispatcher(function, {}, _OPTIONS, _Compiler)
     dispatcher._cache = _Cache(function)
     return cast("F", dispatcher)
 
@@ -93,23 +90,21 @@ def direct(function: F) -> F:
 
 _POSSE: Final = Path(__file__).resolve().parents[1]
 _SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).hexdigest()
-_VERSIONS: Final = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
+_VERSIONS: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__)
 _DEBUGGING: Final = (_CONFIG.OPT, _CONFIG.BOUNDSCHECK)  # options that change the machine code
-_PLAIN: Final = int | float | complex | str | bytes | np.dtype | BuiltinFunctionType | np.ufunc | None
 _PROCESS: Final = os.urandom(16)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
-_unknown: dict[int, Any] = {}  # values that cannot be hashed; kept, so that no other gets their address
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
 
 
-def stamp(*functions: Callable[..., Any]) -> str:
-    """Return a hash of functions with all that they reach, as it is now.
+def stamp(*values: Any) -> str:
+    """Return a hash of functions with all that they reach, and of other values, as they are now.
 
     Functions of posse count by its sources; others by their code, defaults, closures, and the globals and attributes
     of modules that they name, recursively.
     """
     _known.clear()
-    return _hash(_VERSIONS, _DEBUGGING, _SOURCES, list(map(_digest, functions))).hex()
+    return _hash(_VERSIONS, _DEBUGGING, _SOURCES, list(map(_digest, values))).hex()
 
 
 def _hash(*parts: object) -> bytes:
@@ -118,7 +113,7 @@ def _hash(*parts: object) -> bytes:
 
 def _digest(value: Any, names: frozenset[str] = frozenset()) -> bytes:
     """Return a hash of a value that compiled code may hold; of a module, only what has one of the names."""
-    function = getattr(value, "py_func", getattr(value, "_defn", value))  # compiled, or numba's intrinsic
+    function = getattr(value, "py_func", value)
     if isinstance(function, FunctionType):
         found = _digest_function(function)
         if type(value) is CPUDispatcher and _compiled_with.get(value) != found:
@@ -129,20 +124,18 @@ def _digest(value: Any, names: frozenset[str] = frozenset()) -> bytes:
         inside = () if value.__name__.partition(".")[0] in ("numba", "numpy") else sorted(names)
         reached = [(n, _digest(getattr(value, n), names - {n})) for n in inside if hasattr(value, n)]
         return _hash(value.__name__, reached)
-    if isinstance(value, np.ndarray | np.generic):
-        return _hash(value.dtype, value.shape, value.tobytes())
     if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
         return _hash(str(value), _digest(getattr(value, "instance_class", None)), _digest(getattr(value, "types", ())))
     if isinstance(value, type):
-        members = [(name, _digest(each.value)) for name, each in getattr(value, "__members__", {}).items()]
-        return _hash(value.__qualname__, getattr(value, "_fields", ()), members)
-    if isinstance(value, enum.Enum):
-        return _hash(_digest(type(value)), value.name)
+        return _hash(
+            value.__qualname__, getattr(value, "_fields", ()), list(getattr(value, "__members__", {}).values())
+        )
     if isinstance(value, tuple | list):
         return _hash(_digest(type(value)), list(map(_digest, value)))
-    if isinstance(value, _PLAIN):
-        return _hash(type(value).__name__, value)
-    return _hash(_PROCESS, id(_unknown.setdefault(id(value), value)))
+    try:
+        return _hash(pickle.dumps(value))
+    except Exception:  # pickle may raise anything; unknown values make a kernel that this process alone uses
+        return _hash(_PROCESS, id(value))
 
 
 def _digest_function(function: FunctionType) -> bytes:
@@ -165,14 +158,11 @@ def _parts_of(code: CodeType) -> tuple[str, list[str], frozenset[str]]:
     codes = [code]
     for each in codes:
         codes += (constant for constant in each.co_consts if isinstance(constant, CodeType))
-    text = [(c.co_code, c.co_names, c.co_varnames, c.co_freevars) for c in codes]
     constants = [constant for each in codes for constant in each.co_consts if not isinstance(constant, CodeType)]
+    text = repr(([(c.co_code, c.co_names, c.co_varnames, c.co_freevars) for c in codes], constants))
     steps = (step for each in codes for step in dis.get_instructions(each))
     read = {step.argval for step in steps if step.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
-    return repr((text, constants)), sorted(read), frozenset(name for each in codes for name in each.co_names)
-
-
-_KEPT: Final = 256  # files, of up to 1 MB
+    return text, sorted(read), frozenset(name for each in codes for name in each.co_names)
 
 
 class _Cache(caching.NullCache):
@@ -182,9 +172,10 @@ class _Cache(caching.NullCache):
         self._function = function
 
     def _path(self, sig: Any, target: Any) -> Path:
+        user = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+        folder = Path(os.environ.get("POSSE_CACHE_DIR") or Path(user).expanduser() / "posse").absolute()
         f = self._function
-        key = _hash(stamp(f), f.__module__, f.__qualname__, _digest(tuple(sig)), target)
-        return _folder() / f"{f.__name__}-{key.hex()[:32]}.kernel"
+        return folder / f"{f.__name__}-{_hash(stamp(f, tuple(sig)), f.__module__, f.__qualname__, target).hex()}.kernel"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with contextlib.suppress(Exception):  # what cannot be read is compiled
@@ -200,40 +191,46 @@ class _Cache(caching.NullCache):
             with contextlib.suppress(Exception):  # no room or permission: the next process compiles, too
                 path, content = self._path(sig, data.codegen.magic_tuple()), serialize.dumps(data._reduce())
                 path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-                with tempfile.TemporaryDirectory(dir=path.parent) as unfinished:
-                    Path(unfinished, "kernel").write_bytes(_hash(path.name, content) + content)
-                    Path(unfinished, "kernel").replace(path)
-                for old in sorted(path.parent.glob("*.kernel"), key=lambda each: each.stat().st_mtime)[:-_KEPT]:
-                    old.unlink(missing_ok=True)
-
-
-def _folder() -> Path:
-    user = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(os.environ.get("POSSE_CACHE_DIR") or Path(user).expanduser() / "posse").absolute()
+                unfinished = path.with_suffix(f".{os.getpid()}")
+                unfinished.write_bytes(_hash(path.name, content) + content)
+                unfinished.replace(path)
 
 
 @functools.cache  # once per process
 def _announce() -> None:
-    with contextlib.suppress(RuntimeError):  # no home
-        once = f"once, if {_folder()} can be written to; otherwise set POSSE_CACHE_DIR"
-        sys.stderr.write(f"posse: compiling kernels, which takes some seconds ({once})\n")
+    again = "if it does so at every start, set POSSE_CACHE_DIR to a folder that can be written to"
+    sys.stderr.write(f"posse: compiling kernels, which takes some seconds; {again}\n")
 
 
 # numba's inner parts.
 
 
 class _Library(codegen.JITCodeLibrary):
-    """LLVM code of a kernel: no short loop is vectorised, which makes it 6 % faster and saves 1.5 s of compiling."""
+    """LLVM code of a kernel, in which only what is marked is inlined, and no loop is unrolled or vectorised.
+
+    Most loops run a few times: this makes kernels 10 % faster, and saves 1.5 s of compiling.
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        for function in ir_module.functions:
+            if function.blocks and "alwaysinline" not in function.attributes:
+                function.attributes.add("noinline")
+        super().add_ir_module(ir_module)
 
     def _optimize_final_module(self) -> None:
-        passes, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=True)
-        passes.run(self._final_module, builder)
+        options = binding.create_pipeline_tuning_options(_CONFIG.OPT)
+        options.loop_unrolling = options.loop_vectorization = False
+        builder = binding.create_pass_builder(self._codegen._tm, options)
+        builder.getModulePassManager().run(self._final_module, builder)
 
 
-class _InnerLibrary(codegen.JITCodeLibrary):
+class _InnerLibrary(_Library):
     """LLVM code of a function, which is optimised and made machine code only where it is linked; saves 12 s."""
 
     codegen: Any = SimpleNamespace(set_env=lambda name, environment: None)  # numba's requires machine code
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         pass
@@ -242,18 +239,15 @@ class _InnerLibrary(codegen.JITCodeLibrary):
         self._finalized = True
 
 
-class _KernelCompiler(compiler.CompilerBase):
-    library: Any = _Library
+class _Compiler(compiler.CompilerBase):
+    """numba's passes with the libraries above: the inner one for functions without a wrapper for Python."""
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
-        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        library = _InnerLibrary if state.flags.no_cpython_wrapper else _Library
+        state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return [compiler.DefaultPassBuilder.define_nopython_pipeline(state)]
-
-
-class _InnerCompiler(_KernelCompiler):
-    library = _InnerLibrary
 
 
 class _FunctionType(types.Dispatcher):
@@ -270,15 +264,15 @@ imputils.lower_constant(_FunctionType)(lambda context, builder, kind, function: 
 class _Function(CPUDispatcher):
     """A function that Python can call, with a form to link into kernels for each state of what it reaches."""
 
-    def __init__(self, function: Callable[..., Any], *, forceinline: bool) -> None:
+    def __init__(self, function: Callable[..., Any], out_of_line: bool) -> None:
         super().__init__(function, {}, _OPTIONS)
         wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self.inner_options = {**_OPTIONS, **wrappers, "forceinline": forceinline}
+        self.inner_options = {**_OPTIONS, **wrappers, "forceinline": not out_of_line}
         self.inner: dict[bytes, CPUDispatcher] = {}
 
     @property
     def _numba_type_(self) -> _FunctionType:
         state = _digest(self)
         if state not in self.inner:
-            self.inner[state] = CPUDispatcher(self.py_func, {}, self.inner_options, _InnerCompiler)
+            self.inner[state] = CPUDispatcher(self.py_func, {}, self.inner_options, _Compiler)
         return _FunctionType(self.inner[state])

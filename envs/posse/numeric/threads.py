@@ -6,7 +6,6 @@ much as 50 worlds' step, and an interrupt within its ``wait`` can leave a future
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import itertools
 import os
@@ -33,9 +32,8 @@ def _jobs() -> SimpleQueue[Callable[[], None]]:
         while True:
             jobs.get()()
 
-    with contextlib.suppress(RuntimeError):  # no thread can be started: the callers do all
-        for k in range(1, MOST_THREADS):
-            threading.Thread(target=serve, name=f"posse-{k}", daemon=True).start()
+    for k in range(1, MOST_THREADS):
+        threading.Thread(target=serve, name=f"posse-{k}", daemon=True).start()
     return jobs
 
 
@@ -50,10 +48,13 @@ def threads_for(num_worlds: int, robots_each: int, most: int) -> int:
 
 @functools.lru_cache(maxsize=64)
 def _shares_of(num_worlds: int, threads: int) -> list[tuple[int, int]]:
-    """Return shares of whole eights of worlds, ever smaller ones, so that the threads end at the same time."""
+    """Return shares of whole eights of worlds, ever smaller ones, so that the threads end at the same time.
+
+    The first is half of a thread's part: a thread that the system interrupts leaves the rest to the others.
+    """
     ends = [0]
     while ends[-1] < num_worlds:
-        share = max(_LEAST_SHARE, (num_worlds - ends[-1]) // threads // WIDTH * WIDTH)
+        share = max(_LEAST_SHARE, (num_worlds - ends[-1]) // (2 * threads) // WIDTH * WIDTH)
         ends.append(min(num_worlds, ends[-1] + share))
     return list(itertools.pairwise(ends))
 
@@ -72,9 +73,7 @@ def over_worlds(
     shares = iter(_shares_of(num_worlds, threads))  # all threads take from it
     results: list[Any] = []
     errors: list[BaseException] = []
-    in_time: dict[int, bool] = {}  # whether a thread began before the caller had done all
-    ended: set[int] = set()
-    news: SimpleQueue[None] = SimpleQueue()  # wakes the caller after a thread has ended
+    turns = [threading.RLock() for _ in range(threads)]  # each is held by its thread, in the end by the caller
 
     def take(thread: int) -> None:
         for first, end in shares:
@@ -84,15 +83,14 @@ def over_worlds(
                 errors.append(error)
 
     def work(thread: int) -> None:
-        if in_time.setdefault(thread, True):
+        if turns[thread].acquire(blocking=False):  # otherwise the caller has done all
             take(thread)
-            ended.add(thread)
-            news.put(None)
+            turns[thread].release()
 
     def finish() -> None:
         take(0)
-        while any(in_time.setdefault(thread, False) and thread not in ended for thread in range(1, threads)):
-            news.get()
+        for turn in turns:
+            turn.acquire()
 
     try:
         for thread in range(1, threads):

@@ -67,11 +67,11 @@ class Camera:
         held = float((2 * reach / pixels).max())
         self.scale = min(self.scale / math.exp(zoom), 1 / held)
 
-    def project(self, points: Points) -> Points:
-        """Return the pixel coordinates (..., 2) of points (..., 2) m."""
+    def project(self, points: npt.ArrayLike) -> Points:
+        """Return the pixels (..., 2), right and down, of points (..., 2) m."""
         left, top, width, height = self.viewport
         middle = np.array([left + width / 2, top + height / 2])
-        return middle + (points - self.centre) * (self.scale, -self.scale)
+        return middle + (np.asarray(points) - self.centre) * (self.scale, -self.scale)
 
     def floor(self) -> Points:
         """Return the lower left and the upper right corner (2, 2) m of the arena, or of the plane in view."""

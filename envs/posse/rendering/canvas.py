@@ -34,10 +34,7 @@ def _font(size: int) -> pygame.font.Font:
 class Canvas:
     """The surface of a frame: drawn at a higher resolution, then averaged down.
 
-    Coordinates and lengths are in pixels of the finished frame. It needs no display.
-
-    Args:
-        size: Width and height, px.
+    Coordinates, lengths and ``size`` (width, height) are in pixels of the finished frame. It needs no display.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
@@ -85,8 +82,7 @@ class Canvas:
 
     def pixels(self) -> npt.NDArray[np.uint8]:
         """Return a copy of the frame, (H, W, 3) uint8."""
-        flat = np.frombuffer(pygame.image.tobytes(self.finish(), "RGB"), np.uint8)
-        return flat.reshape(self.size[1], self.size[0], 3).copy()
+        return np.ascontiguousarray(pygame.surfarray.array3d(self.finish()).swapaxes(0, 1))
 
     def _places(self, points: Sequence[Point] | npt.NDArray[np.float64]) -> list[list[float]]:
         places = np.asarray(points, np.float64) * _OVERSAMPLED

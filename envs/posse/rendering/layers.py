@@ -5,16 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from posse.rendering import style
 from posse.rendering.camera import Camera
+from posse.rendering.canvas import Canvas
 from posse.rendering.scene import Floats, History, Scene
-
-if TYPE_CHECKING:
-    from posse.rendering.canvas import Canvas
 
 _LEAST_RADIUS: Final = 5.0  # points, of a drawn robot
 _MOST_LINKED: Final = 12  # trackers
@@ -101,7 +99,7 @@ def trails(d: Drawing) -> None:
     """Draw the trails, fading with age."""
     for (before, _), (after, fresh) in itertools.pairwise(d.history.trail()):
         for i, (start, end) in enumerate(zip(d.camera.project(before), d.camera.project(after), strict=True)):
-            colour = style.TARGET if i == len(before) - 1 else style.TRAIL
+            colour = style.TARGET if i == len(before) - 1 else style.TRACKER
             d.canvas.line(start, end, 1.6 * d.point, style.mix(colour, style.GROUND, 0.12 + 0.68 * fresh**1.5))
 
 

@@ -7,20 +7,18 @@ target has its own colour. :mod:`posse.rendering.layers` lists the layers of a f
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from posse.engine.batch import Batch
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, Window
 from posse.rendering.layers import FOOTER, HEADER, Drawing, draw
 from posse.rendering.scene import History, Scene
 from posse.rendering.style import DESIGN_SIZE, Colour
 from posse.scenarios import Scenario
-
-if TYPE_CHECKING:
-    from posse.engine.batch import Batch
 
 RENDER_MODES: Final = ("human", "rgb_array")
 LEAST_SIZE: Final = 200  # px, of width and height
@@ -43,7 +41,9 @@ class Renderer:
 
     Attributes:
         title: May be set between frames.
+        camera: The view of the last frame; its ``project`` gives the pixels of points.
         window: The window of the mode "human"; ``None`` once closed.
+        closed: Whether :meth:`close` was called, or the user closed the window.
 
     Raises:
         ValueError: An unknown mode, or a size below :data:`LEAST_SIZE`.
@@ -63,30 +63,19 @@ class Renderer:
         given = np.asarray(size)
         if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
             raise ValueError(f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px")
-        self.scenario = scenario
-        self.mode = mode
-        self.size = (int(size[0]), int(size[1]))
-        self.title = title
-        self._canvas = Canvas(self.size)
-        self._point = min(self.size) / DESIGN_SIZE
+        width, height = int(size[0]), int(size[1])
+        self.scenario, self.mode, self.title, self.closed = scenario, mode, title or scenario.name, False
+        self._canvas = Canvas((width, height))
+        self._point = min(width, height) / DESIGN_SIZE
         above, below = round(HEADER * self._point), round(FOOTER * self._point)
-        self.camera = Camera((0, above, self.size[0], self.size[1] - above - below), scenario.arena)
+        self.camera = Camera((0, above, width, height - above - below), scenario.arena)
         self._history = History()
-        self._closed = False
         self.window: Window | None = None
         if mode == "human":
-            self.window = Window(self.size, f"posse: {scenario.name}", 1 / scenario.control_step, keys)
-
-    @property
-    def closed(self) -> bool:
-        """Whether :meth:`close` was called, or the user closed the window."""
-        return self._closed
+            self.window = Window((width, height), f"posse: {scenario.name}", 1 / scenario.control_step, keys)
 
     def follow(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> Scene:
-        """Record the current state for trails and view, without drawing it: for videos that skip steps.
-
-        Arguments and errors are those of :meth:`draw`.
-        """
+        """Do as :meth:`draw` without drawing: for trails and view of videos that skip steps."""
         if batch.scenario != self.scenario:
             raise ValueError(
                 f"a batch of {batch.scenario.name!r} does not fit a renderer of "
@@ -115,28 +104,23 @@ class Renderer:
                 colours, or the renderer of the mode ``"rgb_array"`` was closed.
             ResetNeeded: The batch has not been reset.
         """
-        if self._closed:
+        if self.closed:
             if self.mode == "human":
                 return None
             raise ValueError("this renderer was closed: make a new one")
         scene = self.follow(batch, world, colours)
         if self.window is not None and not self.window.begin():
             return None
-        title = self.title or self.scenario.name
-        draw(Drawing(scene, self._history, self.camera, self._canvas, self._point, title))
+        draw(Drawing(scene, self._history, self.camera, self._canvas, self._point, self.title))
         if self.window is None:
             return self._canvas.pixels()
         if not self.window.show(self._canvas.finish()):
             self.close()
         return None
 
-    def project(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return the pixels (..., 2), right and down, of points (..., 2) m in the last frame."""
-        return self.camera.project(np.asarray(points, np.float64))
-
     def close(self) -> None:
         """Close the window, if there is one. May be called twice."""
-        self._closed = True
+        self.closed = True
         if self.window is not None:
             self.window.close()
             self.window = None

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from posse.engine.batch import Batch
 from posse.rendering.style import TRACKER, Colour
 from posse.rules.state import NEVER
-
-if TYPE_CHECKING:
-    from posse.engine.batch import Batch
 
 Floats = npt.NDArray[np.float64]
 
@@ -26,14 +24,7 @@ _FLASH_TIME: Final = 0.8  # s
 class Scene:
     """One world at one time. N trackers, M obstacles; metres, seconds, radians.
 
-    Args:
-        batch: A batch that has been reset.
-        world: Its index in the batch.
-        colours: Red, green, blue of each tracker, 0 to 255; default: grey.
-
-    Raises:
-        ValueError: No such world, or another number of colours.
-        ResetNeeded: The batch has not been reset.
+    Arguments and errors are those of :meth:`posse.rendering.renderer.Renderer.draw`.
     """
 
     def __init__(self, batch: Batch, world: int = 0, colours: Sequence[Colour] | None = None) -> None:

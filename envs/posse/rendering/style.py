@@ -28,7 +28,6 @@ SLOT_FILLED: Final[Colour] = (250, 221, 199)
 
 TRACKER: Final[Colour] = (150, 156, 165)
 TRACKER_RIM: Final[Colour] = (74, 81, 91)
-TRAIL: Final[Colour] = (150, 156, 165)
 BROKEN: Final[Colour] = (222, 225, 229)
 LINK: Final[Colour] = (0, 114, 178)
 SENSING: Final[Colour] = (237, 244, 250)

@@ -13,7 +13,7 @@ import numpy as np
 from numba.core import types
 
 from posse.numeric import UNCOMPILED
-from posse.numeric.lane_code import LanesType, tuple_of_lanes
+from posse.numeric.lanes import LanesType, tuple_of_lanes
 from posse.registry import Function, parameters_of, plain
 from posse.rules.state import CONFIG, OBSTACLE, SLOT, TRACKER, world_record_of
 from posse.signals.generate import Declarations

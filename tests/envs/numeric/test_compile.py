@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numba
-import numpy as np
 import pytest
 from tests.support.forks import forks_of
 
@@ -18,37 +17,30 @@ from posse.numeric import UNCOMPILED, compiled, kernel
 
 pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
 
-PARTS = {
-    "numba.core.registry.CPUDispatcher": ("recompile", "_numba_type_"),
-    "numba.core.caching.NullCache": ("load_overload", "save_overload"),
-    "numba.core.codegen.JITCodeLibrary": (
-        "_optimize_final_module",
-        "_finalize_final_module",
-        "enable_object_caching",
-        "has_dynamic_globals",
-    ),
-    "numba.core.codegen.JITCPUCodegen": ("_module_pass_manager", "magic_tuple", "set_env"),
-    "numba.core.compiler.CompilerBase": ("define_pipelines",),
-    "numba.core.compiler.DefaultPassBuilder": ("define_nopython_pipeline",),
-    "numba.core.compiler.CompileResult": ("_reduce", "_rebuild"),
-    "numba.core.compiler.Flags": ("forceinline",),
-    "numba.core.types.Dispatcher": ("get_call_type",),
-    "numba.core.extending.models.OpaqueModel": (),
-    "numba.core.extending.register_model": (),
-    "numba.core.imputils.lower_constant": (),
-    "numba.core.serialize.dumps": (),
-}
+PARTS = """
+numba.core.caching NullCache.load_overload NullCache.save_overload
+numba.core.codegen JITCodeLibrary.add_ir_module JITCodeLibrary.enable_object_caching JITCodeLibrary.has_dynamic_globals
+numba.core.codegen JITCodeLibrary._optimize_functions JITCodeLibrary._optimize_final_module JITCPUCodegen.magic_tuple
+numba.core.codegen JITCodeLibrary._finalize_final_module JITCPUCodegen.set_env
+numba.core.compiler CompilerBase.define_pipelines DefaultPassBuilder.define_nopython_pipeline Flags.forceinline
+numba.core.compiler CompileResult._reduce CompileResult._rebuild Flags.no_cpython_wrapper
+numba.core.extending models.OpaqueModel models.PrimitiveModel register_model
+numba.core.imputils lower_builtin lower_cast lower_constant
+numba.core.registry CPUDispatcher.recompile CPUDispatcher._numba_type_
+numba.core.serialize dumps
+numba.core.types Dispatcher.get_call_type unliteral
+numba.core.typing.templates AbstractTemplate ConcreteTemplate infer_global signature
+llvmlite.binding create_pass_builder create_pipeline_tuning_options
+"""
 
 
-@pytest.mark.parametrize("name", PARTS)
-def test_numba_has_the_inner_parts_that_are_used(name: str) -> None:
-    module, _, last = name.rpartition(".")
-    inside = importlib.import_module(module.removesuffix(".models"))
-    part = getattr(getattr(inside, "models", inside) if module.endswith("models") else inside, last, None)
-    lacking = [each for each in PARTS[name] if not hasattr(part, each)]
-    assert part is not None and not lacking, (  # noqa: PT018
-        f"numba {numba.__version__} lacks {name} {', '.join(lacking)}, which posse/numeric/compile.py uses"
-    )
+def test_numba_has_the_inner_parts_that_are_used() -> None:
+    for module, *names in map(str.split, PARTS.strip().splitlines()):
+        for name in names:
+            part: Any = importlib.import_module(module)
+            for each in name.split("."):
+                part = getattr(part, each, None)
+            assert part is not None, f"numba {numba.__version__} lacks {module}.{name}, which posse.numeric uses"
 
 
 @compiled(out_of_line=True)
@@ -76,19 +68,6 @@ def test_a_function_is_linked_with_all_that_it_calls(decorate: Any) -> None:
 
     assert decorate(outer)(1.0) == 12349.5
     assert both(1.0) == 12349.5, "Python can call it, too"
-
-
-def test_no_loop_is_vectorised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("POSSE_CACHE_DIR", str(tmp_path))
-
-    @kernel
-    def fill(out: Any, source: Any) -> None:
-        for i in range(len(out)):
-            out[i] = twice(source[0])
-
-    fill(np.zeros(3), np.ones(1))
-    (code,) = fill.inspect_llvm().values()  # type: ignore[attr-defined]
-    assert "x double>" not in code
 
 
 MODULES = {
@@ -128,6 +107,7 @@ EDITS = {
     "a constant in nested tuples": ("lists", "(2.0, 3.0)", "(2.0, 30.0)"),
     "a global of a function of numba's own": ("plain", "SHIFT = 1.0", "SHIFT = 11.0"),
     "a default": ("main", "step=0.5", "step=1.5"),
+    "a comment and a number that it does not reach": ("gains", "A = 1.0", "# A comment.\nUNUSED = 3.0\nA = 1.0"),
 }
 
 
@@ -137,10 +117,10 @@ def write(folder: Path) -> None:
         (folder / f"{name}.py").write_text(text)
 
 
-def play(folder: Path, cache: Path, code: str | None = None) -> tuple[list[str], str]:
-    """Run a script in a new process, as ``__main__`` without a file; return what it prints, and the errors."""
-    code = (folder / "main.py").read_text() if code is None else code
+def play(folder: Path, cache: Path) -> tuple[list[str], str]:
+    """Run main.py in a new process, as ``__main__`` without a file; return what it prints, and the errors."""
     variables = {**os.environ, "POSSE_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
+    code = (folder / "main.py").read_text()
     done = forks_of("posse.numeric", options=("-W", "error")).run(code, folder, variables)
     assert done.returncode == 0, done.stderr
     return done.stdout.split(), done.stderr
@@ -154,13 +134,13 @@ def cached(tmp_path_factory: pytest.TempPathFactory) -> Path:
     printed, said = play(folder, folder / "cache")
     assert printed[1:] == ["True", "0"]
     assert said.count("\n") == 1
-    assert str(folder / "cache") in said, "one line says where kernels are kept"
+    assert "compiling kernels" in said
     assert play(folder, folder / "cache") == ([printed[0], "True", "1"], "")
     return folder
 
 
 @pytest.mark.parametrize("what", EDITS)
-def test_a_kernel_is_compiled_again_when_anything_that_it_reaches_changes(
+def test_a_kernel_is_compiled_again_when_what_it_reaches_changes_and_only_then(
     what: str, cached: Path, tmp_path: Path
 ) -> None:
     write(tmp_path)
@@ -168,14 +148,7 @@ def test_a_kernel_is_compiled_again_when_anything_that_it_reaches_changes(
     path = tmp_path / f"{name}.py"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
-    printed, _ = play(tmp_path, cached / "cache")
-    assert printed[1:] == ["True", "0"]
-
-
-def test_what_a_kernel_does_not_reach_compiles_nothing(cached: Path, tmp_path: Path) -> None:
-    write(tmp_path)
-    (tmp_path / "gains.py").write_text("# A comment, and another number.\nA = 1.0\nB = 2.0\nUNUSED = 3.0\n")
-    assert play(tmp_path, cached / "cache")[0][1:] == ["True", "1"]
+    assert play(tmp_path, cached / "cache")[0][1:] == ["True", "1" if "not reach" in what else "0"]
 
 
 def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
@@ -236,30 +209,3 @@ def test_a_new_kernel_reads_changed_globals(tmp_path: Path, monkeypatch: pytest.
     for name, value, expected in (("GAIN", 1.0, 2.0), ("GAIN", 3.0, 6.0), ("SHIFT", 4.0, 18.0), ("GAIN", 1.0, 6.0)):
         monkeypatch.setitem(globals(), name, value)
         assert kernel(once)(2.0) == expected
-
-
-BATCH = """
-import numpy as np
-import posse
-
-GAIN = 1.0
-
-@posse.reward_term("1")
-def own(c, w, t):
-    '''A gain.'''
-    return GAIN
-
-def term():
-    batch = posse.batch("constant", 1, reward_weights={"own": 1.0})
-    batch.reset(seed=0)
-    return float(batch.step(np.zeros(batch.action_shape, np.float32))[1][0, 0])
-
-print(term())
-GAIN = 3.0
-print(term())
-"""
-
-
-@pytest.mark.long
-def test_a_new_batch_reads_a_changed_global_of_a_cell(tmp_path: Path) -> None:
-    assert play(tmp_path, tmp_path / "cache", BATCH)[0] == ["1.0", "3.0"]

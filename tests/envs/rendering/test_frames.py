@@ -25,13 +25,6 @@ def worlds(scenario: str, num_worlds: int = 1, **settings: Any) -> posse.Batch:
     return batch
 
 
-def placed(*trackers: tuple[float, float, float]) -> posse.Batch:
-    """One world with the target in the origin, heading to the right, and trackers at given poses."""
-    batch = posse.batch("constant", 1, seed=3, num_trackers=len(trackers))
-    batch.reset(options={"tracker_pose": trackers, "target_pose": (0, 0, 0)})
-    return batch
-
-
 def frame_of(renderer: Renderer, batch: posse.Batch, world: int = 0) -> Frame:
     frame = renderer.draw(batch, world)
     assert frame is not None
@@ -39,7 +32,7 @@ def frame_of(renderer: Renderer, batch: posse.Batch, world: int = 0) -> Frame:
 
 
 def assert_colour(renderer: Renderer, frame: Frame, place: npt.ArrayLike, colour: tuple[int, int, int]) -> None:
-    column, row = renderer.project(place).round().astype(int)
+    column, row = renderer.camera.project(place).round().astype(int)
     np.testing.assert_allclose(frame[row, column].astype(int), colour, rtol=0, atol=4)
 
 
@@ -64,21 +57,22 @@ def test_frames_change_when_robots_move_and_never_change_the_world(scenario: str
 
 
 def test_equal_states_give_equal_frames_also_where_some_are_left_out() -> None:
-    batch, other = worlds("smart"), worlds("smart")
+    batch = worlds("smart")
     start = batch.save()
-    drawn, followed = Renderer(batch.scenario, size=SIZE), Renderer(other.scenario, size=SIZE)
+    drawn, followed = Renderer(batch.scenario, size=SIZE), Renderer(batch.scenario, size=SIZE)
     for _ in range(25):
         frame_of(drawn, batch)
-        followed.follow(other)
+        followed.follow(batch)
         advance(batch)
-        advance(other)
-    np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(followed, other))
+    np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(followed, batch))
     batch.restore(start)  # back in time: a clean picture
     np.testing.assert_array_equal(frame_of(drawn, batch), frame_of(Renderer(batch.scenario, size=SIZE), batch))
 
 
 def test_robots_slots_and_headings_are_drawn_where_they_are() -> None:
-    batch = placed((5, 0, 1.57), (-1.2, 0, 0))  # the second in the wedge's first slot, 1.2 m behind the target
+    batch = posse.batch("constant", 1, num_trackers=2)
+    poses = [(5, 0, 1.57), (-1.2, 0, 0)]  # the second in the wedge's first slot, 1.2 m behind the target
+    batch.reset(options={"tracker_pose": poses, "target_pose": (0, 0, 0)})
     renderer = Renderer(batch.scenario, size=(900, 800))
     frame = renderer.draw(batch, colours=[TRACKER, (0, 0, 255)])
     assert frame is not None
@@ -87,32 +81,24 @@ def test_robots_slots_and_headings_are_drawn_where_they_are() -> None:
     assert_colour(renderer, frame, (-0.05, 0.05), TARGET)
     assert_colour(renderer, frame, (-1.2, 0.225), SLOT_FILLED)
     assert_colour(renderer, frame, (2, 1), GROUND)
-    ahead, beside = (frame[tuple(renderer.project(at).round().astype(int)[::-1])].sum() for at in ((5, 0.2), (5.2, 0)))
+    ahead, beside = (
+        frame[tuple(renderer.camera.project(at).round().astype(int)[::-1])].sum() for at in ((5, 0.2), (5.2, 0))
+    )
     assert ahead < beside, "the line of the heading is darker than the ground"
-    (right, _), (centre, low), (_, above) = renderer.project([(1, 0), (0, 0), (0, 1)])
+    (right, _), (centre, low), (_, above) = renderer.camera.project([(1, 0), (0, 0), (0, 1)])
     assert right > centre
     assert above < low
 
 
 def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
-    batch = worlds("obstacles", 6, num_trackers=1, sensing_range=5.0)
-    looked = 0
-    for world in range(6):
-        renderer = Renderer(batch.scenario)
-        frame = frame_of(renderer, batch, world)
-        me, target = (np.array([batch.state[f"{who}_{k}"][world].item() for k in "xy"]) for who in ("tracker", "world"))
-        rows = [batch.state[f"obstacle_{k}"][world] for k in ("x", "y", "radius")]
-        for x, y, radius in np.stack(rows, -1).astype(float):
-            way = np.array([x, y]) - me
-            distance = float(np.hypot(*way))
-            ends = np.array([me + way * (1 + side * (radius + 0.3) / distance) for side in (-1, 1)])
-            places = renderer.project(ends)
-            clear = np.hypot(*(target - ends).T).min() > 1.5
-            if clear and distance + radius < 4.5 and ((places > 60) & (places < 580)).all():
-                assert_colour(renderer, frame, ends[0], SENSING)
-                assert_colour(renderer, frame, ends[1], GROUND)
-                looked += 1
-    assert looked > 0
+    batch = posse.batch("obstacles", 1, num_trackers=1, num_obstacles=1, sensing_range=5.0)
+    batch.reset(options={"tracker_pose": [(0, 0, 0)], "target_pose": (0, 4, 0)})
+    (obstacle,) = batch.arrays.obstacle[0]
+    obstacle["x"], obstacle["y"], obstacle["radius"] = 2.0, 0.0, 0.5
+    renderer = Renderer(batch.scenario)
+    frame = frame_of(renderer, batch)
+    assert_colour(renderer, frame, (1.2, 0.2), SENSING)
+    assert_colour(renderer, frame, (3.2, 0.2), GROUND)
 
 
 def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:
@@ -134,9 +120,11 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(ResetNeeded, match="call reset"):
         renderer.draw(batch)
     batch.reset()
-    with pytest.raises(ValueError, match=r"world=-1 is not in the batch.*0 to 1"):
-        renderer.draw(batch, -1)
-    with pytest.raises(ValueError, match="1 colours do not fit 5 trackers"):
-        renderer.draw(batch, colours=[TRACKER])
-    with pytest.raises(ValueError, match="'constant' does not fit a renderer of 'smart'"):
-        renderer.draw(worlds("constant"))
+    mistakes = (
+        (r"world=-1 is not in the batch.*0 to 1", batch, -1, None),
+        ("1 colours do not fit 5 trackers", batch, 0, [TRACKER]),
+        ("'constant' does not fit a renderer of 'smart'", worlds("constant"), 0, None),
+    )
+    for message, drawn, world, colours in mistakes:
+        with pytest.raises(ValueError, match=message):
+            renderer.draw(drawn, world, colours)
