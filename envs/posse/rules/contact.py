@@ -34,8 +34,6 @@ from posse.rules.state import BIT, NO_BITS
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
 
-_SURELY_APART: Final = np.float32(0.01)  # m; far more than a touch and all rounding
-
 _TINY: Final = np.float32(1e-30)  # m²; a move so short meets nothing
 _FIRST_WALL: Final = 60
 
@@ -128,19 +126,14 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
             wall = inner - max(abs(t.x), abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= t.max_speed * c.control_step + TOUCHING_GAP
-        near = s.excess[i] <= ZERO or wall_near
-        if not near:
-            if t.near:
-                t.touching_trackers, t.touching_obstacles = NO_BITS, NO_BITS
-                t.near, t.touching, t.onsets = 0, 0, 0
-            continue
-        t.near, t.onsets = 1, 0
-        dx, dy, reach = w.x - t.x, w.y - t.y, touch + (t.max_speed + c.target_speed) * c.control_step
-        target_near = target_near or dx * dx + dy * dy <= reach * reach
-        if min(s.gap[i], wall) > _SURELY_APART:
+        t.near, t.onsets = s.excess[i] <= ZERO or wall_near, 0
+        if t.near:
+            dx, dy, reach = w.x - t.x, w.y - t.y, touch + (t.max_speed + c.target_speed) * c.control_step
+            target_near = target_near or dx * dx + dy * dy <= reach * reach
+            if meet_closely(c, w, t, obstacles, i, s):
+                target_touching |= BIT << np.uint64(i)
+        else:
             t.touching_trackers, t.touching_obstacles, t.touching = NO_BITS, NO_BITS, 0
-        elif meet_closely(c, w, t, obstacles, i, s):
-            target_touching |= BIT << np.uint64(i)
     w.touching = target_touching
     w.onsets = w.contacts_target - before
     w.near = target_near
