@@ -28,7 +28,7 @@ from posse.numeric import (
     load,
     root,
 )
-from posse.rules.discs import A_LITTLE_MORE, FAR, TOUCHING_GAP, blocks, obstacle_within
+from posse.rules.discs import FAR, TOUCHING_GAP, blocks, obstacle_within
 from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
@@ -74,14 +74,9 @@ def free_of_robots(
 
     The positions of ``count`` robots are in ``xs`` and ``ys``; the robot itself may be among them.
     """
-    reach = c.robot_radius + c.robot_radius + BLOCKING_GAP
-    within = (reach + abs(dx) + abs(dy)) * A_LITTLE_MORE
-    share = ONE
-    for block in range(blocks(count)):
-        other_x, other_y = load(xs, WIDTH * block), load(ys, WIDTH * block)
-        rx, ry = x - other_x, y - other_y
-        if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < ZERO)) != 0:
-            share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
+    reach, share = c.robot_radius + c.robot_radius + BLOCKING_GAP, ONE
+    for k in range(0, WIDTH * blocks(count), WIDTH):
+        share = min(share, least(free_share(x, y, dx, dy, load(xs, k), load(ys, k), reach)))
     return np.float32(share)
 
 
@@ -147,6 +142,16 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     w.least_gap = smallest
 
 
+@compiled
+def ones(mask: np.uint64) -> int:
+    """Return the number of bits that are set."""
+    count = 0
+    while mask != NO_BITS:
+        mask &= mask - BIT
+        count += 1
+    return count
+
+
 @compiled(out_of_line=True)
 def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
     """Find the contacts of tracker i with something near; return whether it touches the target."""
@@ -166,12 +171,8 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         found |= bits((x * x + y * y <= touch * touch) & other) << j
     touching = np.uint64(found) & ~bit
     begun = touching & ~t.touching_trackers
-    while begun != NO_BITS:
-        first = begun & (~begun + BIT)
-        begun ^= first
-        t.onsets += 1
-        if first > bit:
-            w.contacts_tracker += 1
+    t.onsets += ones(begun)
+    w.contacts_tracker += ones(begun >> np.uint64(i))  # each pair once
     t.touching_trackers = touching
     # Obstacles and walls.
     touching = NO_BITS
@@ -185,11 +186,9 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         for k, along in enumerate((t.x, -t.x, t.y, -t.y)):
             if along >= inner:
                 touching |= BIT << np.uint64(_FIRST_WALL + k)
-    begun = touching & ~t.touching_obstacles
-    while begun != NO_BITS:
-        begun &= begun - BIT
-        t.onsets += 1
-        w.contacts_obstacle += 1
+    begun = ones(touching & ~t.touching_obstacles)
+    t.onsets += begun
+    w.contacts_obstacle += begun
     t.touching_obstacles = touching
     t.touching = touches_target or (t.touching_trackers | touching) != NO_BITS
     return bool(touches_target)

@@ -38,7 +38,6 @@ TOUCHING_GAP: Final = np.float32(0.001)
 
 FAR: Final = np.float32(1e9)
 _MINUS_ONE: Final = np.float32(-1.0)
-A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled

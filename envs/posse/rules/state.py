@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -103,24 +104,16 @@ DERIVED: Final[_Numbers] = {
 """What kernels read of a scenario beside its numbers: type and value."""
 
 
-def _number(name: str, place: int | None = None) -> Callable[[Scenario], Any]:
-    """Return the function that reads a setting; of a pair, its number at a place."""
-
-    def read(s: Scenario) -> Any:
-        value = getattr(s, name) if place is None else getattr(s, name)[place]
-        return FAR if value == math.inf else value
-
-    return read
-
-
 def _numbers() -> _Numbers:
     """Return all numbers that kernels read of a scenario: type and value."""
     numbers: _Numbers = {}
     for name, setting in Scenario.settings().items():
+        read = attrgetter(name)
         if setting.kind in _NUMERIC:
-            numbers[name] = _NUMERIC[setting.kind], _number(name)
+            numbers[name] = _NUMERIC[setting.kind], read
         elif setting.kind == "tuple[float, float]":
-            numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _number(name, 0)), (_F, _number(name, 1))
+            numbers[f"{name}_least"] = _F, lambda s, read=read: read(s)[0]
+            numbers[f"{name}_most"] = _F, lambda s, read=read: read(s)[1]
     return {**numbers, **DERIVED}
 
 
@@ -387,6 +380,7 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
     config = np.zeros(1, CONFIG)
-    for name, (_, value) in _numbers().items():
-        config[name] = value(scenario)
+    for name, (_, read) in _numbers().items():
+        value = read(scenario)
+        config[name] = FAR if value == math.inf else value
     return config

@@ -24,9 +24,10 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import A_LITTLE_MORE, FAR, blocks, natural, num_discs
+from posse.rules.discs import FAR, blocks, natural, num_discs
 
 _A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
+_A_LITTLE_MORE: Final = np.float32(1.0001)
 
 Place = tuple[np.float32, np.float32, np.float32, np.float32]
 """x, y, cosine and sine of the heading, of a tracker or the target."""
@@ -87,7 +88,7 @@ def echo_of_discs(c: Record, robot: Place, number: int, s: Record) -> None:
     for block in range(blocks(num_discs(c))):
         j = WIDTH * block
         dx, dy = load(s.x, j) - x, load(s.y, j) - y
-        reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * A_LITTLE_MORE
+        reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
         near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
         while near != 0:
             disc = natural(j + lowest_bit(near))
