@@ -11,7 +11,7 @@ import math
 import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, unknown
 from posse.scenarios.formation import FORMATIONS, slot_offsets
@@ -29,6 +29,8 @@ from posse.scenarios.limits import (
 )
 from posse.scenarios.setting import Setting, UnknownSettingError, fail, setting
 
+_WEIGHT: Final = ("1", -MOST_WEIGHT, MOST_WEIGHT)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
@@ -36,7 +38,7 @@ class Scenario:
 
     Lengths are in metres, times in seconds, speeds in m/s, angles in radians, turn rates in rad/s.
     Every field can be overridden by keyword: ``posse.parallel_env("smart", num_trackers=8)``.
-    :meth:`settings` lists the fields with unit, range, meaning and source.
+    :meth:`settings` lists the fields with unit, range and meaning.
 
     Raises:
         ScenarioError: An invalid field or combination of fields.
@@ -47,14 +49,9 @@ class Scenario:
     version: int = setting(1, "incremented when the behaviour of the named scenario changes", "1", 1, 1e6)
 
     # The team
-    num_trackers: int = setting(5, "robots in the team", "1", 1, MAX_TRACKERS, source="section 4: five trackers")
+    num_trackers: int = setting(5, "robots in the team (paper, section 4: five)", "1", 1, MAX_TRACKERS)
     tracker_speed: float | tuple[float, ...] = setting(
-        1.0,
-        "greatest speed of a tracker, or of each; above target_speed",
-        "m/s",
-        SMALL,
-        1000,
-        source="section 2, assumption ii",
+        1.0, "greatest speed of a tracker, or of each; above target_speed (paper, assumption ii)", "m/s", SMALL, 1000
     )
     tracker_turn_rate: float | tuple[float, ...] = setting(
         2.0, "greatest turn rate of a tracker, or of each", "rad/s", SMALL, WIDE
@@ -69,7 +66,7 @@ class Scenario:
 
     # The target
     target_motion: str = setting(
-        "constant", "how the target moves; agent: a policy controls it", choices=TARGET_MOTIONS, source="section 2"
+        "constant", "how the target moves (paper, section 2); agent: a policy controls it", choices=TARGET_MOTIONS
     )
     target_speed: float = setting(0.6, "speed of the target; an agent's greatest", "m/s", 0, 1000)
     target_turn_rate: float = setting(1.0, "greatest turn rate of the target", "rad/s", SMALL, WIDE)
@@ -79,10 +76,7 @@ class Scenario:
 
     # The formation
     formation: str = setting(
-        "wedge",
-        "wedge: behind the target; ring: around it; rows: compact, behind",
-        choices=FORMATIONS,
-        source="section 3.3, figure 6",
+        "wedge", "wedge (paper, figure 6): behind the target; ring: around it; rows: a block behind", choices=FORMATIONS
     )
     formation_distance: float = setting(
         1.2, "from the target to the nearest slot (ring: the least radius of the ring)", "m", 0, FARTHEST, above=True
@@ -93,8 +87,7 @@ class Scenario:
     tolerance: float = setting(0.3, "a slot is occupied when a tracker is within this distance", "m", SMALL, WIDE)
     settle_time: float = setting(
         3.0,
-        "the team has settled when every slot has been held continuously for this long; by name"
-        " (get_scenario) at most the length of an episode whose horizon is given without it",
+        "the team has settled when every slot has been held for this long; a horizon given alone shortens it",
         "s",
         0,
         1e8,
@@ -158,8 +151,7 @@ class Scenario:
     breaks: int = setting(0, "trackers that break during an episode, below num_trackers", "1", 0, MAX_TRACKERS - 1)
     break_choice: str = setting(
         "nearest",
-        "which one breaks: the nearest to the target at that time (usually the leader), a random"
-        " one, or the one given by number",
+        "which one breaks: the nearest to the target then (usually the leader), any, or that of break_number",
         choices=("nearest", "drawn", "given"),
     )
     break_number: int = setting(
@@ -184,16 +176,10 @@ class Scenario:
     reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = setting(
         (("slot", 1.0), ("progress", 0.5), ("contact", -0.2)),
         "weight of each reward term by name (posse.REWARD_TERMS); others: 0",
-        "1",
-        -MOST_WEIGHT,
-        MOST_WEIGHT,
+        *_WEIGHT,
     )
     target_reward_weights: Mapping[str, float] | tuple[tuple[str, float], ...] = setting(
-        (("team", -1.0),),
-        "the same for a target that is an agent: contact, effort, team",
-        "1",
-        -MOST_WEIGHT,
-        MOST_WEIGHT,
+        (("team", -1.0),), "the same for a target that is an agent: contact, effort, team", *_WEIGHT
     )
 
     def __post_init__(self) -> None:
@@ -207,7 +193,7 @@ class Scenario:
     @staticmethod
     @functools.cache
     def settings() -> Mapping[str, Setting]:
-        """Return the declaration of every field by name: unit, range, meaning, source."""
+        """Return the declaration of every field by name: unit, range, meaning."""
         return {
             field.name: dataclasses.replace(field.metadata["setting"], kind=field.type)
             for field in dataclasses.fields(Scenario)

@@ -1,4 +1,4 @@
-"""A setting of a scenario, written once: unit, range, meaning and source on the field, its kind by the annotation."""
+"""A setting of a scenario, written once: unit, range and meaning on the field, its kind by the annotation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,6 @@ class Setting:
         above: Whether the range excludes ``low``.
         infinite: Whether ``math.inf`` is allowed beyond ``high``: no limit.
         choices: The valid values of a text, if not all are.
-        source: Section of the paper.
         kind: The annotation of the field, such as ``"int"`` or ``"tuple[float, float]"``.
     """
 
@@ -51,7 +50,6 @@ class Setting:
     above: bool = False
     infinite: bool = False
     choices: Iterable[str] | None = None
-    source: str = ""
     kind: str = ""
 
     @property

@@ -26,8 +26,7 @@ from posse.numeric import (
 )
 from posse.rules.discs import FAR, blocks, natural, num_discs
 
-_A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
-_A_LITTLE_MORE: Final = np.float32(1.0001)
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 Place = tuple[np.float32, np.float32, np.float32, np.float32]
 """x, y, cosine and sine of the heading, of a tracker or the target."""
@@ -82,9 +81,14 @@ def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
 
 
 @compiled
-def echo_of_discs(c: Record, robot: Place, number: int, s: Record) -> None:
-    """Update the sonar readings with all discs in range."""
+def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: int) -> None:
+    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
+
+    The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`).
+    """
     x, y, _, _ = robot
+    for block in range(blocks(c.sonar_beams)):
+        store(s.reading, WIDTH * block, eight(c.sonar_range))
     for block in range(blocks(num_discs(c))):
         j = WIDTH * block
         dx, dy = load(s.x, j) - x, load(s.y, j) - y
@@ -95,25 +99,7 @@ def echo_of_discs(c: Record, robot: Place, number: int, s: Record) -> None:
             if disc != number:
                 echo_of_disc(c, robot, disc, s)
             near &= near - 1
-
-
-@compiled
-def ping(c: Record, robot: Place, number: int, gap: np.float32, s: Record, o: FloatArray, first: int) -> None:
-    """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
-
-    The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`); the gap to
-    the nearest other disc is at least ``gap``, m.
-    """
-    for block in range(blocks(c.sonar_beams)):
-        store(s.reading, WIDTH * block, eight(c.sonar_range))
-    if gap < c.sonar_range + _A_LITTLE:
-        echo_of_discs(c, robot, number, s)
-    x, y, _, _ = robot
     if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
-    beams = natural(c.sonar_beams)
-    whole = beams // WIDTH
-    for block in range(whole):
-        store(o, first + WIDTH * block, load(s.reading, WIDTH * block))
-    for k in range(WIDTH * whole, beams):
-        o[first + k] = s.reading[k]
+    for k in range(natural(c.sonar_beams)):
+        o[natural(first + k)] = s.reading[k]

@@ -31,13 +31,7 @@ class Memory(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TargetMotion(Declaration):
-    """A motion of the target; its function sets the goal heading.
-
-    Attributes:
-        draw: ``(c, w)``: draws the parameters of an episode, from the stream TARGET.
-        memory: Its state variables.
-        mirrored: Whether the goal heading is mirrored near walls.
-    """
+    """A motion of the target; its function sets the goal heading. :func:`target_motion` describes the attributes."""
 
     draw: Function | None = None
     memory: tuple[Memory, ...] = ()

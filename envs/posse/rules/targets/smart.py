@@ -11,7 +11,22 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import HALF, ONE, WIDTH, ZERO, Record, Records, choose, compiled, eight, lesser, load, root, store
+from posse.numeric import (
+    HALF,
+    ONE,
+    TINY,
+    WIDTH,
+    ZERO,
+    Record,
+    Records,
+    choose,
+    compiled,
+    eight,
+    lesser,
+    load,
+    root,
+    store,
+)
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
 from posse.rules.targets.declaration import Memory, target_motion
@@ -21,7 +36,6 @@ SMART_REPLAN: Final = 5
 PATIENCE: Final = np.float32(3.0)
 """Time of station keeping by the whole team that triggers a dart, s."""
 
-_TWO: Final = np.float32(2.0)
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _STATION_MARGIN: Final = np.float32(1.0)  # m; beyond the outermost slot, counts as near
 _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
@@ -32,7 +46,6 @@ DART_TURN: Final = np.float32(1.3 * math.pi)
 SMART_DIRECTIONS: Final = 2 * WIDTH
 """Number of candidate directions."""
 
-_TINY: Final = np.float32(1e-12)
 _FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by this time
 _LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
 _LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
@@ -104,7 +117,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
         ux, uy = t.speed * t.heading_cos - vx, t.speed * t.heading_sin - vy
         if d2 < near * near and ux * ux + uy * uy < slow * slow:
             committed += ONE
-    return _TWO * committed / np.float32(max(w.working, 1)) - ONE
+    return (committed + committed) / np.float32(max(w.working, 1)) - ONE
 
 
 @compiled
@@ -155,9 +168,9 @@ def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.f
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
     inner = c.half_arena - c.safe_distance
-    if abs(ux) > _TINY:
+    if abs(ux) > TINY:
         far = min(far, (inner - w.x) / ux if ux > ZERO else (-inner - w.x) / ux)
-    if abs(uy) > _TINY:
+    if abs(uy) > TINY:
         far = min(far, (inner - w.y) / uy if uy > ZERO else (-inner - w.y) / uy)
     for k in range(c.num_obstacles):
         o = obstacles[k]
