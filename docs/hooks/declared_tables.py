@@ -32,8 +32,7 @@ def all_settings() -> str:
     for name, setting in posse.Scenario.settings().items():
         default = defaults[name]
         shown = "" if default is dataclasses.MISSING else code(value(default))
-        meaning = setting.meaning + (f" (paper, {setting.source})" if setting.source else "")
-        rows.append((code(name), shown, setting.unit, setting.range, meaning))
+        rows.append((code(name), shown, setting.unit, setting.range, setting.meaning))
     return table(("setting", "default", "unit", "range", "meaning"), rows)
 
 

@@ -110,6 +110,9 @@ def test_a_world_goes_as_an_independent_computation_says(
         judge_motion(s, before, state, actions[0])
         assert np.isfinite(rewards).all()
         assert np.isclose(infos["score"][0], episode.score, rtol=1e-5, atol=1e-6)
+        assert set(state["tracker_slot"]) - {-1} == set(episode.occupied.values())
+        np.testing.assert_array_equal(infos["reward/contact"][0, : s.num_trackers], episode.onsets)
+        assert state["tracker_sees"].astype(bool).tolist() == senses.sees
         assert ((observations >= low) & (observations <= high)).all()
         if step % 4 == 1:
             views = batch.layout.views(observations)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from posse.numeric import WIDTH, ZERO, FloatArray, Lanes, Record, Records, compiled, store, transpose
+from posse.numeric import WIDTH, FloatArray, Lanes, Record, Records, compiled, store, transpose
 from posse.rules.discs import natural
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
@@ -56,9 +56,9 @@ def observe_sonar(c: Record, w: Record, trackers: Records, s: Record, observatio
     for i in range(n):
         t = trackers[i]
         pose = (t.x, t.y, t.heading_cos, t.heading_sin)
-        ping(c, pose, i, s.gap[i], s, observations[i], first)
+        ping(c, pose, i, s, observations[i], first)
     if c.target_agent != 0:
-        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, ZERO, s, observations[n], first)
+        ping(c, (w.x, w.y, w.heading_cos, w.heading_sin), n, s, observations[n], first)
 
 
 @compiled

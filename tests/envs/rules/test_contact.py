@@ -6,12 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.reference.motion import free_gaps
-from tests.support.reference.score import Episode
 from tests.support.reference.state import one_world, positions, snapshot
 
 import posse
@@ -23,12 +20,6 @@ def at(batch: posse.Batch, target: list[float], *trackers: list[float]) -> None:
 
 def act(batch: posse.Batch, *actions: list[float]) -> dict[str, Any]:
     return batch.step(np.array([actions], np.float32))[-1]
-
-
-def least_gap(batch: posse.Batch) -> float:
-    state = snapshot(batch)
-    worlds = [one_world(state, e) for e in range(batch.num_worlds)]
-    return min(float(free_gaps(batch.scenario, world).min()) for world in worlds)
 
 
 @settings(derandomize=True, max_examples=60, deadline=None)
@@ -100,41 +91,3 @@ def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
         counts.append((int(w.contacts_tracker), int(w.contacts_target), int(w.contacts_obstacle)))
         assert infos["reward/contact"].shape == (1, 3)
     assert counts == [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 0), (1, 1, 0), (2, 1, 0), (2, 1, 0)]
-
-
-def test_a_robot_that_is_far_from_all_is_swept_as_soon_as_it_matters() -> None:
-    """The engine sweeps only robots that are near something, which must be detected in time."""
-    batch = posse.batch(
-        "obstacles",
-        32,
-        num_trackers=16,
-        tracker_speed=3.0,
-        start_distance=(1.0, 10.0),
-        tracker_acceleration=math.inf,
-        tracker_turn_acceleration=math.inf,
-    )
-    batch.reset(seed=4)
-    episodes = [Episode(batch.scenario) for _ in range(2)]
-    rng = np.random.default_rng(4)
-    actions: npt.NDArray[np.float64] = np.zeros(batch.action_shape)
-    for k in range(60):
-        if k % 10 == 0:
-            actions = rng.uniform(-0.2, 0.2, batch.action_shape) + np.array([0.8, 0.0])
-        infos = batch.step(actions)[-1]
-        assert least_gap(batch) > 0
-        state = snapshot(batch)
-        for e, episode in enumerate(episodes):
-            if k == 0:
-                episode.follow(one_world(state, e))  # what touched at the start is not of interest
-                continue
-            episode.follow(one_world(state, e))
-            np.testing.assert_array_equal(infos["reward/contact"][e], episode.onsets)
-
-
-def test_the_least_gap_is_to_anything_however_slow_the_robots() -> None:
-    batch = posse.batch("obstacles", 16)
-    batch.reset(seed=6)
-    state = snapshot(batch)
-    for e in range(16):
-        least = float(free_gaps(batch.scenario, one_world(state, e)).min())
-        assert batch.metrics()["least_gap"][e] == pytest.approx(least, rel=1e-4, abs=1e-4)

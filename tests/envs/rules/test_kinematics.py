@@ -13,7 +13,7 @@ from tests.support.reference.motion import on_arc
 from tests.support.reference.state import snapshot
 
 import posse
-from posse.rules.kinematics import arc, turn_towards
+from posse.rules import arc
 
 F = np.float32
 
@@ -62,56 +62,6 @@ def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:
     for name in ("tracker_heading", "world_heading", "world_frame"):
         length = np.hypot(state[f"{name}_cos"].astype(float), state[f"{name}_sin"])
         np.testing.assert_allclose(length, 1.0, rtol=0, atol=3e-7)
-
-
-def test_acceleration_limits_are_kept_and_used() -> None:
-    batch = posse.batch(num_worlds=4, tracker_acceleration=0.8, tracker_turn_acceleration=3.0, autoreset="disabled")
-    batch.reset(seed=2)
-    rng = np.random.default_rng(2)
-    before = snapshot(batch)
-    faster, sharper = 0.0, 0.0
-    for k in range(200):
-        if k % 7 == 0:
-            actions = rng.choice([-1.0, 1.0], batch.action_shape)
-        batch.step(actions)
-        after = snapshot(batch)
-        change = after["tracker_speed"] - before["tracker_speed"]
-        turn = after["tracker_turn_rate"] - before["tracker_turn_rate"]
-        freely = before["tracker_near"] == 0  # a robot that is blocked stops at once
-        faster = max(faster, float(np.abs(change[freely]).max()))
-        sharper = max(sharper, float(np.abs(turn).max()))
-        assert (after["tracker_speed"] >= 0).all()
-        assert (after["tracker_speed"] <= 1.0).all()
-        assert (np.abs(after["tracker_turn_rate"]) <= 2.0).all()
-        before = after
-    assert faster == pytest.approx(0.08, rel=1e-4)
-    assert sharper == pytest.approx(0.3, rel=1e-4)
-
-
-@settings(derandomize=True, max_examples=1000, deadline=None)
-@given(
-    st.floats(-math.pi, math.pi),
-    st.sampled_from([1e-7, 1e-3, 0.1, 0.99, 1.4, 1.5, 20.0]),
-    st.sampled_from([0.0, 1e-8, 3e-7, 1e-6, 1e-3, 0.5, 0.9999, 1.0, 1.00005, 1.001, 2.0, 30.0]),
-    st.sampled_from([-1.0, 1.0]),
-)
-def test_a_turn_is_the_angle_within_its_limit(heading: float, limit: float, share: float, side: float) -> None:
-    """Also close to the limit, to zero and to an about-turn."""
-    error = side * min(share * limit, math.pi)
-    most, time = F(limit / 0.1), F(0.1)
-    cosine, sine = F(math.cos(heading)), F(math.sin(heading))
-    wanted = F(math.cos(heading + error)), F(math.sin(heading + error))
-    rate = turn_towards(cosine, sine, *wanted, most, time)
-    # float32 has the two headings to a ten millionth, which is what the angle can be known to.
-    exact = math.atan2(
-        float(cosine) * float(wanted[1]) - float(sine) * float(wanted[0]),
-        float(cosine) * float(wanted[0]) + float(sine) * float(wanted[1]),
-    )
-    assert abs(rate) <= most
-    if abs(exact) < 3.1:
-        assert float(rate) * 0.1 == pytest.approx(max(-limit, min(limit, exact)), rel=1e-6, abs=1e-6)
-    else:
-        assert abs(float(rate)) == pytest.approx(min(float(most), math.pi / 0.1), rel=1e-3)
 
 
 def test_each_tracker_moves_within_its_own_limits() -> None:

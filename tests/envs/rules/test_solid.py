@@ -65,6 +65,21 @@ def scenarios(draw: st.DrawFn) -> posse.Scenario:
         raise
 
 
+def in_the_largest_arena(speed: float, radius: float) -> posse.Scenario:
+    """Where float32 is coarsest, and the moves are as long as can be checked for contact."""
+    return posse.get_scenario(
+        "constant",
+        arena=1000.0,
+        num_trackers=8,
+        tracker_speed=speed,
+        target_speed=0.6 * speed,
+        robot_radius=radius,
+        formation_distance=2 * radius + 2,
+        formation_spacing=2 * radius + 2,
+        start_distance=(2 * radius + 0.3, 20 * radius + 8),
+    )
+
+
 @settings(derandomize=True, max_examples=25, deadline=None)
 @given(
     scenario=scenarios(),
@@ -80,6 +95,8 @@ def scenarios(draw: st.DrawFn) -> posse.Scenario:
     leaves=4.0,
     seed=7,
 )
+@example(scenario=in_the_largest_arena(17.0, 0.4), crowds=True, stays=4.0, leaves=4.0, seed=3)
+@example(scenario=in_the_largest_arena(244.0, 7.4), crowds=True, stays=4.0, leaves=4.0, seed=3)
 @example(
     scenario=posse.get_scenario("field", arena=20.0, target_turn_rate=0.8, obstacle_gap=0.6),
     crowds=True,

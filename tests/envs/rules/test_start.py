@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import stats
+from tests.support.crowding import headings, points
 from tests.support.reference.motion import free_gaps
 from tests.support.reference.state import obstacles, one_world, positions, snapshot
 
@@ -19,12 +20,12 @@ import posse
 @pytest.mark.parametrize("name", posse.scenario_names())
 @pytest.mark.parametrize(
     "overrides",
-    [{}, {"num_trackers": 30, "breaks": 0}, {"num_trackers": 1, "breaks": 0}, {"target_motion": "agent"}],
-    ids=["", "thirty", "one", "agent"],
+    [{}, {"num_trackers": 64, "breaks": 0}, {"num_trackers": 1, "breaks": 0}, {"target_motion": "agent"}],
+    ids=["", "sixty-four", "one", "agent"],
 )
 def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(name: str, overrides: dict[str, Any]) -> None:
-    if overrides.get("num_trackers") == 30 and math.isinf(posse.get_scenario(name).arena):
-        overrides = {**overrides, "start_distance": (1.5, 5.0)}
+    if overrides.get("num_trackers") == 64 and math.isinf(posse.get_scenario(name).arena):
+        overrides = {**overrides, "start_distance": (1.5, 12.0)}
     batch = posse.batch(name, 60, **overrides)
     s = batch.scenario
     batch.reset(seed=1)
@@ -45,9 +46,8 @@ def test_distance_bearing_and_heading_are_uniform() -> None:
     batch = posse.batch(num_worlds=1000)
     batch.reset(seed=2)
     state = snapshot(batch)
-    offset = state["tracker_x"] - state["world_x"][:, None] + 1j * (state["tracker_y"] - state["world_y"][:, None])
-    heading = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
-    course = state["world_heading_cos"] + 1j * state["world_heading_sin"]
+    offset = points(batch, "tracker") - points(batch, "world")[:, None]
+    heading, course = headings(batch, "tracker"), headings(batch, "world")
     for shares in (
         (np.abs(offset) - 4) / 6,
         (np.angle(offset) + math.pi) / (2 * math.pi),
@@ -67,7 +67,7 @@ def test_obstacles_leave_their_gap_between_them_and_to_the_walls(name: str) -> N
     s = batch.scenario
     batch.reset(seed=3)
     state = snapshot(batch)
-    centres = state["obstacle_x"].astype(float) + 1j * state["obstacle_y"]
+    centres = points(batch, "obstacle")
     radii = state["obstacle_radius"].astype(float)
     count = s.num_obstacles
     gaps = np.abs(centres[:, :, None] - centres[:, None]) - radii[:, :, None] - radii[:, None]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from tests.support.crowding import headings, points
 from tests.support.reference.state import snapshot
 
 import posse
@@ -16,28 +17,16 @@ Complexes = npt.NDArray[np.complex128]
 FAR_AWAY: dict[str, Any] = {"num_trackers": 1, "start_distance": (300.0, 400.0)}
 
 
-def follow(
-    batch: posse.Batch, steps: int, trackers: str = "rest"
-) -> tuple[Complexes, Complexes, npt.NDArray[np.float64]]:
-    """Return places, headings (steps + 1, E) and turn rates (steps, E) of the targets."""
-    rng = np.random.default_rng(0)
+def follow(batch: posse.Batch, steps: int) -> tuple[Complexes, Complexes, npt.NDArray[np.float64]]:
+    """Return places, headings (steps + 1, E) and turn rates (steps, E) of the targets; the trackers rest."""
     places, courses, turns = [], [], []
-    views = None
-    for step in range(steps + 1):
-        state = snapshot(batch)
-        places.append(state["world_x"].astype(float) + 1j * state["world_y"])
-        courses.append(state["world_heading_cos"].astype(float) + 1j * state["world_heading_sin"])
-        if step:
-            turns.append(state["world_turn_rate"].astype(float))
-        actions = np.tile([-1.0, 0.0], (*batch.action_shape[:2], 1))
-        if trackers == "chase":
-            actions = rng.uniform(-1, 1, batch.action_shape)
-            if views is not None:
-                bearing = views["target_bearing"]
-                actions[..., 1] = np.clip(2 * np.arctan2(bearing[..., 1], bearing[..., 0]), -1, 1)
-                actions[..., 0] = 1.0
-        views = batch.layout.views(batch.step(actions)[0])
-    return np.array(places), np.array(courses), np.array(turns)
+    rest = np.tile([-1.0, 0.0], (*batch.action_shape[:2], 1))
+    for _ in range(steps + 1):
+        places.append(points(batch, "world"))
+        courses.append(headings(batch, "world"))
+        turns.append(batch.state["world_turn_rate"].astype(float))
+        batch.step(rest)
+    return np.array(places), np.array(courses), np.array(turns[1:])
 
 
 def test_constant_goes_straight_at_its_speed() -> None:
@@ -92,48 +81,23 @@ def test_what_the_accelerating_motion_is_drawn_of_walks_within_its_range(
     assert last.max() <= high * (1 + 1e-6)
 
 
-def room(batch: posse.Batch, places: Complexes) -> float:
-    """Return the least free width that a target ever had to a wall or an obstacle."""
-    s, state = batch.scenario, snapshot(batch)
-    walls = s.arena / 2 - s.robot_radius - np.maximum(np.abs(places.real), np.abs(places.imag))
-    least = float(walls.min())
-    for k in range(s.num_obstacles):
-        centre = state["obstacle_x"][:, k] + 1j * state["obstacle_y"][:, k]
-        gaps = np.abs(places - centre) - state["obstacle_radius"][:, k] - s.robot_radius
-        least = min(least, float(gaps.min()))
-    return least
-
-
 @pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
 @pytest.mark.parametrize("name", ["search", "obstacles", "field"])
 def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, motion: str) -> None:
     batch = posse.batch(name, 300, target_motion=motion, horizon=600, num_trackers=2, breaks=0)
     batch.reset(seed=4)
     places, courses, turns = follow(batch, 595)
-    assert room(batch, places) > 0.09, "SAFE_MARGIN, rounding aside"
-    limit, step = batch.scenario.target_turn_rate, batch.scenario.target_speed * 0.1
+    s = batch.scenario
+    room = s.arena / 2 - np.maximum(np.abs(places.real), np.abs(places.imag))
+    if s.num_obstacles:
+        gaps = np.abs(places[..., None] - points(batch, "obstacle")) - batch.state["obstacle_radius"]
+        room = np.minimum(room, gaps.min(axis=-1))
+    assert room.min() - s.robot_radius > 0.09, "SAFE_MARGIN, rounding aside"
+    limit, step = s.target_turn_rate, s.target_speed * 0.1
     assert np.abs(turns).max() <= limit * (1 + 1e-6)
     moved = np.abs(np.diff(places, axis=0))
     assert moved.max() <= step + 1e-5
-    tracker = batch.state["tracker_x"][:, :, None] + 1j * batch.state["tracker_y"][:, :, None]
-    away = np.abs(places.T[:, None] - tracker).min(axis=1).T  # the trackers rest
+    away = np.abs(places[..., None] - points(batch, "tracker")).min(axis=-1)
     np.testing.assert_allclose(moved[away[1:] > 0.5], step, atol=1e-3 * limit)
     assert np.abs(np.angle(courses[1:] / courses[:-1])).max() <= 0.1 * limit + 1e-5
-
-
-def test_a_target_in_an_arena_still_gets_about() -> None:
-    batch = posse.batch("search", 100, num_trackers=1)
-    batch.reset(seed=7)
-    places, _, _ = follow(batch, 590)
-    reach = np.abs(places - places[0]).max(axis=0)
-    assert np.median(reach) > 4.0, "the safeguard does not leave it circling on the spot"
-
-
-def test_an_agent_moves_as_it_is_told() -> None:
-    batch = posse.batch(target_motion="agent", num_trackers=1)
-    batch.reset(options={"target_pose": [0, 0, 0], "tracker_pose": [[9, 9, 0]]})
-    batch.step([[[-1.0, 0.0], [0.5, -0.5]]])
-    assert batch.state["world_speed"][0] == pytest.approx(0.45)
-    assert batch.state["world_turn_rate"][0] == pytest.approx(-0.5)
-    heading = math.atan2(batch.state["world_heading_sin"][0], batch.state["world_heading_cos"][0])
-    assert heading == pytest.approx(-0.05, rel=1e-4)
+    assert np.median(np.abs(places - places[0]).max(axis=0)) > 4.0, "it gets about"

@@ -13,130 +13,84 @@ import pytest
 from gymnasium.error import ResetNeeded
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.support.crowding import TOLERANCE, Team, depth
+from tests.support.crowding import TOLERANCE, depth
 
 import posse
 from posse import Scenario, ScenarioError
 from posse.signals.global_state import StateLayout
 
-WALLED = {"arena": 20.0}
 FIELDS = [field.name for field in dataclasses.fields(Scenario)]
 
-# What is refused, and a word that the message must have beside the field's name.
+# What is refused, and words that the message must have beside the field's name.
 IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"name": 3}, "string"),
-    ({"meaning": 3}, "string"),
-    ({"version": 0}, "[1, 1e+06]"),
-    ({"num_trackers": 65}, "[1, 64]"),
     ({"num_trackers": 2.0}, "whole"),
     ({"num_trackers": True}, "whole"),
-    ({"num_trackers": np.True_}, "whole"),
-    ({"num_trackers": None}, "whole"),
-    ({"num_trackers": np.array([2])}, "whole"),
-    ({"tracker_speed": 0.0}, "[0.001, 1000]"),
     ({"tracker_speed": math.nan}, "number"),
-    ({"tracker_speed": np.float32("nan")}, "number"),
     ({"tracker_speed": math.inf}, "[0.001, 1000]"),
-    ({"tracker_speed": True}, "number"),
-    ({"tracker_speed": np.True_}, "number"),
     ({"tracker_speed": "fast"}, "number"),
-    ({"tracker_speed": 1j}, "number"),
-    ({"tracker_speed": np.complex64(1)}, "number"),
     ({"tracker_speed": 10**400}, "number"),
     ({"tracker_speed": (1.0, 2.0)}, "2 values for num_trackers=5: give one number, or one for each"),
     ({"tracker_speed": (1.0,) * 4 + (0.0,)}, "tracker_speed[4]=0.0"),
     ({"tracker_speed": (1.0,) * 4 + (0.5,)}, "must be below tracker_speed=0.5"),
     ({"tracker_speed": 1000.0, "horizon": 4, "settle_time": 0.1}, "physics_step <= 0.0173"),
-    ({"tracker_speed": 30.0, "robot_radius": 0.001, **WALLED}, "physics_step <= 0.0471"),
-    ({"tracker_speed": 0.001, "target_speed": 0.0005, "physics_step": 1e-3}, ">= 0.0305"),
     ({"tracker_turn_rate": 30.0}, "physics_step"),
-    ({"tracker_turn_rate": 0.001, "physics_step": 1e-3}, ">= 0.00191"),
-    ({"tracker_acceleration": 1e39}, "[0.001, 1e+06], or be inf"),
-    ({"tracker_acceleration": (1.0,) * 5}, "number"),
-    ({"tracker_turn_acceleration": 0.001, "physics_step": 0.001}, ">= 0.00381"),
-    ({"robot_radius": 0.0}, "0.001"),
     ({"target_motion": "smrat"}, "did you mean 'smart'"),
-    ({"target_speed": 1.0}, "tracker_speed"),
-    ({"target_speed": 0.99995}, "0.01 %"),
-    ({"target_speed": 1e-300}, ">= 0.00"),
-    ({"target_speed": 0.0, "target_motion": "smart"}, "constant"),
+    ({"target_speed": 1.0}, "0.01 %"),
+    ({"target_speed": 1e-300, "target_motion": "smart"}, "constant"),
     ({"target_turn_rate": 21.0}, "physics_step"),
     ({"target_least_speed": 0.7}, "at most target_speed=0.6"),
-    ({"formation": "vedge"}, "wedge"),
     ({"formation_distance": 0.3}, "target"),
     ({"formation_spacing": 0.6}, "tolerance"),
     ({"formation_spacing": 0.9, "robot_radius": 0.5, "formation_distance": 2.0}, "robot_radius"),
-    ({"formation_spacing": 9000.0}, "at most 500 m"),
-    ({"tolerance": 0.6}, "formation_spacing"),
     ({"settle_time": 61.0}, "horizon=600 steps of 0.1 s: set settle_time to at most 60"),
     ({"control_step": 0.12}, "physics_step"),
-    ({"physics_step": 1e-310}, "0.0001"),
-    ({"horizon": 0}, "1"),
-    ({"horizon": 1.5}, "whole"),
     ({"horizon": 10**6, "tracker_speed": 9.0}, "at most 500 m"),
     ({"terminate_on_contact": 1}, "True or False"),
-    ({"arena": -5.0}, "(0, 1000], or be inf"),
-    ({"arena": 1000.1}, "(0, 1000], or be inf"),
     ({"arena": 2.0}, "too small"),
     ({"num_obstacles": 3}, "arena"),
-    ({"num_obstacles": 61, **WALLED}, "60"),
-    ({"obstacle_radius": (0.0, 0.0), "num_obstacles": 1, **WALLED}, "above 0"),
     ({"obstacle_radius": (0.8, 0.4)}, "least"),
-    ({"obstacle_radius": (0.4, math.inf)}, "[0, 1000]"),
     ({"obstacle_radius": "ab"}, "tuple"),
-    ({"obstacle_gap": -0.1}, "0"),
     ({"start_distance": (0.2, 3.0)}, "clear of the target"),
-    ({"start_distance": (4.0, 600.0)}, "at most 500 m"),
     ({"start_distance": 4.0}, "tuple"),
-    ({"sensor": "range-bearings"}, "range-bearing"),
-    ({"sensing_range": 1e308}, "(0, 10000], or be inf"),
-    ({"field_of_view": 7.0}, "6.28"),
-    ({"range_noise": 0.5}, "0.3"),
-    ({"bearing_noise": 1.0}, "0.5"),
-    ({"velocity_smoothing": -1.0}, "0"),
-    ({"sonar_beams": 65}, "64"),
-    ({"sonar_range": 0.0}, "0.001"),
-    ({"radio_range": -1.0}, "(0, 10000], or be inf"),
-    ({"radio_delay": 0.5}, "whole"),
-    ({"radio_loss": 1.0}, "0.999"),
-    ({"message_size": 65}, "64"),
-    ({"forget_after": 0.0}, "0"),
-    ({"num_neighbours": 64}, "63], or be None"),
     ({"breaks": 5}, "num_trackers - 1"),
     ({"breaks": 2, "break_choice": "given"}, "break_number"),
-    ({"break_choice": "neares"}, "nearest"),
     ({"break_number": 5, "break_choice": "given", "breaks": 1}, "0 to 4"),
-    ({"break_window": (0.5, 1.5)}, "[0, 1]"),
-    ({"sensor_outages": 1.1}, "1"),
-    ({"radio_outages": -0.1}, "0"),
-    ({"outage_time": 0.0}, "0"),
     ({"extra_fields": 5}, "tuple of names"),
+    ({"extra_fields": ("speed",)}, "in every observation"),
     ({"metrics": ["scor"]}, "did you mean 'score'"),
     ({"metrics": ("score", "score")}, "each once"),
     ({"reward_weights": {"slots": 1.0}}, "did you mean 'slot'"),
     ({"reward_weights": {"slot": math.nan}}, "number"),
-    ({"reward_weights": {"slot": -1e300}}, "[-1e+06, 1e+06]"),
     ({"reward_weights": 3}, "reward terms"),
-    ({"reward_weights": {1: 1.0, "slot": 1.0}}, "reward terms"),
     ({"target_reward_weights": {"slot": 1.0}}, "term of a target 'slot'"),
 ]
 
 
-@pytest.mark.parametrize(("settings", "word"), IMPOSSIBLE, ids=lambda part: str(part)[:60])
-def test_an_impossible_setting_is_refused_by_name(settings: dict[str, Any], word: str) -> None:
+@pytest.mark.parametrize(("settings", "words"), IMPOSSIBLE, ids=lambda part: str(part)[:60])
+def test_an_impossible_setting_is_refused_by_name(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError) as refused:
         Scenario(**{"name": "mine", **settings})
     assert next(iter(settings)) in str(refused.value)
-    assert word in str(refused.value)
-    with pytest.raises(ScenarioError):
-        posse.batch("constant", **settings)
+    assert words in str(refused.value)
 
 
-def test_every_setting_says_what_it_is_and_refuses_something() -> None:
-    assert {next(iter(settings)) for settings, _ in IMPOSSIBLE} == set(FIELDS)
-    for name, setting in Scenario.settings().items():
-        assert setting.meaning, name
-        assert setting.unit or setting.kind in ("str", "bool"), name
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_setting_says_what_it_is_and_keeps_to_its_range(name: str) -> None:
+    setting = Scenario.settings()[name]
+    assert setting.meaning
+    assert setting.unit or setting.kind in ("str", "bool")
+    for bound, beyond in ((setting.low, -1), (setting.high, 1)):
+        if math.isfinite(bound):
+            wrong: Any = bound + beyond if abs(bound) < 1e6 else 2 * bound
+            if setting.kind == "tuple[float, float]":
+                wrong = (wrong, wrong)
+            elif setting.kind.startswith("Mapping"):
+                wrong = {"contact": wrong}
+            with pytest.raises(ScenarioError) as refused:
+                Scenario(**{"name": "mine", name: wrong})
+            assert name in str(refused.value)
+            assert setting.range in str(refused.value)
 
 
 def test_numbers_of_numpy_are_taken_as_python_s() -> None:
@@ -145,7 +99,6 @@ def test_numbers_of_numpy_are_taken_as_python_s() -> None:
         num_trackers=np.uint8(2),
         tracker_speed=np.array([1.0, 2.0], np.float32),
         target_speed=np.float32(0.5),
-        horizon=np.int64(70),
         arena=np.int16(20),
         terminate_on_contact=np.True_,
         start_distance=np.array([2, 5]),
@@ -156,7 +109,6 @@ def test_numbers_of_numpy_are_taken_as_python_s() -> None:
         num_trackers=2,
         tracker_speed=[1.0, 2.0],
         target_speed=0.5,
-        horizon=70,
         arena=20,
         terminate_on_contact=True,
         start_distance=[2, 5],
@@ -164,78 +116,56 @@ def test_numbers_of_numpy_are_taken_as_python_s() -> None:
     )
     for name, value in scenario.to_dict().items():
         assert type(value) in (int, float, str, bool, tuple, dict, type(None)), name
-    assert type(scenario.arena) is float
-    assert {type(each) for each in (*scenario.tracker_speed, *scenario.start_distance)} == {float}  # type: ignore[misc]
+    assert {type(each) for each in (*scenario.tracker_speeds, *scenario.start_distance, scenario.arena)} == {float}
 
 
 def test_a_horizon_alone_shortens_the_time_to_settle() -> None:
     assert posse.get_scenario("constant", horizon=20).settle_time == pytest.approx(2.0)
     assert posse.get_scenario("constant", horizon=20, control_step=0.05).settle_time == pytest.approx(1.0)
     assert posse.get_scenario("constant", horizon=200).settle_time == 3.0
-    env = posse.parallel_env("constant", horizon=20)
-    env.reset(seed=0)
-    with pytest.raises(
-        ScenarioError, match=r"settle_time=3.0 is refused: it is longer .* horizon=20 .* settle_time to at most 2"
-    ):
+    with pytest.raises(ScenarioError, match=r"settle_time=3.0 is refused: it is longer .* settle_time to at most 2"):
         posse.get_scenario("constant", horizon=20, settle_time=3.0)
-    with pytest.raises(ScenarioError, match=r"settle_time=3\.0 is refused: it is longer"):
-        posse.get_scenario("constant").replace(horizon=20)
-    for wrong in (0, True, "20", math.nan):
-        with pytest.raises(ScenarioError, match=r"horizon=.* whole number"):
-            posse.get_scenario("constant", horizon=wrong)
+    with pytest.raises(ScenarioError, match=r"horizon=.* whole number"):
+        posse.get_scenario("constant", horizon="20")
 
 
-# What cannot be drawn; the words of the message; poses with which it can.
+# What cannot be drawn, and the words of the message.
 TIGHT: list[tuple[dict[str, Any], str]] = [
     ({"num_obstacles": 40}, "place num_obstacles=40 .* enlarge arena"),
-    ({"arena": 3.1, "num_obstacles": 1}, "place num_obstacles=1 .* enlarge arena"),
     (
         {"arena": 16.0, "num_obstacles": 20, "obstacle_gap": 0.3, "target_turn_rate": 0.2, "target_motion": "smart"},
         "place the target .* raise target_turn_rate",
     ),
-    ({"start_distance": (4.0, 4.01), "num_trackers": 64}, "place num_trackers=64 at start_distance=.* widen"),
-    ({"start_distance": (15.0, 15.1)}, "place num_trackers=5 .* enlarge arena"),
-    (
-        {"arena": math.inf, "num_obstacles": 0, "start_distance": (1, 1.1), "num_trackers": 30},
-        "place num_trackers=30 .* lower num_trackers",
-    ),
+    ({"start_distance": (15.0, 15.1)}, "place num_trackers=5 at start_distance=.* widen .* enlarge arena"),
 ]
 
 
 @pytest.mark.parametrize(("settings", "words"), TIGHT, ids=str)
 def test_a_start_that_cannot_be_drawn_is_an_error_that_changes_nothing(settings: dict[str, Any], words: str) -> None:
     batch = posse.batch("obstacles", 2, **{"target_motion": "agent", **settings})
+    before = batch.arrays.copy()
     with pytest.raises(ScenarioError, match=f"could not {words}"):
         batch.reset(seed=3)
-    assert not any(
-        array.any() for name, array in batch.state.items() if not name.startswith(("tracker_max", "tracker_per"))
-    )
+    assert all(np.array_equal(*both) for both in zip(before, batch.arrays, strict=True))
     with pytest.raises(ResetNeeded):
         batch.step(np.zeros(batch.action_shape))
 
 
-@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
 def test_a_later_start_that_cannot_be_drawn_is_an_error_too(autoreset: str) -> None:
     batch = posse.batch(
         "obstacles", num_obstacles=34, target_motion="agent", start_distance=(1.0, 20.0), horizon=2, autoreset=autoreset
     )
     batch.reset(seed=0)
-    before = batch.arrays.copy()
 
     def play() -> None:
         for _ in range(100):  # one start in three fails
-            before.write(batch.arrays)
-            if autoreset == "disabled":
-                batch.reset()
             batch.step(np.zeros(batch.action_shape))
 
     with pytest.raises(ScenarioError, match="could not place num_obstacles=34"):
         play()
-    if autoreset == "disabled":
-        assert all(np.array_equal(*both) for both in zip(before, batch.arrays, strict=True))
-    else:
-        with pytest.raises(ResetNeeded):
-            batch.step(np.zeros(batch.action_shape))
+    with pytest.raises(ResetNeeded):
+        batch.step(np.zeros(batch.action_shape))
 
 
 def test_given_poses_need_no_draw() -> None:
@@ -252,14 +182,11 @@ VALUES = st.one_of(
     st.none(),
     st.booleans(),
     st.integers(-3, 100),
-    st.integers(),
     st.floats(),
     st.text(max_size=5),
-    st.complex_numbers(),
     st.tuples(st.floats(0, 10), st.floats(0, 10)),
-    st.lists(st.integers(), max_size=3),
     st.dictionaries(st.text(max_size=3), st.floats(), max_size=2),
-    st.sampled_from([10**400, np.nan, np.float32(2), np.uint8(2), np.True_, np.zeros(2), np.zeros((2, 2))]),
+    st.sampled_from([10**400, 1j, np.float32(2), np.uint8(2), np.True_, np.zeros((2, 2))]),
 )
 
 
@@ -268,12 +195,11 @@ VALUES = st.one_of(
     name=st.sampled_from(posse.scenario_names()),
     overrides=st.dictionaries(st.sampled_from(FIELDS), VALUES, min_size=1, max_size=3),
 )
-def test_nothing_but_a_scenario_error_is_ever_raised(name: str, overrides: dict[str, Any]) -> None:
+def test_only_a_scenario_error_is_ever_raised(name: str, overrides: dict[str, Any]) -> None:
     try:
         scenario = posse.get_scenario(name, **overrides)
     except ScenarioError:
         return
-    # What passes can be turned into what the kernels read, without a number lost.
     layout = posse.ObservationLayout(scenario)
     assert all(np.isfinite(bound).all() for bound in layout.bounds())
     assert 0 <= scenario.slot_turn_rate < math.inf
@@ -288,37 +214,31 @@ def wide(least: float, most: float, *more: float) -> st.SearchStrategy[float]:
 @st.composite
 def wide_settings(draw: st.DrawFn) -> dict[str, Any]:
     """Settings of which many are possible, up to where they no longer are."""
-    physics_step = draw(wide(1e-4, 10, 0.05))
-    least = draw(wide(0.5, 1000, 4.0))
-    radius = draw(wide(1e-3, 10, 0.0))
+    physics_step, least, radius = draw(wide(1e-4, 10, 0.05)), draw(wide(0.5, 1000, 4.0)), draw(wide(1e-3, 10))
     speed = draw(wide(1e-3, 1000, 1.0))
     chosen: dict[str, Any] = {
         "tracker_speed": speed,
         "target_speed": speed * draw(st.sampled_from([1e-6, 0.01, 0.6, 0.9999])),
         "tracker_turn_rate": draw(wide(1e-3, 1e4)),
         "target_turn_rate": draw(wide(1e-3, 1e4)),
-        "tracker_acceleration": draw(wide(1e-3, 1e308, math.inf)),
-        "tracker_turn_acceleration": draw(wide(1e-3, 1e308, math.inf)),
+        "tracker_acceleration": draw(wide(1e-3, 1e6, math.inf)),
+        "tracker_turn_acceleration": draw(wide(1e-3, 1e6, math.inf)),
         "robot_radius": draw(wide(1e-3, 1)),
         "physics_step": physics_step,
         "control_step": physics_step * draw(st.integers(1, 5)),
         "tolerance": draw(wide(1e-3, 1)),
-        "formation_distance": draw(wide(0.1, 1e4)),
-        "formation_spacing": draw(wide(0.1, 1e4)),
+        "formation_distance": draw(wide(0.1, 500)),
+        "formation_spacing": draw(wide(0.1, 500)),
         "start_distance": (least, least * draw(wide(1.001, 10))),
-        "arena": draw(wide(1, 1e4, math.inf)),
+        "arena": draw(wide(1, 1e3, math.inf)),
         "num_obstacles": draw(st.integers(0, 5)),
         "obstacle_radius": (radius / 2, radius),
-        "sensing_range": draw(wide(1e-3, 1e308, math.inf)),
-        "radio_range": draw(wide(1e-3, 1e308, math.inf)),
-        "range_noise": draw(st.sampled_from([0.0, 0.3])),
-        "bearing_noise": draw(st.sampled_from([0.0, 0.5])),
-        "velocity_smoothing": draw(wide(1e-300, 1e308, 0.0)),
+        "sensing_range": draw(wide(1e-3, 1e4, math.inf)),
+        "radio_range": draw(wide(1e-3, 1e4, math.inf)),
+        "velocity_smoothing": draw(wide(1e-300, 1e4, 0.0)),
         "sonar_range": draw(wide(1e-3, 1e4)),
         "num_trackers": draw(st.sampled_from([1, 2, 5, 9])),
-        "breaks": draw(st.integers(0, 3)),
-        "formation": draw(st.sampled_from(["wedge", "ring", "rows"])),
-        "reward_weights": {name: draw(wide(1e-30, 1e300)) for name in ("distance", "contact")},
+        "reward_weights": {name: draw(wide(1e-30, 1e6)) for name in ("distance", "contact")},
     }
     names = draw(st.sets(st.sampled_from(sorted(chosen)), min_size=1))
     return {name: chosen[name] for name in names}
@@ -340,42 +260,17 @@ def test_what_is_allowed_is_finite_within_its_bounds_and_solid(
         observations = batch.reset(seed=1)
     except ScenarioError:
         hypothesis.reject()
-    state = StateLayout(batch.scenario)
-    low, high = batch.layout.bounds()
+    state, (low, high) = StateLayout(batch.scenario), batch.layout.bounds()
     rng = np.random.default_rng(1)
-    total = np.zeros(batch.observation_shape[:2], np.float32)
     for _ in range(35):
-        outside = (observations < low) | (observations > high) | ~np.isfinite(observations)
-        assert not outside.any(), np.argwhere(outside)
+        assert ((observations >= low) & (observations <= high)).all()
         assert np.isfinite(state.vector(batch.arrays)).all()
         assert depth(batch).max() <= TOLERANCE
-        actions = rng.choice([-1, 0.5, 1], batch.action_shape)
         try:
-            observations, rewards, *_ = batch.step(actions)
+            observations, rewards, *_ = batch.step(rng.choice([-1, 0.5, 1], batch.action_shape))
         except ScenarioError:  # too tight for the next episode
             return
-        total += rewards
-        assert np.isfinite(total).all()
-
-
-@pytest.mark.parametrize(("speed", "radius"), [(17.0, 0.4), (1.0, 0.15), (4.0, 0.15), (244.0, 7.4)])
-def test_contact_is_as_exact_in_the_largest_arena(speed: float, radius: float) -> None:
-    batch = posse.batch(
-        num_worlds=100,
-        arena=1000.0,
-        num_trackers=8,
-        tracker_speed=speed,
-        target_speed=0.6 * speed,
-        robot_radius=radius,
-        formation_distance=2 * radius + 2,
-        formation_spacing=2 * radius + 2,
-        start_distance=(2 * radius + 0.3, 20 * radius + 8),
-    )
-    batch.reset(seed=3)
-    team = Team(batch, 3, crowds=True, stays=4.0, leaves=4.0)
-    for _ in range(100):
-        team.play()
-        assert depth(batch).max() <= TOLERANCE
+        assert np.isfinite(rewards).all()
 
 
 def test_unknown_names_name_the_near_ones() -> None:
@@ -386,27 +281,15 @@ def test_unknown_names_name_the_near_ones() -> None:
         posse.get_scenario("smart", num_tracker=3)
     with pytest.raises(TypeError, match="unexpected keyword argument 'num_tracker'"):
         posse.get_scenario("smart", num_tracker=3)
-    with pytest.raises(ScenarioError) as unknown:
-        posse.get_scenario("zzzzzzzz")
-    assert "mean" not in str(unknown.value)
 
 
 def test_reward_weights_compare_whatever_their_order_and_kind() -> None:
     weights = {"slot": 1.0, "contact": -1.0}
     one = Scenario(name="mine", reward_weights=weights)
-    other = Scenario(name="mine", reward_weights=(("contact", -1.0), ("slot", 1.0)))
-    assert one == other
+    assert one == Scenario(name="mine", reward_weights=(("contact", -1.0), ("slot", 1.0)))
     assert one.to_dict()["reward_weights"] == weights
     weights["slot"] = 5.0
-    assert dict(one.reward_weights)["slot"] == 1.0, "nothing outside can change it"
-
-
-def test_a_limit_may_be_one_number_or_one_for_each_tracker() -> None:
-    each = posse.get_scenario("smart", num_trackers=3, tracker_speed=[1.0, 0.8, 1.5])
-    assert each.tracker_speed == each.tracker_speeds == (1.0, 0.8, 1.5)
-    assert posse.get_scenario("smart", num_trackers=3).tracker_speeds == (1.0, 1.0, 1.0)
-    assert each.slot_turn_rate < posse.get_scenario("smart", num_trackers=3).slot_turn_rate
-    assert each.position_bound > posse.get_scenario("smart", num_trackers=3).position_bound
+    assert dict(one.reward_weights)["slot"] == 1.0, "later changes outside do not reach it"
 
 
 @pytest.mark.parametrize("name", posse.scenario_names())
@@ -424,15 +307,3 @@ def test_a_named_scenario_is_a_value(name: str) -> None:
     larger = posse.get_scenario(name, num_trackers=6)
     assert {k for k, v in larger.to_dict().items() if scenario.to_dict()[k] != v} == {"num_trackers"}
     assert larger.replace(num_trackers=5) == scenario
-
-
-@pytest.mark.parametrize("number", [1, 2, 64])
-@pytest.mark.parametrize("name", posse.scenario_names())
-def test_one_to_sixty_four_trackers_in_every_scenario(name: str, number: int) -> None:
-    overrides: dict[str, Any] = {"breaks": 0} if number == 1 else {}
-    if number == 64 and math.isinf(posse.get_scenario(name).arena):
-        overrides["start_distance"] = (1.5, 12.0)
-    batch = posse.batch(name, 1, num_trackers=number, **overrides)
-    observations = batch.reset(seed=0)
-    assert np.isfinite(observations).all()
-    assert np.isfinite(batch.step(np.zeros(batch.action_shape))[0]).all()

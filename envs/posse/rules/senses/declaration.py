@@ -27,10 +27,7 @@ MEASURE_PARAMETERS: Final = ("c", "w", "number", "dx", "dy")
 class Sensor(Declaration):
     """A kind of target sensor; its function tells whether the target is in sight.
 
-    Attributes:
-        measure: ``(c, w, number, dx, dy)`` -> the measured (dx, dy); ``None``: the true one with
-            the scenario's noise.
-        fix: The kind of a fix, ``"position"`` or ``"bearing"``.
+    :func:`sensor` describes the attributes.
     """
 
     measure: Function | None = None

@@ -26,9 +26,7 @@ from posse.numeric import (
 )
 from posse.rules.discs import FAR, blocks, natural, num_discs
 
-_WORD: Final = 8  # blocks of eight discs in a bit set of 64
-
-_A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
+_A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 Place = tuple[np.float32, np.float32, np.float32, np.float32]
 """x, y, cosine and sine of the heading, of a tracker or the target."""
@@ -83,41 +81,25 @@ def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
 
 
 @compiled
-def echo_of_discs(c: Record, robot: Place, number: int, s: Record) -> None:
-    """Update the sonar readings with all discs in range."""
-    x, y, _, _ = robot
-    discs = blocks(num_discs(c))
-    for first_block in range(0, discs, _WORD):
-        near = 0  # candidate discs as bits, found without a square root
-        for block in range(min(_WORD, discs - first_block)):
-            j = WIDTH * (first_block + block)
-            dx, dy = load(s.x, j) - x, load(s.y, j) - y
-            near |= bits(dx * dx + dy * dy < load(s.sonar_reach2, j)) << (WIDTH * block)
-        own = int(number) - WIDTH * first_block
-        if 0 <= own < WIDTH * _WORD:
-            near &= ~(1 << own)
-        while near != 0:
-            echo_of_disc(c, robot, natural(WIDTH * first_block + lowest_bit(near)), s)
-            near &= near - 1
-
-
-@compiled
-def ping(c: Record, robot: Place, number: int, gap: np.float32, s: Record, o: FloatArray, first: int) -> None:
+def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: int) -> None:
     """Write the sonar ring of a robot, metres from its rim, (S,) from ``first`` on in ``o``.
 
-    The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`); the gap to
-    the nearest other disc is at least ``gap``, m.
+    The robot is disc ``number`` in ``s`` (:func:`posse.rules.discs.lay_out`).
     """
+    x, y, _, _ = robot
     for block in range(blocks(c.sonar_beams)):
         store(s.reading, WIDTH * block, eight(c.sonar_range))
-    if gap < c.sonar_range + _A_LITTLE:
-        echo_of_discs(c, robot, number, s)
-    x, y, _, _ = robot
+    for block in range(blocks(num_discs(c))):
+        j = WIDTH * block
+        dx, dy = load(s.x, j) - x, load(s.y, j) - y
+        reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
+        near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
+        while near != 0:
+            disc = natural(j + lowest_bit(near))
+            if disc != number:
+                echo_of_disc(c, robot, disc, s)
+            near &= near - 1
     if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
-    beams = natural(c.sonar_beams)
-    whole = beams // WIDTH
-    for block in range(whole):
-        store(o, first + WIDTH * block, load(s.reading, WIDTH * block))
-    for k in range(WIDTH * whole, beams):
-        o[first + k] = s.reading[k]
+    for k in range(natural(c.sonar_beams)):
+        o[natural(first + k)] = s.reading[k]

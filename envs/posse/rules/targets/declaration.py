@@ -31,13 +31,7 @@ class Memory(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TargetMotion(Declaration):
-    """A motion of the target; its function sets the goal heading.
-
-    Attributes:
-        draw: ``(c, w)``: draws the parameters of an episode, from the stream TARGET.
-        memory: Its state variables.
-        mirrored: Whether the goal heading is mirrored near walls.
-    """
+    """A motion of the target; its function sets the goal heading. :func:`target_motion` describes the attributes."""
 
     draw: Function | None = None
     memory: tuple[Memory, ...] = ()
@@ -79,8 +73,6 @@ def target_motion(
     def declare(function: Function) -> Function:
         if draw is not None:
             TARGET_MOTIONS.check_function(draw, ("c", "w"))
-        if not isinstance(mirrored, bool):
-            raise TARGET_MOTIONS.error(function, f"mirrored={mirrored!r} must be True or False")
         _check_memory(function, memory)
         drawing = None if draw is None else compiled(plain(draw))
         return TARGET_MOTIONS.declare(

@@ -11,7 +11,22 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import HALF, ONE, WIDTH, ZERO, Record, Records, choose, compiled, eight, lesser, load, root, store
+from posse.numeric import (
+    HALF,
+    ONE,
+    TINY,
+    WIDTH,
+    ZERO,
+    Record,
+    Records,
+    choose,
+    compiled,
+    eight,
+    lesser,
+    load,
+    root,
+    store,
+)
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
 from posse.rules.targets.declaration import Memory, target_motion
@@ -21,7 +36,6 @@ SMART_REPLAN: Final = 5
 PATIENCE: Final = np.float32(3.0)
 """Time of station keeping by the whole team that triggers a dart, s."""
 
-_TWO: Final = np.float32(2.0)
 _SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _STATION_MARGIN: Final = np.float32(1.0)  # m; beyond the outermost slot, counts as near
 _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
@@ -32,7 +46,6 @@ DART_TURN: Final = np.float32(1.3 * math.pi)
 SMART_DIRECTIONS: Final = 2 * WIDTH
 """Number of candidate directions."""
 
-_TINY: Final = np.float32(1e-12)
 _FORESIGHT: Final = np.float32(0.5)  # s; positions of trackers are predicted by this time
 _LOYALTY: Final = np.float32(0.5)  # s; reversing a choice must gain twice this
 _LOOKOUT: Final = np.float32(4.0)  # s; obstacles and walls farther ahead are ignored
@@ -45,6 +58,7 @@ _FAR: Final = np.float32(1e3)  # for an unblocked direction
 _BLOCKED: Final = np.float32(100.0)  # m; penalty of a dart for a collision
 
 _ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
+_SIDES: Final = (ONE, -ONE)
 _DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
 _DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 
@@ -103,7 +117,7 @@ def team_pressure(c: Record, w: Record, trackers: Records) -> np.float32:
         ux, uy = t.speed * t.heading_cos - vx, t.speed * t.heading_sin - vy
         if d2 < near * near and ux * ux + uy * uy < slow * slow:
             committed += ONE
-    return _TWO * committed / np.float32(max(w.working, 1)) - ONE
+    return (committed + committed) / np.float32(max(w.working, 1)) - ONE
 
 
 @compiled
@@ -120,39 +134,33 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     clear = c.robot_radius + c.robot_radius + _CLEARANCE
     # No hysteresis for the initial heading, nor for a choice that ended in contact.
     loyalty = _LOYALTY if w.step > 0 and w.touching == NO_BITS else ZERO
-    # Half the directions; the opposite ones share the square root.
-    ux, uy = load(_DIRECTION_COS, 0), load(_DIRECTION_SIN, 0)
-    ahead, astern = eight(_FAR), eight(_FAR)
-    for i in range(c.num_trackers):
-        t = trackers[i]
-        if t.broken_at != NEVER:
-            # A broken tracker is only an obstacle.
-            px, py = t.x - w.x, t.y - w.y
-            along, across = px * ux + py * uy, px * uy - py * ux
-            met = (across < clear) & (across > -clear)
-            along = along * (a / v)
-            ahead = lesser(ahead, choose(met & (along > ZERO), along, _FAR))
-            astern = lesser(astern, choose(met & (along < ZERO), ZERO - along, _FAR))
-        else:
-            px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
-            py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
-            b = v * (px * ux + py * uy)
-            until = root(b * b + a * (px * px + py * py))
-            ahead, astern = lesser(ahead, until - b), lesser(astern, until + b)
-    same_way = loyalty * (ux * w.goal_cos + uy * w.goal_sin)
-    store(s.worth, 0, ahead * per_a + same_way)
-    store(s.worth, WIDTH, astern * per_a - same_way)
+    for side in range(2):  # half the directions, then the opposite ones
+        ux, uy = _SIDES[side] * load(_DIRECTION_COS, 0), _SIDES[side] * load(_DIRECTION_SIN, 0)
+        latest = eight(_FAR)
+        for i in range(c.num_trackers):
+            t = trackers[i]
+            if t.broken_at != NEVER:
+                # A broken tracker is only an obstacle.
+                px, py = t.x - w.x, t.y - w.y
+                along, across = px * ux + py * uy, px * uy - py * ux
+                met = (across < clear) & (across > -clear) & (along > ZERO)
+                latest = lesser(latest, choose(met, along * (a / v), _FAR))
+            else:
+                px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
+                py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
+                b = v * (px * ux + py * uy)
+                latest = lesser(latest, root(b * b + a * (px * px + py * py)) - b)
+        store(s.worth, WIDTH * side, latest * per_a + loyalty * (ux * w.goal_cos + uy * w.goal_sin))
     best = np.float32(-1e9)
     for k in range(WIDTH):
-        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         for side in range(2):
+            ux, uy = _SIDES[side] * _DIRECTION_COS[k], _SIDES[side] * _DIRECTION_SIN[k]
             value = s.worth[WIDTH * side + k]
-            if c.walled and value + _LOOKOUT > best:
+            if c.walled:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
                 best = value
                 w.goal_cos, w.goal_sin = ux, uy
-            ux, uy = -ux, -uy
 
 
 @compiled(out_of_line=True)
@@ -160,9 +168,9 @@ def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.f
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
     inner = c.half_arena - c.safe_distance
-    if abs(ux) > _TINY:
+    if abs(ux) > TINY:
         far = min(far, (inner - w.x) / ux if ux > ZERO else (-inner - w.x) / ux)
-    if abs(uy) > _TINY:
+    if abs(uy) > TINY:
         far = min(far, (inner - w.y) / uy if uy > ZERO else (-inner - w.y) / uy)
     for k in range(c.num_obstacles):
         o = obstacles[k]
