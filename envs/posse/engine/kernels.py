@@ -37,7 +37,7 @@ from posse.numeric import (
     stamp,
 )
 from posse.rules.contact import meet
-from posse.rules.discs import find_gaps, lay_out, lay_out_constants, natural
+from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
 from posse.rules.faults import apply_faults
 from posse.rules.motion import motion
 from posse.rules.score import occupy, settle
@@ -279,7 +279,7 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
             lay_out_constants(tables.config[0], tables.beams, s)
             s.prepared[0] = ONE
         over = 0
-        for e in range(natural(first), end, TOGETHER):
+        for e in range(nonnegative(first), end, TOGETHER):
             count = min(TOGETHER, end - e)
             over += advance_worlds(e, count, tables, worlds, actions, results, orders, made, s)
         return over
@@ -317,7 +317,7 @@ def bad_action(actions: FloatArray) -> int:
     flat = actions.reshape(-1)
     whole, worst = len(flat) // _AT_ONCE * _AT_ONCE, eight(ZERO)
     for at in range(0, whole, _AT_ONCE):
-        k = natural(at)
+        k = nonnegative(at)
         first = _in_box(load(flat, k)) & _in_box(load(flat, k + WIDTH))
         last = _in_box(load(flat, k + 2 * WIDTH)) & _in_box(load(flat, k + 3 * WIDTH))
         worst = lesser(worst, choose(first & last, ZERO, -ONE))

@@ -27,7 +27,7 @@ from posse.numeric import (
     store_fields,
 )
 from posse.rules.contact import free_of_robots, free_of_surroundings
-from posse.rules.discs import FAR, blocks, columns, natural, store_rows
+from posse.rules.discs import FAR, blocks, columns, nonnegative, store_rows
 from posse.rules.kinematics import approach, arc, follow_heading
 from posse.rules.state import NEVER, POSE, Pose
 from posse.rules.targets.steering import target_turn_rate
@@ -62,10 +62,10 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, a
     The other robots cannot block them.
     """
     near = 0
-    for i in range(natural(c.num_trackers)):
+    for i in range(nonnegative(c.num_trackers)):
         t = trackers[i]
         s.near[near], s.near_x[near], s.near_y[near] = np.float32(i), t.x, t.y
-        near = natural(near + (t.near != 0))
+        near = nonnegative(near + (t.near != 0))
     s.near_x[near], s.near_y[near] = w.x, w.y
     store(s.near_x, near + 1, eight(FAR))
     store(s.near_y, near + 1, eight(FAR))
@@ -73,7 +73,7 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, a
         if w.near != 0:
             move_swept(c, w, near, near + 1, obstacles, s)
         for k in range(near):
-            i = natural(int(s.near[k]))
+            i = nonnegative(int(s.near[k]))
             t = trackers[i]
             if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
@@ -102,7 +102,7 @@ def command(
 @compiled
 def move_freely(c: Record, trackers: Records, actions: FloatArray, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers with nothing near on their arcs; return whether there are others."""
-    n = natural(c.num_trackers)
+    n = nonnegative(c.num_trackers)
     for i in range(n):
         s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
     for block in range(blocks(n)):

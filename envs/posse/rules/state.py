@@ -104,16 +104,18 @@ DERIVED: Final[_Numbers] = {
 """What kernels read of a scenario beside its numbers: type and value."""
 
 
+def _of_pair(name: str, place: int) -> Callable[[Scenario], float]:
+    return lambda s: getattr(s, name)[place]  # type: ignore[no-any-return]
+
+
 def _numbers() -> _Numbers:
     """Return all numbers that kernels read of a scenario: type and value."""
     numbers: _Numbers = {}
     for name, setting in Scenario.settings().items():
-        read = attrgetter(name)
         if setting.kind in _NUMERIC:
-            numbers[name] = _NUMERIC[setting.kind], read
+            numbers[name] = _NUMERIC[setting.kind], attrgetter(name)
         elif setting.kind == "tuple[float, float]":
-            numbers[f"{name}_least"] = _F, lambda s, read=read: read(s)[0]
-            numbers[f"{name}_most"] = _F, lambda s, read=read: read(s)[1]
+            numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _of_pair(name, 0)), (_F, _of_pair(name, 1))
     return {**numbers, **DERIVED}
 
 

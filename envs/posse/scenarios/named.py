@@ -144,7 +144,7 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
     """
     if isinstance(scenario, Scenario):
         found = scenario
-    elif isinstance(scenario, str) and scenario in SCENARIOS:
+    elif scenario in tuple(SCENARIOS):  # also of what is not hashable
         found = _named(scenario)
     else:
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS))

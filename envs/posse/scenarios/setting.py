@@ -112,9 +112,10 @@ class Setting:
 
     def _number(self, name: str, value: object) -> float:
         if isinstance(value, Real) and not isinstance(value, bool):
-            inside = self.low < value <= self.high if self.above else self.low <= value <= self.high
-            if inside or (self.infinite and value == math.inf):
-                return float(value)
+            number: Any = value  # compared before it becomes a float, which a whole number may be too large for
+            inside = self.low < number <= self.high if self.above else self.low <= number <= self.high
+            if inside or (self.infinite and number == math.inf):
+                return float(number)
         fail(name, value, f"it must be a number in {self.range}")
 
     def _numbers(self, name: str, values: Iterable[object]) -> tuple[float, ...]:

@@ -31,7 +31,7 @@ from posse.numeric import (
     store,
     transpose,
 )
-from posse.rules.discs import FAR, natural
+from posse.rules.discs import FAR, nonnegative
 from posse.rules.state import MESSAGE, POSE, Heard, Pose, WorldArrays
 from posse.signals.generate import Generated
 from posse.signals.views import Mate, Observers, Rows, View, columns, ego, world_of
@@ -52,17 +52,17 @@ def observe_mates(
 
     Requires :func:`~.views.lay_out_observers`.
     """
-    places = natural(c.neighbours)
+    places = nonnegative(c.neighbours)
     if places == 0:
         return
     _list_nearest(c, worlds, observers, v, now, s)
-    start, size = natural(made.width + c.sonar_beams), natural(made.mate_width + c.message_size)
+    start, size = nonnegative(made.width + c.sonar_beams), nonnegative(made.mate_width + c.message_size)
     for p in range(places):
         number = load(s.placed, WIDTH * p)
         if bits(number >= ZERO) == 0:
             break
         mate = _mate_in_place(c, worlds, observers, v, p, now, s)
-        made.write_mate(c, v, mate, s, Rows(observers, observations, natural(start + p * size)))
+        made.write_mate(c, v, mate, s, Rows(observers, observations, nonnegative(start + p * size)))
     if c.message_size > 0 or bits(load(s.placed, WIDTH * (places - 1)) < ZERO) != 0:
         _write_the_rest(c, worlds, observers, made, s, observations)
 
@@ -70,7 +70,7 @@ def observe_mates(
 @compiled
 def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View, now: bool, s: Record) -> None:
     """List the nearest mates that the observers know; of equally near ones the lower number is first."""
-    n, places = natural(c.num_trackers), natural(c.neighbours)
+    n, places = nonnegative(c.num_trackers), nonnegative(c.neighbours)
     for p in range(places):
         store(s.placed, WIDTH * p, eight(-ONE))
         store(s.placed_at, WIDTH * p, eight(FAR))
@@ -97,7 +97,7 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
 @compiled
 def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int) -> tuple[Lanes, Lanes, Mask]:
     """Return where mate j was when last heard, and whether that is not forgotten."""
-    heard = Heard(*columns(worlds.heard[:, natural(observers.i)], observers, j, MESSAGE))
+    heard = Heard(*columns(worlds.heard[:, nonnegative(observers.i)], observers, j, MESSAGE))
     sent = counts(heard.step)
     return heard.x, heard.y, (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
 
@@ -143,10 +143,10 @@ def _mate_in_place(c: Record, worlds: WorldArrays, observers: Observers, v: View
 @compiled
 def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lane: int, s: Record) -> Lanes:
     """Return eight fields of a lane's mate in a place: now, or as last heard."""
-    e, j = world_of(observers, lane), natural(max(int(s.placed[WIDTH * p + lane]), 0))
+    e, j = world_of(observers, lane), nonnegative(max(int(s.placed[WIDTH * p + lane]), 0))
     if now:
         return load_fields(worlds.tracker[e, j], POSE)
-    return load_fields(worlds.heard[e, natural(observers.i), j], MESSAGE)
+    return load_fields(worlds.heard[e, nonnegative(observers.i), j], MESSAGE)
 
 
 @compiled(out_of_line=True)
@@ -154,17 +154,17 @@ def _write_the_rest(
     c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
 ) -> None:
     """Write the messages of the listed mates, none to a target, and the empty places."""
-    size = natural(made.mate_width + c.message_size)
+    size = nonnegative(made.mate_width + c.message_size)
     for lane in range(observers.number):
-        e, i = natural(observers.e + lane), natural(observers.i)
+        e, i = nonnegative(observers.e + lane), nonnegative(observers.i)
         o = observations[e, i]
-        for p in range(natural(c.neighbours)):
-            start, number = natural(made.width + c.sonar_beams + p * size), int(s.placed[WIDTH * p + lane])
+        for p in range(nonnegative(c.neighbours)):
+            start, number = nonnegative(made.width + c.sonar_beams + p * size), int(s.placed[WIDTH * p + lane])
             if number < 0:
                 made.write_empty(o, start)
-            for q in range(natural(c.message_size)):
+            for q in range(nonnegative(c.message_size)):
                 said = ZERO
                 if number >= 0 and i < c.num_trackers:
-                    j = natural(number)
+                    j = nonnegative(number)
                     said = worlds.message[e, 0, j, q] if c.perfect_radio != 0 else worlds.heard_message[e, i, j, q]
                 o[start + made.mate_width + q] = said

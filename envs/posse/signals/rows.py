@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from posse.numeric import WIDTH, FloatArray, Lanes, Record, Records, compiled, store, transpose
-from posse.rules.discs import natural
+from posse.rules.discs import nonnegative
 from posse.rules.senses.sonar import ping
 from posse.rules.state import WorldArrays
 from posse.signals.generate import Generated
@@ -27,7 +27,7 @@ def observe_together(
 ) -> None:
     """Write the observations of all agents of ``count`` worlds, at most eight, without the sonar."""
     lay_out_observers(c, worlds, first, count, s)
-    for i in range(natural(c.num_trackers)):
+    for i in range(nonnegative(c.num_trackers)):
         observers = Observers(first, i, count)
         view = view_of_trackers(c, worlds, observers, s)
         made.write_own(c, view, s, Rows(observers, observations, 0))
@@ -52,7 +52,7 @@ def observe_sonar(c: Record, w: Record, trackers: Records, s: Record, observatio
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
     """
-    n = natural(c.num_trackers)
+    n = nonnegative(c.num_trackers)
     for i in range(n):
         t = trackers[i]
         pose = (t.x, t.y, t.heading_cos, t.heading_sin)
@@ -81,8 +81,8 @@ def write_block(
 @compiled
 def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
     if lane < rows.observers.number:
-        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
-        store(o, natural(rows.start) + first, row)
+        o = rows.observations[nonnegative(rows.observers.e + lane), nonnegative(rows.observers.i)]
+        store(o, nonnegative(rows.start) + first, row)
 
 
 @compiled
@@ -90,5 +90,5 @@ def write_column(column: Lanes, number: int, s: Record, rows: Rows) -> None:
     """Write one column."""
     store(s.column, 0, column)
     for lane in range(rows.observers.number):
-        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
-        o[natural(rows.start) + number] = s.column[lane]
+        o = rows.observations[nonnegative(rows.observers.e + lane), nonnegative(rows.observers.i)]
+        o[nonnegative(rows.start) + number] = s.column[lane]

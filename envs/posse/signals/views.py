@@ -30,7 +30,7 @@ from posse.numeric import (
     transpose,
 )
 from posse.rules.contact import touches_surroundings
-from posse.rules.discs import natural
+from posse.rules.discs import nonnegative
 from posse.rules.scratch import TEAM, Fields
 from posse.rules.state import CONDITION, FIX, NEVER, NO_BITS, POSE, Condition, Fix, Pose, WorldArrays
 
@@ -76,7 +76,7 @@ class Rows(NamedTuple):
 @compiled
 def world_of(observers: Observers, lane: int) -> int:
     """Return the world of a lane."""
-    return natural(observers.e + min(lane, observers.number - 1))
+    return nonnegative(observers.e + min(lane, observers.number - 1))
 
 
 @compiled
@@ -85,7 +85,7 @@ def columns(records: Records, observers: Observers, j: int, at: int) -> tuple[La
 
     ``records`` is (E, N); see :func:`posse.rules.state.block_at`.
     """
-    k = natural(j)
+    k = nonnegative(j)
     return transpose(
         load_fields(records[world_of(observers, 0), k], at),
         load_fields(records[world_of(observers, 1), k], at),
@@ -181,7 +181,7 @@ class Mate(NamedTuple):
 @compiled
 def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s: Record) -> None:
     """Write what all agents of ``count`` worlds, at most eight, need: positions, control steps, target agents."""
-    n = natural(c.num_trackers)
+    n = nonnegative(c.num_trackers)
     observers = Observers(first, n, count)
     for i in range(n):
         pose = Pose(*columns(worlds.tracker, observers, i, POSE))

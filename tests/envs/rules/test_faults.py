@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ def test_the_nearest_to_the_target_break_one_after_the_other_within_the_window()
 
 
 def test_a_broken_tracker_stops_is_silent_and_ignores_its_actions() -> None:
-    settings = {"break_window": (0.1, 0.1), "horizon": 60, "message_size": 1}
+    settings: dict[str, Any] = {"break_window": (0.1, 0.1), "horizon": 60, "message_size": 1}
     batch, twin = posse.batch("leader-loss", 10, **settings), posse.batch("leader-loss", 10, **settings)
     batch.reset(seed=4)
     twin.reset(seed=4)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.support.reference.motion import on_arc
-from tests.support.reference.state import snapshot
 
 import posse
 from posse.rules import arc
@@ -32,23 +29,6 @@ def test_a_step_lies_on_the_circle(theta: float, speed: float, turn: float, time
     place, heading = on_arc(0j, start, float(F(speed)), float(F(rate)), float(F(time)))
     assert abs(complex(dx, dy) - place) <= 2e-6 * speed * time + 1e-12
     assert abs(complex(c, s) - heading / abs(heading)) < 2e-6
-
-
-@pytest.mark.parametrize("name", ["constant", "accelerating", "smart"])
-def test_the_physics_step_changes_nothing_but_rounding(name: str) -> None:
-    at_once: dict[str, Any] = {"tracker_acceleration": math.inf, "tracker_turn_acceleration": math.inf}
-    coarse = posse.batch(name, 8, physics_step=0.1, **at_once)
-    fine = posse.batch(name, 8, physics_step=0.005, **at_once)
-    coarse.reset(seed=3)
-    fine.reset(seed=3)
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        actions = rng.uniform(-1, 1, coarse.action_shape).astype(np.float32)
-        coarse.step(actions)
-        fine.step(actions)
-        assert (snapshot(coarse)["tracker_near"] == 0).any()
-    for key in ("tracker_x", "tracker_y", "world_x", "world_y", "tracker_heading_cos"):
-        np.testing.assert_allclose(snapshot(coarse)[key], snapshot(fine)[key], rtol=1e-5, atol=1e-4)
 
 
 def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:

@@ -113,9 +113,12 @@ def test_no_disc_is_ever_inside_another_or_a_wall(
     except ScenarioError:
         assume(False)
     team = Team(batch, seed, crowds=crowds, stays=stays, leaves=leaves)
+    low, high = batch.layout.bounds()
     for _ in range(200):
-        team.play()
+        observations, rewards = team.play()
         assert depth(batch).max() <= TOLERANCE
+        assert ((observations >= low) & (observations <= high)).all()
+        assert np.isfinite(rewards).all()
 
 
 def tight_spots(batch: posse.Batch, rng: np.random.Generator) -> Complexes:

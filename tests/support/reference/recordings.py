@@ -30,39 +30,37 @@ class Recording:
         return self.batch.scenario
 
 
-CASES: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...] = (
-    *((name, ()) for name in posse.scenario_names()),
-    (
-        "constant",
-        (
-            ("num_trackers", 12),
-            ("num_neighbours", 3),
-            ("message_size", 2),
-            ("formation", "ring"),
-            ("formation_spacing", 0.65),
-        ),
-    ),  # a ring so tight that trackers run into the target
-    ("constant", (("num_trackers", 3), ("num_neighbours", 8), ("message_size", 1))),
-    (
+Case = tuple[str, tuple[tuple[str, Any], ...]]
+"""A scenario and its changed settings."""
+
+
+def _case(name: str, **settings: Any) -> Case:
+    return name, tuple(settings.items())
+
+
+CASES: tuple[Case, ...] = (
+    *map(_case, posse.scenario_names()),
+    # A ring so tight that trackers run into the target.
+    _case("constant", num_trackers=12, num_neighbours=3, message_size=2, formation="ring", formation_spacing=0.65),
+    _case("constant", num_trackers=3, num_neighbours=8, message_size=1),
+    _case(
         "obstacles",
-        (
-            ("tracker_speed", (1.0, 0.8, 1.3, 0.7, 1.0)),
-            ("tracker_turn_rate", (1.2, 2.0, 1.0, 1.5, 0.8)),
-            ("tracker_acceleration", 2.0),
-        ),
-    ),  # no two trackers alike
-    ("constant", (("num_trackers", 1),)),
-    ("constant", (("num_trackers", 26), ("num_neighbours", 5), ("formation", "ring"), ("message_size", 1))),
-    ("constant", (("breaks", 2), ("formation", "ring"), ("break_window", (0.2, 0.4)))),
-    ("field", (("num_trackers", 9), ("num_neighbours", 3), ("message_size", 2))),
-    ("field", (("breaks", 3), ("field_of_view", 2.0), ("forget_after", 0.35))),
-    ("radio", (("num_trackers", 2), ("formation", "ring"), ("sonar_beams", 1))),
-    ("radio", (("num_trackers", 7), ("formation", "rows"), ("sonar_beams", 0))),
+        tracker_speed=(1.0, 0.8, 1.3, 0.7, 1.0),
+        tracker_turn_rate=(1.2, 2.0, 1.0, 1.5, 0.8),
+        tracker_acceleration=2.0,
+    ),
+    _case("constant", num_trackers=1),
+    _case("constant", num_trackers=26, num_neighbours=5, formation="ring", message_size=1),
+    _case("constant", breaks=2, formation="ring", break_window=(0.2, 0.4)),
+    _case("field", num_trackers=9, num_neighbours=3, message_size=2),
+    _case("field", breaks=3, field_of_view=2.0, forget_after=0.35),
+    _case("radio", num_trackers=2, formation="ring", sonar_beams=1),
+    _case("radio", num_trackers=7, formation="rows", sonar_beams=0),
 )
 """Every scenario, and variants of settings, to be recorded and computed independently."""
 
 
-def case_name(case: tuple[str, tuple[tuple[str, Any], ...]]) -> str:
+def case_name(case: Case) -> str:
     return "-".join([case[0], *(f"{key}={value}" for key, value in case[1])])
 
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, bits, compiled, load, root
-from posse.rules.discs import blocks, natural
+from posse.rules.discs import blocks, nonnegative
 from posse.rules.randomness import SENSOR_NOISE, normal_pair
 from posse.rules.senses.declaration import sensor
 from posse.rules.state import NEVER
@@ -42,7 +42,7 @@ def hidden(c: Record, t: Record, dx: np.float32, dy: np.float32, s: Record) -> b
     In blocks of eight, since single branches would be mispredicted.
     """
     d2 = dx * dx + dy * dy
-    first = natural(c.num_trackers) + 1
+    first = nonnegative(c.num_trackers) + 1
     for block in range(blocks(c.num_obstacles)):
         j = first + WIDTH * block
         ox, oy, radius = load(s.x, j) - t.x, load(s.y, j) - t.y, load(s.radius, j)

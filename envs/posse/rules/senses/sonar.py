@@ -24,7 +24,7 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import FAR, blocks, natural, num_discs
+from posse.rules.discs import FAR, blocks, nonnegative, num_discs
 
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
@@ -95,11 +95,11 @@ def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: 
         reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
         near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
         while near != 0:
-            disc = natural(j + lowest_bit(near))
+            disc = nonnegative(j + lowest_bit(near))
             if disc != number:
                 echo_of_disc(c, robot, disc, s)
             near &= near - 1
     if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
-    for k in range(natural(c.sonar_beams)):
-        o[natural(first + k)] = s.reading[k]
+    for k in range(nonnegative(c.sonar_beams)):
+        o[nonnegative(first + k)] = s.reading[k]

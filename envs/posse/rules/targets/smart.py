@@ -156,7 +156,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
         for side in range(2):
             ux, uy = _SIDES[side] * _DIRECTION_COS[k], _SIDES[side] * _DIRECTION_SIN[k]
             value = s.worth[WIDTH * side + k]
-            if c.walled:
+            if c.walled and value + _LOOKOUT > best:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
                 best = value
