@@ -67,7 +67,7 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         (["watch", "pursuit", "--film", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
         (["watch", "pursuit", "--film", "film.gif", "--speed", "0"], "speed=0.0 must be"),
         (["watch", "pursuit", "--film", "film.gif", "--size", "9", "9"], "at least 200 px"),
-        (["watch", "pursuit", "--speed", "2"], "--speed 2 is for films: add --film film.gif"),
+        (["watch", "pursuit", "--speed", "2"], "--speed is not for a window: leave it out"),
         (["watch", "pursuit", "--size", "9", "9"], "--size 9 9 must be 200 to 4096 px"),
         (["watch", "numpy:ndarray"], "cannot be created without arguments"),
         (["reproduce", "--seed", "-1"], "seed=-1"),
