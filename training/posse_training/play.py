@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final
@@ -15,10 +15,10 @@ from posse.rendering.canvas import Window
 from posse.rendering.renderer import Renderer
 from posse.rendering.style import TRACKER
 from posse_baselines import Policy, PolicyError, Recorder, begin, load
-from posse_training.commands.watch import open_window
 from posse_training.errors import SettingsError
 from posse_training.replay import RECORD, Replay, join, replay_of, write_replay
 
+_SIZES: Final = (200, 4096)  # px, least and most
 _ARROWS: Final = ("left", "right", "up", "down")
 _CHANGE: Final = 2.0  # of the speed's action per second: from rest to full speed in a second
 _YOU: Final = (0, 114, 178)  # colour of the player's tracker
@@ -70,6 +70,26 @@ def main(arguments: Sequence[str]) -> None:
         print("Nothing was played: no replay is written.")
         return
     print(f"replay: {write_replay(page, which.out)} (open it in a browser)")
+
+
+def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, str]) -> tuple[Renderer, Window]:
+    """Open a window; ``keys`` are those beside its own, with what they do.
+
+    Raises:
+        SettingsError: A size out of range, or no display.
+    """
+    least, most = _SIZES
+    if not all(least <= side <= most for side in size):
+        raise SettingsError(f"--size {size[0]} {size[1]} must be {least} to {most} px each")
+    try:
+        renderer = Renderer(scenario, "human", size, keys=keys)
+    except RuntimeError as error:
+        raise SettingsError(
+            f"no window can be opened ({error.__cause__}): posse watch --page records a replay page, --film film.gif "
+            "writes a film"
+        ) from error
+    assert renderer.window is not None
+    return renderer, renderer.window
 
 
 def robot_of(name: str, num_trackers: int) -> int:

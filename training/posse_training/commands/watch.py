@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from posse.rendering.renderer import Renderer
     from posse_baselines import Policy
 
-_SIZES: Final = (200, 4096)
 _PAGE: Final = Path("runs/watch/replay.html")
 
 
@@ -115,28 +114,6 @@ def main(arguments: Sequence[str]) -> None:
         watch([against(p, target) for p in policies], scenario, size, **world)
 
 
-def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, str]) -> tuple[Renderer, Window]:
-    """Open a window; ``keys`` are those beside its own, with what they do.
-
-    Raises:
-        SettingsError: A size out of range, or no display.
-    """
-    from posse.rendering.renderer import Renderer
-
-    least, most = _SIZES
-    if not all(least <= side <= most for side in size):
-        raise SettingsError(f"--size {size[0]} {size[1]} must be {least} to {most} px each")
-    try:
-        renderer = Renderer(scenario, "human", size, keys=keys)
-    except RuntimeError as error:
-        raise SettingsError(
-            f"no window can be opened ({error.__cause__}): posse watch --page records a replay page, --film film.gif "
-            "writes a film"
-        ) from error
-    assert renderer.window is not None
-    return renderer, renderer.window
-
-
 def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int], world: int, **worlds: Any) -> None:
     """Play one policy at a time in a window, until the user closes it; each ended episode prints its score.
 
@@ -145,6 +122,7 @@ def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int],
         PolicyError: A policy that does not fit the scenario.
     """
     from posse_training.film import Team
+    from posse_training.play import open_window
 
     shown, keys = 0, {"n": "next world"} | ({"p": "next policy"} if len(policies) > 1 else {})
     longest = max(scenario.message_size, *(policy.message_size for policy in policies))
