@@ -70,7 +70,7 @@ def test_a_label_that_a_page_would_read_as_markdown_stops_the_build(
     hostile = "![p](https://x.invalid/p){: onerror=alert(1) }"
     path.write_text(path.read_text(encoding="utf-8").replace("LABEL", hostile), encoding="utf-8")
     for made in (hooks[0].leaderboard, hooks[0].results, lambda: hooks[0].scores("smart")):
-        with pytest.raises(Exception, match=r"standings\.csv, line 2: label=.* must be 1 to 60 letters"):
+        with pytest.raises(Exception, match=r"standings\.csv, line 2: label=.* must be at most 100 letters"):
             made()
 
 

@@ -41,7 +41,7 @@ def run(code: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[st
 MAIN = "from posse_training.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
-@pytest.mark.parametrize("arguments", [["train"], ["train", "--scenario", "smart"], ["train", "--resume", "somewhere"]])
+@pytest.mark.parametrize("arguments", [["train"], ["train", "--resume", "somewhere"]])
 def test_training_says_what_to_install(tmp_path: Path, arguments: list[str]) -> None:
     done = run(MAIN, *arguments, cwd=tmp_path)
     assert done.returncode == 2
@@ -69,9 +69,6 @@ COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]
         pytest.param(COMPARE, marks=pytest.mark.long),
         ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
-        pytest.param(
-            ["replay", "idle", "--scenario", "paper-distributed", "--out", "replay.html"], marks=pytest.mark.long
-        ),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
     ],
     ids=lambda arguments: " ".join(arguments[:2]),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +10,6 @@ import pytest
 from PIL import Image
 from tests.support.learned import any_policy
 
-import posse
-import posse_baselines
-import posse_training
 from posse_training import demo
 from posse_training.replay.page import read_replay
 
@@ -30,7 +26,7 @@ def test_it_ends_with_scripted_beside_learned_where_one_is_shipped(
     monkeypatch.setattr(demo, "POLICIES", ("idle", "pursuit"))
     if learned:
         any_policy().with_card({"name": demo.LEARNED}).save(shipped / f"{demo.LEARNED}.safetensors")
-    demo.main(episodes=2, seconds=0.5)
+    demo.demo(episodes=2, seconds=0.5)
     shown = capsys.readouterr().out
     assert (demo.LEARNED in shown) == learned
     page = read_replay(tmp_path / "replay.html")
@@ -47,19 +43,3 @@ def test_it_needs_no_torch() -> None:
     code = "import sys, posse_training.demo; print('torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "False", done.stderr
-
-
-def test_a_script_without_a_main_guard_is_told_to_add_one(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text("from posse_training.demo import main\n\nmain(episodes=2, seconds=1.0)\n")
-    sources = [Path(module.__file__ or "").parents[1] for module in (posse, posse_baselines, posse_training)]
-    done = subprocess.run(
-        [sys.executable, "script.py"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources))},
-    )
-    assert done.returncode == 1
-    assert 'below a line `if __name__ == "__main__":`' in done.stderr

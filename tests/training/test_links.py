@@ -10,12 +10,11 @@ from tests.support.runs import quiet, small
 
 import posse
 from posse_baselines import load
-from posse_training.cli import main
 from posse_training.errors import RunFolderError
 from posse_training.files import locked
 from posse_training.film import film
 from posse_training.replay import record, write_replay
-from posse_training.train.train import resume, train
+from posse_training.train.train import train
 
 PRECIOUS = b"precious"
 
@@ -33,7 +32,7 @@ def untouched(elsewhere: Path) -> bool:
     return elsewhere.read_bytes() == PRECIOUS and list(elsewhere.parent.iterdir()) == [elsewhere]
 
 
-@pytest.mark.parametrize("name", ["lock", "checkpoint.pt", ".checkpoint.pt.partial", "curve.csv", "settings.json"])
+@pytest.mark.parametrize("name", ["lock", "checkpoint.pt"])
 def test_a_new_run(tmp_path: Path, elsewhere: Path, name: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
@@ -42,16 +41,6 @@ def test_a_new_run(tmp_path: Path, elsewhere: Path, name: str) -> None:
         train(small(folder), console=quiet())
     assert untouched(elsewhere)
     assert [path.name for path in folder.iterdir()] == [name]
-
-
-@pytest.mark.parametrize("name", ["lock", "last.safetensors"])
-def test_a_run_that_is_resumed(tmp_path: Path, elsewhere: Path, name: str) -> None:
-    train(small(tmp_path / "run", steps=320), console=quiet())
-    (tmp_path / "run" / name).unlink()
-    (tmp_path / "run" / name).symlink_to(elsewhere)
-    with pytest.raises(RunFolderError, match="symbolic link"):
-        resume(tmp_path / "run", steps=640, console=quiet())
-    assert untouched(elsewhere)
 
 
 def test_a_subfolder_that_leads_elsewhere(tmp_path: Path, elsewhere: Path) -> None:
@@ -63,7 +52,7 @@ def test_a_subfolder_that_leads_elsewhere(tmp_path: Path, elsewhere: Path) -> No
     assert untouched(elsewhere)
 
 
-@pytest.mark.parametrize("name", ["page.html", "film.gif", "film.mp4"])
+@pytest.mark.parametrize("name", ["page.html", "film.gif"])
 def test_a_replay_and_a_film(tmp_path: Path, elsewhere: Path, name: str) -> None:
     path = tmp_path / name
     path.symlink_to(elsewhere)
@@ -71,27 +60,7 @@ def test_a_replay_and_a_film(tmp_path: Path, elsewhere: Path, name: str) -> None
     write: dict[str, Callable[[], object]] = {
         "page.html": lambda: write_replay(record(["pursuit"], scenario), path),
         "film.gif": lambda: film([("a", load("idle"))], scenario, path=path, seconds=0.3, size=200),
-        "film.mp4": lambda: film([("a", load("idle"))], scenario, path=path, seconds=0.3, size=200),
     }
     with pytest.raises(OSError, match=f"symbolic link.*{name}"):
         write[name]()
-    assert untouched(elsewhere)
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["submit", "pursuit", "--scenario", "constant", "--worlds", "2"],
-        ["compare", "pursuit", "--scenarios", "constant", "--episodes", "2"],
-    ],
-    ids=lambda command: command[0],
-)
-def test_a_submission_and_a_comparison(
-    tmp_path: Path, elsewhere: Path, command: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Both write to a new or an empty folder, which holds no links."""
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "summary.json").symlink_to(elsewhere)
-    assert main([*command, "--out", str(tmp_path / "out")]) == 2
-    assert str(tmp_path / "out") in capsys.readouterr().err
     assert untouched(elsewhere)

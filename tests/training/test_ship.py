@@ -125,15 +125,6 @@ def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Pat
     assert not list(tmp_path.glob("*.safetensors"))
 
 
-def test_a_file_too_large_is_not_left_behind(
-    runs: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("scripts.ship.LARGEST", 1000)
-    with pytest.raises(SettingsError, match="1,000 are allowed"):
-        ship(Settings(runs[:1], "learned-x", worlds=2, out=tmp_path))
-    assert not list(tmp_path.iterdir())
-
-
 def test_the_command_on_record_gives_the_settings_again() -> None:
     for settings in (
         replace(

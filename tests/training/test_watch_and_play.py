@@ -74,7 +74,7 @@ def test_a_page_is_recorded_and_opened(
     ("arguments", "message"),
     [
         (["watch", "idle", "--page", "--film", "a.gif"], "exclude each other"),
-        (["watch", "idle"], "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): --page records"),
+        (["watch", "idle"], "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): posse watch --page"),
         (["play", "--as", "tracker_9"], "--as tracker_9 is no robot; there are: tracker_0"),
         (["play", "--against", "planner"], "cannot play against a person"),
         (["play", "--out", "play.txt"], "--out play.txt must end in .html"),

@@ -14,7 +14,7 @@ from typing import Any, Final
 from posse_training.errors import UserError
 
 COMMANDS: Final = {
-    "demo": ("a table of scores, films and a replay page", "commands.demo"),
+    "demo": ("a table of scores, films and a replay page", "demo"),
     "train": ("train a team", "commands.train"),
     "tune": ("tune the settings of a scripted team", "tune"),
     "league": ("train teams and targets in turns against each other", "league"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final
@@ -10,15 +10,15 @@ from typing import Annotated, Final
 import numpy as np
 import tyro
 
-from posse import Batch, Scenario
+from posse import Batch, Scenario, get_scenario
 from posse.rendering.canvas import Window
 from posse.rendering.renderer import Renderer
 from posse.rendering.style import TRACKER
-from posse_baselines import Policy, PolicyError, Recorder, begin
+from posse_baselines import Policy, PolicyError, Recorder, begin, load
 from posse_training.errors import SettingsError
 from posse_training.replay import RECORD, Replay, join, replay_of, write_replay
 
-_LEAST, _MOST = 200, 4096
+_SIZES: Final = (200, 4096)  # px, least and most
 _ARROWS: Final = ("left", "right", "up", "down")
 _CHANGE: Final = 2.0  # of the speed's action per second: from rest to full speed in a second
 _YOU: Final = (0, 114, 178)  # colour of the player's tracker
@@ -57,22 +57,39 @@ def main(arguments: Sequence[str]) -> None:
     which = tyro.cli(_Play, prog="posse play", args=arguments)
     if which.out.suffix.lower() not in (".html", ".htm"):
         raise SettingsError(f"--out {which.out} must end in .html or .htm")
-    if not all(_LEAST <= side <= _MOST for side in which.size):
-        raise SettingsError(f"--size {which.size[0]} {which.size[1]} must be {_LEAST} to {_MOST} px each")
-    from posse import get_scenario
-    from posse_baselines import load
-
     scenario = get_scenario(which.scenario)
     if which.num_trackers is not None:
         scenario = scenario.replace(num_trackers=which.num_trackers)
     robot = robot_of(which.robot, scenario.num_trackers)
-    rounds, page = play(load(which.against), scenario, robot, which.seed, which.world, which.split, which.size)
+    rounds, page = play(
+        load(which.against), scenario, robot, which.size, seed=which.seed, world=which.world, split=which.split
+    )
     if rounds:
         print(f"{len(rounds)} rounds, best {max(rounds):.0f} points")
     if page is None:
         print("Nothing was played: no replay is written.")
         return
     print(f"replay: {write_replay(page, which.out)} (open it in a browser)")
+
+
+def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, str]) -> tuple[Renderer, Window]:
+    """Open a window; ``keys`` are those beside its own, with what they do.
+
+    Raises:
+        SettingsError: A size out of range, or no display.
+    """
+    least, most = _SIZES
+    if not all(least <= side <= most for side in size):
+        raise SettingsError(f"--size {size[0]} {size[1]} must be {least} to {most} px each")
+    try:
+        renderer = Renderer(scenario, "human", size, keys=keys)
+    except RuntimeError as error:
+        raise SettingsError(
+            f"no window can be opened ({error.__cause__}): posse watch --page records a replay page, --film film.gif "
+            "writes a film"
+        ) from error
+    assert renderer.window is not None
+    return renderer, renderer.window
 
 
 def robot_of(name: str, num_trackers: int) -> int:
@@ -97,7 +114,7 @@ def steer(speed: float, held: Collection[str], seconds: float) -> tuple[float, f
 
 
 def play(
-    policy: Policy, scenario: Scenario, robot: int, seed: int, world: int, split: str, size: tuple[int, int]
+    policy: Policy, scenario: Scenario, robot: int, size: tuple[int, int], *, seed: int, world: int, split: str
 ) -> tuple[list[float], Replay | None]:
     """Play rounds in a window until the user closes it; ``robot`` is the user's, N: the target.
 
@@ -125,16 +142,7 @@ def play(
         raise SettingsError(f"the target of {scenario.name!r} is an agent that nobody drives: play as the target")
     who = "you as the target" if robot == n else f"you as tracker {robot}"
     Batch(scenario, 1, seed=seed, split=split, first_world=world).reset()  # finds mistakes before the window opens
-    try:
-        renderer = Renderer(scenario, "human", size, keys={"n": "next world"})
-    except RuntimeError as error:
-        raise SettingsError(
-            f"no window can be opened ({error.__cause__}); "
-            f"see the team alone: posse watch {policy.name} --film film.gif"
-        ) from error
-    window = renderer.window
-    assert window is not None
-
+    renderer, window = open_window(scenario, size, {"n": "next world"})
     rounds: list[float] = []
     best: Replay | None = None
     last: Replay | None = None

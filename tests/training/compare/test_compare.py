@@ -78,11 +78,13 @@ def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert not list(tmp_path.glob("*.png"))
 
 
-def test_a_file_goes_by_the_name_on_its_card(files: list[str]) -> None:
+def test_a_file_goes_by_the_name_on_its_card(files: list[str], tmp_path: Path) -> None:
     again = files[0].replace("0.safetensors", "again.safetensors")
     learned(0).save(Path(again))
+    learned(0).save(tmp_path / "seed=1.safetensors")
     found = read_contenders((*files[:2], again, f"mine={files[2]}"))
     assert [contender.label for contender in found] == ["any-0", "any-1", again, "mine"]
+    assert read_contenders((str(tmp_path / "seed=1.safetensors"),))[0].label == "any-0"
     found = read_contenders((files[0], f"any-0={files[1]}"))
     assert [contender.label for contender in found] == [files[0], "any-0"]
 
@@ -185,3 +187,30 @@ def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None
     files = [name for row in found.rows for name in row["files"]]
     assert files == ["constant-a_b.csv", "constant-a_b-2.csv", "constant-A_B-3.csv"]
     assert all((tmp_path / name).is_file() for name in files)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a\nb=idle", "printable characters"),
+        ("x" * 400 + "=idle", r"400 characters\) must have at most 100"),
+        ("x" * 5000, r"5,000 characters\) cannot be a policy"),
+        ("", "cannot be a policy"),
+    ],
+)
+def test_labels_that_no_report_can_show(text: str, message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        read_contenders(("pursuit", text))
+
+
+def test_brackets_and_dollars_are_shown_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    labels = ("[bold]a[/bold]", "[/]", "$x^{$", "_hidden")
+    policies = [f"{label}=idle" for label in labels]
+    options = ["--scenarios", "constant", "--episodes", "1"]
+    assert main(["compare", *policies, *options, "--out", str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr().out
+    assert all(label in shown for label in labels)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert [row["policy"] for row in summary["comparison"]] == [*labels, "planner"]
+    drawn = (tmp_path / "out" / "scenarios.svg").read_text()
+    assert all(f"{label}</text>" in drawn for label in labels)

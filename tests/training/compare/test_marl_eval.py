@@ -33,12 +33,3 @@ def test_the_export_holds_every_worlds_metrics(tmp_path: Path) -> None:
         assert run["absolute_metrics"][name] == expected
         assert run["step_0"][name] == expected
     assert run["step_0"]["step_count"] == 0
-
-
-def test_nothing_is_exported_unasked(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    settings = Settings(
-        policies=("idle",), scenarios=("constant",), episodes=1, out=out, figures=False, planner_episodes=0
-    )
-    compare(settings)
-    assert not (out / "marl-eval.json").exists()

@@ -14,7 +14,6 @@ import pytest
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
-from posse_training.errors import SettingsError
 
 ROOT = Path(__file__).parents[3]
 BAD = "tests.support.bad_policies:"
@@ -182,10 +181,3 @@ def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["compare", f"{BAD}RaisesOnLoad", *options, "--out", str(tmp_path / "b")]) == 2
     assert "cannot be created without arguments: LookupError: no weights" in capsys.readouterr().err
     assert not (tmp_path / "b").exists()
-
-
-@pytest.mark.parametrize("limit", [0.0, -1.0, float("inf"), float("nan")])
-def test_impossible_time_limits(tmp_path: Path, limit: float) -> None:
-    with pytest.raises(SettingsError, match="time_limit="):
-        compare(settings_for(tmp_path, limit=limit))
-    assert list(tmp_path.iterdir()) == []

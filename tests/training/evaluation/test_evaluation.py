@@ -106,3 +106,17 @@ def test_leader_exchanges_are_counted_where_most_agree() -> None:
     for leaders in ([[0, 0, 0], [1, 1, 2]], [[0, 1, 2], [1, 1, 1]], [[2, 2, 0], [1, 1, 1]]):
         counter.count(np.array(leaders), running)
     assert list(counter.total) == [1, 0]
+
+
+@pytest.mark.parametrize("reads", [False, True])
+def test_only_a_policy_that_says_so_is_given_the_state(reads: bool) -> None:
+    class Spy(Spinning):
+        given = False
+        reads_state = reads
+
+        def watch(self, batch: posse.Batch) -> None:
+            self.given = True
+
+    spy = Spy()
+    evaluate(spy, "constant", 1, **FAST)
+    assert spy.given is reads

@@ -24,11 +24,6 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     assert 0.88 <= covered / 200 <= 0.99
 
 
-def test_the_same_values_give_the_same_interval() -> None:
-    values = np.random.default_rng(3).normal(size=50)
-    assert mean(values) == mean(values)
-
-
 def test_episodes_in_which_it_never_happened_do_not_count() -> None:
     estimate = mean([1.0, np.nan, 3.0])
     assert (estimate.value, estimate.count) == (2.0, 2)
@@ -94,10 +89,7 @@ class TestTrainingSeeds:
 
     def test_one_seed_is_a_plain_bootstrap_of_worlds(self) -> None:
         values = np.random.default_rng(6).normal(size=400)
-        plain, nested = mean(values), over_seeds(values)
-        assert nested.value == pytest.approx(plain.value)
-        assert nested.low == pytest.approx(plain.low, abs=0.01)
-        assert nested.high == pytest.approx(plain.high, abs=0.01)
+        assert over_seeds(values) == mean(values)
 
     def test_what_worlds_have_in_common_leaves_a_paired_difference(self) -> None:
         rng = np.random.default_rng(7)

@@ -39,10 +39,6 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
             assert off.max(initial=0) <= column.resolution * 0.501, name
 
 
-def test_the_same_replay_is_the_same_page() -> None:
-    assert page(short()) == page(short())
-
-
 class Tags(HTMLParser):
     """Every tag with its attributes, and the contents of scripts and style."""
 

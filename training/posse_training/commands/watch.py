@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -17,10 +17,7 @@ if TYPE_CHECKING:
     from posse.rendering.canvas import Window
     from posse.rendering.renderer import Renderer
     from posse_baselines import Policy
-    from posse_training.film import Team
 
-_SIZE: Final = (960, 720)
-_LEAST, _MOST = 200, 4096
 _PAGE: Final = Path("runs/watch/replay.html")
 
 
@@ -69,17 +66,16 @@ def main(arguments: Sequence[str]) -> None:
         raise SettingsError("No policies given. Pass at least one, such as ddcs-distributed.")
     if which.page and which.film is not None:
         raise SettingsError(f"--page and --film {which.film} exclude each other: leave one out")
-    unused = {"--from": which.start, "--speed": which.speed} if which.film is None else {}
-    if not which.page and which.film is None:
-        unused["--seconds"] = which.seconds
-    for option, value in unused.items():
-        if value is not None:
-            raise SettingsError(f"{option} {value:g} is for films: add --film film.gif, or leave it out")
-    if which.page and which.size is not None:
-        raise SettingsError(f"--size {which.size[0]} {which.size[1]} is for a window or film: leave it out")
-    size = which.size or _SIZE
-    if which.film is None and not all(_LEAST <= side <= _MOST for side in size):
-        raise SettingsError(f"--size {size[0]} {size[1]} must be {_LEAST} to {_MOST} px each")
+    is_film = which.film is not None
+    for option, value, is_used in (
+        ("--from", which.start, is_film),
+        ("--speed", which.speed, is_film),
+        ("--seconds", which.seconds, is_film or which.page),
+        ("--size", which.size, not which.page),
+    ):
+        if value is not None and not is_used:
+            raise SettingsError(f"{option} is not for a {'page' if which.page else 'window'}: leave it out")
+    size = which.size or (960, 720)
 
     from posse import get_scenario
     from posse_baselines import against, load, load_target
@@ -115,39 +111,33 @@ def main(arguments: Sequence[str]) -> None:
         print(f"{path}: open it in a browser")
         webbrowser.open(path.resolve().as_uri())
     else:
-        watch([against(p, target) for p in policies], scenario, which.seed, which.world, which.split, size)
+        watch([against(p, target) for p in policies], scenario, size, **world)
 
 
-def watch(
-    policies: Sequence[Policy], scenario: Scenario, seed: int, world: int, split: str, size: tuple[int, int]
-) -> None:
+def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int], world: int, **worlds: Any) -> None:
     """Play one policy at a time in a window, until the user closes it; each ended episode prints its score.
 
     Raises:
         SettingsError: No display is available.
         PolicyError: A policy that does not fit the scenario.
     """
-    from posse.rendering.renderer import Renderer
     from posse_training.film import Team
+    from posse_training.play import open_window
 
     shown, keys = 0, {"n": "next world"} | ({"p": "next policy"} if len(policies) > 1 else {})
     longest = max(scenario.message_size, *(policy.message_size for policy in policies))
     scenario = scenario.replace(message_size=longest)  # a window shows batches of one scenario
-    Team(policies[0], scenario, seed, world, split).step()  # compiles what is needed before the window opens
-    try:
-        renderer = Renderer(scenario, "human", size, keys=keys)
-    except RuntimeError as error:
-        raise SettingsError(
-            f"no window can be opened ({error.__cause__}): --page records a replay page, --film film.gif writes a film"
-        ) from error
-    window = renderer.window
-    assert window is not None
+    Team(policies[0], scenario, world=world, **worlds).step()  # compiles what is needed before the window opens
+    renderer, window = open_window(scenario, size, keys)
     try:
         while not renderer.closed:
-            team = Team(policies[shown], scenario, seed, world, split)
+            team = Team(policies[shown], scenario, world=world, **worlds)
             renderer.title = f"{team.policy.name}, world {world}"
             renderer.draw(team.batch)
-            _play(team, renderer, window, keys)
+            while not (team.over or _is_left(renderer, window, keys)):
+                team.step()
+                window.paused |= team.over  # the last moment stays until a key is pressed
+                renderer.draw(team.batch, colours=team.colours)
             if steps := len(team.scores):
                 time, score = steps * scenario.control_step, sum(team.scores) / steps
                 print(f"world {world}, {team.policy.name}: score {score:.3f} after {time:.1f} s", flush=True)
@@ -159,9 +149,6 @@ def watch(
         renderer.close()
 
 
-def _play(team: Team, renderer: Renderer, window: Window, keys: Collection[str]) -> None:
-    """Play a team until its episode ends, or the user closes the window or presses one of some keys."""
-    while not (renderer.closed or team.over or window.pressed & set(keys)):
-        team.step()
-        window.paused |= team.over  # the last moment stays until a key is pressed
-        renderer.draw(team.batch, colours=team.colours)
+def _is_left(renderer: Renderer, window: Window, keys: Mapping[str, str]) -> bool:
+    """Whether the user has closed the window, or pressed one of some keys."""
+    return renderer.closed or bool(window.pressed & keys.keys())

@@ -19,6 +19,7 @@ def main(arguments: list[str]) -> None:
 
 def _replay(
     players: Annotated[tuple[str, ...], tyro.conf.Positional],
+    *,
     scenario: str = "smart",
     target: str | None = None,
     world: int = 0,

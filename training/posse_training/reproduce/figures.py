@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from matplotlib import pyplot as plt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
@@ -32,6 +31,11 @@ _HEADING: Final = 2.6  # rad; of the target in the tracks
 _TASK_COLOURS: Final = (GRID, ORANGE, GREEN, BLUE)
 
 
+def _subplots(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
+
+
 def look_of(number: int) -> dict[str, Any]:
     """Colour and line style of a robot."""
     return {"color": COLOURS[number % 5], "ls": LINES[number % 5]}
@@ -52,7 +56,7 @@ def frames(shown: Sequence[Shown], played: str) -> Figure:
 
     ``played`` is written below: world, split, seed and version.
     """
-    figure, axes = plt.subplots(len(shown), 3, figsize=(9.6, 3.3 * len(shown)), layout="constrained", squeeze=False)
+    figure, axes = _subplots(len(shown), 3, (9.6, 3.3 * len(shown)), squeeze=False)
     for row, one in zip(axes, shown, strict=True):
         time = times(one.run)
         last = one.settled if np.isfinite(one.settled) else time[-1]
@@ -108,9 +112,7 @@ def draw_robots(axis: Axes, run: Trajectory, world: int, frame: int, since: int 
 
 def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
     """Draw every tracker against time, a column for each policy."""
-    figure, axes = plt.subplots(
-        5, len(shown), figsize=(4.6 * len(shown), 8.6), layout="constrained", sharex="col", sharey="row", squeeze=False
-    )
+    figure, axes = _subplots(5, len(shown), (4.6 * len(shown), 8.6), sharex="col", sharey="row", squeeze=False)
     for column, one in zip(axes.T, shown, strict=True):
         run, world, settled, time = one.run, one.world, one.settled, times(one.run)
         end = max(_LEAST, _AFTER * settled) if np.isfinite(settled) else time[-1]
@@ -148,7 +150,7 @@ def curves(shown: Sequence[Shown], paper: float, played: str) -> Figure:
 
 def tracks(seed: int) -> Figure:
     """Draw one tracker for three K with c = 0, and a team with different K and c."""
-    figure, axes = plt.subplots(2, 3, figsize=(10, 5.2), layout="constrained", gridspec_kw={"height_ratios": (1.3, 1)})
+    figure, axes = _subplots(2, 3, (10, 5.2), gridspec_kw={"height_ratios": (1.3, 1)})
     alone = posse.get_scenario("constant", num_trackers=1, horizon=300)
     start = {"tracker_pose": [(6.0, -1.5, 3.0)], "target_pose": (0.0, 0.0, _HEADING)}
     for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
@@ -208,9 +210,7 @@ def leader_loss(policy: str, worlds: int, seed: int) -> Figure:
     run = runs.run_of(policy, scenario, worlds, seed)
     world, broke, recovered = _shown(run)
     time, alive, error = times(run), runs.working(run)[:, world], slot_error(run)[:, world]
-    figure, axes = plt.subplots(
-        4, 1, figsize=(8.4, 8.2), layout="constrained", gridspec_kw={"height_ratios": (2.6, 2, 1, 1)}
-    )
+    figure, axes = _subplots(4, 1, (8.4, 8.2), gridspec_kw={"height_ratios": (2.6, 2, 1, 1)})
     start = max(0.0, broke - 5.0)
     end = min(time[-1], max(recovered, broke) + 5.0)
     keep = (time >= start) & (time <= end)

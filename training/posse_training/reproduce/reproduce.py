@@ -14,19 +14,17 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 import tyro
-from matplotlib import pyplot as plt
-from matplotlib.figure import Figure
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 import posse
 from posse_baselines.ddcs.baseline import FAMILY
-from posse_baselines.files import replacing, write_atomically
+from posse_baselines.files import write_atomically
 from posse_training.reproduce import runs
 from posse_training.reproduce.figures import Shown, curves, frames, leader_loss, tracks
 from posse_training.reproduce.runs import SPLIT, Floats, draw_starts, median_world, settling_times, slot_error
-from posse_training.style import RC
+from posse_training.style import RC, save
 
 HORIZON: Final = 250
 """Control steps of an episode, enough for the slowest law to settle."""
@@ -83,7 +81,6 @@ def summary(policy: str, times: Floats, error: Floats) -> dict[str, Any]:
 
 def reproduce(settings: Settings) -> list[dict[str, Any]]:
     """Play every member of the family, write figures and numbers, and return the numbers."""
-    mpl.use("Agg")
     settings.out.mkdir(parents=True, exist_ok=True)
     scenario = posse.get_scenario(PLAYED, horizon=HORIZON)
     tracker_pose, target_pose = draw_starts(scenario, settings.starts, settings.seed)
@@ -101,23 +98,15 @@ def reproduce(settings: Settings) -> list[dict[str, Any]]:
                 for policy in (model.paper_policy, model.our_policy)
             ]
             facts = f"start {world}, the median of {settings.starts:,} starts, {runs.played(scenario, settings.seed)}"
-            _write(settings.out, f"{model.name}-frames", frames(pair, facts))
-            _write(settings.out, f"{model.name}-curves", curves(pair, model.paper_settling_time, facts))
-        _write(settings.out, "tracks", tracks(settings.seed))
+            save(frames(pair, facts), settings.out, f"{model.name}-frames")
+            save(curves(pair, model.paper_settling_time, facts), settings.out, f"{model.name}-curves")
+        save(tracks(settings.seed), settings.out, "tracks")
         loss = leader_loss("pngl-l-phi", settings.starts, settings.seed)
-        _write(settings.out, "leader-loss", loss)
+        save(loss, settings.out, "leader-loss")
     stated = {"seed": settings.seed, "split": SPLIT, "tolerance": settings.tolerance}
     text = json.dumps({**stated, "policies": rows}, indent=2)
     write_atomically(settings.out / "settling.json", f"{text}\n".encode())
     return rows
-
-
-def _write(folder: Path, name: str, figure: Figure) -> None:
-    for suffix in ("png", "svg"):
-        dated = {"Date": None} if suffix == "svg" else None
-        with replacing(folder / f"{name}.{suffix}") as part:
-            figure.savefig(part, dpi=130, metadata=dated)
-    plt.close(figure)
 
 
 def table(rows: Sequence[dict[str, Any]], settings: Settings) -> Table:

@@ -70,7 +70,7 @@ export function tracker(ctx, x, y, heading, radius, fill, rim = colours.TRACKER_
 }
 
 export function target(ctx, x, y, heading, radius) {
-  for (const [colour, grow, width] of [[colours.PAPER, 3, 4], [colours.TARGET, 1, 2.8]]) {
+  for (const [colour, grow, width] of [[colours.PAPER, 1, 4], [colours.TARGET, -0.4, 2.8]]) {
     pen(ctx, colour, width);
     robot(ctx, x, y, heading, radius + grow, colour);
   }

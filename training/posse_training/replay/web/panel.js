@@ -112,7 +112,7 @@ function rewards(robot) {
   return section("reward", [...rows, row("reward", "1", (player, frame) => number(total(player, frame), 3))]);
 }
 
-function beliefs(robot) {
+function believed(robot) {
   const names = app.players.flatMap((player) => [...player.columns.keys()]).filter((name) => name.startsWith("belief/"));
   const rows = [...new Set(names)].map((key) => {
     const name = key.slice("belief/".length);
@@ -216,7 +216,7 @@ function build(robot) {
   } else {
     const isTracker = robot < app.world.settings.num_trackers;
     if (isTracker) parts.push(condition(robot));
-    parts.push(actions(robot), rewards(robot), ...(isTracker ? beliefs(robot) : []), ...observation(robot));
+    parts.push(actions(robot), rewards(robot), ...(isTracker ? believed(robot) : []), ...observation(robot));
   }
   document.getElementById("panel").replaceChildren(...parts, metrics(), eventList(), ...cards());
 }

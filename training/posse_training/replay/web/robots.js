@@ -66,7 +66,7 @@ export function trackers(d) {
   for (const i of order) {
     const [x, y] = d.place(i);
     const fill = isBroken(i) ? colours.BROKEN : colourOf(d, i);
-    if (i === d.robot) ring(d, x, y);
+    if (i === d.robot) selection(d, x, y);
     tracker(ctx, x, y, d.pose(i)[2], radius, fill, isBroken(i) ? colours.TRACKER : undefined);
     const ink = isBroken(i) ? colours.FAINT_INK : onTop(fill);
     write(ctx, String(i), x, y + 0.5, Math.min(13, Math.max(9, radius * 1.15)), ink, "center", 600);
@@ -81,9 +81,9 @@ export function trackers(d) {
   }
 }
 
-function ring({ ctx, radius }, x, y) {
+function selection({ ctx, radius }, x, y) {
   pen(ctx, colours.INK, 2.5);
-  disc(ctx, x, y, radius + 6);
+  disc(ctx, x, y, radius + 5);
   ctx.stroke();
 }
 
@@ -92,7 +92,7 @@ export function quarry(d) {
   const n = d.settings.num_trackers;
   const [x, y] = d.place(n);
   const heading = d.pose(n)[2];
-  if (d.robot === n) ring(d, x, y);
+  if (d.robot === n) selection(d, x, y);
   target(ctx, x, y, heading, radius);
   if (d.at("target_dart")) {
     const [right, down] = [Math.cos(heading) * (radius + 6), -Math.sin(heading) * (radius + 6)];
