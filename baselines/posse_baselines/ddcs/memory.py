@@ -58,12 +58,6 @@ def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     )
 
 
-@compiled
-def single(team: Team) -> Team:
-    """Return a team with the records themselves, as kernels read it."""
-    return Team(team.at[0], team.world[0], team.settings[0], team.slots, team.outermost, team.beams)
-
-
 class Work(NamedTuple):
     """Arrays that a step works in, one of each for a thread."""
 
@@ -82,12 +76,6 @@ def work_for(num_trackers: int) -> Work:
     n, threads = num_trackers, MOST_THREADS
     cost, assigning = np.empty((threads, n, n)), np.empty((threads, WORK_ROWS, n + 1))
     return Work(cost, assigning, np.empty((threads, _MOST_DISCS), DISC), np.empty(threads, PLAYS))
-
-
-@compiled
-def of_thread(work: Work, thread: int) -> Work:
-    """Return the arrays of one thread."""
-    return Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
 
 
 def _fields(*fields: tuple[str, Any, int]) -> tuple[np.dtype[Any], Any]:

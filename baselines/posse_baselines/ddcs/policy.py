@@ -19,9 +19,8 @@ from posse_baselines.ddcs.memory import (
     MIND,
     MIND_AT_START,
     Minds,
+    Team,
     Work,
-    of_thread,
-    single,
     team_of,
     work_for,
 )
@@ -174,7 +173,9 @@ def _propose(
     minds: Minds, work: Work, observations: FloatArray, proposals: FloatArray, thread: int, first: int, end: int
 ) -> None:
     """Plan in a share of worlds; write the wanted velocities (E, N, 2), ahead and left, in shares of the top speed."""
-    team, mine = single(minds.team), of_thread(work, thread)
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
     for e in range(first, end):
         for i in range(observations.shape[1]):
             me = minds.me[e, i]
@@ -188,7 +189,9 @@ def _carry_out(
     minds: Minds, work: Work, observations: FloatArray, actions: FloatArray, thread: int, first: int, end: int
 ) -> None:
     """Carry out the plans of a share of worlds, corrected by what stands in the actions' first two numbers."""
-    team, mine = single(minds.team), of_thread(work, thread)
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
     for e in range(first, end):
         for i in range(observations.shape[1]):
             me, action = minds.me[e, i], actions[e, i]
@@ -199,7 +202,8 @@ def _carry_out(
 @kernel
 def _believe(minds: Minds, beliefs: FloatArray, thread: int, first: int, end: int) -> None:
     """Write the beliefs (E, N, BELIEF_SIZE) of a share of worlds."""
-    team = single(minds.team)
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
     for e in range(first, end):
         for i in range(minds.me.shape[1]):
             write_belief(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], beliefs[e, i])

@@ -175,7 +175,7 @@ def simulate(body: Record, discs: Records, error: float, speeds: Any, directions
 
 @compiled
 def cost_of(body: Record, p: Record, m: int, wanted: complex) -> float:
-    """Return a play's danger, and how far it ends from where the wanted velocity leads as a share of the greatest way."""
+    """Return a play's danger, and how far it ends from where the wanted velocity leads, as a share of the horizon."""
     if p.going[m] == 0.0:
         return p.danger[m] + 2.0
     scale = 1.0 / (body.max_speed * _HORIZON)
