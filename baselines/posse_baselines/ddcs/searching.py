@@ -70,7 +70,9 @@ def wander(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16])
         choose_goal(team, me, mates, seen)
         way = me.goal - me.position
     distance = length(way)
-    return scaled(way, me.max_speed / distance) if distance > 1e-6 else 0j
+    if distance < 1e-6:
+        return 0j
+    return complex(me.max_speed * way.real / distance, me.max_speed * way.imag / distance)
 
 
 @compiled

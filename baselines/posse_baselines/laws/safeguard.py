@@ -26,13 +26,16 @@ LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
 
 _STEPS: Final = np.array(LOOK_AHEAD)
 _HORIZON: Final = sum(LOOK_AHEAD)
-_SHARES: Final = np.array((1.0, 0.5))  # of the greatest speed, each tried in all directions
+_SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed, each tried in all directions
 # From the wanted direction outwards, alternating right and left.
 _DIRECTIONS: Final = 16
 _TURNS: Final = np.array(
     [(1 if k % 2 else -1) * ((k + 1) // 2) * 2.0 * math.pi / _DIRECTIONS for k in range(_DIRECTIONS)]
 )
+_TURNED: Final = np.cos(_TURNS) + 1j * np.sin(_TURNS)
+_PLAYS: Final = _DIRECTIONS * len(_SPEED_LEVELS)
 _KEEP_RIGHT: Final = 0.02  # preference for passing on the right
+_LIKELY: Final = 0.6  # share of a velocity's difference by which the robot ends elsewhere, at least
 _SAME_SPEED: Final = 0.3  # m/s
 _SAME_HEADING: Final = math.cos(0.35)  # cosine of the angle between two headings
 _GLANCE: Final = 0.15  # m; allowed deviation from the straight path
@@ -66,13 +69,13 @@ PLAYS: Final[np.dtype[Any]] = np.dtype(
         np.dtype(
             [
                 *((name, np.float64, (_DIRECTIONS,)) for name in _OF_DIRECTION),
-                *((name, np.float64, (_DIRECTIONS * len(_SHARES),)) for name in _OF_PLAY),
+                *((name, np.float64, (_PLAYS,)) for name in _OF_PLAY),
             ],
             align=True,
         ),
     )
 )
-"""What :func:`simulate` works in: all directions at the first speed, then at the next one. Floats by component, since
+"""What :func:`play_all` works in: all directions at the first speed, then at the next one. Floats by component, since
 the loops over them are vectorised."""
 
 
@@ -101,52 +104,92 @@ def put_walls(discs: Records, count: int, position: complex, extent: float, radi
 
 
 @compiled
-def half_turn(turn: float) -> tuple[float, float]:
-    """Return cosine and sine of half an angle (rad), by short polynomials.
+def half_turn(turn: float) -> complex:
+    """Return the unit vector at half an angle (rad), by short polynomials.
 
     Half a turn in a step is at most about a quarter of a radian, and low accuracy suffices.
     """
     half = 0.5 * turn
     square = half * half
-    return 1.0 - square * (0.5 - square * (1.0 / 24.0)), half * (1.0 - square * (1.0 / 6.0))
+    return complex(1.0 - square * (0.5 - square * (1.0 / 24.0)), half * (1.0 - square * (1.0 / 6.0)))
 
 
 @compiled
-def simulate(body: Record, discs: Records, error: float, speeds: Any, directions: int, p: Record) -> None:
-    """Play how a robot tracks each of ``speeds`` (m/s) in the first of the directions.
+def cost_of(
+    body: Record, discs: Records, speed: float, error: float, wanted: complex, enough: float
+) -> tuple[float, float]:
+    """Return (cost, danger) of a velocity; stops above ``enough``.
 
-    The first direction is an ``error`` (rad) to the left of the robot's heading, the others are turned from it by
-    ``_TURNS``. ``p.x, p.y`` is where the robot ends. ``p.danger`` is the mean intrusion into the margins, as a share of
-    them, and a price for a contact, the higher the sooner; ``p.going`` is 0 after a contact. The loops over directions
-    and plays have no branches and are vectorised.
+    The velocity is a speed (m/s) and the angle to its heading from the present one (rad).
+
+    The danger is the mean intrusion into the margins over the look-ahead, as a share of them, and a
+    price for a contact, the higher the sooner. The cost adds how far the robot ends from where the
+    wanted velocity leads, as a share of the greatest distance.
+    """
+    place, danger, time = 0j, 0.0, 0.0
+    v, omega, heading = body.speed, body.omega, body.heading
+    goal = heading * vector(1.0, error)
+    for k in range(len(_STEPS)):
+        step = _STEPS[k]
+        turn_change, change = body.turn_acceleration * step, body.acceleration * step
+        omega = clip(turn_command(body, error, step), omega - turn_change, omega + turn_change)
+        v = clip(speed * max(0.0, dot(heading, goal)), v - change, v + change)
+        half = half_turn(omega * step)
+        place += scaled(heading * half, v * step)
+        heading = heading * half * half
+        error -= omega * step
+        time += step
+        weight = _INTRUSION_COST * step / _HORIZON
+        for j in range(len(discs)):
+            d = discs[j]
+            way, far = d.place + scaled(d.velocity, time) - place, d.reach + d.margin
+            square = dot(way, way)
+            if square < far * far:
+                gap = math.sqrt(square) - d.reach
+                if gap < _CONTACT:
+                    danger += _CONTACT_COST * (1.2 - time / _HORIZON)
+                    return danger + 2.0, danger
+                danger += weight * (1.0 - gap / d.margin)
+        if danger > enough:
+            return danger, danger
+    top = body.max_speed
+    short = scaled(place, 1.0 / (top * _HORIZON)) - complex(wanted.real / top, wanted.imag / top)
+    return danger + length(short), danger
+
+
+@compiled
+def play_all(body: Record, discs: Records, error: float, p: Record) -> None:
+    """Simulate all velocities of a :data:`PLAYS` as :func:`cost_of` does one; straight ahead is a turn of ``error``.
+
+    The loops over the 32 velocities have no branches and are vectorised.
     """
     goal = body.heading * vector(1.0, error)
-    for k in range(directions):
+    for k in range(_DIRECTIONS):
         p.error[k], p.omega[k] = wrap(error + _TURNS[k]), body.omega
         p.cos[k], p.sin[k] = body.heading.real, body.heading.imag
-        turned = goal * vector(1.0, _TURNS[k])
+        turned = goal * _TURNED[k]
         p.goal_cos[k], p.goal_sin[k] = turned.real, turned.imag
-    plays = directions * len(speeds)
-    for m in range(plays):
+    for m in range(_PLAYS):
         p.speed[m], p.x[m], p.y[m], p.danger[m], p.going[m] = body.speed, 0.0, 0.0, 0.0, 1.0
     time = 0.0
     for n in range(len(_STEPS)):
         step = _STEPS[n]
         turn_change, change = body.turn_acceleration * step, body.acceleration * step
-        for k in range(directions):
+        for k in range(_DIRECTIONS):
             c, s, old = p.cos[k], p.sin[k], p.omega[k]
             p.ahead[k] = max(0.0, c * p.goal_cos[k] + s * p.goal_sin[k])
             omega = clip(turn_command(body, p.error[k], step), old - turn_change, old + turn_change)
-            half_c, half_s = half_turn(omega * step)
-            middle_c, middle_s = c * half_c - s * half_s, s * half_c + c * half_s
+            half = half_turn(omega * step)
+            middle_c, middle_s = c * half.real - s * half.imag, s * half.real + c * half.imag
             p.omega[k], p.middle_cos[k], p.middle_sin[k] = omega, middle_c, middle_s
-            p.cos[k] = middle_c * half_c - middle_s * half_s
-            p.sin[k] = middle_s * half_c + middle_c * half_s
+            p.cos[k] = middle_c * half.real - middle_s * half.imag
+            p.sin[k] = middle_s * half.real + middle_c * half.imag
             p.error[k] -= omega * step
-        for level in range(len(speeds)):
-            for k in range(directions):
-                m = level * directions + k
-                v = clip(speeds[level] * p.ahead[k], p.speed[m] - change, p.speed[m] + change)
+        for level in range(len(_SPEED_LEVELS)):
+            goal_speed = body.max_speed * _SPEED_LEVELS[level]
+            for k in range(_DIRECTIONS):
+                m = level * _DIRECTIONS + k
+                v = clip(goal_speed * p.ahead[k], p.speed[m] - change, p.speed[m] + change)
                 p.speed[m] = v
                 p.x[m] += v * step * p.middle_cos[k]
                 p.y[m] += v * step * p.middle_sin[k]
@@ -155,31 +198,21 @@ def simulate(body: Record, discs: Records, error: float, speeds: Any, directions
         contact_cost = _CONTACT_COST * (1.2 - time / _HORIZON)
         for j in range(len(discs)):
             d = discs[j]
-            x, y = d.place.real + d.velocity.real * time, d.place.imag + d.velocity.imag * time
-            near = d.reach + d.margin
-            hits = 0
-            for m in range(plays):
+            place = d.place + scaled(d.velocity, time)
+            x, y, near, hits = place.real, place.imag, d.reach + d.margin, 0
+            for m in range(_PLAYS):
                 dx, dy = x - p.x[m], y - p.y[m]
                 hits += dx * dx + dy * dy < near * near
             if hits == 0:
                 continue
             by_margin = 1.0 / max(d.margin, 1e-9)
-            for m in range(plays):
+            for m in range(_PLAYS):
                 dx, dy = x - p.x[m], y - p.y[m]
                 gap = math.sqrt(dx * dx + dy * dy) - d.reach
                 touches = 1.0 if gap < _CONTACT else 0.0
                 intrusion = max(0.0, 1.0 - gap * by_margin)
                 p.danger[m] += p.going[m] * (touches * contact_cost + (1.0 - touches) * weight * intrusion)
                 p.going[m] *= 1.0 - touches
-
-
-@compiled
-def cost_of(body: Record, p: Record, m: int, wanted: complex) -> float:
-    """Return a play's danger, and how far it ends from where the wanted velocity leads, as a share of the horizon."""
-    if p.going[m] == 0.0:
-        return p.danger[m] + 2.0
-    scale = 1.0 / (body.max_speed * _HORIZON)
-    return p.danger[m] + length(scaled(complex(p.x[m], p.y[m]), scale) - scaled(wanted, 1.0 / body.max_speed))
 
 
 @compiled
@@ -213,21 +246,31 @@ def safe_velocity(body: Record, discs: Records, wanted: complex, plays: Record) 
     """
     if len(discs) == 0 or is_clear(body, discs, wanted):
         return wanted, False
-    error = heading_error(body, wanted) if length(wanted) > _STANDSTILL else 0.0
-    simulate(body, discs, error, (length(wanted),), 1, plays)
-    if plays.danger[0] <= 0.0:
+    speed = length(wanted)
+    error = heading_error(body, wanted) if speed > _STANDSTILL else 0.0
+    least, danger = cost_of(body, discs, speed, error, wanted, 1e9)
+    if danger <= 0.0:
         return wanted, False
-    best, least = wanted, cost_of(body, plays, 0, wanted)
-    simulate(body, discs, 0.0, (0.0,), 1, plays)
-    cost = cost_of(body, plays, 0, wanted)
+    best = wanted
+    cost, _ = cost_of(body, discs, 0.0, 0.0, wanted, least)
     if cost < least:
-        best, least = 0j, cost
-    top = body.max_speed
-    simulate(body, discs, error, (top * _SHARES[0], top * _SHARES[1]), _DIRECTIONS, plays)
+        least, best = cost, 0j
+    play_all(body, discs, error, plays)
+    # As shares of the greatest speed and distance.
+    top, farthest = body.max_speed, body.max_speed * _HORIZON
+    wish = complex(wanted.real / top, wanted.imag / top)
     for k in range(_DIRECTIONS):
-        for level in range(len(_SHARES)):
+        for level in range(len(_SPEED_LEVELS)):
             m = level * _DIRECTIONS + k
-            cost = cost_of(body, plays, m, wanted) + (_KEEP_RIGHT if k % 2 == 1 else 0.0)
+            share = scaled(complex(plays.goal_cos[k], plays.goal_sin[k]), _SPEED_LEVELS[level])
+            # A lower limit of the distance from the wanted final position.
+            if _LIKELY * length(share - wish) >= least:
+                continue
+            cost = plays.danger[m] + (_KEEP_RIGHT if k % 2 == 1 else 0.0)
+            if plays.going[m] == 0.0:  # it touched something
+                cost += 2.0
+            else:
+                cost += length(complex(plays.x[m] / farthest, plays.y[m] / farthest) - wish)
             if cost < least:
-                best, least = scaled(complex(plays.goal_cos[k], plays.goal_sin[k]), top * _SHARES[level]), cost
+                least, best = cost, scaled(share, top)
     return best, True
