@@ -54,9 +54,10 @@ def put(me: Record, v: complex, out: FloatArray) -> None:
 
 
 @compiled
-def soft(v: complex, scale: float) -> complex:
-    """Return a vector (m) with its length scaled."""
-    return scaled(v, 1.0 / (length(v) + scale))
+def put_soft(me: Record, v: complex, scale: float, out: FloatArray) -> None:
+    """Write a vector (m) as it lies to the tracker, its length scaled."""
+    own = scaled(v * me.heading.conjugate(), 1.0 / (length(v) + scale))
+    out[0], out[1] = own.real, own.imag
 
 
 @compiled
@@ -66,7 +67,7 @@ def write_belief(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.ui
     if me.known != 0:
         b = out[TARGET_AT:]
         b[0] = 1.0
-        put(me, soft(me.target - me.position, _FAR), b[1:])
+        put_soft(me, me.target - me.position, _FAR, b[1:])
         put(me, me.target_velocity, b[3:])
         put(me, me.frame, b[5:])
         b[7] = me.psi_rate
@@ -77,15 +78,15 @@ def write_belief(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.ui
         arm = team.slots[me.slot] * me.frame
         way = me.target + arm - me.position
         b[0] = 1.0
-        put(me, soft(way, _NEAR), b[1:])
-        put(me, soft(way, _FAR), b[3:])
+        put_soft(me, way, _NEAR, b[1:])
+        put_soft(me, way, _FAR, b[3:])
         put(me, slot_velocity(me.target_velocity, me.psi_rate, arm), b[5:])
     if me.task == SEARCHING:
         b = out[SEARCH_AT:]
         lost = float(me.step - max(0, me.lost_step)) * team.world.dt
         b[0] = lost / (lost + _LOST)
         if me.goal_step >= 0:
-            put(me, soft(me.goal - me.position, _FAR), b[1:])
+            put_soft(me, me.goal - me.position, _FAR, b[1:])
     _write_mates(team, me, mates, out[MATES_AT:])
     if len(seen) > 0:
         _write_looks(team, me, seen, out[LOOKS_AT:])
@@ -109,7 +110,7 @@ def _write_mates(team: Team, me: Record, mates: Records, out: FloatArray) -> Non
                     least, best, nearest = away, j, way
         if best < 0:
             break
-        put(me, soft(nearest, _BESIDE), out[1 + 2 * k :])
+        put_soft(me, nearest, _BESIDE, out[1 + 2 * k :])
         last, last_j = least, best
 
 

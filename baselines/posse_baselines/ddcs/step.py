@@ -57,7 +57,8 @@ def correct(me: Record, correction: complex) -> None:
     if correction == 0j:
         return
     wish = me.wish + scaled(correction * me.heading, me.max_speed)
-    wish = scaled(wish, 1.0 / max(1.0, length(wish) / max(me.max_speed, length(me.wish))))
+    excess = max(1.0, length(wish) / max(me.max_speed, length(me.wish)))
+    wish = complex(wish.real / excess, wish.imag / excess)
     old_speed, old_omega = regulate(me, me.wish, 0.0)
     speed, omega = regulate(me, wish, 0.0)
     me.wish = wish
