@@ -15,7 +15,7 @@ import numpy.typing as npt
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel
 from posse.rules import NEVER
 from posse_baselines.laws.assignment import WORK_ROWS, assign
-from posse_baselines.laws.geometry import angle_of, dot, length, scaled, wrap
+from posse_baselines.laws.geometry import angle_of, dot, length, wrap
 from posse_baselines.laws.guidance import BODY, regulate, write_motion
 from posse_baselines.laws.safeguard import DISC, NEAR, PLAYS, put_disc, put_walls, safe_velocity
 from posse_baselines.laws.steering import Course, approach_velocity, meeting_velocity, time_to_slot, way_round
@@ -117,12 +117,6 @@ def work_for(num_trackers: int) -> Work:
 
 
 @compiled
-def vector_at(r: Record) -> complex:
-    """Return the position of a robot, an obstacle or a slot."""
-    return complex(r.x, r.y)
-
-
-@compiled
 def velocity_of(r: Record) -> complex:
     """Return the velocity of a robot."""
     return complex(r.speed * r.heading_cos, r.speed * r.heading_sin)
@@ -131,7 +125,7 @@ def velocity_of(r: Record) -> complex:
 @compiled
 def arm_of(scene: Scene, slot: int) -> complex:
     """Return where a slot is from the target, m."""
-    return vector_at(scene.slots[slot]) * complex(scene.world.frame_cos, scene.world.frame_sin)
+    return complex(scene.slots[slot].x, scene.slots[slot].y) * complex(scene.world.frame_cos, scene.world.frame_sin)
 
 
 @compiled
@@ -155,7 +149,7 @@ def foreseen(path: FloatArray, at: float, slot: Record) -> complex:
     s = path[k, 3] + turned * (path[k + 1, 3] - path[k, 3])
     x = path[k, 0] + share * (path[k + 1, 0] - path[k, 0])
     y = path[k, 1] + share * (path[k + 1, 1] - path[k, 1])
-    return complex(x, y) + vector_at(slot) * complex(c, s)
+    return complex(x, y) + complex(slot.x, slot.y) * complex(c, s)
 
 
 @compiled
@@ -185,10 +179,10 @@ def assign_slots(scene: Scene, work: Work) -> None:
             continue
         speed = float(t.max_speed)
         for k in range(n):
-            way = vector_at(w) + arm_of(scene, k) - vector_at(t)
+            way = complex(w.x, w.y) + arm_of(scene, k) - complex(t.x, t.y)
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
                 dt = scene.config.control_step
-                time = arrival_time(scene.path, float(scene.since), scene.slots[k], vector_at(t), speed, dt)
+                time = arrival_time(scene.path, float(scene.since), scene.slots[k], complex(t.x, t.y), speed, dt)
             else:
                 time = time_to_slot(way, course_of(scene), speed)
             # Time for turning towards it.
@@ -211,21 +205,21 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
     """List what is near tracker i, as discs for the safeguard; return how many things that are."""
     c, w, t = scene.config, scene.world, scene.trackers[i]
     count, two = 0, 2.0 * c.robot_radius
-    way = vector_at(w) - vector_at(t)
+    way = complex(w.x, w.y) - complex(t.x, t.y)
     if dot(way, way) < NEAR * NEAR:
         count = put_disc(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
     for j in range(c.num_trackers):
         other = scene.trackers[j]
-        way = vector_at(other) - vector_at(t)
+        way = complex(other.x, other.y) - complex(t.x, t.y)
         if j != i and dot(way, way) < NEAR * NEAR:
             count = put_disc(discs, count, way, velocity_of(other), two, _MARGIN)
     for k in range(c.num_obstacles):
         disc = scene.obstacles[k]
-        way, reach = vector_at(disc) - vector_at(t), disc.radius + c.robot_radius
+        way, reach = complex(disc.x, disc.y) - complex(t.x, t.y), disc.radius + c.robot_radius
         if dot(way, way) < (NEAR + reach) * (NEAR + reach):
             count = put_disc(discs, count, way, 0j, reach, _MARGIN)
     if c.walled:
-        count = put_walls(discs, count, vector_at(t), c.half_arena, c.robot_radius, _MARGIN)
+        count = put_walls(discs, count, complex(t.x, t.y), c.half_arena, c.robot_radius, _MARGIN)
     return count
 
 
@@ -234,13 +228,14 @@ def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
     w, t, way, slot = scene.world, scene.trackers[i], scene.ways[i], scene.plans[i].slot
     dt, speed = scene.config.control_step, float(t.max_speed)
-    arm, start = arm_of(scene, slot), vector_at(t) - vector_at(w)
+    arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
     shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene.path, float(scene.since), scene.slots[slot], vector_at(t), speed, dt)
+        time = arrival_time(scene.path, float(scene.since), scene.slots[slot], complex(t.x, t.y), speed, dt)
         if time > _SOON:
             goal = foreseen(scene.path, scene.since + time / dt, scene.slots[slot])
-            velocity = scaled(goal - vector_at(w) - arm, 1.0 / time)
+            moved = goal - complex(w.x, w.y) - arm
+            velocity = complex(moved.real / time, moved.imag / time)
             offset = way_round(start, arm, _CLEARANCE) + shift - start
             return approach_velocity(offset, velocity, way.gain, speed, acceleration)
     return meeting_velocity(start, arm + shift, course_of(scene), _CLEARANCE, way.gain, speed, acceleration)
