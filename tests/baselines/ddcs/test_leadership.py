@@ -10,8 +10,8 @@ from tests.support.drive import Instant, drive
 
 from posse_baselines import with_settings
 from posse_baselines.ddcs import EXCHANGING, SEARCHING
-from posse_baselines.ddcs.leadership import better_claim
-from posse_baselines.ddcs.messages import COUNT, decode, encode, is_newer
+from posse_baselines.ddcs.monitoring import COUNT, decode, encode, is_newer
+from posse_baselines.ddcs.roles import better_claim
 from posse_baselines.ddcs.settings import NO_EXCHANGE
 
 
