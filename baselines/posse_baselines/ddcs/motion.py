@@ -32,28 +32,8 @@ from posse_baselines.ddcs.settings import (
     PNGL,
     SEARCHING,
 )
+from posse_baselines.laws import guidance, l_l, l_phi, steering
 from posse_baselines.laws.geometry import angle_of, clip, cross, length, scaled, vector, wrap
-from posse_baselines.laws.guidance import (
-    MIN_COSINE,
-    bearing_rate,
-    deviation,
-    lawful_heading,
-    lawful_rate,
-    line_of_sight,
-    maintenance_speed,
-    regulate,
-)
-from posse_baselines.laws.l_l import l_l_velocity
-from posse_baselines.laws.l_phi import (
-    Demand,
-    Polar,
-    held_command,
-    l_phi_demand,
-    limit_command,
-    point_velocity,
-    sampled_rate,
-)
-from posse_baselines.laws.steering import approach_velocity, meeting_velocity, slot_heading, slot_velocity
 
 _FULL_SPEED: Final = 1e6  # 1/s; a gain that saturates the speed at any distance
 _FAR_SIGHT: Final = 8.0  # m; with a longer sensing range no motion is needed to see a lost target again
@@ -108,7 +88,7 @@ def next_task(team: Team, me: Record, mates: Records) -> int:
 def want(me: Record, velocity: complex, rate: float) -> None:
     """Set a wanted velocity (m/s) that turns at ``rate`` (rad/s), with its command."""
     me.wish = velocity
-    me.wish_speed, me.wish_omega = regulate(me, velocity, rate)
+    me.wish_speed, me.wish_omega = guidance.regulate(me, velocity, rate)
 
 
 @compiled
@@ -124,9 +104,11 @@ def move(team: Team, me: Record, mates: Records) -> None:
             follow(team, me, mates)
         else:
             leader = place_by(team, me, mates[me.leader], 0)
-            slot = slot_velocity(vector(leader.speed, leader.theta), leader.frame_rate, leader.place - leader.position)
+            slot = steering.slot_velocity(
+                vector(leader.speed, leader.theta), leader.frame_rate, leader.place - leader.position
+            )
             way = leader.place - me.position
-            want(me, approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration), 0.0)
+            want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration), 0.0)
     elif settings.guidance == PNGL:
         pursue(team, me)
     else:
@@ -160,7 +142,7 @@ def hold_slot(team: Team, me: Record) -> None:
     if me.task == CONVERGING:
         gain, clearance, rate = _FULL_SPEED, settings.clearance, 0.0
     start, course = me.position - me.target, course_of(team, me)
-    want(me, meeting_velocity(start, arm, course, clearance, gain, me.max_speed, me.acceleration), rate)
+    want(me, steering.meeting_velocity(start, arm, course, clearance, gain, me.max_speed, me.acceleration), rate)
 
 
 @compiled
@@ -175,7 +157,7 @@ def pursue(team: Team, me: Record) -> None:
     if settings.model != CENTRALIZED and n > 1:  # K of its own
         constant += settings.spread * (2.0 * me.number / (n - 1) - 1.0)
     arm = team.slots[me.slot] * me.frame
-    r, sigma = line_of_sight(me.position, me.target)
+    r, sigma = guidance.line_of_sight(me.position, me.target)
     wanted_sigma, wanted_theta, frame_rate = 0.0, 0.0, 0.0
     if settings.deviation != NO_DEVIATION:
         wanted_sigma, wanted_theta, frame_rate = angle_of(-arm), angle_of(me.frame), me.psi_rate
@@ -183,21 +165,23 @@ def pursue(team: Team, me: Record) -> None:
             # Feedback on the bearing, c = ... + G wrap(σ - σ_d), acts as a greater K does.
             constant += settings.bearing_gain
     if settings.deviation == OF_OCCUPANT:
-        wanted_theta = slot_heading(me.target_velocity, me.psi_rate, arm, wanted_theta)
+        wanted_theta = steering.slot_heading(me.target_velocity, me.psi_rate, arm, wanted_theta)
         if me.task == FLOCKING:
             # In front of the target, heading away from it, the bearing turns the other way.
-            constant *= clip(math.cos(wanted_theta - wanted_sigma) / MIN_COSINE, -1.0, 1.0)
-    delta = deviation(lawful_heading(sigma, constant, wanted_sigma, wanted_theta), sigma)
-    target = vector(me.target_speed, deviation(me.target_theta, sigma))
+            constant *= clip(math.cos(wanted_theta - wanted_sigma) / guidance.MIN_COSINE, -1.0, 1.0)
+    delta = guidance.deviation(guidance.lawful_heading(sigma, constant, wanted_sigma, wanted_theta), sigma)
+    target = vector(me.target_speed, guidance.deviation(me.target_theta, sigma))
     if me.task == FLOCKING:
         wanted_range = length(arm)
-        speed = maintenance_speed(target, delta, r, wanted_range, frame_rate, settings.range_gain, me.max_speed)
+        speed = guidance.maintenance_speed(
+            target, delta, r, wanted_range, frame_rate, settings.range_gain, me.max_speed
+        )
     else:
         # A chase has to close in, whichever side of the target its slot is on.
         speed, delta = float(me.max_speed), clip(delta, -_MOST_DEVIATION, _MOST_DEVIATION)
     me.closing = 1 if me.task == CONVERGING else 0
-    sigma_rate = bearing_rate(r, target, vector(speed, delta))
-    want(me, vector(speed, sigma + delta), lawful_rate(constant, sigma_rate, frame_rate))
+    sigma_rate = guidance.bearing_rate(r, target, vector(speed, delta))
+    want(me, vector(speed, sigma + delta), guidance.lawful_rate(constant, sigma_rate, frame_rate))
 
 
 # --- following -----------------------------------------------------------------------------------
@@ -238,7 +222,7 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Leader:
 
 
 @compiled
-def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[Demand, float]:
+def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[l_phi.Demand, float]:
     """Return the demand of l-φ on the control point c_j by a team-mate in its ``slot``, and the wanted direction of l.
 
     c_j is wanted where it lies when the robot is in its place, and heads as one does there.
@@ -246,18 +230,18 @@ def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[Demand, 
     settings, offset = team.settings, team.settings.point_offset
     leader = place_by(team, me, mate, slot)
     velocity, arm = vector(leader.speed, leader.theta), leader.place - leader.position
-    heading = slot_heading(velocity, leader.frame_rate, arm, leader.frame)
-    l_now, angle = line_of_sight(leader.position, me.position + scaled(me.heading, offset))
-    l_d, wanted = line_of_sight(leader.position, leader.place + vector(offset, heading))
-    demand = l_phi_demand(
-        Polar(l_now, wrap(angle - leader.theta)),
-        Polar(l_d, wrap(wanted - leader.theta)),
+    heading = steering.slot_heading(velocity, leader.frame_rate, arm, leader.frame)
+    l_now, angle = guidance.line_of_sight(leader.position, me.position + scaled(me.heading, offset))
+    l_d, wanted = guidance.line_of_sight(leader.position, leader.place + vector(offset, heading))
+    demand = l_phi.l_phi_demand(
+        l_phi.Polar(l_now, wrap(angle - leader.theta)),
+        l_phi.Polar(l_d, wrap(wanted - leader.theta)),
         leader.speed,
         leader.frame_rate,
-        sampled_rate(settings.alpha_1, me.dt),
-        sampled_rate(settings.alpha_2, me.dt),
+        l_phi.sampled_rate(settings.alpha_1, me.dt),
+        l_phi.sampled_rate(settings.alpha_2, me.dt),
     )
-    return Demand(l_now, demand, wrap(angle - angle_of(me.heading))), wanted
+    return l_phi.Demand(l_now, demand, wrap(angle - angle_of(me.heading))), wanted
 
 
 @compiled
@@ -290,11 +274,11 @@ def follow(team: Team, me: Record, mates: Records) -> None:
     """
     offset = team.settings.point_offset
     demand, wanted = demand_by(team, me, mates[me.leader], 0)
-    velocity = point_velocity(demand)
+    velocity = l_phi.point_velocity(demand)
     second = second_of(team, me, mates) if team.settings.follower_law == L_L else -1
     if second >= 0:
         other, other_wanted = demand_by(team, me, mates[second], mates[second].slot)
-        velocity = l_l_velocity(demand, other, other_wanted - wanted, _LEAST_CROSSING)
+        velocity = l_l.l_l_velocity(demand, other, other_wanted - wanted, _LEAST_CROSSING)
     me.wish = velocity * me.heading
-    speed, omega = held_command(velocity, offset, me.dt)
-    me.wish_speed, me.wish_omega = limit_command(me, speed, omega, offset)
+    speed, omega = l_phi.held_command(velocity, offset, me.dt)
+    me.wish_speed, me.wish_omega = l_phi.limit_command(me, speed, omega, offset)

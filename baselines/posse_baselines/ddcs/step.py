@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
+from posse_baselines.ddcs.detour import detour
 from posse_baselines.ddcs.memory import Team, Work, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
 from posse_baselines.ddcs.searching import begin_search, look_around, wander
 from posse_baselines.ddcs.settings import CENTRALIZED, FLOCKING, SEARCHING
-from posse_baselines.ddcs.surroundings import detour, surround
+from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.guidance import regulate, write_motion
 from posse_baselines.laws.safeguard import safe_velocity

@@ -9,7 +9,7 @@ import pytest
 
 import posse
 from posse_baselines import play, with_settings
-from posse_baselines.ddcs.surroundings import turn_past
+from posse_baselines.ddcs.detour import turn_past
 from posse_baselines.laws.safeguard import DISC, put_disc
 
 CLEARANCE = 0.2
