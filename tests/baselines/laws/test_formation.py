@@ -81,39 +81,6 @@ def test_limits_hold_and_reversing_becomes_a_turn(speed: float, omega: float) ->
 
 # --- l-l -----------------------------------------------------------------------------------------
 
-LEADERS = (0j, -1.0 + 1.0j)
-PLACE = -1.5 - 0.8j
-SPEED = 0.6 + 0j
-
-
-def asked(point: complex, theta: float) -> complex:
-    """Demand of l-l on a control point, in the common frame; both leaders move straight ahead."""
-    seen = []
-    for leader in LEADERS:
-        arm, wanted = point - leader, PLACE - leader
-        demand = l_phi.l_phi_demand(Polar(*cmath.polar(arm)), Polar(*cmath.polar(wanted)), 0.6, 0.0, 2.0, 2.0)
-        seen.append(Demand(abs(arm), demand, short_way(cmath.phase(arm) - theta)))
-    crossing = cmath.phase(PLACE - LEADERS[1]) - cmath.phase(PLACE - LEADERS[0])
-    return l_l.l_l_velocity(*seen, crossing, 0.15) * cmath.exp(1j * theta)
-
-
-@pytest.mark.parametrize("theta", [0.0, 1.5, -2.5])
-@pytest.mark.parametrize("point", [-2.2 - 0.9j, -1.2 - 1.6j, PLACE])
-def test_l_l_closes_both_distances_at_alpha(point: complex, theta: float) -> None:
-    velocity = asked(point, theta) - SPEED
-    for leader in LEADERS:
-        arm = point - leader
-        rate = (velocity * arm.conjugate()).real / abs(arm)
-        assert rate == pytest.approx(-2.0 * (abs(arm) - abs(PLACE - leader)), abs=1e-9)
-
-
-@pytest.mark.parametrize(("point", "nearer"), [(-2.05 + 2.0j, 1), (1.0 - 1.05j, 0), (1.0 + 0j, 0)])
-def test_l_l_in_line_or_on_the_wrong_side_is_l_phi_on_the_nearer(point: complex, nearer: int) -> None:
-    arm, wanted = point - LEADERS[nearer], PLACE - LEADERS[nearer]
-    turn = cmath.phase(wanted / arm)
-    along = complex(-2.0 * (abs(arm) - abs(wanted)), 2.0 * turn * abs(arm))
-    assert asked(point, 0.4) == pytest.approx(SPEED + along * arm / abs(arm), abs=1e-9)
-
 
 @pytest.mark.parametrize("wanted", [1.2, -1.2])
 @pytest.mark.parametrize("crossing", [0.1, 0.2, 1.5, 2.9, -0.1, -0.2, -1.5, -2.9])

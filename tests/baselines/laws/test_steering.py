@@ -71,17 +71,6 @@ def test_the_way_round_keeps_clear_and_arrives(start: float, away: float, end: f
     assert least > 0.82 * 0.75  # the cosine of the least turn
 
 
-@pytest.mark.parametrize("heading", [0.0, 2.0])
-@pytest.mark.parametrize("side", [1, -1])
-def test_the_way_round_begins_along_a_tangent(heading: float, side: int) -> None:
-    turn = cmath.rect(1.0, heading)
-    start, end = (-2 + 0.3j * side) * turn, (3 + 0.1j * side) * turn
-    point = way_round(start, end, 0.8)
-    assert abs(point) == pytest.approx(0.8)
-    assert (point / (start - point)).real == pytest.approx(0.0, abs=1e-9)
-    assert (point / turn).imag * side > 0
-
-
 def test_a_way_that_is_clear_is_left_alone() -> None:
     assert way_round(-3 + 1j, 3 + 1j, 0.75) == 3 + 1j
     assert way_round(-3 + 0j, -1.2 + 0j, 0.75) == -1.2
