@@ -161,9 +161,10 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         heading = pair(row, at.neighbour_heading + k) * me.heading
         mate.heading, mate.velocity = heading, scaled(heading, row[at.neighbour_speed + k])
         mate.turn = row[at.neighbour_turn_rate + k]
-        m = at.neighbour_message + k
-        mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
-        mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
+        if at.message_size >= MESSAGE_SIZE:
+            m = at.neighbour_message + k
+            mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
+            mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
 
 
 @compiled

@@ -103,11 +103,9 @@ def move(team: Team, me: Record, mates: Records) -> None:
         if me.task == FLOCKING:
             follow(team, me, mates)
         else:
-            leader = place_by(team, me, mates[me.leader], 0)
-            slot = steering.slot_velocity(
-                vector(leader.speed, leader.theta), leader.frame_rate, leader.place - leader.position
-            )
-            way = leader.place - me.position
+            ref = place_by(team, me, mates[me.leader], 0)
+            slot = steering.slot_velocity(vector(ref.speed, ref.theta), ref.frame_rate, ref.place - ref.position)
+            way = ref.place - me.position
             want(me, steering.approach_velocity(way, slot, _FULL_SPEED, me.max_speed, me.acceleration), 0.0)
     elif settings.guidance == PNGL:
         pursue(team, me)
@@ -187,14 +185,14 @@ def pursue(team: Team, me: Record) -> None:
 # --- following -----------------------------------------------------------------------------------
 
 
-class Leader(NamedTuple):
-    """A team-mate in its slot, and the place in the formation that a follower has by it."""
+class Reference(NamedTuple):
+    """A team-mate that a follower keeps its place by, as it moves now."""
 
     position: complex
     speed: float
     theta: float
     place: complex
-    """Of the follower."""
+    """Where the follower is wanted."""
     frame: float
     """Heading (rad) of the frame that the formation is kept in: the mate's own (figure 6), or the slot frame."""
     frame_rate: float
@@ -202,7 +200,7 @@ class Leader(NamedTuple):
 
 
 @compiled
-def place_by(team: Team, me: Record, mate: Record, slot: int) -> Leader:
+def place_by(team: Team, me: Record, mate: Record, slot: int) -> Reference:
     """Return a team-mate as it moves now, and the own place by one in its ``slot``.
 
     A mate that has been silent for too long counts as stopped. In the first step, the mate is
@@ -218,7 +216,7 @@ def place_by(team: Team, me: Record, mate: Record, slot: int) -> Leader:
         frame, rate = angle_of(me.frame), float(me.psi_rate)
     position, _ = mate_now(team, me, mate)
     place = position + (team.slots[me.slot] - team.slots[slot]) * vector(1.0, frame)
-    return Leader(position, speed, theta, place, frame, rate)
+    return Reference(position, speed, theta, place, frame, rate)
 
 
 @compiled
@@ -228,16 +226,16 @@ def demand_by(team: Team, me: Record, mate: Record, slot: int) -> tuple[l_phi.De
     c_j is wanted where it lies when the robot is in its place, and heads as one does there.
     """
     settings, offset = team.settings, team.settings.point_offset
-    leader = place_by(team, me, mate, slot)
-    velocity, arm = vector(leader.speed, leader.theta), leader.place - leader.position
-    heading = steering.slot_heading(velocity, leader.frame_rate, arm, leader.frame)
-    l_now, angle = guidance.line_of_sight(leader.position, me.position + scaled(me.heading, offset))
-    l_d, wanted = guidance.line_of_sight(leader.position, leader.place + vector(offset, heading))
+    ref = place_by(team, me, mate, slot)
+    velocity, arm = vector(ref.speed, ref.theta), ref.place - ref.position
+    heading = steering.slot_heading(velocity, ref.frame_rate, arm, ref.frame)
+    l_now, angle = guidance.line_of_sight(ref.position, me.position + scaled(me.heading, offset))
+    l_d, wanted = guidance.line_of_sight(ref.position, ref.place + vector(offset, heading))
     demand = l_phi.l_phi_demand(
-        l_phi.Polar(l_now, wrap(angle - leader.theta)),
-        l_phi.Polar(l_d, wrap(wanted - leader.theta)),
-        leader.speed,
-        leader.frame_rate,
+        l_phi.Polar(l_now, wrap(angle - ref.theta)),
+        l_phi.Polar(l_d, wrap(wanted - ref.theta)),
+        ref.speed,
+        ref.frame_rate,
         l_phi.sampled_rate(settings.alpha_1, me.dt),
         l_phi.sampled_rate(settings.alpha_2, me.dt),
     )
