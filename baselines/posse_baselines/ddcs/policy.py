@@ -27,7 +27,7 @@ from posse_baselines.ddcs.memory import (
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.ddcs.step import carry_out, correct, plan
-from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations, message_size_of
+from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations
 
 
 @dataclass
@@ -106,7 +106,7 @@ class DDCS(OwnArrays, BasePolicy):
         Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
         give the actions of :meth:`act`.
         """
-        size = 2 + message_size_of(memory.layout)
+        size = 2 + memory.layout.scenario.message_size
         return self._over_worlds(_carry_out, observations, memory, size, corrections), memory
 
     def _over_worlds(
@@ -152,11 +152,6 @@ class DDCS(OwnArrays, BasePolicy):
         notes["estimate"] = np.stack([me["target"].real, me["target"].imag, me["target_theta"]], axis=-1)
         notes["estimate_age"] = np.where(me["known"] != 0, me["fix_age"], np.float32(-1.0))
         return notes
-
-    def leaders(self, memory: Memory) -> npt.NDArray[Any]:
-        """Return the leader of each tracker, (E, N), -1 for none, as a view."""
-        leaders: npt.NDArray[Any] = memory.minds.me["leader"]
-        return leaders
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
