@@ -12,13 +12,13 @@ from typing import Final
 
 from posse.numeric import compiled
 
-TURN: Final = 2.0 * math.pi
+_TURN: Final = 2.0 * math.pi
 
 
 @compiled
 def wrap(angle: float) -> float:
     """Return the same direction (rad) as an angle in (-π, π]."""
-    return angle - TURN * math.ceil((angle - math.pi) / TURN)
+    return angle - _TURN * math.ceil((angle - math.pi) / _TURN)
 
 
 @compiled

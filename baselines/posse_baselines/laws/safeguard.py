@@ -21,11 +21,9 @@ NEAR: Final = 3.0
 """m. Objects farther away are no danger yet."""
 WALLS: Final = np.array((1.0, -1.0, 1.0j, -1.0j))
 """Outward normals of the walls."""
-LOOK_AHEAD: Final = (0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25)
-"""Time steps of a simulated velocity, s."""
 
-_STEPS: Final = np.array(LOOK_AHEAD)
-_HORIZON: Final = sum(LOOK_AHEAD)
+_STEPS: Final = np.array((0.1, 0.1, 0.1, 0.15, 0.15, 0.2, 0.2, 0.25, 0.25))  # of a simulated velocity, s
+_HORIZON: Final = sum(_STEPS.tolist())
 _SPEED_LEVELS: Final = np.array((1.0, 0.5))  # shares of the greatest speed, each tried in all directions
 # From the wanted direction outwards, alternating right and left.
 _DIRECTIONS: Final = 16
