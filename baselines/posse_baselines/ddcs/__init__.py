@@ -1,16 +1,13 @@
 """The paper's Distributed Decision Control System (DDCS): three layers, four tasks.
 
-====================  =====================================================================================
+====================  ===============================================================================================
 layer                 where it is
-====================  =====================================================================================
+====================  ===============================================================================================
 monitoring            :mod:`~posse_baselines.ddcs.monitoring`: an estimate of the target, a table of team-mates
-target tracking       :mod:`~posse_baselines.ddcs.tasks`, :mod:`~posse_baselines.ddcs.leadership`,
-                      :mod:`~posse_baselines.ddcs.slots`, and the motion of each task:
-                      :mod:`~posse_baselines.ddcs.searching`, :mod:`~posse_baselines.ddcs.motion` (guided by the
-                      target), :mod:`~posse_baselines.ddcs.following` (on a leader)
-motor actuation       :mod:`~posse_baselines.ddcs.surroundings`, :mod:`~posse_baselines.ddcs.detour`, then
-                      :mod:`posse_baselines.laws.safeguard`
-====================  =====================================================================================
+target tracking       :mod:`~posse_baselines.ddcs.roles`: leader and slots; :mod:`~posse_baselines.ddcs.motion`: the
+                      four tasks and their laws; :mod:`~posse_baselines.ddcs.searching`
+motor actuation       :mod:`~posse_baselines.ddcs.surroundings`, then :mod:`posse_baselines.laws.safeguard`
+====================  ===============================================================================================
 
 :mod:`~posse_baselines.ddcs.baseline` says what the baseline PNGL + l-φ is; :mod:`~posse_baselines.ddcs.step` is one
 control step of one tracker, in order.

@@ -9,16 +9,17 @@ everyone, target unknown         explores what the team has not covered yet     
 leader, far (converging)         PNGL, θ = K σ + c, at full speed: (5), (6), (12)        ``motion.pursue``,
                                                                                          ``laws.guidance``
 leader, near (flocking)          PNGL, the speed of (13) with a correction of the range  ``motion.pursue``
-follower, far (converging)       intercepts its place on the leader at full speed        ``laws.steering``
-follower, near (flocking)        l-φ on the leader, figure 6                             ``following.on_leader``,
+follower, far (converging)       intercepts its place on the leader at full speed        ``motion.move``,
+                                                                                         ``laws.steering``
+follower, near (flocking)        l-φ on the leader, figure 6                             ``motion.follow``,
                                                                                          ``laws.l_phi``
-follower, leader exchanged       holds the flock's course until it hears the new leader  ``motion.wanted_motion``
-everyone, always                 regulates its heading, section 3.3; avoids contact      ``laws.heading``,
+everyone, leader exchanged       holds the flock's course until it hears the new leader  ``motion.move``
+everyone, always                 regulates its heading, section 3.3; avoids contact      ``laws.guidance``,
                                                                                          ``laws.safeguard``
 ===============================  ======================================================  =======================
 
-The leader is the tracker nearest to the target (nearest-neighbour rule, :mod:`~posse_baselines.ddcs.leadership`); it
-takes the first slot, and the others take slots by least total time (:mod:`~posse_baselines.ddcs.slots`).
+The leader is the tracker nearest to the target (nearest-neighbour rule); it takes the first slot, and the
+others take slots by least total time (:mod:`~posse_baselines.ddcs.roles`).
 """
 
 from __future__ import annotations

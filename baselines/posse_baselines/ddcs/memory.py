@@ -1,12 +1,12 @@
 """What a team knows in common, and the memory of its trackers, as records that compiled code reads by name.
 
 Functions of the DDCS take ``team`` (:class:`Team`), ``me`` (:data:`MIND`, the tracker that decides), ``mates``
-((N,) :data:`MATE`, by number) and, where they read the observation, its ``row`` (F,).
+((N,) :data:`MATE`, by number) and, where they read the observation, its ``row`` (F,). Positions (m), velocities (m/s)
+and headings are complex numbers (:mod:`~posse_baselines.laws.geometry`), in common axes unless said otherwise.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -14,14 +14,14 @@ import numpy.typing as npt
 
 from posse import ObservationLayout
 from posse.numeric import MOST_THREADS, FloatArray, Record, Records, compiled
-from posse.rules import beam_directions, slot_records
+from posse.rules import beam_directions
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
-from posse_baselines.laws.heading import BODY
+from posse_baselines.laws.guidance import BODY
 from posse_baselines.laws.offsets import constants_of, offsets_of
 from posse_baselines.laws.safeguard import DISC, PLAYS
 
-_F, _I = np.float32, np.int32
+_F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
 _UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
@@ -35,20 +35,27 @@ class Team(NamedTuple):
     """:data:`~posse_baselines.laws.offsets.CONSTANTS`: robots and arena."""
     settings: Record
     """:data:`~posse_baselines.ddcs.settings.SETTINGS`."""
-    slots: Records
-    """(N,) position of each slot in the slot frame, m."""
+    slots: npt.NDArray[np.complex64]
+    """(N,) place of each slot in the slot frame, m."""
     outermost: float
     """Distance of the outermost slot from the target, m."""
-    beams: FloatArray
-    """(2, S) cosine and sine of each sonar beam's direction."""
+    beams: npt.NDArray[np.complex64]
+    """(S,) direction of each sonar beam in the robot's own axes."""
 
 
 def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     """Return what a team has in common; ``at``, ``world`` and ``settings`` are arrays of one record."""
     scenario = layout.scenario
-    outermost = max(math.hypot(x, y) for x, y in scenario.slot_offsets)
-    at, world, played = offsets_of(layout), constants_of(scenario), settings_record(settings)
-    return Team(at, world, played, slot_records(scenario), outermost, beam_directions(scenario))
+    slots = [complex(*slot) for slot in scenario.slot_offsets]
+    cosines, sines = beam_directions(scenario)
+    return Team(
+        offsets_of(layout),
+        constants_of(scenario),
+        settings_record(settings),
+        np.array(slots, np.complex64),
+        max(map(abs, slots)),
+        (cosines + 1j * sines).astype(np.complex64),
+    )
 
 
 class Work(NamedTuple):
@@ -84,34 +91,26 @@ MIND, MIND_AT_START = _fields(
     ("step", _I, 0),  # control steps since the episode began
     # this robot, from the observation of this step; heading, motion and limits are those of BODY
     ("number", _I, 0),
-    ("x", np.float64, 0),
-    ("y", np.float64, 0),
-    *((name, np.float64, 0) for name in BODY.names or ()),
-    # the target, as it was at the newest fix; common frame
+    ("position", np.complex128, 0),
+    *((name, BODY[name], 0) for name in BODY.names or ()),
+    # the target, as it was at the newest fix
     ("fix_step", _I, -1),  # own step of that fix; -1: none yet
-    ("fix_x", _F, 0),
-    ("fix_y", _F, 0),
+    ("fix", _C, 0),  # estimated position
+    ("raw", _C, 0),  # position by the fix alone
     ("fix_theta", _F, 0),
     ("fix_psi", _F, 0),
     ("target_speed", _F, 0),  # estimated speed, m/s
     ("target_turn", _F, 0),  # estimated turn rate, rad/s
+    ("target_mean", _C, 0),  # mean velocity
     ("speed_known", _I, 0),  # 1: the speed has been measured
-    ("raw_x", _F, 0),  # the fix itself, before it was blended
-    ("raw_y", _F, 0),
-    ("mean_vx", _F, 0),  # mean velocity, m/s
-    ("mean_vy", _F, 0),
     # the target, as it is taken to be now
-    ("target_x", _F, 0),
-    ("target_y", _F, 0),
+    ("target", _C, 0),  # position
     ("target_theta", _F, 0),
-    ("target_vx", _F, 0),  # velocity, m/s
-    ("target_vy", _F, 0),
+    ("target_velocity", _C, 0),
     ("psi_rate", _F, 0),  # turn rate of the slot frame, rad/s
-    ("frame_cos", _F, 0),  # heading of the slot frame
-    ("frame_sin", _F, 0),
+    ("frame", _C, 0),  # heading of the slot frame
     ("fix_age", _F, 0),  # s
     ("known", _I, 0),  # 1: there is an estimate that is not too old
-    ("sees", _I, 0),  # 1: its own sensor has the target
     ("horizon", _F, 0),  # distance within which every team-mate that is heard is listed, m
     ("usual_gap", _F, 0),  # about the longest silence of a team-mate lately, s
     ("usual_age", _F, 0),  # about the usual age of the fix, s
@@ -119,14 +118,11 @@ MIND, MIND_AT_START = _fields(
     ("task", _I, 0),
     ("slot", _I, -1),  # -1: none
     ("taken", np.uint64, 0),  # bit set of slots in which the sonar detected a robot not heard
-    ("error", _F, -1),  # distance from its place (PNGL: excess of the range), m; -1: it has none
-    ("pursues", _I, 0),  # 1: under PNGL
     ("closing", _I, 0),  # 1: the law itself, not the safeguard, keeps the range to the target
     ("side", _I, 0),  # of the last detour: 1 left, -1 right
     ("side_step", _I, 0),  # own step of that detour
     # the tracking layer's result; float64, so that storing it changes no action
-    ("wish_x", np.float64, 0),  # wanted velocity, common frame, m/s
-    ("wish_y", np.float64, 0),
+    ("wish", np.complex128, 0),  # wanted velocity
     ("wish_speed", np.float64, 0),  # its command: m/s, rad/s
     ("wish_omega", np.float64, 0),
     # leadership
@@ -137,25 +133,20 @@ MIND, MIND_AT_START = _fields(
     ("confirmed", _I, 0),  # 0: the leader has not been heard of since it was appointed
     ("exchanges", _I, 0),  # times that the lead passed to another, as far as this one knows
     # searching
-    ("goal_x", _F, 0),
-    ("goal_y", _F, 0),
+    ("goal", _C, 0),
     ("goal_step", _I, -1),  # own step at which the goal was chosen; -1: there is none
     ("lost_step", _I, -1),  # when the target was lost; -1: never seen yet
-    ("area_x", _F, 0),  # middle of the area that is searched
-    ("area_y", _F, 0),
+    ("area", _C, 0),  # middle of the area that is searched
 )
 """Memory of one tracker, and its value at the start of an episode."""
 
 MATE, MATE_AT_START = _fields(
     ("step", _I, -1),  # own step at which it sent what follows; -1: never heard
-    ("x", _F, 0),
-    ("y", _F, 0),
-    ("speed_x", _F, 0),
-    ("speed_y", _F, 0),
-    ("heading_cos", _F, 0),
-    ("heading_sin", _F, 0),
-    ("turn", _F, 0),  # turn rate, rad/s
     ("fresh", _I, 0),  # 1: heard in this step
+    ("position", _C, 0),
+    ("velocity", _C, 0),
+    ("heading", _C, 0),
+    ("turn", _F, 0),  # turn rate, rad/s
     ("task", _I, -1),
     ("leader", _I, -1),
     ("term", _I, -1),
@@ -168,13 +159,30 @@ GRID: Final = 16
 """Cells of a tracker's map of covered areas, along each axis."""
 
 
+class Minds(NamedTuple):
+    """The memory of a team of N trackers in each of E worlds."""
+
+    team: Team
+    me: Records
+    """(E, N) :data:`MIND`."""
+    mates: Records
+    """(E, N, N) :data:`MATE`, the second N by the mate's number."""
+    seen: npt.NDArray[np.uint16]
+    """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
+
+
+@compiled
+def pair(row: FloatArray, at: int) -> complex:
+    """Return the vector whose two components stand at a place of an observation."""
+    return complex(row[at], row[at + 1])
+
+
 @compiled
 def read_body(team: Team, me: Record, row: FloatArray) -> None:
     """Read the robot's number, pose, motion and limits from its observation (F,), once a step."""
     at = team.at
     me.number = int(row[at.number])
-    me.x, me.y = row[at.position], row[at.position + 1]
-    me.heading_cos, me.heading_sin = row[at.heading], row[at.heading + 1]
+    me.position, me.heading = pair(row, at.position), pair(row, at.heading)
     me.speed, me.omega = row[at.speed], row[at.turn_rate]
     me.max_speed, me.max_omega = row[at.max_speed], row[at.max_turn_rate]
     me.acceleration, me.turn_acceleration = _UNLIMITED, _UNLIMITED

@@ -10,27 +10,30 @@ import numpy as np
 import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import BoolArray, FloatArray, OwnArrays, Records, over_worlds
-from posse_baselines.ddcs.belief import BELIEF_SIZE
-from posse_baselines.ddcs.memory import GRID, MATE, MATE_AT_START, MIND, MIND_AT_START, Team, team_of, work_for
-from posse_baselines.ddcs.messages import MESSAGE_SIZE
+from posse.numeric import BoolArray, FloatArray, OwnArrays, kernel, over_worlds
+from posse_baselines.ddcs.belief import BELIEF_SIZE, write_belief
+from posse_baselines.ddcs.memory import (
+    GRID,
+    MATE,
+    MATE_AT_START,
+    MIND,
+    MIND_AT_START,
+    Minds,
+    Team,
+    Work,
+    team_of,
+    work_for,
+)
+from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
-from posse_baselines.ddcs.step import carry_out_all, propose_all, write_beliefs
+from posse_baselines.ddcs.step import carry_out, correct, plan
 from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations
 
 
 @dataclass
-class _Minds(OwnArrays):
-    """The memory of a team in each of E worlds."""
-
+class _Memory(OwnArrays):
     layout: ObservationLayout
-    team: Team
-    minds: Records
-    """(E, N) :data:`~posse_baselines.ddcs.memory.MIND`."""
-    mates: Records
-    """(E, N, N) :data:`~posse_baselines.ddcs.memory.MATE`, the second N by the mate's number."""
-    seen: npt.NDArray[np.uint16]
-    """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
+    minds: Minds
 
 
 class DDCS(OwnArrays, BasePolicy):
@@ -69,25 +72,25 @@ class DDCS(OwnArrays, BasePolicy):
         scenario = layout.scenario
         n = scenario.num_trackers
         cells = GRID * GRID if math.isfinite(scenario.sensing_range) else 0
-        memory = _Minds(
-            layout,
+        minds = Minds(
             team_of(layout, self.settings_for(scenario)),
             np.empty((num_worlds, n), MIND),
             np.empty((num_worlds, n, n), MATE),
             np.empty((num_worlds, n, cells), np.uint16),
         )
+        memory = _Memory(layout, minds)
         return self.restart(memory, np.ones(num_worlds, np.bool_))
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
         """Reset the memory of the worlds of a mask (E,)."""
-        m: _Minds = memory
-        m.minds[mask], m.mates[mask], m.seen[mask] = MIND_AT_START, MATE_AT_START, 0
-        return m
+        minds: Minds = memory.minds
+        minds.me[mask], minds.mates[mask], minds.seen[mask] = MIND_AT_START, MATE_AT_START, 0
+        return memory
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) of every team: :meth:`propose`, then :meth:`carry_out`."""
-        proposals, m = self.propose(observations, memory)
-        return self.carry_out(observations, m, np.zeros_like(proposals))
+        proposals, memory = self.propose(observations, memory)
+        return self.carry_out(observations, memory, np.zeros_like(proposals))
 
     def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the wanted velocities (E, N, 2) of every team, before the safeguard.
@@ -95,14 +98,7 @@ class DDCS(OwnArrays, BasePolicy):
         Ahead and to the left of each tracker, as shares of its greatest speed. The first half of
         :meth:`act`; the second half, :meth:`carry_out`, follows with the same observations.
         """
-        m: _Minds = memory
-        num_worlds, n = m.minds.shape
-        observations = check_observations(self, observations, num_worlds, m.layout)
-        proposals = np.zeros((num_worlds, n, 2), np.float32)
-        over_worlds(
-            propose_all, (m.team, m.minds, m.mates, m.seen, observations, work_for(n), proposals), num_worlds, n
-        )
-        return proposals, m
+        return self._over_worlds(_propose, observations, memory, 2), memory
 
     def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
         """Return the actions (E, N, 2 + m) that realise the wanted velocities plus corrections.
@@ -110,15 +106,21 @@ class DDCS(OwnArrays, BasePolicy):
         Corrections (E, N, 2) are in the unit of :meth:`propose`; the safeguard follows them. Zeros
         give the actions of :meth:`act`.
         """
-        m: _Minds = memory
-        num_worlds, n = m.minds.shape
-        observations = check_observations(self, observations, num_worlds, m.layout)
-        corrections = np.ascontiguousarray(corrections, np.float32)
-        actions = np.zeros((num_worlds, n, 2 + m.layout.scenario.message_size), np.float32)
-        over_worlds(
-            carry_out_all, (m.team, m.minds, m.mates, observations, work_for(n), corrections, actions), num_worlds, n
-        )
-        return actions, m
+        size = 2 + memory.layout.scenario.message_size
+        return self._over_worlds(_carry_out, observations, memory, size, corrections), memory
+
+    def _over_worlds(
+        self, kernel: Any, observations: FloatArray, memory: Memory, size: int, given: FloatArray | None = None
+    ) -> FloatArray:
+        """Return what a kernel writes for each tracker, (E, N, size), over the numbers that are ``given``, if any."""
+        minds: Minds = memory.minds
+        num_worlds, n = minds.me.shape
+        observations = check_observations(self, observations, num_worlds, memory.layout)
+        out = np.zeros((num_worlds, n, size), np.float32)
+        if given is not None:
+            out[..., : given.shape[-1]] = given
+        over_worlds(kernel, (minds, work_for(n), observations, out), num_worlds, n)
+        return out
 
     @property
     def belief_size(self) -> int:
@@ -130,10 +132,9 @@ class DDCS(OwnArrays, BasePolicy):
 
         The order is that of :mod:`posse_baselines.ddcs.belief`.
         """
-        m: _Minds = memory
-        num_worlds, n = m.minds.shape
-        beliefs = np.empty((num_worlds, n, BELIEF_SIZE), np.float32)
-        over_worlds(write_beliefs, (m.team, m.minds, m.mates, m.seen, beliefs), num_worlds, n)
+        minds: Minds = memory.minds
+        beliefs = np.empty((*minds.me.shape, BELIEF_SIZE), np.float32)
+        over_worlds(_believe, (minds, beliefs), *minds.me.shape)
         return beliefs
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -143,23 +144,61 @@ class DDCS(OwnArrays, BasePolicy):
         common frame), ``estimate_age`` (s; -1: there is no estimate). Of the centralized model also
         ``leader`` (-1: none yet), ``term`` and ``exchanges`` (number of leader changes).
         """
-        minds = memory.minds
-        estimate = np.empty((*minds.shape, 3), np.float32)
-        for k, name in enumerate(("target_x", "target_y", "target_theta")):
-            estimate[..., k] = minds[name]
+        me = memory.minds.me
         names = ["task", "slot"]
         if self.settings.model == "centralized":
             names += ["leader", "term", "exchanges"]
-        notes: Annotations = {name: minds[name].copy() for name in names}
-        notes["estimate"] = estimate
-        notes["estimate_age"] = np.where(minds["known"] != 0, minds["fix_age"], np.float32(-1.0))
+        notes: Annotations = {name: me[name].copy() for name in names}
+        notes["estimate"] = np.stack([me["target"].real, me["target"].imag, me["target_theta"]], axis=-1)
+        notes["estimate_age"] = np.where(me["known"] != 0, me["fix_age"], np.float32(-1.0))
         return notes
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
-        m: _Minds = memory
-        arrays: dict[str, npt.NDArray[Any]] = {"seen": m.seen}
-        for name, records in (("minds", m.minds), ("mates", m.mates)):
+        minds: Minds = memory.minds
+        arrays: dict[str, npt.NDArray[Any]] = {"seen": minds.seen}
+        for name, records in (("me", minds.me), ("mates", minds.mates)):
             for field in records.dtype.names or ():
                 arrays[f"{name}.{field}"] = records[field]
         return arrays
+
+
+@kernel
+def _propose(
+    minds: Minds, work: Work, observations: FloatArray, proposals: FloatArray, thread: int, first: int, end: int
+) -> None:
+    """Plan in a share of worlds; write the wanted velocities (E, N, 2), ahead and left, in shares of the top speed."""
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
+    for e in range(first, end):
+        for i in range(observations.shape[1]):
+            me = minds.me[e, i]
+            plan(team, me, minds.mates[e, i], minds.seen[e, i], observations[e, i], mine)
+            own = me.wish * me.heading.conjugate()
+            proposals[e, i, 0], proposals[e, i, 1] = own.real / me.max_speed, own.imag / me.max_speed
+
+
+@kernel
+def _carry_out(
+    minds: Minds, work: Work, observations: FloatArray, actions: FloatArray, thread: int, first: int, end: int
+) -> None:
+    """Carry out the plans of a share of worlds, corrected by what stands in the actions' first two numbers."""
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+    mine = Work(work.cost[thread], work.assigning[thread], work.discs[thread], work.plays[thread])
+    for e in range(first, end):
+        for i in range(observations.shape[1]):
+            me, action = minds.me[e, i], actions[e, i]
+            correct(me, complex(float(action[0]), float(action[1])))
+            carry_out(team, me, minds.mates[e, i], observations[e, i], mine, action)
+
+
+@kernel
+def _believe(minds: Minds, beliefs: FloatArray, thread: int, first: int, end: int) -> None:
+    """Write the beliefs (E, N, BELIEF_SIZE) of a share of worlds."""
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+    for e in range(first, end):
+        for i in range(minds.me.shape[1]):
+            write_belief(team, minds.me[e, i], minds.mates[e, i], minds.seen[e, i], beliefs[e, i])

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse.numeric import Record, Records, compiled
 from posse_baselines.ddcs.memory import GRID, Team
-from posse_baselines.ddcs.monitoring import is_there, mate_now
-from posse_baselines.laws.geometry import length
+from posse_baselines.ddcs.monitoring import is_there, mate_now, silence
+from posse_baselines.laws.geometry import clip, dot, length, scaled
+
+_LOOK_TIME: Final = 0.5  # s; between two updates of the map; least time between two goals
+_LOST_SLOPE: Final = 0.3  # what a cell near a lost target is worth less per metre from its predicted position
 
 
 @compiled
-def mark_seen(team: Team, me: Record, seen: npt.NDArray[np.uint16], x: float, y: float, step: int) -> None:
-    """Mark the cells of a map (GRID²,) covered by a tracker at (x, y)."""
+def mark_seen(team: Team, me: Record, seen: npt.NDArray[np.uint16], position: complex) -> None:
+    """Mark the cells of a map (GRID²,) covered by a tracker as covered now."""
     world = team.world
     # In cells from the map's corner; the centre of cell i is at i + 0.5.
     scale = GRID / (2.0 * world.area)
-    x, y, reach = (x - me.area_x + world.area) * scale, (y - me.area_y + world.area) * scale, world.sight * scale
+    x, y = (position.real - me.area.real + world.area) * scale, (position.imag - me.area.imag + world.area) * scale
+    reach = world.sight * scale
     for i in range(max(0, math.floor(x - reach)), min(GRID, math.floor(x + reach) + 1)):
         # The cells with centres in range are contiguous in each row.
         square = reach * reach - (i + 0.5 - x) ** 2
@@ -29,16 +34,15 @@ def mark_seen(team: Team, me: Record, seen: npt.NDArray[np.uint16], x: float, y:
         first = max(0, math.ceil(y - half - 0.5))
         last = min(GRID - 1, math.floor(y + half - 0.5))
         for k in range(i * GRID + first, i * GRID + last + 1):
-            seen[k] = step + 1
+            seen[k] = me.step + 1
 
 
 @compiled(out_of_line=True)
 def begin_search(team: Team, me: Record, seen: npt.NDArray[np.uint16]) -> None:
     """Mark the target as lost; on the open plane, search around its predicted position."""
-    world = team.world
     me.lost_step, me.goal_step = me.step, -1
-    if world.walled == 0 and me.fix_step >= 0:
-        me.area_x, me.area_y = me.target_x, me.target_y
+    if team.world.walled == 0 and me.fix_step >= 0:
+        me.area = me.target
         for k in range(len(seen)):
             seen[k] = 0
 
@@ -46,30 +50,29 @@ def begin_search(team: Team, me: Record, seen: npt.NDArray[np.uint16]) -> None:
 @compiled
 def look_around(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> None:
     """Update the map of areas covered by this tracker and those it hears."""
-    world, settings = team.world, team.settings
-    if len(seen) == 0 or me.step % max(1, round(settings.look_time / world.dt)) != 0:
+    if len(seen) == 0 or me.step % max(1, round(_LOOK_TIME / team.world.dt)) != 0:
         return
-    mark_seen(team, me, seen, me.x, me.y, me.step)
+    mark_seen(team, me, seen, me.position)
     for j in range(len(mates)):
-        if mates[j].step >= 0 and (me.step - mates[j].step) * world.dt <= settings.lost_after:
-            mark_seen(team, me, seen, mates[j].x, mates[j].y, me.step)
+        if mates[j].step >= 0 and silence(team, me, mates[j]) <= team.settings.lost_after:
+            mark_seen(team, me, seen, mates[j].position)
 
 
 @compiled(out_of_line=True)
-def wander(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> tuple[float, float]:
-    """Return the velocity (m/s) of a tracker that searches from (x, y)."""
-    world, settings = team.world, team.settings
-    dx, dy = me.goal_x - me.x, me.goal_y - me.y
-    near = settings.goal_reached * min(world.sight, 4.0)
-    time = (me.step - me.goal_step) * world.dt
-    arrived = dx * dx + dy * dy < near * near and time > settings.look_time
+def wander(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> complex:
+    """Return the velocity (m/s) of a tracker that searches."""
+    settings = team.settings
+    way = me.goal - me.position
+    near = settings.goal_reached * min(team.world.sight, 4.0)
+    time = (me.step - me.goal_step) * team.world.dt
+    arrived = dot(way, way) < near * near and time > _LOOK_TIME
     if me.goal_step < 0 or arrived or time > settings.goal_time:
         choose_goal(team, me, mates, seen)
-        dx, dy = me.goal_x - me.x, me.goal_y - me.y
-    distance = length(dx, dy)
+        way = me.goal - me.position
+    distance = length(way)
     if distance < 1e-6:
-        return 0.0, 0.0
-    return me.max_speed * dx / distance, me.max_speed * dy / distance
+        return 0j
+    return complex(me.max_speed * way.real / distance, me.max_speed * way.imag / distance)
 
 
 @compiled
@@ -78,12 +81,12 @@ def age_of(team: Team, me: Record, seen: npt.NDArray[np.uint16], i: int, j: int,
 
     With ``lost``, a cell not covered since the target was lost counts as never covered.
     """
-    world, settings = team.world, team.settings
+    stale = float(team.settings.stale_after)
     # Signed: uncompiled, a cell that was never covered would count as one covered last.
     looked = np.int64(seen[i * GRID + j]) - 1 if len(seen) > 0 else -1
     if looked < 0 or (lost and looked < me.lost_step):
-        return float(settings.stale_after)
-    return min(float((me.step - looked) * world.dt), float(settings.stale_after))
+        return stale
+    return min(float((me.step - looked) * team.world.dt), stale)
 
 
 @compiled
@@ -99,44 +102,45 @@ def age_around(team: Team, me: Record, seen: npt.NDArray[np.uint16], i: int, j: 
 @compiled
 def choose_goal(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> None:
     """Set the goal: near, long not covered, and nearer to this tracker than to any other."""
-    at, world, settings = team.at, team.world, team.settings
+    world, settings = team.world, team.settings
     cell = 2.0 * world.area / GRID
     inner = world.area - min(1.5, 0.5 * world.area)
-    best = -1e9
-    reach = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
-    me.goal_x, me.goal_y, me.goal_step = 0.0, 0.0, me.step
+    around = max(1, round(0.7 * world.sight / cell))
+    lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
     heard = 0
     for m in range(len(mates)):
         if m != me.number and is_there(team, me, mates[m]):
             heard += 1
-    deaf = 1.0 - heard / max(1.0, min(at.neighbours, len(mates) - 1.0))
-    around = max(1, round(0.7 * world.sight / cell))
+    deaf = 1.0 - heard / max(1.0, min(team.at.neighbours, len(mates) - 1.0))
+    best, me.goal, me.goal_step = -1e9, 0j, me.step
     for i in range(GRID):
         for j in range(GRID):
-            cx = me.area_x + min(max((i + 0.5) * cell - world.area, -inner), inner)
-            cy = me.area_y + min(max((j + 0.5) * cell - world.area, -inner), inner)
+            from_middle = complex(
+                clip((i + 0.5) * cell - world.area, -inner, inner), clip((j + 0.5) * cell - world.area, -inner, inner)
+            )
+            place = me.area + from_middle
             bonus, lost = 0.0, False
             if me.fix_step >= 0:
                 # Near the last known position.
-                away = length(cx - me.target_x, cy - me.target_y)
-                if away < reach:
-                    bonus, lost = settings.lost_worth - settings.lost_slope * away, True
+                away = length(place - me.target)
+                if away < lost_within:
+                    bonus, lost = settings.lost_worth - _LOST_SLOPE * away, True
             age = age_of(team, me, seen, i, j, lost)
             if settings.swath > 0.0:
                 age += settings.swath * (age_around(team, me, seen, i, j, around) - age)
             # A tracker that hears few others stays near the middle, where a report is likely heard.
-            bonus -= settings.middle_weight * deaf * length(cx - me.area_x, cy - me.area_y)
-            way = length(cx - me.x, cy - me.y)
-            turn = 1.0 - ((cx - me.x) * me.heading_cos + (cy - me.y) * me.heading_sin) / max(way, 1e-6)
+            bonus -= settings.middle_weight * deaf * length(place - me.area)
+            way = length(place - me.position)
+            turn = 1.0 - dot(place - me.position, me.heading) / max(way, 1e-6)
             value = settings.age_weight * age + bonus - way - settings.turn_weight * turn
             if value <= best:
                 continue  # team-mates can only reduce it
             for m in range(len(mates)):
                 if m != me.number and is_there(team, me, mates[m]):
-                    mx, my = mate_now(team, me, mates[m])
                     # A team-mate's goal counts more than its position.
-                    other = length(cx - mx - 2.0 * mates[m].speed_x, cy - my - 2.0 * mates[m].speed_y)
+                    position, _ = mate_now(team, me, mates[m])
+                    other = length(place - position - scaled(mates[m].velocity, 2.0))
                     if other < way:
                         value -= way - other
             if value > best:
-                best, me.goal_x, me.goal_y = value, cx, cy
+                best, me.goal = value, place

@@ -23,25 +23,10 @@ NO_DEVIATION: Final = DEVIATIONS.index("none")
 OF_OCCUPANT: Final = DEVIATIONS.index("occupant")
 L_L: Final = FOLLOWER_LAWS.index("l-l")
 BY_SLOT_FRAME: Final = FOLLOWER_FRAMES.index("slot-frame")
-SEARCHING: Final = 0
-CONVERGING: Final = 1
-FLOCKING: Final = 2
-EXCHANGING: Final = 3
 TASKS: Final = ("searching", "converging", "flocking", "exchange")
-"""The four tasks of section 3.1 (:mod:`posse_baselines.ddcs.tasks`); a tracker's memory holds the position."""
-TRANSITIONS: Final = (
-    "searching>converging",
-    "searching>flocking",
-    "converging>searching",
-    "converging>flocking",
-    "converging>exchange",
-    "flocking>searching",
-    "flocking>converging",
-    "flocking>exchange",
-    "exchange>searching",
-    "exchange>converging",
-    "exchange>flocking",
-)
+"""The four tasks of section 3.1 (:mod:`posse_baselines.ddcs.motion`); a tracker's memory holds the position."""
+SEARCHING, CONVERGING, FLOCKING, EXCHANGING = range(len(TASKS))
+TRANSITIONS: Final = tuple(f"{a}>{b}" for a in TASKS for b in TASKS if a != b and (a, b) != ("searching", "exchange"))
 """Changes of the task that can be forbidden, for ablations."""
 NO_EXCHANGE: Final = ("converging>exchange", "flocking>exchange")
 
@@ -90,24 +75,12 @@ class Settings:
     turn_share: float = tuned(0.0, "", 0.0, 1.0)
     """Share of that turn rate in the slot frame's rate once the frame has caught up with it: 1 is
     exact for a target on a circle, 0 scores better against one that weaves."""
-    way_memory: float = tuned(3.0, "s", 0.5, 10.0)
-    """Decay time constant of the target's speed in an estimate older than 1 s."""
     fix_trust: float = tuned(0.6, "", 0.05, 1.0)
     """Share of a new fix in the estimate of the position."""
-    fix_jump: float = number(1.0, "m", 0.1, 10.0)
-    """A fix farther than this from the estimate replaces it."""
-    unknown_speed: float = number(0.6, "", 0.0, 1.0)
-    """Speed of the target until it has been measured, as a share of the own greatest."""
-    gap_memory: float = number(10.0, "s", 1.0, 100.0)
-    """Time constant of the memory of silences."""
     least_patience: float = tuned(0.3, "s", 0.1, 3.0)
     """A silence shorter than this plus twice the usual one is ignored."""
-    late_fix: float = number(1.0, "s", 0.1, 10.0)
-    """A fix of up to this age is delayed, an older one is lost."""
     lost_after: float = tuned(1.5, "s", 0.3, 5.0)
     """Timeout of a team-mate, and of the leader's pulse."""
-    unseen_memory: float = tuned(2.5, "s", 0.3, 10.0)
-    """The same for team-mates that may have had no place in the observation."""
     target_lost_after: float = tuned(10.0, "s", 1.0, 30.0)
     """A fix older than this is no longer followed: the target is lost."""
 
@@ -128,8 +101,6 @@ class Settings:
     """The same under PNGL, by which the range exceeds the wanted one: the chase begins again."""
 
     # searching
-    look_time: float = number(0.5, "s", 0.1, 5.0)
-    """Time between two updates of the map of covered areas; least time between two goals."""
     goal_time: float = tuned(4.0, "s", 0.5, 20.0)
     """A goal is reconsidered at least this often."""
     goal_reached: float = tuned(0.5, "", 0.1, 1.5)
@@ -147,8 +118,6 @@ class Settings:
     """Growth rate of the area in which a lost target is searched first."""
     lost_worth: float = tuned(6.0, "m", 0.0, 20.0)
     """Distance equivalent to a cell in that area."""
-    lost_slope: float = tuned(0.3, "", 0.0, 2.0)
-    """Its decrease per metre from the predicted position of the target."""
     middle_weight: float = tuned(0.5, "", 0.0, 3.0)
     """Distance equivalent to a metre farther from the middle for a tracker that hears no other."""
 
@@ -157,18 +126,10 @@ class Settings:
     """Time between two assignments."""
     loyalty: float = tuned(0.6, "s", 0.0, 5.0)
     """Least gain in total arrival time for a change of slots."""
-    taken_cost: float = tuned(8.0, "s", 0.0, 30.0)
-    """Cost of a slot in which the sonar detects a robot that is not heard, as arrival time."""
-    taken_memory: float = number(3.0, "s", 0.1, 20.0)
-    """Longest time for which a slot counts as taken after an echo from it."""
     sight_worth: float = tuned(10.0, "s", 0.0, 30.0)
     """Bonus of a slot from which the target is in sight, as arrival time."""
     in_sight: float = tuned(0.95, "", 0.1, 1.0)
     """Share of the sensing range within which a slot counts as seeing the target."""
-    in_place: float = number(0.4, "m", 0.05, 2.0)
-    """Nearer to a slot than this, a tracker is in it."""
-    equally_near: float = number(0.1, "m", 0.0, 1.0)
-    """Difference of two distances below which the lower number has precedence for a slot."""
     close_in_after: float = tuned(0.25, "s", 0.0, 3.0)
     """With a fix older than this, beyond the usual age, the team moves to a ring around the
     predicted position of the target, to see it again."""
@@ -198,10 +159,6 @@ class Settings:
     """α_2 of the l-φ law."""
     point_offset: float = tuned(0.15, "m", 0.05, 0.5)
     """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
-    least_crossing: float = number(0.15, "", 0.01, 0.49)
-    """Sine of the angle, seen from a follower under l-l, between the two robots that it keeps its
-    distances from, below which it keeps its place on the nearer one instead. In its place
-    the sine has to be twice that."""
 
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)
@@ -210,12 +167,8 @@ class Settings:
     """Clearance to the target."""
     age_margin: float = tuned(0.15, "m/s", 0.0, 1.0)
     """Increase of the margin of a team-mate per second of its message's age."""
-    most_age: float = number(0.7, "s", 0.0, 5.0)
-    """Age up to which it increases."""
     echo_margin: float = tuned(0.25, "m", 0.0, 0.6)
     """Clearance to unexplained echoes of the sonar."""
-    forgotten: float = number(30.0, "s", 1.0, 100.0)
-    """Silence after which a team-mate is no longer assumed at its last position."""
 
     def __post_init__(self) -> None:
         check(self)
@@ -233,29 +186,26 @@ SETTINGS: Final[np.dtype[Any]] = np.dtype(
         np.record,
         np.dtype(
             [
-                (field.name, np.float64 if "low" in field.metadata else np.int64)
+                ("forbidden", np.int64, (len(TASKS), len(TASKS)))
+                if field.name == "forbidden"
+                else (field.name, np.float64 if "low" in field.metadata else np.int64)
                 for field in dataclasses.fields(Settings)
             ]
         ),
     )
 )
-"""Settings as the kernels read them; a choice is its position among those allowed, ``forbidden``
-a bit for each transition: 4 times the task before plus the task after."""
+"""Settings as the kernels read them; a choice is its position among those allowed, ``forbidden`` a table of the
+transitions from a task (row) to another."""
 
 
 def settings_record(settings: Settings) -> Records:
     """Return an array of one :data:`SETTINGS`."""
     record = np.zeros(1, SETTINGS)
     for field in dataclasses.fields(settings):
-        value = getattr(settings, field.name)
-        if "choices" in field.metadata:
-            value = field.metadata["choices"].index(value)
-        elif field.name == "forbidden":
-            value = sum(1 << _bit(transition) for transition in set(value))
-        record[field.name] = value
+        value, choices = getattr(settings, field.name), field.metadata.get("choices")
+        if field.name != "forbidden":
+            record[field.name] = choices.index(value) if choices else value
+    for transition in settings.forbidden:
+        before, after = transition.split(">")
+        record["forbidden"][0, TASKS.index(before), TASKS.index(after)] = 1
     return record
-
-
-def _bit(transition: str) -> int:
-    before, after = transition.split(">")
-    return 4 * TASKS.index(before) + TASKS.index(after)

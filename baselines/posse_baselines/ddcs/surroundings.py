@@ -3,77 +3,60 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team
-from posse_baselines.ddcs.monitoring import mate_now, patience
-from posse_baselines.ddcs.slots import slot_place
-from posse_baselines.laws.geometry import length
-from posse_baselines.laws.safeguard import put_disc, put_walls, wall_normal
+from posse_baselines.ddcs.monitoring import mate_now, patience, silence
+from posse_baselines.laws.geometry import cross, dot, length, scaled
+from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls
+from posse_baselines.laws.steering import slot_velocity
 
-_BIT = np.uint64(1)
-_NO_BITS = np.uint64(0)
-_SLOT_ECHO = 0.25  # m; how well an echo has to fit a slot
-_NEAR = 3.0  # m; objects farther away are ignored
-_EXPLAINED = 0.06  # m; an echo this near to the expected one needs no other explanation
+_SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
+_EXPLAINED: Final = 0.06  # m; an echo this near to the expected one needs no other explanation
+_TAKEN_TIME: Final = 3.0  # s; longest time for which a slot counts as taken after an echo from it
+_MOST_AGE: Final = 0.7  # s; of a message, up to which the margin of its sender grows
+_FORGOTTEN: Final = 30.0  # s; silence after which a team-mate is no longer assumed at its last position
 
 
 @compiled
-def wall_explains(team: Team, me: Record, beam_x: float, beam_y: float, reading: float) -> bool:
-    """Return whether a wall explains a sonar reading (m)."""
-    world = team.world
-    for k in range(4):
-        nx, ny = wall_normal(k)
-        away = world.extent - nx * me.x - ny * me.y
-        towards = nx * beam_x + ny * beam_y
-        if away >= _NEAR or towards <= 0.0:
+def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading: float) -> bool:
+    """Return whether one of the known robots (discs), or a wall, explains a sonar reading (m) along a beam."""
+    world, radius, wide_beam = team.world, float(team.world.radius), float(team.world.wide_beam)
+    reach = reading + 2.0 * radius + _EXPLAINED
+    for j in range(len(robots)):
+        place = robots[j].place
+        square = dot(place, place)
+        if square > reach * reach:
             continue
-        if towards < world.wide_beam:
-            away /= towards
-        if reading >= away - world.radius - _EXPLAINED:
+        # A little wider than beam and disc, since the position is not exact.
+        along = dot(place, beam)
+        if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(cross(place, beam)) < radius + 0.1):
             return True
+    if world.walled:
+        for k in range(4):
+            away, towards = world.extent - dot(WALLS[k], me.position), dot(WALLS[k], beam)
+            if away < NEAR and towards > 0.0:
+                away = away / towards if towards < wide_beam else away
+                if reading >= away - radius - _EXPLAINED:
+                    return True
     return False
 
 
 @compiled
-def is_explained(
-    team: Team, me: Record, discs: Records, robots: int, beam_x: float, beam_y: float, reading: float
-) -> bool:
-    """Return whether a known object explains a sonar reading (m).
-
-    One of the ``robots`` that head the list, or a wall. (beam_x, beam_y) is the beam's direction.
-    """
-    world = team.world
-    radius, wide_beam = float(world.radius), float(world.wide_beam)
-    reach = reading + 2.0 * radius + _EXPLAINED
-    for j in range(robots):
-        dx, dy = discs[j].x, discs[j].y
-        square = dx * dx + dy * dy
-        if square > reach * reach:
-            continue
-        # A little wider than beam and disc, since the position is not exact.
-        along, across = dx * beam_x + dy * beam_y, dy * beam_x - dx * beam_y
-        if along >= wide_beam * math.sqrt(square) or (along > 0.0 and abs(across) < radius + 0.1):
-            return True
-    return bool(world.walled) and wall_explains(team, me, beam_x, beam_y, reading)
-
-
-@compiled
-def slot_in_beam(team: Team, me: Record, beam_x: float, beam_y: float, reading: float) -> int:
+def slot_in_beam(team: Team, me: Record, beam: complex, reading: float) -> int:
     """Return the slot whose occupant would give this echo, or -1.
 
     Where not all team-mates have a place in the observation, an echo from a slot is attributed to
     one of them, moving with the formation.
     """
-    world = team.world
     for k in range(len(team.slots)):
-        place_x, place_y, _, _ = slot_place(me, team.slots[k])
-        dx, dy = place_x - me.x, place_y - me.y
-        distance = length(dx, dy)
-        fits = abs(distance - 2.0 * world.radius - reading) < _SLOT_ECHO
-        if fits and dx * beam_x + dy * beam_y >= world.wide_beam * distance:
+        way = me.target + team.slots[k] * me.frame - me.position
+        distance = length(way)
+        fits = abs(distance - 2.0 * team.world.radius - reading) < _SLOT_ECHO
+        if fits and dot(way, beam) >= team.world.wide_beam * distance:
             return k
     return -1
 
@@ -84,52 +67,44 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
     at, world, settings = team.at, team.world, team.settings
     count, two, radius = 0, 2.0 * world.radius, float(world.radius)
     if me.known:
-        dx, dy = me.target_x - me.x, me.target_y - me.y
-        if dx * dx + dy * dy < _NEAR * _NEAR:
+        way = me.target - me.position
+        if dot(way, way) < NEAR * NEAR:
             # In a chase the target is not avoided: the law ends the chase in time.
             reach, margin = (0.0, 0.0) if me.closing else (two, float(settings.target_margin))
-            count = put_disc(discs, count, dx, dy, me.target_vx, me.target_vy, reach, margin)
+            count = put_disc(discs, count, way, me.target_velocity, reach, margin)
     few = at.neighbours < len(mates) - 1  # not all team-mates have a place in the observation
     for j in range(len(mates)):
         mate = mates[j]
-        if j == me.number or mate.step < 0 or (me.step - mate.step) * world.dt > settings.forgotten:
+        age = silence(team, me, mate)
+        if j == me.number or mate.step < 0 or age > _FORGOTTEN:
             continue
-        mx, my = mate_now(team, me, mate)
-        dx, dy = mx - me.x, my - me.y
-        if dx * dx + dy * dy < _NEAR * _NEAR:
-            vx, vy = float(mate.speed_x), float(mate.speed_y)
-            age = (me.step - mate.step) * world.dt
-            if age > patience(team, me):
-                if few and length(dx, dy) < me.horizon:
-                    continue  # there still, it would have a place in the observation
-                vx, vy = 0.0, 0.0
-            margin = settings.margin + settings.age_margin * min(age, settings.most_age)
-            count = put_disc(discs, count, dx, dy, vx, vy, two, margin)
+        position, velocity = mate_now(team, me, mate)
+        way = position - me.position
+        # If it were still there after a silence, it would have a place in the observation.
+        gone = few and age > patience(team, me) and length(way) < me.horizon
+        if dot(way, way) < NEAR * NEAR and not gone:
+            margin = settings.margin + settings.age_margin * min(age, _MOST_AGE)
+            count = put_disc(discs, count, way, velocity, two, margin)
     robots = count
     if world.walled:
-        count = put_walls(discs, count, me.x, me.y, world.extent, _NEAR, world.radius, settings.margin)
+        count = put_walls(discs, count, me.position, world.extent, world.radius, settings.margin)
     strangers = me.known != 0 and few
-    if not strangers or me.step % max(1, round(settings.taken_memory / world.dt)) == 0:
-        me.taken = _NO_BITS
-    farthest = world.sonar_range - _EXPLAINED
+    if not strangers or me.step % max(1, round(_TAKEN_TIME / world.dt)) == 0:
+        me.taken = np.uint64(0)
     for k in range(at.sonar_beams):
         reading = float(row[at.sonar + k])
-        if reading >= farthest:
+        beam = team.beams[k] * me.heading
+        if reading >= world.sonar_range - _EXPLAINED or is_explained(team, me, discs[:robots], beam, reading):
             continue
-        beam_x = team.beams[0, k] * me.heading_cos - team.beams[1, k] * me.heading_sin
-        beam_y = team.beams[1, k] * me.heading_cos + team.beams[0, k] * me.heading_sin
-        if is_explained(team, me, discs, robots, beam_x, beam_y, reading):
+        slot = slot_in_beam(team, me, beam, reading) if strangers else -1
+        if slot >= 0:
+            me.taken |= np.uint64(1) << np.uint64(slot)
+            arm = team.slots[slot] * me.frame
+            velocity = slot_velocity(me.target_velocity, me.psi_rate, arm)
+            count = put_disc(discs, count, me.target + arm - me.position, velocity, two, settings.margin)
             continue
-        if strangers:
-            k_slot = slot_in_beam(team, me, beam_x, beam_y, reading)
-            if k_slot >= 0:
-                me.taken |= _BIT << np.uint64(k_slot)
-                place_x, place_y, arm_x, arm_y = slot_place(me, team.slots[k_slot])
-                vx, vy = me.target_vx - me.psi_rate * arm_y, me.target_vy + me.psi_rate * arm_x
-                count = put_disc(discs, count, place_x - me.x, place_y - me.y, vx, vy, two, settings.margin)
-                continue
         # Its position within the beam is unknown: a disc that fills most of the beam.
         wide = min(0.5, 0.4 * (reading + radius))
-        away = reading + radius + wide
-        count = put_disc(discs, count, away * beam_x, away * beam_y, 0.0, 0.0, wide + radius, settings.echo_margin)
+        place = scaled(beam, reading + radius + wide)
+        count = put_disc(discs, count, place, 0j, wide + radius, settings.echo_margin)
     return count

@@ -28,21 +28,9 @@ def assign(cost: npt.NDArray[Any], rows: int, columns: int, work: npt.NDArray[An
         work: (WORK_ROWS, > columns); in the end ``work[0, i]`` is the column of row i.
     """
     # Rows and columns count from 1 here; 0 means none.
-    answer, row_price, column_price, row_of, path, slack, done = (
-        work[0],
-        work[1],
-        work[2],
-        work[3],
-        work[4],
-        work[5],
-        work[6],
-    )
-    for j in range(columns + 1):
-        column_price[j] = 0.0
-        row_of[j] = 0.0
-        path[j] = 0.0
-    for i in range(rows + 1):
-        row_price[i] = 0.0
+    answer, row_price, column_price, row_of = work[0], work[1], work[2], work[3]
+    path, slack, done = work[4], work[5], work[6]
+    work[1:5] = 0.0
     for i in range(1, rows + 1):
         row_of[0] = i
         j0 = 0

@@ -1,16 +1,8 @@
-"""Angles, lengths, and the geometry of a pair of robots (section 3.2, figure 3).
+"""Vectors of the plane as complex numbers, and angles.
 
-A tracker pursues a target (in a chain of robots, the robot ahead of it). Symbols as in the paper,
-without the indices i (target) and i+1 (tracker), which are written out:
-
-==========  =====  ============================================================
-``r``       m      distance from tracker to target
-``sigma``   rad    angle of the line of sight, from the tracker to the target
-``theta``   rad    a heading
-``delta``   rad    deviation of a heading from the line of sight, ``θ - σ``
-==========  =====  ============================================================
-
-Angles are measured from the positive x-axis and wrapped to (-π, π].
+Positions (m) and velocities (m/s) are complex numbers x + iy, a heading is the unit vector e^(iθ). Thus ``v * heading``
+turns a vector from a robot's own axes (ahead, to the left) into the common ones, ``v * heading.conjugate()`` turns it
+back. Angles (rad) are measured from the positive x-axis.
 """
 
 from __future__ import annotations
@@ -20,26 +12,13 @@ from typing import Final
 
 from posse.numeric import compiled
 
-MIN_RANGE: Final = 1e-3
-"""m. A shorter distance counts as this one where a formula divides by it."""
-
-TURN: Final = 2.0 * math.pi
+_TURN: Final = 2.0 * math.pi
 
 
 @compiled
 def wrap(angle: float) -> float:
     """Return the same direction (rad) as an angle in (-π, π]."""
-    return angle - TURN * math.ceil((angle - math.pi) / TURN)
-
-
-@compiled
-def length(x: float, y: float) -> float:
-    """Return the length of a vector.
-
-    ``math.hypot`` also handles lengths whose square overflows, and rounds the last bit correctly;
-    it is several times slower, and neither is needed here.
-    """
-    return math.sqrt(x * x + y * y)
+    return angle - _TURN * math.ceil((angle - math.pi) / _TURN)
 
 
 @compiled
@@ -49,29 +28,39 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 @compiled
-def line_of_sight(tracker_x: float, tracker_y: float, target_x: float, target_y: float) -> tuple[float, float]:
-    """Return the range r (m, >= 0) and the angle σ (rad, (-π, π]) from tracker to target.
-
-    Where the two coincide, σ is 0.
-    """
-    ahead = target_x - tracker_x
-    aside = target_y - tracker_y
-    return math.hypot(ahead, aside), wrap(math.atan2(aside, ahead))
+def dot(a: complex, b: complex) -> float:
+    """Return the scalar product of two vectors."""
+    return a.real * b.real + a.imag * b.imag
 
 
 @compiled
-def deviation(theta: float, sigma: float) -> float:
-    """Return δ (rad, (-π, π]), the angle from the line of sight to a heading: (1), (2)."""
-    return wrap(theta - sigma)
+def cross(a: complex, b: complex) -> float:
+    """Return the vector product of two vectors: positive where b points to the left of a."""
+    return a.real * b.imag - a.imag * b.real
 
 
 @compiled
-def bearing_rate(
-    r: float, target_speed: float, target_delta: float, tracker_speed: float, tracker_delta: float
-) -> float:
-    """Return dσ/dt (rad/s), the turn rate of the line of sight: (4).
+def length(v: complex) -> float:
+    """Return the length of a vector.
 
-    Finite at every range: one below ``MIN_RANGE`` counts as ``MIN_RANGE``.
+    ``abs`` also handles lengths whose square overflows; it is several times slower.
     """
-    across = target_speed * math.sin(target_delta) - tracker_speed * math.sin(tracker_delta)
-    return across / max(r, MIN_RANGE)
+    return math.sqrt(v.real * v.real + v.imag * v.imag)
+
+
+@compiled
+def angle_of(v: complex) -> float:
+    """Return the direction (rad) of a vector, in [-π, π]."""
+    return math.atan2(v.imag, v.real)
+
+
+@compiled
+def vector(size: float, angle: float) -> complex:
+    """Return the vector of a length and a direction (rad)."""
+    return complex(size * math.cos(angle), size * math.sin(angle))
+
+
+@compiled
+def scaled(v: complex, factor: float) -> complex:
+    """Return a vector times a number; compiled code would multiply by a complex number instead."""
+    return complex(v.real * factor, v.imag * factor)

@@ -1,4 +1,14 @@
-"""The proportional navigation guidance law and its special cases (sections 3.2 and 3.3).
+"""Proportional navigation: the geometry of a pair, the guidance law, heading regulation (sections 3.2 and 3.3).
+
+A tracker pursues a target (in a chain of robots, the robot ahead of it). Symbols as in the paper (figure 3), without
+the indices i (target) and i+1 (tracker), which are written out:
+
+==========  =====  ============================================================
+``r``       m      distance from tracker to target
+``sigma``   rad    angle of the line of sight, from the tracker to the target
+``theta``   rad    a heading
+``delta``   rad    deviation of a heading from the line of sight, ``θ - σ``
+==========  =====  ============================================================
 
 One law, ``θ = K σ + c``, with a tracker's own navigation constant K (0.9 to 1.1; M = K - 1),
 deviation c and range r_d. With the pair (σ_d, θ_d), c = θ_d - K σ_d, it is continuous where
@@ -15,20 +25,72 @@ PNGL as printed, (5)     its own       0
 PNGL that holds a slot   its own       ψ - K σ_d, or the heading of the slot's occupant - K σ_d
 =======================  ============  ========================================================
 
-ψ is the heading of the slot frame, σ_d the line of sight from the slot to the target. The heading
-is regulated first (:mod:`~posse_baselines.laws.heading`), then ω = K dσ/dt + dc/dt: (6), (12).
+ψ is the heading of the slot frame, σ_d the line of sight from the slot to the target. The heading is regulated first:
+one that does not obey the law yet is turned by the shorter turn, at the limit. Then ω = K dσ/dt + dc/dt: (6), (12).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
-from posse.numeric import compiled
-from posse_baselines.laws.geometry import clip, wrap
+import numpy as np
+
+from posse.numeric import FloatArray, Record, compiled
+from posse_baselines.laws.geometry import angle_of, clip, dot, length, wrap
 
 MIN_COSINE: Final = 0.6
 """With a smaller cosine of its deviation a tracker hardly changes the range."""
+
+_MIN_RANGE: Final = 1e-3  # m; a shorter one counts as this one where it is divided by
+_BRAKING_SHARE: Final = 0.8
+_STANDSTILL: Final = 1e-3  # m/s
+
+BODY: Final[np.dtype[Any]] = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("heading", np.complex128),
+                ("speed", np.float64),  # m/s
+                ("omega", np.float64),  # turn rate, rad/s
+                ("max_speed", np.float64),
+                ("max_omega", np.float64),
+                ("acceleration", np.float64),  # greatest change of the speed, m/s²
+                ("turn_acceleration", np.float64),  # greatest change of the turn rate, rad/s²
+                ("dt", np.float64),  # control step, s
+            ],
+            align=True,
+        ),
+    )
+)
+"""A robot's present motion and its limits."""
+
+
+@compiled
+def line_of_sight(tracker: complex, target: complex) -> tuple[float, float]:
+    """Return the range r (m, >= 0) and the angle σ (rad, (-π, π]) from tracker to target.
+
+    Where the two coincide, σ is 0.
+    """
+    way = target - tracker
+    return math.hypot(way.real, way.imag), wrap(angle_of(way))
+
+
+@compiled
+def deviation(theta: float, sigma: float) -> float:
+    """Return δ (rad, (-π, π]), the angle from the line of sight to a heading: (1), (2)."""
+    return wrap(theta - sigma)
+
+
+@compiled
+def bearing_rate(r: float, target: complex, tracker: complex) -> float:
+    """Return dσ/dt (rad/s), the turn rate of the line of sight: (4).
+
+    The velocities (m/s) of target and tracker are v e^(iδ), along the line of sight and to its left. Finite at every
+    range.
+    """
+    return (target.imag - tracker.imag) / max(r, _MIN_RANGE)
 
 
 @compiled
@@ -52,14 +114,7 @@ def lawful_rate(navigation_constant: float, sigma_rate: float, frame_rate: float
 
 @compiled
 def maintenance_speed(
-    target_speed: float,
-    target_delta: float,
-    tracker_delta: float,
-    r: float,
-    wanted_range: float,
-    frame_rate: float,
-    range_gain: float,
-    max_speed: float,
+    target: complex, delta: float, r: float, wanted_range: float, frame_rate: float, range_gain: float, max_speed: float
 ) -> float:
     """Return the tracker's speed (m/s, [0, max_speed]) that brings the range to the wanted one.
 
@@ -68,14 +123,50 @@ def maintenance_speed(
         v = (v_i cos(θ_i - σ) + k_r (r - r_d)) / cos(δ)
 
     so that dr/dt = k_r (r_d - r) wherever no limit is hit; δ is the tracker's deviation (M σ in the
-    paper). ``range_gain`` k_r is in 1/s, and has to stay below 1 / control step. It holds for a
-    tracker that moves away from the target too (cos δ < 0), where the target moves towards it.
-    Where cos δ is small, (13) is ill-conditioned: there the speed is the part along the heading of
-    the velocity that keeps range and bearing, the bearing turning at ``frame_rate`` (rad/s).
+    paper), ``target`` the target's velocity, v_i e^(i(θ_i - σ)). ``range_gain`` k_r is in 1/s, and has to stay below
+    1 / control step. It holds for a tracker that moves away from the target too (cos δ < 0), where the target moves
+    towards it. Where cos δ is small, (13) is ill-conditioned: there the speed is the part along the heading of the
+    velocity that keeps range and bearing, the bearing turning at ``frame_rate`` (rad/s).
     """
-    along = target_speed * math.cos(target_delta) + range_gain * (r - wanted_range)
-    cosine = math.cos(tracker_delta)
+    along = target.real + range_gain * (r - wanted_range)
+    cosine = math.cos(delta)
     if abs(cosine) >= MIN_COSINE:
         return clip(along / cosine, 0.0, max_speed)
-    across = target_speed * math.sin(target_delta) - r * frame_rate
-    return clip(along * cosine + across * math.sin(tracker_delta), 0.0, max_speed)
+    return clip(along * cosine + (target.imag - r * frame_rate) * math.sin(delta), 0.0, max_speed)
+
+
+@compiled
+def heading_error(body: Record, v: complex) -> float:
+    """Return the angle (rad) by which a robot has to turn to head along a vector."""
+    return angle_of(v * body.heading.conjugate())
+
+
+@compiled
+def turn_command(body: Record, error: float, time: float) -> float:
+    """Return the turn rate (rad/s) that ends a heading error (rad) without overshooting."""
+    most = math.sqrt(2.0 * _BRAKING_SHARE * body.turn_acceleration * abs(error))
+    return clip(error / time, -min(most, body.max_omega), min(most, body.max_omega))
+
+
+@compiled
+def regulate(body: Record, velocity: complex, rate: float) -> tuple[float, float]:
+    """Return the command (V, ω) of a robot that tracks a velocity (m/s) within its limits.
+
+    V is the part of the velocity that lies ahead, and 0 while it points backwards: the robot turns
+    on the spot instead of reversing. The wanted velocity itself turns at ``rate`` (rad/s)::
+
+        ω = clip(rate + wrap(θ_wanted - θ) / dt, -ω_max, ω_max)
+
+    It holds in every quadrant. A velocity near zero keeps the heading.
+    """
+    if length(velocity) < _STANDSTILL:
+        return 0.0, 0.0
+    omega = turn_command(body, heading_error(body, velocity), body.dt) + rate
+    return clip(dot(velocity, body.heading), 0.0, body.max_speed), clip(omega, -body.max_omega, body.max_omega)
+
+
+@compiled
+def write_motion(action: FloatArray, speed: float, omega: float, max_speed: float, max_omega: float) -> None:
+    """Write a command as the first two numbers of an action (2 + m,), clipped to [-1, 1]."""
+    action[0] = clip(2.0 * speed / max_speed - 1.0, -1.0, 1.0)
+    action[1] = clip(omega / max_omega, -1.0, 1.0)

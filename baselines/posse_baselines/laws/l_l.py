@@ -9,23 +9,12 @@ from __future__ import annotations
 import math
 
 from posse.numeric import compiled
-from posse_baselines.laws.l_phi import point_velocity
+from posse_baselines.laws.l_phi import Demand, point_velocity
 
 
 @compiled
-def l_l_velocity(
-    l_i: float,
-    along_i: float,
-    across_i: float,
-    gamma_i: float,
-    l_k: float,
-    along_k: float,
-    across_k: float,
-    gamma_k: float,
-    wanted_crossing: float,
-    min_crossing_sine: float,
-) -> tuple[float, float]:
-    """Return (v_j, d ω_j), m/s, that keep a follower's distances to two leaders i and k.
+def l_l_velocity(i: Demand, k: Demand, wanted_crossing: float, min_crossing_sine: float) -> complex:
+    """Return v_j + i d ω_j (m/s) that keeps a follower's distances to two leaders i and k.
 
     Both dl/dt equations, solved for v_j and d ω_j::
 
@@ -36,18 +25,14 @@ def l_l_velocity(
     Two distances fit two places, one on each side of the line through the leaders:
     ``wanted_crossing`` (rad), γ_k - γ_i in the wanted place, says which. Where the lines
     are nearly parallel (a sine below ``min_crossing_sine``, in (0, 1)), or the follower is on the
-    wrong side, it keeps its place on the nearer leader instead, by l-φ.
-
-    A (``along``) and B (``across``) of each leader come from
-    :func:`~posse_baselines.laws.l_phi.l_phi_demand`; B is used by the fallback only. Without limits
-    each distance error decays as exp(-α_1 t) otherwise.
+    wrong side, it keeps its place on the nearer leader instead, by l-φ. Without limits each distance error decays as
+    exp(-α_1 t) otherwise.
     """
-    determinant = math.sin(gamma_k - gamma_i)
+    determinant = math.sin(k.gamma - i.gamma)
     side = 1.0 if math.sin(wanted_crossing) >= 0.0 else -1.0
     if side * determinant < min_crossing_sine:
-        if l_i <= l_k:
-            return point_velocity(along_i, across_i, gamma_i)
-        return point_velocity(along_k, across_k, gamma_k)
-    speed = (along_i * math.sin(gamma_k) - along_k * math.sin(gamma_i)) / determinant
-    sideways = (along_k * math.cos(gamma_i) - along_i * math.cos(gamma_k)) / determinant
-    return speed, sideways
+        return point_velocity(i) if i.l <= k.l else point_velocity(k)
+    a_i, a_k = i.velocity.real, k.velocity.real
+    speed = (a_i * math.sin(k.gamma) - a_k * math.sin(i.gamma)) / determinant
+    sideways = (a_k * math.cos(i.gamma) - a_i * math.cos(k.gamma)) / determinant
+    return complex(speed, sideways)

@@ -14,28 +14,40 @@ The motion of the control point obeys::
 
       dl/dt   =  v_j cos(γ) + d ω_j sin(γ) - v_i cos(φ)
     l dφ/dt = -v_j sin(γ) + d ω_j cos(γ) + v_i sin(φ) - l ω_i
+
+Its velocity in the follower's own axes is the complex number v_j + i d ω_j.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from posse.numeric import compiled
-from posse_baselines.laws.geometry import clip, wrap
+from posse.numeric import Record, compiled
+from posse_baselines.laws.geometry import clip, vector, wrap
+
+
+class Polar(NamedTuple):
+    """Where a control point is, or is wanted, seen from the leader."""
+
+    l: float  # noqa: E741 (the paper's symbol)
+    phi: float
+
+
+class Demand(NamedTuple):
+    """What the law demands of a control point."""
+
+    l: float  # noqa: E741
+    velocity: complex
+    """A + iB: along the line of l and to its left, m/s."""
+    gamma: float
 
 
 @compiled
 def l_phi_demand(
-    l_now: float,
-    phi: float,
-    l_d: float,
-    phi_d: float,
-    leader_speed: float,
-    frame_rate: float,
-    alpha_1: float,
-    alpha_2: float,
-) -> tuple[float, float]:
-    """Return the wanted velocity (m/s) of the control point: A along the line of l, B across it.
+    now: Polar, wanted: Polar, leader_speed: float, frame_rate: float, alpha_1: float, alpha_2: float
+) -> complex:
+    """Return the wanted velocity A + iB (m/s) of the control point, along the line of l and to its left.
 
     ::
 
@@ -45,9 +57,9 @@ def l_phi_demand(
     With it, l - l_d decays as exp(-α_1 t) and φ - φ_d as exp(-α_2 t). ``frame_rate`` (rad/s) is
     ω_i where φ_d is constant in the leader's frame, and dψ/dt where it follows the slot frame.
     """
-    along = alpha_1 * (l_d - l_now) + leader_speed * math.cos(phi)
-    turning = alpha_2 * wrap(phi_d - phi) + frame_rate
-    return along, l_now * turning - leader_speed * math.sin(phi)
+    along = alpha_1 * (wanted.l - now.l) + leader_speed * math.cos(now.phi)
+    turning = alpha_2 * wrap(wanted.phi - now.phi) + frame_rate
+    return complex(along, now.l * turning - leader_speed * math.sin(now.phi))
 
 
 @compiled
@@ -57,8 +69,8 @@ def sampled_rate(alpha: float, dt: float) -> float:
 
 
 @compiled
-def point_velocity(along: float, across: float, gamma: float) -> tuple[float, float]:
-    """Return the wanted velocity (m/s) of the control point ahead of and across the follower.
+def point_velocity(demand: Demand) -> complex:
+    """Return the wanted velocity v_j + i d ω_j (m/s) of the control point.
 
     ::
 
@@ -66,37 +78,32 @@ def point_velocity(along: float, across: float, gamma: float) -> tuple[float, fl
 
     No γ is singular.
     """
-    cosine = math.cos(gamma)
-    sine = math.sin(gamma)
-    return along * cosine - across * sine, along * sine + across * cosine
+    return demand.velocity * vector(1.0, demand.gamma)
 
 
 @compiled
-def held_command(ahead: float, across: float, point_offset: float, dt: float) -> tuple[float, float]:
-    """Return (v_j, ω_j) that, held for dt (s), move the control point as its velocity asks.
+def held_command(velocity: complex, point_offset: float, dt: float) -> tuple[float, float]:
+    """Return (v_j, ω_j) that, held for dt (s), move the control point as its velocity (m/s) asks.
 
-    The robot moves on an arc. It ends with the control point where (``ahead``, ``across``), m/s,
-    takes it in a straight line; as dt goes to 0, v_j = ahead and ω_j = across / d. The command
-    ignores limits, and may ask for reversing: see :func:`limit_command`.
+    The robot moves on an arc. It ends with the control point where the velocity takes it in a straight line; as dt
+    goes to 0, v_j is its part ahead and ω_j its part to the left by d. The command ignores limits, and may ask for
+    reversing: see :func:`limit_command`.
     """
-    half = math.atan2(0.5 * across * dt, point_offset + 0.5 * ahead * dt)
+    ahead, left = velocity.real * dt, velocity.imag * dt
+    half = math.atan2(0.5 * left, point_offset + 0.5 * ahead)
     c, s = math.cos(half), math.sin(half)
-    chord = ahead * dt * c + across * dt * s
     arc = half / s if abs(s) > 1e-6 else 1.0
-    return chord * arc / dt, 2.0 * half / dt
+    return (ahead * c + left * s) * arc / dt, 2.0 * half / dt
 
 
 @compiled
-def limit_command(
-    speed: float, omega: float, point_offset: float, max_speed: float, max_omega: float
-) -> tuple[float, float]:
+def limit_command(body: Record, speed: float, omega: float, point_offset: float) -> tuple[float, float]:
     """Return the command (V, ω) of l-φ or l-l control within a robot's limits.
 
-    V in [0, max_speed], ω in [-max_omega, max_omega]. A command to reverse becomes a turn on
-    the spot, the short way round, towards the velocity wanted of the control point: at the rate
-    that moves the control point at the wanted speed, so that it fades out where nothing is wanted.
+    A command to reverse becomes a turn on the spot, the short way round, towards the velocity wanted of the control
+    point: at the rate that moves the control point at the wanted speed, so that it fades out where nothing is wanted.
     """
     if speed < 0.0:
         sideways = math.hypot(speed, omega * point_offset)
-        return 0.0, clip(math.copysign(sideways / point_offset, omega), -max_omega, max_omega)
-    return min(speed, max_speed), clip(omega, -max_omega, max_omega)
+        speed, omega = 0.0, math.copysign(sideways / point_offset, omega)
+    return min(speed, body.max_speed), clip(omega, -body.max_omega, body.max_omega)

@@ -12,41 +12,13 @@ from posse.numeric import Records
 from posse.scenarios.limits import OPEN_PLANE_EXTENT
 
 _FIELDS: Final = (
-    "heading",
-    "position",
-    "speed",
-    "turn_rate",
-    "touching",
-    "working",
-    "formation",
-    "number",
-    "team_size",
-    "formation_distance",
-    "formation_spacing",
-    "max_speed",
-    "max_turn_rate",
-    "acceleration_time",
-    "turn_acceleration_time",
-    "time_left",
-    "target_known",
-    "target_seen",
-    "target_age",
-    "target_range",
-    "target_bearing",
-    "target_heading",
-    "target_frame",
-    "target_velocity",
-    "sonar",
-    "neighbour_number",
-    "neighbour_age",
-    "neighbour_range",
-    "neighbour_bearing",
-    "neighbour_heading",
-    "neighbour_speed",
-    "neighbour_turn_rate",
-    "neighbour_message",
+    *("heading", "position", "speed", "turn_rate", "number"),
+    *("max_speed", "max_turn_rate", "acceleration_time", "turn_acceleration_time"),
+    *("target_known", "target_seen", "target_age", "target_range", "target_bearing"),
+    *("target_heading", "target_frame", "target_velocity", "sonar"),
+    *("neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing"),
+    *("neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message"),
 )
-
 _WIDER: Final = 1.2
 _MOST_SIGHT: Final = 8.0  # m; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT

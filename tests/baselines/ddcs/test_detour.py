@@ -17,11 +17,10 @@ CLEARANCE = 0.2
 
 def turn(discs: list[tuple[float, float, float]], side: float, speed: float = 0.0) -> float:
     """The turn of a robot that heads along the x-axis, past discs (x, y, reach)."""
-    records = np.zeros(8, DISC)
-    count = 0
+    records, count = np.zeros(8, DISC), 0
     for x, y, reach in discs:
-        count = put_disc(records, count, x, y, speed, 0.0, reach, 0.1)
-    return float(turn_past(records, count, CLEARANCE, 1.0, 0.0, side))
+        count = put_disc(records, count, complex(x, y), complex(speed), reach, 0.1)
+    return float(turn_past(records[:count], CLEARANCE, 1 + 0j, side))
 
 
 @pytest.mark.parametrize("y", [-0.3, 0.0, 0.5])

@@ -10,7 +10,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from posse_baselines.laws.steering import NEVER, approach_velocity, intercept_time, way_round
+from posse_baselines.laws.steering import (
+    NEVER,
+    approach_velocity,
+    intercept_time,
+    slot_heading,
+    slot_velocity,
+    way_round,
+)
 
 PROPERTY = settings(derandomize=True, database=None, deadline=None, max_examples=100)
 PLACES = st.floats(-20.0, 20.0)
@@ -20,7 +27,7 @@ SPEEDS = st.floats(-0.6, 0.6)
 @PROPERTY
 @given(PLACES, PLACES, SPEEDS, SPEEDS)
 def test_the_point_is_as_far_away_as_the_robot_gets_in_that_time(x: float, y: float, vx: float, vy: float) -> None:
-    t = intercept_time(x, y, vx, vy, 1.0)
+    t = intercept_time(complex(x, y), complex(vx, vy), 1.0)
     assert t >= 0.0
     assert math.isclose(math.hypot(x + vx * t, y + vy * t), t, rel_tol=1e-6, abs_tol=1e-6)
 
@@ -31,55 +38,77 @@ def test_a_point_is_met_at_the_first_root(away: float, vx: float, vy: float, top
     assume(math.hypot(vx, vy) < top - 0.01)
     roots = np.roots([vx**2 + vy**2 - top**2, 2 * away * vx, away**2])  # |p + v t| = top t
     earliest = min(root.real for root in roots if root.real >= 0)
-    assert intercept_time(away, 0.0, vx, vy, top) == pytest.approx(earliest, rel=1e-6, abs=1e-9)
+    assert intercept_time(complex(away), complex(vx, vy), top) == pytest.approx(earliest, rel=1e-6, abs=1e-9)
 
 
 def test_a_point_that_gets_away_is_never_met() -> None:
-    assert intercept_time(1.0, 0.0, 1.2, 0.0, 1.0) == NEVER
-    assert intercept_time(2.0, 0.0, -1.0, 0.0, 1.0) == 1.0
+    assert intercept_time(1 + 0j, 1.2 + 0j, 1.0) == NEVER
+    assert intercept_time(2 + 0j, -1 + 0j, 1.0) == 1.0
     # As fast as the robot: it is met if it comes nearer.
-    assert intercept_time(3.0, 4.0, -0.6, -0.8, 1.0) == pytest.approx(2.5)
-    assert intercept_time(3.0, 4.0, -0.8, 0.6, 1.0) == NEVER
-    assert intercept_time(3.0, 4.0, 0.6, 0.8, 1.0) == NEVER
+    assert intercept_time(3 + 4j, -0.6 - 0.8j, 1.0) == pytest.approx(2.5)
+    assert intercept_time(3 + 4j, -0.8 + 0.6j, 1.0) == NEVER
+    assert intercept_time(3 + 4j, 0.6 + 0.8j, 1.0) == NEVER
 
 
 @PROPERTY
 @given(st.floats(0.05, 10.0), st.floats(0.2, 4.0))
 def test_an_approach_leaves_room_to_brake(distance: float, deceleration: float) -> None:
-    speed, aside = approach_velocity(distance, 0.0, 0.0, 0.0, 2.0, 1.0, deceleration)
-    assert aside == 0.0
-    assert 0.0 < speed <= 1.0
-    assert speed**2 / (2.0 * deceleration) <= distance
+    velocity = approach_velocity(complex(distance), 0j, 2.0, 1.0, deceleration)
+    assert velocity.imag == 0.0
+    assert 0.0 < velocity.real <= 1.0
+    assert velocity.real**2 / (2.0 * deceleration) <= distance
 
 
 @PROPERTY
 @given(st.floats(-math.pi, math.pi), st.floats(1.0, 6.0), st.floats(-math.pi, math.pi))
 def test_the_way_round_keeps_clear_and_arrives(start: float, away: float, end: float) -> None:
-    clearance = 0.75
-    x, y = away * math.cos(start), away * math.sin(start)
-    to = (1.2 * math.cos(end), 1.2 * math.sin(end))
-    least = away
+    position, goal, least = cmath.rect(away, start), cmath.rect(1.2, end), away
     for _ in range(4000):
-        wx, wy = way_round(x, y, *to, clearance)
-        left = math.hypot(wx - x, wy - y)
-        x, y = x + 0.01 * (wx - x) / max(left, 0.01), y + 0.01 * (wy - y) / max(left, 0.01)
-        least = min(least, math.hypot(x, y))
-    assert math.dist((x, y), to) < 0.02
-    assert least > 0.82 * clearance  # the cosine of the least turn
-
-
-@pytest.mark.parametrize("heading", [0.0, 2.0])
-@pytest.mark.parametrize("side", [1, -1])
-def test_the_way_round_begins_along_a_tangent(heading: float, side: int) -> None:
-    turn = cmath.rect(1.0, heading)
-    start, end = (-2 + 0.3j * side) * turn, (3 + 0.1j * side) * turn
-    point = complex(*way_round(start.real, start.imag, end.real, end.imag, 0.8))
-    assert abs(point) == pytest.approx(0.8)
-    assert (point / (start - point)).real == pytest.approx(0.0, abs=1e-9)
-    assert (point / turn).imag * side > 0
+        way = way_round(position, goal, 0.75) - position
+        position += 0.01 * way / max(abs(way), 0.01)
+        least = min(least, abs(position))
+    assert abs(position - goal) < 0.02
+    assert least > 0.82 * 0.75  # the cosine of the least turn
 
 
 def test_a_way_that_is_clear_is_left_alone() -> None:
-    assert way_round(-3.0, 1.0, 3.0, 1.0, 0.75) == (3.0, 1.0)
-    assert way_round(-3.0, 0.0, -1.2, 0.0, 0.75) == (-1.2, 0.0)
-    assert way_round(-3.0, 0.1, 3.0, 0.1, 0.75)[1] > 0.0  # round the side that is nearer
+    assert way_round(-3 + 1j, 3 + 1j, 0.75) == 3 + 1j
+    assert way_round(-3 + 0j, -1.2 + 0j, 0.75) == -1.2
+    assert way_round(-3 + 0.1j, 3 + 0.1j, 0.75).imag > 0.0  # round the side that is nearer
+
+
+def test_a_slot_moves_on_a_circle_of_its_own() -> None:
+    arm, speed, rate, step = 0.8 - 1.1j, 0.5 + 0.2j, 0.4, 1e-6
+    turned = speed * step + arm * cmath.exp(1j * rate * step)
+    velocity = slot_velocity(speed, rate, arm)
+    assert velocity == pytest.approx((turned - arm) / step, abs=1e-5)
+    assert slot_heading(speed, rate, arm, 9.0) == pytest.approx(cmath.phase(velocity))
+    assert slot_heading(1e-3j, 0.0, 1 + 0j, 0.7) == 0.7
+
+
+@PROPERTY
+@given(
+    st.complex_numbers(min_magnitude=0.01, max_magnitude=10.0),
+    st.complex_numbers(max_magnitude=0.99),
+    st.floats(0.2, 3.0),
+)
+def test_the_slot_law_adds_an_approach_along_the_offset(offset: complex, slot: complex, gain: float) -> None:
+    def velocity(max_speed: float) -> complex:
+        return approach_velocity(offset, slot, gain, max_speed, math.inf)
+
+    free = slot + gain * offset
+    assert velocity(100.0) == pytest.approx(free, abs=1e-9)
+    limited = velocity(1.0)
+    if abs(free) <= 1.0:
+        assert limited == pytest.approx(free, abs=1e-9)
+    else:
+        share = (limited - slot) / offset
+        assert abs(limited) == pytest.approx(1.0)
+        assert share.imag == pytest.approx(0.0, abs=1e-9)
+        assert -1e-9 <= share.real <= gain
+
+
+def test_the_slot_law_behind_a_faster_slot_follows_its_direction() -> None:
+    velocity = approach_velocity(0.5 + 0j, 2j, 1.0, 1.0, math.inf)
+    assert velocity == pytest.approx(cmath.rect(1.0, math.atan2(2.0, 0.5)))
+    assert approach_velocity(0j, 0j, 1.0, 1.0, 1.0) == 0j

@@ -16,11 +16,10 @@ from posse import Batch, Scenario
 from posse.numeric import MOST_THREADS, BoolArray, FloatArray, Record, Records, compiled, kernel, over_worlds
 from posse.rules import NEVER, config_record, slot_records
 from posse_baselines.laws.assignment import WORK_ROWS, assign
-from posse_baselines.laws.geometry import length, wrap
-from posse_baselines.laws.heading import BODY, regulate
-from posse_baselines.laws.safeguard import DISC, PLAYS, put_disc, put_walls, safe_velocity
-from posse_baselines.laws.slots import rotate
-from posse_baselines.laws.steering import approach_velocity, meeting_velocity, time_to_slot, way_round, write_motion
+from posse_baselines.laws.geometry import angle_of, dot, length, wrap
+from posse_baselines.laws.guidance import BODY, regulate, write_motion
+from posse_baselines.laws.safeguard import DISC, NEAR, PLAYS, put_disc, put_walls, safe_velocity
+from posse_baselines.laws.steering import Course, approach_velocity, meeting_velocity, time_to_slot, way_round
 
 _UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 _REPLAN_STEPS: Final = 3  # control steps between two assignments of the slots
@@ -30,7 +29,6 @@ _LOYALTY: Final = 0.5  # s; least gain for which a tracker changes its slot
 _TURNING: Final = 0.5  # delay of an arrival as a share of the time for a turn on the spot
 _CLEARANCE: Final = 0.75  # m; distance at which the way to a slot leads round the target
 _MARGIN: Final = 0.15  # m; free width that is kept; twice as much to the target
-_NEAR: Final = 3.0  # m; farther things are no danger yet
 _MOST_DISCS: Final = 32
 _SOON: Final = 0.3  # s; a slot met sooner is followed as it moves now
 _FARTHEST: Final = 20.0  # s; later meetings are as good as this one
@@ -74,7 +72,7 @@ class Work(NamedTuple):
     discs: Records
     """(32,) :data:`~posse_baselines.laws.safeguard.DISC`: what is near."""
     body: Record
-    """:data:`~posse_baselines.laws.heading.BODY`."""
+    """:data:`~posse_baselines.laws.guidance.BODY`."""
     plays: Record
     """:data:`~posse_baselines.laws.safeguard.PLAYS`."""
 
@@ -137,7 +135,26 @@ def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> 
 
 
 @compiled
-def foreseen(path: FloatArray, at: float, slot: Record) -> tuple[float, float]:
+def velocity_of(r: Record) -> complex:
+    """Return the velocity of a robot."""
+    return complex(r.speed * r.heading_cos, r.speed * r.heading_sin)
+
+
+@compiled
+def arm_of(scene: Scene, slot: int) -> complex:
+    """Return where a slot is from the target, m."""
+    return complex(scene.slots[slot].x, scene.slots[slot].y) * complex(scene.world.frame_cos, scene.world.frame_sin)
+
+
+@compiled
+def course_of(scene: Scene) -> Course:
+    """Return how the target is taken to move."""
+    mean = complex(scene.plans[0].mean_x, scene.plans[0].mean_y)
+    return Course(velocity_of(scene.world), mean, _WEAVE_TIME, scene.frame_rate)
+
+
+@compiled
+def foreseen(path: FloatArray, at: float, slot: Record) -> complex:
     """Return where a slot will be, m, ``at`` control steps along a path.
 
     The path (T, 4) is the target's x, y and the slot frame's cosine and sine at each step; beyond
@@ -148,10 +165,9 @@ def foreseen(path: FloatArray, at: float, slot: Record) -> tuple[float, float]:
     turned = min(share, 1.0)
     c = path[k, 2] + turned * (path[k + 1, 2] - path[k, 2])
     s = path[k, 3] + turned * (path[k + 1, 3] - path[k, 3])
-    arm_x, arm_y = rotate(slot.x, slot.y, c, s)
     x = path[k, 0] + share * (path[k + 1, 0] - path[k, 0])
     y = path[k, 1] + share * (path[k + 1, 1] - path[k, 1])
-    return x + arm_x, y + arm_y
+    return complex(x, y) + complex(slot.x, slot.y) * complex(c, s)
 
 
 @compiled
@@ -165,8 +181,7 @@ def arrival_time(scene: Scene, i: int, slot: Record) -> float:
     max_speed = float(t.max_speed)
     time = 0.0
     for _ in range(_MOST_STEPS):
-        slot_x, slot_y = foreseen(scene.path, float(scene.since) + time / dt, slot)
-        gap = length(slot_x - t.x, slot_y - t.y) - max_speed * time
+        gap = length(foreseen(scene.path, float(scene.since) + time / dt, slot) - complex(t.x, t.y)) - max_speed * time
         if gap <= _MET or time > _FARTHEST:
             break
         time += max(0.5 * gap / max_speed, _LEAST_STEP)
@@ -178,22 +193,19 @@ def assign_slots(scene: Scene, work: Work) -> None:
     """Assign the working trackers to slots with the least total arrival time."""
     w, plans, rows = scene.world, scene.plans, 0
     n = scene.config.num_trackers
-    vx, vy = float(w.speed * w.heading_cos), float(w.speed * w.heading_sin)
     for i in range(n):
         t = scene.trackers[i]
         if t.broken_at != NEVER:
             continue
         speed = float(t.max_speed)
         for k in range(n):
-            slot = scene.slots[k]
-            arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
-            x, y = w.x + arm_x - t.x, w.y + arm_y - t.y
+            way = complex(w.x, w.y) + arm_of(scene, k) - complex(t.x, t.y)
             if scene.since >= 0 and scene.ways[i].foresees > 0.0:
-                time = arrival_time(scene, i, slot)
+                time = arrival_time(scene, i, scene.slots[k])
             else:
-                time = time_to_slot(x, y, vx, vy, plans[0].mean_x, plans[0].mean_y, _WEAVE_TIME, speed)
+                time = time_to_slot(way, course_of(scene), speed)
             # Time for turning towards it.
-            away = wrap(math.atan2(y, x) - math.atan2(t.heading_sin, t.heading_cos))
+            away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
             time += _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
@@ -212,61 +224,40 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
     """List what is near tracker i, as discs for the safeguard; return how many things that are."""
     c, w, t = scene.config, scene.world, scene.trackers[i]
     count, two = 0, 2.0 * c.robot_radius
-    dx, dy = w.x - t.x, w.y - t.y
-    if dx * dx + dy * dy < _NEAR * _NEAR:
-        vx, vy = w.speed * w.heading_cos, w.speed * w.heading_sin
-        count = put_disc(discs, count, dx, dy, vx, vy, two, 2.0 * _MARGIN)
+    way = complex(w.x, w.y) - complex(t.x, t.y)
+    if dot(way, way) < NEAR * NEAR:
+        count = put_disc(discs, count, way, velocity_of(w), two, 2.0 * _MARGIN)
     for j in range(c.num_trackers):
         other = scene.trackers[j]
-        dx, dy = other.x - t.x, other.y - t.y
-        if j != i and dx * dx + dy * dy < _NEAR * _NEAR:
-            vx, vy = other.speed * other.heading_cos, other.speed * other.heading_sin
-            count = put_disc(discs, count, dx, dy, vx, vy, two, _MARGIN)
+        way = complex(other.x, other.y) - complex(t.x, t.y)
+        if j != i and dot(way, way) < NEAR * NEAR:
+            count = put_disc(discs, count, way, velocity_of(other), two, _MARGIN)
     for k in range(c.num_obstacles):
         disc = scene.obstacles[k]
-        dx, dy = disc.x - t.x, disc.y - t.y
-        reach = disc.radius + c.robot_radius
-        if dx * dx + dy * dy < (_NEAR + reach) * (_NEAR + reach):
-            count = put_disc(discs, count, dx, dy, 0.0, 0.0, reach, _MARGIN)
+        way, reach = complex(disc.x, disc.y) - complex(t.x, t.y), disc.radius + c.robot_radius
+        if dot(way, way) < (NEAR + reach) * (NEAR + reach):
+            count = put_disc(discs, count, way, 0j, reach, _MARGIN)
     if c.walled:
-        count = put_walls(discs, count, t.x, t.y, c.half_arena, _NEAR, c.robot_radius, _MARGIN)
+        count = put_walls(discs, count, complex(t.x, t.y), c.half_arena, c.robot_radius, _MARGIN)
     return count
 
 
 @compiled
-def wanted_velocity(scene: Scene, i: int, acceleration: float) -> tuple[float, float]:
+def wanted_velocity(scene: Scene, i: int, acceleration: float) -> complex:
     """Return the velocity (m/s) on a course that meets tracker i's slot, round the target."""
-    w, t, way = scene.world, scene.trackers[i], scene.ways[i]
-    slot, target, dt = scene.slots[scene.plans[i].slot], scene.plans[0], scene.config.control_step
-    speed = float(t.max_speed)
-    arm_x, arm_y = rotate(slot.x, slot.y, w.frame_cos, w.frame_sin)
-    shift_x, shift_y = rotate(way.ahead, way.left, w.heading_cos, w.heading_sin)
-    from_x, from_y = t.x - w.x, t.y - w.y
+    w, t, way, slot = scene.world, scene.trackers[i], scene.ways[i], scene.plans[i].slot
+    dt, speed = scene.config.control_step, float(t.max_speed)
+    arm, start = arm_of(scene, slot), complex(t.x, t.y) - complex(w.x, w.y)
+    shift = complex(way.ahead, way.left) * complex(w.heading_cos, w.heading_sin)
     if scene.since >= 0 and way.foresees > 0.0:
-        time = arrival_time(scene, i, slot)
+        time = arrival_time(scene, i, scene.slots[slot])
         if time > _SOON:
-            to_x, to_y = foreseen(scene.path, scene.since + time / dt, slot)
-            slot_vx, slot_vy = (to_x - w.x - arm_x) / time, (to_y - w.y - arm_y) / time
-            round_x, round_y = way_round(from_x, from_y, arm_x, arm_y, _CLEARANCE)
-            return approach_velocity(
-                round_x + shift_x - from_x, round_y + shift_y - from_y, slot_vx, slot_vy, way.gain, speed, acceleration
-            )
-    return meeting_velocity(
-        from_x,
-        from_y,
-        arm_x + shift_x,
-        arm_y + shift_y,
-        float(w.speed * w.heading_cos),
-        float(w.speed * w.heading_sin),
-        float(target.mean_x),
-        float(target.mean_y),
-        scene.frame_rate,
-        _WEAVE_TIME,
-        _CLEARANCE,
-        way.gain,
-        speed,
-        acceleration,
-    )
+            goal = foreseen(scene.path, scene.since + time / dt, scene.slots[slot])
+            moved = goal - complex(w.x, w.y) - arm
+            velocity = complex(moved.real / time, moved.imag / time)
+            offset = way_round(start, arm, _CLEARANCE) + shift - start
+            return approach_velocity(offset, velocity, way.gain, speed, acceleration)
+    return meeting_velocity(start, arm + shift, course_of(scene), _CLEARANCE, way.gain, speed, acceleration)
 
 
 @compiled
@@ -297,13 +288,13 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         if t.broken_at != NEVER:
             write_motion(actions[i], 0.0, 0.0, 1.0, 1.0)
             continue
-        vx, vy = wanted_velocity(scene, i, body.acceleration)
-        count = surround(scene, i, work.discs)
-        body.heading_cos, body.heading_sin = t.heading_cos, t.heading_sin
+        velocity = wanted_velocity(scene, i, body.acceleration)
+        discs = work.discs[: surround(scene, i, work.discs)]
+        body.heading = complex(t.heading_cos, t.heading_sin)
         body.speed, body.omega = t.speed, t.turn_rate
         body.max_speed, body.max_omega = t.max_speed, t.max_turn_rate
-        vx, vy, _ = safe_velocity(body, work.discs, count, vx, vy, work.plays)
-        v, omega = regulate(body, vx, vy, 0.0)
+        velocity, _ = safe_velocity(body, discs, velocity, work.plays)
+        v, omega = regulate(body, velocity, 0.0)
         write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
 
 

@@ -1,0 +1,221 @@
+"""What the trackers agree on: who leads (section 3.5), and who takes which slot.
+
+**Leader** (centralized model). A claim is a pair (term, leader). Every tracker broadcasts the claim that it holds and
+adopts a better one that it receives: the higher term; for equal terms, the lower leader number. Two events
+create a higher term: the leader finds another tracker clearly nearer to the target and hands over
+(the nearest-neighbour rule, every time lag), or a tracker has not heard of the leader for too long
+and appoints the nearest one that it knows. A connected radio graph thus converges to one claim, and
+two parts that meet again agree on the higher one.
+
+There is a leader from the first step on. While the target is unknown, it is the most central
+tracker of those that hear each other. A tracker that hears no other leads itself (rule ii) under a
+lower term, so that it yields when it meets a group. The leader counts its steps in its message, and the others relay
+the highest count, so that trackers several hops away know that the leader is alive.
+
+**Slots.** Each tracker assigns all known trackers and takes its own slot. Trackers with equal knowledge get equal
+results. Otherwise, for example after lost messages, slots claimed in messages are respected (``loyalty``), and of two
+trackers that claim one slot the nearer one keeps it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from posse.numeric import Record, Records, compiled
+from posse_baselines.ddcs.memory import Team, Work
+from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, patience
+from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
+from posse_baselines.laws.assignment import assign
+from posse_baselines.laws.geometry import dot, length
+from posse_baselines.laws.steering import Course, time_to_slot
+
+_IN_PLACE: Final = 0.4  # m; nearer to a slot than this, a tracker is in it
+_EQUALLY_NEAR: Final = 0.1  # m; difference of two distances below which the lower number has precedence for a slot
+_TAKEN_COST: Final = 8.0  # s; cost of a slot in which the sonar detects a robot that is not heard
+_RESERVED: Final = 1e4  # s; cost of a slot claimed by another
+_HALF_TURN: Final = 0.25 * math.pi  # of the turning time, per 1 - cos
+_BIT: Final = np.uint64(1)
+
+
+@compiled
+def better_claim(term: int, leader: int, old_term: int, old_leader: int) -> bool:
+    """Return whether a claim (term, leader) wins over another; -1 is no leader."""
+    if leader < 0:
+        return False
+    if old_leader < 0 or is_newer(term, old_term):
+        return True
+    return term == old_term and leader < old_leader
+
+
+@compiled
+def appoint(me: Record, leader: int, term: int, pulse: int) -> None:
+    """Adopt a claim."""
+    if leader != me.leader:
+        me.confirmed = 0
+        if me.leader >= 0:
+            me.exchanges += 1
+    me.leader, me.term, me.pulse, me.pulse_step = leader, term, pulse, me.step
+
+
+@compiled
+def position_of(team: Team, me: Record, mates: Records, j: int) -> complex:
+    """Return the current position of tracker j, which may be this one."""
+    return me.position if j == me.number else mate_now(team, me, mates[j])[0]
+
+
+@compiled
+def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tuple[int, float]:
+    """Return the working tracker other than ``barred`` (-1: any) that is nearest to the target, and its distance."""
+    best, least = me.number, length(me.target - me.position)
+    for j in range(len(mates)):
+        if j != me.number and j != barred and is_there(team, me, mates[j]):
+            distance = length(me.target - position_of(team, me, mates, j))
+            if distance < least:
+                best, least = j, distance
+    return best, least
+
+
+@compiled(out_of_line=True)
+def central_tracker(team: Team, me: Record, mates: Records) -> tuple[int, int]:
+    """Return the tracker with the least sum of distances to all heard, and their number."""
+    n, others = len(mates), 0
+    best, least = me.number, 1e30
+    for i in range(n):
+        if i != me.number:
+            if not is_there(team, me, mates[i]):
+                continue
+            others += 1
+        position, total = position_of(team, me, mates, i), 0.0
+        for j in range(n):
+            if j != i and (j == me.number or is_there(team, me, mates[j])):
+                total += length(position - position_of(team, me, mates, j))
+        # Ties within rounding go to the lower number.
+        if total < least - 1e-3:
+            best, least = i, total
+    return best, others
+
+
+@compiled
+def select_leader(team: Team, me: Record, mates: Records, barred: int) -> None:
+    """Appoint a tracker other than ``barred`` (-1: any) under a new term."""
+    if me.known:
+        best, _ = nearest_tracker(team, me, mates, barred)
+        appoint(me, best, (me.term + 1) % COUNT, 0)
+        return
+    best, others = central_tracker(team, me, mates)
+    if others == 0:
+        appoint(me, me.number, (me.term - 1) % COUNT, 0)
+    else:
+        appoint(me, best if best != barred else me.number, (me.term + 1) % COUNT, 0)
+
+
+@compiled
+def settle_lead(team: Team, me: Record, mates: Records) -> None:
+    """Process received claims; hand over or appoint if due."""
+    settings, dt = team.settings, team.world.dt
+    for j in range(len(mates)):
+        mate = mates[j]
+        if mate.fresh == 0 or mate.leader < 0:
+            continue
+        if mate.leader == me.leader and mate.term == me.term:
+            if is_newer(mate.pulse, me.pulse):
+                me.pulse, me.pulse_step, me.confirmed = mate.pulse, me.step, 1
+        elif better_claim(mate.term, mate.leader, me.term, me.leader):
+            appoint(me, mate.leader, mate.term, mate.pulse)
+    if me.leader == me.number:
+        me.pulse, me.pulse_step, me.confirmed = (me.pulse + 1) % COUNT, me.step, 1
+    if me.leader < 0:
+        select_leader(team, me, mates, -1)
+        return
+    # In the search there are no followers, and leadership changes without the exchange task.
+    if me.task != SEARCHING and settings.forbidden[me.task, EXCHANGING]:
+        return
+    if me.leader == me.number:
+        if me.known and me.step % max(1, round(settings.time_lag / dt)) == 0:
+            best, least = nearest_tracker(team, me, mates, -1)
+            if best != me.number and least < length(me.target - me.position) - settings.lead_hysteresis:
+                appoint(me, best, (me.term + 1) % COUNT, 0)
+    elif (me.step - me.pulse_step) * dt > patience(team, me) + settings.lead_patience:
+        select_leader(team, me, mates, me.leader)
+
+
+@compiled
+def course_of(team: Team, me: Record) -> Course:
+    """Return how the target is taken to move."""
+    return Course(me.target_velocity, me.target_mean, team.settings.weave_time, me.psi_rate)
+
+
+@compiled(out_of_line=True)
+def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
+    """Set the own slot by the assignment of least total arrival time."""
+    settings, n, cost = team.settings, len(team.slots), work.cost
+    if settings.radio == 0:
+        me.slot = me.number  # no team-mates
+        return
+    rows, mine = 0, 0
+    for j in range(n):
+        mate = mates[j]
+        if j == me.number:
+            mine = rows
+            held, heading = me.slot, me.heading
+        elif is_there(team, me, mate):
+            held, heading = mate.slot, mate.heading
+        elif team.at.neighbours < n - 1 and mate.slot >= 0:
+            # It has no place in the observation but claimed a slot. If it were still near its
+            # slot, and the slot were near, it would have a place.
+            place = me.target + team.slots[mate.slot] * me.frame
+            if length(place - me.position) < me.horizon - _IN_PLACE:
+                mate.slot = -1
+                continue
+            for k in range(n):
+                cost[rows, k] = 0.0 if k == mate.slot else _RESERVED
+            rows += 1
+            continue
+        else:
+            continue
+        position = position_of(team, me, mates, j)
+        for k in range(n):
+            slot = team.slots[k]
+            way = me.target + slot * me.frame - position
+            time = time_to_slot(way, course_of(team, me), me.max_speed)
+            # Time for turning towards it, up to half a turn.
+            facing = dot(way, heading) / max(length(way), 1e-6)
+            time += _HALF_TURN * (1.0 - facing) / me.max_omega * min(1.0, time)
+            if held == k:
+                time -= settings.loyalty
+            if j == me.number and (me.taken >> np.uint64(k)) & _BIT:
+                time += _TAKEN_COST
+            # With more slots than trackers, those that see the target are filled first.
+            if dot(slot, slot) < (settings.in_sight * team.world.sight) ** 2:
+                time -= settings.sight_worth
+            # The leader of the centralized model takes the first slot.
+            if settings.model == CENTRALIZED and me.leader >= 0 and (k == 0) != (j == me.leader):
+                time += _RESERVED
+            cost[rows, k] = time + 1e-4 * j
+        rows += 1
+    assign(cost, rows, n, work.assigning)
+    slot = int(work.assigning[0, mine])
+    if me.slot == slot and has_precedence(team, me, mates, slot):
+        cost[mine, slot] = _RESERVED
+        assign(cost, rows, n, work.assigning)
+    me.slot = int(work.assigning[0, mine])
+
+
+@compiled
+def has_precedence(team: Team, me: Record, mates: Records, slot: int) -> bool:
+    """Return whether a team-mate that claims a slot has precedence over this tracker.
+
+    The nearer one has; for equal distances the lower number. Both trackers get the same result,
+    whatever else they know.
+    """
+    place = me.target + team.slots[slot] * me.frame
+    mine = length(place - me.position)
+    for j in range(len(mates)):
+        if j != me.number and mates[j].slot == slot and is_there(team, me, mates[j]):
+            other = length(place - position_of(team, me, mates, j))
+            if other < mine - _EQUALLY_NEAR or (other < mine + _EQUALLY_NEAR and j < me.number):
+                return True
+    return False
