@@ -48,7 +48,11 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
             known = ", ".join(ALGORITHMS)
             raise SettingsError(f"only={name!r:.80} has no learned team of its own; those that have: {known}")
     return [
-        replace(default_settings(name, ALGORITHMS[name]), seed=seed, folder=settings.folder / f"{name}-{seed}")
+        replace(
+            default_settings(name, ALGORITHMS[name], preset="residual"),
+            seed=seed,
+            folder=settings.folder / f"{name}-{seed}",
+        )
         for seed in settings.seeds or range(1, 1 + max(SEEDS.values()))
         for name in settings.only
         if settings.seeds or seed <= SEEDS.get(name, 3)

@@ -42,7 +42,7 @@ def training_defaults() -> str:
     names = ("steps", "encoding", "advise", "correction", "contact_bound")
     rows = []
     for scenario in posse.scenario_names():
-        chosen = default_settings(scenario).to_dict()
+        chosen = default_settings(scenario, preset="residual").to_dict()
         shown = {name: "" if chosen[name] is None else code(chosen[name]) for name in names}
         if chosen["advise"] is None:
             shown["correction"] = ""

@@ -93,3 +93,10 @@ BELIEVING: dict[str, Any] = {
     "contact_bound": 0.03,
 }
 """With the settings of the shipped trainings: adviser, belief, bound on contact."""
+GUARDED: dict[str, Any] = {
+    "scenario": "smart",
+    "safeguard": True,
+    "end_on_contact": True,
+    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
+}
+"""From nothing, behind the safeguard."""

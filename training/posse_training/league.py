@@ -305,7 +305,7 @@ class _Run:
             return
         start = next((m.run for m in reversed(own) if m.run is not None), None)
         values = {
-            **default_settings(s.scenario, side=side).to_dict(),
+            **default_settings(s.scenario, side=side, preset="residual").to_dict(),
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,

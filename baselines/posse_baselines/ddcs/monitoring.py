@@ -11,7 +11,7 @@ import math
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team
-from posse_baselines.ddcs.messages import decode
+from posse_baselines.ddcs.messages import MESSAGE_SIZE, decode
 from posse_baselines.laws.geometry import clip, length, wrap
 
 
@@ -151,9 +151,10 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
         mate.heading_cos, mate.heading_sin = cosine, sine
         mate.speed_x, mate.speed_y = speed * cosine, speed * sine
         mate.turn = row[at.neighbour_turn_rate + k]
-        m = at.neighbour_message + k
-        mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
-        mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
+        if at.message_size >= MESSAGE_SIZE:
+            m = at.neighbour_message + k
+            mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
+            mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
 
 
 @compiled

@@ -23,6 +23,7 @@ from posse_baselines.learned.network import Network
 from posse_baselines.learned.policy_file import read_policy_file, write_policy_file
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_observations, message_size_of
+from posse_baselines.safeguard import Guard
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
@@ -37,6 +38,7 @@ class _Memory(OwnArrays):
     robots: int
     encoder: Encoder
     adviser: Memory
+    guard: Guard | None
 
 
 class LearnedPolicy(OwnArrays, BasePolicy):
@@ -49,6 +51,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Scripted policy whose proposals the network refines, if any
             (:mod:`posse_baselines.learned.advice`).
         correction: What the network's output corrects: ``"motion"`` or ``"velocity"``.
+        safeguard: Whether its actions are wanted velocities, which the safeguard carries out
+            (:mod:`posse_baselines.safeguard`).
 
     Attributes:
         trained_splits: Splits whose worlds it was trained on; evaluations refuse them.
@@ -65,6 +69,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         card: Mapping[str, Any],
         adviser: Adviser | None = None,
         correction: str = "motion",
+        safeguard: bool = False,
     ) -> None:
         network.check()
         if adviser is None and encoding.believes:
@@ -80,6 +85,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         self._set_card(card)
         self.message_size = max(network.outputs - MOTION, encoding.message_size)
         self.adviser = adviser
+        self.safeguard = safeguard
         if adviser is not None:
             if network.outputs != MOTION:
                 raise PolicyError(
@@ -114,7 +120,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         encoder = Encoder(self.encoding, layout)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
         adviser_memory = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        return _Memory(layout, num_worlds, robots, encoder, adviser_memory)
+        guard = Guard(layout, num_worlds) if self.safeguard else None
+        return _Memory(layout, num_worlds, robots, encoder, adviser_memory, guard)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -137,17 +144,24 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         )
         if self._advising is not None:
             actions, m.adviser = self._advising.answer(observations, proposals, actions[..., :MOTION], m.adviser)
+        if m.guard is not None:
+            actions = m.guard.actions(observations, actions)
         return actions, m
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with the adviser restarted in the worlds of a mask (E,)."""
+        """Return the memory with adviser and safeguard restarted in the worlds of a mask (E,)."""
         m: _Memory = memory
+        if m.guard is not None:
+            m.guard.restart(mask)
         if self.adviser is not None:
             m.adviser = self.adviser.restart(m.adviser, mask)
         return m
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the adviser's memory as arrays by name; views, not copies."""
+        """Return the memory of adviser or safeguard as arrays by name; views, not copies."""
+        if memory.guard is not None:
+            found: dict[str, npt.NDArray[Any]] = memory.guard.arrays()
+            return found
         return {} if self.adviser is None else self.adviser.arrays(memory.adviser)
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -169,6 +183,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
             "correction": "motion" if self._advising is None else self._advising.correction,
+            "safeguard": self.safeguard,
         }
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), description)
@@ -208,7 +223,12 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         )
         encoding = Encoding.from_dict(description["encoding"])
         return cls(
-            network, encoding, description["card"], _adviser(description["adviser"]), str(description["correction"])
+            network,
+            encoding,
+            description["card"],
+            _adviser(description["adviser"]),
+            str(description["correction"]),
+            bool(description.get("safeguard", False)),
         )
 
 

@@ -14,6 +14,8 @@ from torchrl.envs.utils import check_env_specs
 import posse
 from posse.adapters.actions import MOTIONS
 from posse.signals.global_state import StateLayout
+from posse_baselines import PolicyError
+from posse_baselines.safeguard import Guard
 from posse_training.torchrl.env import PosseEnv
 
 WORLDS = 6
@@ -76,6 +78,23 @@ def test_steps_equal_those_of_the_batch() -> None:
         np.testing.assert_array_equal(now["terminated"].squeeze(-1).numpy(), terminated)
         np.testing.assert_array_equal(now["truncated"].squeeze(-1).numpy(), truncated)
         np.testing.assert_array_equal(now["score"].squeeze(-1).numpy(), infos["score"])
+
+
+def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
+    env = PosseEnv("smart", WORLDS, seed=5, safeguard=True, **SHORT)
+    batch = posse.batch("smart", WORLDS, seed=5, autoreset="disabled", **SHORT)
+    guard = Guard(batch.layout, WORLDS)
+    carried, seen = env.reset(), batch.reset()
+    for wanted in some_actions(batch.action_shape, 30):
+        seen, _, _, truncated, _ = batch.step(guard.actions(seen, wanted))
+        following, carried = env.step_and_maybe_reset(act(carried, wanted))
+        np.testing.assert_array_equal(following["next", "agents", "observation"].numpy(), seen)
+        if truncated.any():
+            seen = batch.reset(options={"reset_mask": truncated})
+            guard.restart(truncated)
+    check_env_specs(env, seed=1)
+    with pytest.raises(PolicyError, match="discrete actions are no velocities"):
+        PosseEnv("smart", WORLDS, safeguard=True, discrete_actions=True)
 
 
 def test_rows_of_a_target_that_is_an_agent_come_last() -> None:

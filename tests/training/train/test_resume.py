@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.runs import ADVISED, BELIEVING, assert_equal, numbers, quiet, small, steps_saved
+from tests.support.runs import BELIEVING, GUARDED, assert_equal, numbers, quiet, small, steps_saved
 
 from posse_training.train import TrainSettings, checkpoint
 from posse_training.train.train import resume, train
@@ -23,8 +23,8 @@ from posse_training.train.train import resume, train
     [
         ("ppo", {}),
         *(pytest.param(name, {}, marks=pytest.mark.long) for name in ("mappo", "sac", "td3")),
-        ("mappo", ADVISED),
         ("ppo", BELIEVING),
+        ("ppo", GUARDED),
     ],
 )
 def test_a_training_that_was_cut_ends_where_it_would_have(

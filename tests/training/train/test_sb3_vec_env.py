@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 import posse
 from posse_baselines.learned import Encoder, Encoding
+from posse_baselines.safeguard import Guard
 from posse_training.train.networks import Normaliser
 from posse_training.train.vec_env import TeamVecEnv
 
@@ -62,6 +63,24 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
             total[:] = 0
         else:
             assert all(told == {} for told in infos)
+
+
+def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
+    settings: dict[str, Any] = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5}
+    batches = [posse.batch("smart", 3, autoreset="disabled", **settings) for _ in range(2)]
+    env = TeamVecEnv([batches[0]], Encoding.of(batches[0].layout), safeguard=True, staggered=False)
+    guard = Guard(batches[1].layout, 3)
+    env.reset()
+    seen = batches[1].reset()
+    generator = np.random.default_rng(1)
+    for _ in range(2 * HORIZON):
+        wanted = draw(env, generator)
+        observations, _, dones, _ = move(env, wanted)
+        seen, *_ = batches[1].step(guard.actions(seen, wanted.reshape(3, 5, 2)))
+        if dones.any():
+            seen = batches[1].reset(options={"reset_mask": np.ones(3, np.bool_)})
+            guard.restart(np.ones(3, np.bool_))
+        np.testing.assert_array_equal(observations.reshape(3, 5, -1), seen)
 
 
 def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:

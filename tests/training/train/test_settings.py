@@ -23,7 +23,7 @@ from posse_training.train.train import resume, train
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("scenario", [*posse.scenario_names(), "smart,radio"])
 def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
-    found = default_settings(scenario, algorithm)
+    found = default_settings(scenario, algorithm, preset="residual")
     assert TrainSettings.from_dict(json.loads(json.dumps(found.to_dict()))) == found
 
 
@@ -50,6 +50,7 @@ def test_every_scenario_has_defaults(scenario: str, algorithm: str) -> None:
         ({"algorithm": "dqn"}, "algorithm='dqn' is unknown; known: ppo"),
         ({"encoding": ["plain"]}, "encoding="),
         ({"beside": "x" * 5000}, r"beside='x.*1 to 4096 characters"),
+        ({"safeguard": True, "advise": "ddcs-tuned"}, "safeguard=True goes with neither advise nor imitate"),
         ({"overrides": [1]}, r"overrides=\[1\]"),
         ({"overrides": {"name": "x"}}, "overrides cannot set 'name'"),
         ({"overrides": {"message_size": 3}}, "use the setting message_size"),
@@ -64,9 +65,10 @@ def test_impossible_settings(changes: dict[str, Any], message: str) -> None:
 def test_the_preset_nothing_learns_from_random_weights_on_every_scenario() -> None:
     for scenario in (*posse.scenario_names(), "smart,radio"):
         found = default_settings(scenario, preset="nothing")
-        assert (found.advise, found.imitate, found.correction, found.encoding) == (None, None, "motion", "slots")
+        assert (found.advise, found.imitate, found.safeguard, found.end_on_contact) == (None, None, True, True)
         assert replace(found, scenario="smart") == default_settings("smart", preset="nothing")
-    assert default_settings("smart").advise == "ddcs-tuned", "the default is the residual"
+    assert default_settings("smart") == default_settings("smart", preset="nothing")
+    assert default_settings("smart", preset="residual").advise == "ddcs-tuned"
 
 
 def test_unknown_settings() -> None:

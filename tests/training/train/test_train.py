@@ -12,7 +12,17 @@ import pytest
 import torch
 from rich.console import Console
 from stable_baselines3 import PPO
-from tests.support.runs import ADVISED, ALGORITHM_CASES, BELIEVING, assert_equal, numbers, quiet, small, steps_saved
+from tests.support.runs import (
+    ADVISED,
+    ALGORITHM_CASES,
+    BELIEVING,
+    GUARDED,
+    assert_equal,
+    numbers,
+    quiet,
+    small,
+    steps_saved,
+)
 
 from posse_baselines import PolicyError, load
 from posse_baselines.learned import LearnedPolicy
@@ -34,12 +44,12 @@ def test_two_trainings_from_one_seed_agree_exactly(tmp_path: Path, algorithm: st
     assert mine != other
 
 
-@pytest.mark.parametrize("changes", [ADVISED, BELIEVING])
-def test_an_advised_training_exports_what_it_played(tmp_path: Path, changes: dict[str, Any]) -> None:
+@pytest.mark.parametrize("changes", [ADVISED, BELIEVING, GUARDED])
+def test_a_training_exports_what_it_played(tmp_path: Path, changes: dict[str, Any]) -> None:
     file = train(small(tmp_path / "run", **changes), console=quiet())
     policy = load(file)
     assert isinstance(policy, LearnedPolicy)
-    assert policy.adviser is not None
+    assert (policy.adviser is None, policy.safeguard) == ("advise" not in changes, "safeguard" in changes)
     scenario = small(tmp_path, **changes).scenarios[0]
     results = evaluate(policy, scenario, 3, 0, split="validation", progress=False)
     for name in ("safe_score", "score", "contact_free"):
@@ -47,7 +57,7 @@ def test_an_advised_training_exports_what_it_played(tmp_path: Path, changes: dic
     again = results["safe_score"].mean()
     with (file.parent / "curve.csv").open(newline="") as lines:
         curve = list(csv.DictReader(lines))
-    assert float(curve[0]["steps"]) == 0, "what it begins with is scored, too"
+    assert float(curve[0]["steps"]) == (0 if policy.adviser else 640), "an adviser is scored, too"
     assert again == pytest.approx(max(float(row["safe_score"]) for row in curve), abs=1e-12)
     with pytest.raises(SettingsError, match="neither imitate nor message_size"):
         small(tmp_path, advise="ddcs-distributed", message_size=1)

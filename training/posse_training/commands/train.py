@@ -26,16 +26,16 @@ class _Which:
     scenario: str = "smart"
     algorithm: str = "ppo"
     side: str = "trackers"
-    preset: Preset = "residual"
+    preset: Preset = "nothing"
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Arguments(TrainSettings):
     """Settings of a training, and how often and where it is made."""
 
-    preset: Preset = "residual"
-    """Default settings: learn a correction of a scripted team, where the scenario has such defaults
-    and the algorithm is on policy; or learn from nothing, that is from random weights."""
+    preset: Preset = "nothing"
+    """Default settings: learn from nothing, that is from random weights; or learn a correction of a scripted team,
+    where the scenario has such defaults and the algorithm is on policy."""
     seeds: tuple[int, ...] = ()
     """Seeds of several runs, in turn, or with --ray at once; the same command again resumes them."""
     ray: RayOption = None

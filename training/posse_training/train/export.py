@@ -61,7 +61,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         activation=_NAMES[between.pop()] if between else "relu",
         output=algorithm.bound,
     )
-    return LearnedPolicy(network, encoding, card, adviser, settings.correction)
+    return LearnedPolicy(network, encoding, card, adviser, settings.correction, settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

@@ -81,6 +81,12 @@ class TrainSettings:
     reward_weights: dict[str, float] = field(default_factory=dict)
     """Weight of each reward term; default: the scenario's own."""
 
+    end_on_contact: bool = False
+    """A contact ends the training episode, so that the return of the rewards that follow is lost, as it is of the
+    safe score. Evaluations go on."""
+    safeguard: bool = False
+    """The action is a wanted velocity, which the safeguard of the script carries out."""
+
     # The networks
     encoding: Literal["plain", "slots", "belief"] = "slots"
     """Network inputs: the observation; with features computed from it; and the adviser's belief."""
@@ -285,6 +291,11 @@ def _check_together(s: TrainSettings) -> None:
             f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
             "its adviser, which sends the messages"
         )
+    if s.safeguard and (s.advise is not None or s.imitate is not None):
+        raise SettingsError(
+            "safeguard=True goes with neither advise nor imitate, whose actions are not wanted velocities: "
+            "use --no-safeguard; a correction of the adviser's velocity is safeguarded by the adviser"
+        )
     if s.side == "target":
         _check_target(s)
     for name, instead in _ELSEWHERE.items():
@@ -303,7 +314,13 @@ def _check_target(s: TrainSettings) -> None:
     """Raise if settings do not fit a target that learns."""
     if s.against is None:
         raise SettingsError("side='target' needs the teams that chase it: set against, for example to ddcs-tuned")
-    for name, wanted in (("imitate", None), ("advise", None), ("message_size", 0), ("encoding", "plain")):
+    for name, wanted in (
+        ("imitate", None),
+        ("advise", None),
+        ("message_size", 0),
+        ("encoding", "plain"),
+        ("safeguard", False),
+    ):
         value = getattr(s, name)
         if value != wanted:
             raise SettingsError(
@@ -325,21 +342,21 @@ _ELSEWHERE = {
 
 
 def default_settings(
-    scenario: str = "smart", algorithm: str = "ppo", *, side: str = "trackers", preset: Preset = "residual"
+    scenario: str = "smart", algorithm: str = "ppo", *, side: str = "trackers", preset: Preset = "nothing"
 ) -> TrainSettings:
     """Return the default settings of a scenario.
 
-    They are kept in ``posse_training/defaults``: ``all.toml`` holds for every scenario, and the file
-    of a scenario for the preset ``"residual"``. In each, the table ``all`` holds for every
-    algorithm, ``on-policy`` and ``off-policy`` for those, and a table that is named after an
-    algorithm for it alone.
+    They are kept in ``posse_training/defaults``: ``all.toml`` holds for every training, ``nothing.toml``
+    and ``residual.toml`` for a preset, and the file of a scenario for the second one. In each, the
+    table ``all`` holds for every algorithm, ``on-policy`` and ``off-policy`` for those, and a table
+    that is named after an algorithm for it alone.
 
     Args:
         scenario: A scenario's name, or several separated by commas.
         algorithm: One of the algorithms.
         side: What learns; the defaults of a target are in ``target.toml``, whatever the preset.
-        preset: ``"residual"``: learn a correction of a scripted team, on policy and where the
-            scenario has a file; ``"nothing"``: learn from random weights.
+        preset: ``"nothing"``: learn from random weights, behind the safeguard; ``"residual"``: learn
+            a correction of a scripted team, on policy and where the scenario has a file.
 
     Raises:
         SettingsError: An unknown algorithm, or an invalid default.
@@ -353,9 +370,10 @@ def default_settings(
     files = [folder / "all.toml"]
     if side == "target":
         files.append(folder / "target.toml")
-    elif preset == "residual":
-        name = "mixture.toml" if "," in scenario else f"{scenario}.toml"
-        files += [file for file in folder.iterdir() if file.name == name]
+    else:
+        own = folder / ("mixture.toml" if "," in scenario else f"{scenario}.toml")
+        corrects = preset == "residual" and ALGORITHMS[algorithm].on_policy and own.is_file()
+        files += [folder / "residual.toml", own] if corrects else [folder / "nothing.toml"]
     for file in files:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
         for table in ("all", "on-policy" if ALGORITHMS[algorithm].on_policy else "off-policy", algorithm):

@@ -20,6 +20,7 @@ from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.advice import MOTION, Advice, Advising
+from posse_baselines.safeguard import Guard
 from posse_training.train.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -42,6 +43,8 @@ class TeamVecEnv(VecEnv):
         encoding: Which inputs are read from an observation.
         advising: Adviser whose proposals are appended to the observations, and corrected by the
             actions (2,) (:mod:`posse_baselines.learned.advice`).
+        safeguard: Whether actions are wanted velocities, which the safeguard carries out
+            (:mod:`posse_baselines.safeguard`).
         see_state: Append the state of the world, for a centralized critic
             (:mod:`posse_training.train.world_state`).
         staggered: Shorten the first episodes.
@@ -61,6 +64,7 @@ class TeamVecEnv(VecEnv):
         encoding: Encoding,
         *,
         advising: Advising | None = None,
+        safeguard: bool = False,
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
@@ -73,7 +77,7 @@ class TeamVecEnv(VecEnv):
         slots = 0
         for batch in batches:
             state = StateWriter(batch, places, obstacles) if see_state else None
-            group = _SlotGroup(batch, encoding, advising, state, slots)
+            group = _SlotGroup(batch, encoding, advising, safeguard, state, slots)
             self._groups.append(group)
             slots = group.slots.stop
         self.private_size = self._groups[0].private_size
@@ -260,6 +264,7 @@ class _SlotGroup:
         batch: The worlds.
         encoding: Which inputs are read from an observation.
         advising: Adviser whose proposals are appended to the observations, if any.
+        safeguard: Whether actions are wanted velocities.
         state: Writes the state of the world behind them, if given.
         first: Number of the group's first slot.
 
@@ -271,7 +276,13 @@ class _SlotGroup:
     """
 
     def __init__(
-        self, batch: Batch, encoding: Encoding, advising: Advising | None, state: StateWriter | None, first: int
+        self,
+        batch: Batch,
+        encoding: Encoding,
+        advising: Advising | None,
+        safeguard: bool,
+        state: StateWriter | None,
+        first: int,
     ) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
@@ -282,6 +293,8 @@ class _SlotGroup:
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         self._advice = Advice(advising, batch) if advising else None
+        self._guard = Guard(batch.layout, worlds) if safeguard else None
+        self._observed = np.zeros(batch.observation_shape if safeguard else 0, np.float32)  # what the guard reads
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
         # Rewards of the present episode so far, (E, N), without the cost of contacts.
@@ -305,6 +318,9 @@ class _SlotGroup:
             self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
         if self._advice is not None:
             self._advice.restart(raw, np.ones(self.batch.num_worlds, np.bool_))
+        if self._guard is not None:
+            self._guard.restart(np.ones(self.batch.num_worlds, np.bool_))
+            self._observed[...] = raw
         self._encode(raw, out)
 
     def step(
@@ -320,6 +336,8 @@ class _SlotGroup:
         actions = actions.reshape(*batch.action_shape[:2], -1)
         if self._advice is not None:
             actions = self._advice.actions(actions)
+        if self._guard is not None:
+            actions = self._guard.actions(self._observed, actions)
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
         contacts = told["reward/contact"]
@@ -336,9 +354,13 @@ class _SlotGroup:
             raw = batch.reset(options={"reset_mask": ended})
             if self._advice is not None:
                 self._advice.restart(raw, ended)
+            if self._guard is not None:
+                self._guard.restart(ended)
             self._returns[ended] = 0
             self._touched[ended] = False
             self._cut_at[ended] = _NEVER
+        if self._guard is not None:
+            self._observed[...] = raw
         self._encode(raw, observations)
 
     def _count(self, contacts: FloatArray) -> None:
@@ -412,6 +434,8 @@ class _SlotGroup:
             "terms": self._terms,
         }
         memory = self._advice.arrays() if self._advice is not None else {}
+        if self._guard is not None:
+            own |= {"observed": self._observed, **{f"guard.{k}": array for k, array in self._guard.arrays().items()}}
         advice = {f"advice.{name}": array for name, array in memory.items()}
         return {**self.batch.arrays.by_name(), **_arrays_inside(self.batch), **advice, **own}
 

@@ -88,6 +88,7 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
         batches,
         encoding,
         advising=(Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None),
+        safeguard=settings.safeguard,
         see_state=ALGORITHMS[settings.algorithm].reads_state,
     )
 
@@ -118,14 +119,16 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
         )
     batches = []
     for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
-        inside: dict[str, Any] = {}
+        scenario, inside = pair.scenario, dict[str, Any]()
+        if settings.end_on_contact:
+            scenario = scenario.replace(terminate_on_contact=True)
         if settings.side == TARGET:
             inside = {"team_policy": pair.opponent}
         elif isinstance(pair.opponent, Target) and pair.opponent.policy is not None:
             inside = {"target_policy": pair.opponent.policy}
         batches.append(
             posse.batch(
-                pair.scenario,
+                scenario,
                 last - first,
                 seed=settings.seed,
                 first_world=first,
