@@ -191,7 +191,8 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
         """Advance by one control step with wanted velocities of the trackers."""
         wanted = np.stack([np.asarray(actions[agent], np.float32) for agent in self._trackers])
         motions = self._guard.actions(self._observed, wanted[None])[0]
-        result: tuple[Any, Any, Any, Any, Any] = self.env.step({**actions, **dict(zip(self._trackers, motions, strict=True))})
+        guarded = {**actions, **dict(zip(self._trackers, motions, strict=True))}
+        result: tuple[Any, Any, Any, Any, Any] = self.env.step(guarded)
         self._observe(result[0])
         return result
 
