@@ -12,7 +12,8 @@ import tyro
 from rich.console import Console
 
 from posse_baselines import load
-from posse_training.train.settings import TrainSettings, default_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import TrainSettings
 from posse_training.train.train import train
 from posse_training.train.validation import validate
 

@@ -13,7 +13,8 @@ import tyro
 from rich.console import Console
 
 from posse_training.errors import SettingsError
-from posse_training.train.settings import LAST, SETTINGS, TrainSettings, default_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import LAST, SETTINGS, TrainSettings
 from posse_training.train.train import resume, train
 
 ALGORITHMS: Final = {

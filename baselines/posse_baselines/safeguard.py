@@ -59,16 +59,21 @@ class Guard(OwnArrays):
         self._team = team_of(layout, TunedDDCS("ddcs-tuned").settings_for(scenario))
         self._minds = np.empty((num_worlds, robots), MIND)
         self._mates = np.empty((num_worlds, robots, n), MATE)
+        self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
         self.restart(np.ones(num_worlds, np.bool_))
+
+    def follow(self, observations: FloatArray) -> None:
+        """Take the observations (E, R, F) of a control step, before :meth:`actions`."""
+        self._observed[...] = observations
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
         self._minds[mask], self._mates[mask] = MIND_AT_START, MATE_AT_START
 
-    def actions(self, observations: FloatArray, wanted: npt.ArrayLike) -> FloatArray:
+    def actions(self, wanted: npt.ArrayLike) -> FloatArray:
         """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
 
-        To be called once a control step, with the observations (E, R, F) of that step.
+        To be called once a control step.
 
         Raises:
             ValueError: A wanted velocity that is not finite.
@@ -77,19 +82,17 @@ class Guard(OwnArrays):
         if not np.isfinite(wished).all():
             raise ValueError("a wanted velocity must be finite")
         actions = wished.copy()
-        worlds, robots = self._minds.shape
-        seen = np.ascontiguousarray(observations, np.float32)
         work = work_for(self._mates.shape[2])
-        over_worlds(_guard_all, (self._team, self._minds, self._mates, seen, work, wished, actions), worlds, robots)
+        arguments = (self._team, self._minds, self._mates, self._observed, work, wished, actions)
+        over_worlds(_guard_all, arguments, *self._minds.shape)
         return actions
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return what it remembers as arrays (E, ...) by name; views, not copies."""
-        return {
-            f"{name}.{field}": records[field]
-            for name, records in (("minds", self._minds), ("mates", self._mates))
-            for field in records.dtype.names or ()
-        }
+        arrays: dict[str, npt.NDArray[Any]] = {"observed": self._observed}
+        for name, records in (("minds", self._minds), ("mates", self._mates)):
+            arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
+        return arrays
 
 
 @kernel
@@ -158,16 +161,17 @@ class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._observed = np.atleast_2d(observation)[None]
-        self._guard = Guard(self.get_wrapper_attr("layout"), 1, self._observed.shape[1])
+        rows = np.atleast_2d(observation)
+        self._guard = Guard(self.get_wrapper_attr("layout"), 1, len(rows))
+        self._guard.follow(rows[None])
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Advance by one control step with wanted velocities."""
         wanted = np.asarray(action, np.float32)
-        motion = self._guard.actions(self._observed, np.atleast_2d(wanted)[None])
+        motion = self._guard.actions(np.atleast_2d(wanted)[None])
         observation, *rest = self.env.step(motion.reshape(wanted.shape))
-        self._observed = np.atleast_2d(observation)[None]
+        self._guard.follow(np.atleast_2d(observation)[None])
         return observation, *rest
 
 
@@ -190,11 +194,11 @@ class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
         """Advance by one control step with wanted velocities of the trackers."""
         wanted = np.stack([np.asarray(actions[agent], np.float32) for agent in self._trackers])
-        motions = self._guard.actions(self._observed, wanted[None])[0]
+        motions = self._guard.actions(wanted[None])[0]
         guarded = {**actions, **dict(zip(self._trackers, motions, strict=True))}
         result: tuple[Any, Any, Any, Any, Any] = self.env.step(guarded)
         self._observe(result[0])
         return result
 
     def _observe(self, observations: Mapping[str, Any]) -> None:
-        self._observed = np.stack([observations[agent] for agent in self._trackers])[None]
+        self._guard.follow(np.stack([observations[agent] for agent in self._trackers])[None])

@@ -48,7 +48,8 @@ def full_speed(safe: bool) -> tuple[float, float]:
         c, s = views["heading"][..., 0], views["heading"][..., 1]
         d = (middle - at) / np.maximum(np.linalg.norm(middle - at, axis=-1, keepdims=True), 1e-6)
         wanted = np.stack([d[..., 0] * c + d[..., 1] * s, d[..., 1] * c - d[..., 0] * s], axis=-1)
-        actions = guard.actions(observations, wanted)
+        guard.follow(observations)
+        actions = guard.actions(wanted)
         if not safe:
             turn = np.arctan2(wanted[..., 1], wanted[..., 0]) / batch.scenario.control_step
             ahead = 2 * np.clip(wanted[..., 0], 0, 1) - 1
@@ -86,7 +87,8 @@ def test_environments_do_as_the_batch_does() -> None:
         seen_each, _ = parallel.reset()
         for _ in range(30):
             wanted = generator.uniform(-1, 1, (5, 3)).astype(np.float32)
-            seen, *_ = batch.step(guard.actions(seen, wanted[None]))
+            guard.follow(seen)
+            seen, *_ = batch.step(guard.actions(wanted[None]))
             seen_team, *_ = team.step(wanted)
             seen_each, *_ = parallel.step({f"tracker_{i}": wanted[i] for i in range(5)})
             np.testing.assert_array_equal(seen[0], seen_team)
@@ -120,4 +122,4 @@ def test_what_cannot_be_guarded() -> None:
         Safeguard(3)
     batch = posse.batch("smart", 1)
     with pytest.raises(ValueError, match="finite"):
-        Guard(batch.layout, 1).actions(batch.reset(), np.full((1, 5, 2), np.nan))
+        Guard(batch.layout, 1).actions(np.full((1, 5, 2), np.nan))

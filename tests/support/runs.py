@@ -90,9 +90,9 @@ BELIEVING: dict[str, Any] = {
     "advise": "ddcs-tuned",
     "correction": "velocity",
     "encoding": "belief",
-    "contact_bound": 0.03,
+    "end_on_contact": True,
 }
-"""With the settings of the shipped trainings: adviser, belief, bound on contact."""
+"""With the settings of a correction: adviser, belief, a contact ends an episode."""
 GUARDED: dict[str, Any] = {
     "scenario": "smart",
     "safeguard": True,

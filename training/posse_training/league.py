@@ -27,7 +27,8 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import InUseError, locked, read_json
-from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, default_settings, read_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, read_settings
 
 FILE: Final = "league.json"
 MATRIX: Final = "matrix.csv"

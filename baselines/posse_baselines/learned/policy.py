@@ -145,7 +145,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         if self._advising is not None:
             actions, m.adviser = self._advising.answer(observations, proposals, actions[..., :MOTION], m.adviser)
         if m.guard is not None:
-            actions = m.guard.actions(observations, actions)
+            m.guard.follow(observations)
+            actions = m.guard.actions(actions)
         return actions, m
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:

@@ -30,7 +30,7 @@ from posse_training.errors import DivergedError, SettingsError
 from posse_training.evaluation import evaluate
 from posse_training.train import train as module
 from posse_training.train.algorithms import ALGORITHMS, even_minibatch
-from posse_training.train.train import resume, train
+from posse_training.train.train import resume, steps_made, train
 from posse_training.train.worlds import make_env
 
 
@@ -117,8 +117,8 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     assert schedule(0.5) == pytest.approx(5.5e-4)
     assert schedule(0.0) == schedule(-7.0) == pytest.approx(1e-4)
     at_once = env.num_envs * settings.rollout
-    assert settings.steps_made(env.num_envs) == -(-100 // at_once) * at_once
-    assert replace(settings, steps=3 * at_once).steps_made(env.num_envs) == 3 * at_once
+    assert steps_made(settings, env.num_envs) == -(-100 // at_once) * at_once
+    assert steps_made(replace(settings, steps=3 * at_once), env.num_envs) == 3 * at_once
 
 
 @pytest.mark.parametrize(("rows", "wanted", "size"), [(81920, 8192, 8192), (100, 40, 50), (7, 3, 7), (6, 100, 6)])
@@ -184,7 +184,7 @@ def test_a_name_that_does_not_exist_leaves_no_folder(tmp_path: Path, name: str) 
 
 def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
     accumulators = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
-    train(small(tmp_path, tensorboard=True, contact_bound=0.1), console=quiet())
+    train(small(tmp_path, tensorboard=True), console=quiet())
     log = accumulators.EventAccumulator(str(tmp_path)).Reload()
     with (tmp_path / "curve.csv").open(newline="") as lines:
         curve = list(csv.DictReader(lines))
@@ -194,4 +194,3 @@ def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
         assert [step for step, _ in logged] == [step for step, _ in wanted] == [640, 1280]
         assert [v for _, v in logged] == pytest.approx([v for _, v in wanted], rel=1e-5, abs=1e-6)
     assert {"reward/slot", "reward/contact", "training/score", "rollout/success_rate"} <= set(log.Tags()["scalars"])
-    assert {"contact/share", "contact/multiplier"} <= set(log.Tags()["scalars"])

@@ -14,7 +14,8 @@ import tyro
 from posse_training.errors import require
 from posse_training.files import read_json
 from posse_training.parallel import RayOption, address_of
-from posse_training.train.settings import Preset, TrainSettings, default_settings, opponents_of
+from posse_training.train.presets import Preset, default_settings
+from posse_training.train.settings import TrainSettings, opponents_of
 
 _NEEDED = ("training", "torch", "stable_baselines3")
 
@@ -55,8 +56,6 @@ class _Resume:
     """Run folder."""
     steps: int | None = None
     """Total steps to train for; default: as the run was started with."""
-    trust_code: bool = False
-    """Import policies that the folder's settings.json names as package.module:Class."""
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -67,7 +66,7 @@ def main(arguments: Sequence[str]) -> None:
         from posse_training.train.train import resume
 
         with _how_to_resume(run.resume):
-            path = resume(run.resume, steps=run.steps, trust_code=run.trust_code)
+            path = resume(run.resume, steps=run.steps)
         print(_what_next(path))
         return
     asked = [a for a in arguments if a not in ("-h", "--help")]

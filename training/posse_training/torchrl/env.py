@@ -152,9 +152,9 @@ class PosseEnv(EnvBase):
         observations = self.batch.reset(seed=seed, options=options)
         if all_worlds:
             self._seed = None
-        self._observed = observations
         if self._guard is not None:
             self._guard.restart(mask)
+            self._guard.follow(observations[:, self._rows[TRACKERS]])
         return self._pack(observations)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -170,11 +170,11 @@ class PosseEnv(EnvBase):
             together = self._motions[together]
         actions_of_all = self._array(together.detach())
         if self._guard is not None:
-            part = self._rows[TRACKERS]
-            motions = self._guard.actions(self._observed[:, part], actions_of_all[:, part])
+            motions = self._guard.actions(actions_of_all[:, self._rows[TRACKERS]])
             actions_of_all = np.concatenate([motions, actions_of_all[:, motions.shape[1] :]], axis=1)
         observations, rewards, *_ = self.batch.step(actions_of_all)
-        self._observed = observations
+        if self._guard is not None:
+            self._guard.follow(observations[:, self._rows[TRACKERS]])
         packed = self._pack(observations)
         each = self._tensor(rewards).unsqueeze(-1)
         for group, part in self._rows.items():
