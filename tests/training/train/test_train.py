@@ -115,7 +115,7 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     schedule = ALGORITHMS[settings.algorithm].make(settings, env).lr_schedule
     assert schedule(1.0) == pytest.approx(1e-3)
     assert schedule(0.5) == pytest.approx(5.5e-4)
-    assert schedule(0.0) == schedule(-7.0) == pytest.approx(1e-4)
+    assert schedule(0.0) == pytest.approx(schedule(-7.0)) == pytest.approx(1e-4)
     at_once = env.num_envs * settings.rollout
     assert steps_made(settings, env.num_envs) == -(-100 // at_once) * at_once
     assert steps_made(replace(settings, steps=3 * at_once), env.num_envs) == 3 * at_once

@@ -10,7 +10,6 @@ import csv
 import functools
 import io
 import json
-import random
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -144,16 +143,11 @@ def arrays_of(tensors: Mapping[str, torch.Tensor]) -> dict[str, npt.NDArray[Any]
 def random_state() -> State:
     """Return the state of every global random generator that training draws from."""
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 (SB3 draws from it)
-    return {
-        "python": random.getstate(),
-        "numpy": (str(name), torch.from_numpy(np.asarray(keys)), *rest),
-        "torch": torch.get_rng_state(),
-    }
+    return {"numpy": (str(name), torch.from_numpy(np.asarray(keys)), *rest), "torch": torch.get_rng_state()}
 
 
 def restore_random_state(state: State) -> None:
     """Set the generators to the state of :func:`random_state`."""
-    random.setstate(state["python"])
     name, keys, *rest = state["numpy"]
     np.random.set_state((name, keys.numpy(), *rest))  # noqa: NPY002
     torch.set_rng_state(state["torch"])
