@@ -27,7 +27,7 @@ from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import BEST, CURVE, LAST, SETTINGS, TrainSettings, best_policy, read_settings
-from posse_training.train.validation import score_beside, validate
+from posse_training.train.validation import first_statistics, score_beside, validate
 from posse_training.train.vec_env import TeamVecEnv
 from posse_training.train.worlds import check_opponents, load_own, make_adviser, make_env
 
@@ -139,9 +139,11 @@ class Run(BaseCallback):
         self._saved_at: int | None = None  # steps at the last checkpoint
 
     def begin(self) -> None:
-        """Take what the model begins with: another run's networks, or a copy of a policy."""
+        """Take what the model begins with: input statistics, another run's networks, a copy of a policy."""
         s = self.settings
-        if s.start is not None:
+        if s.start is None:
+            first_statistics(s, self.statistics)
+        else:
             checkpoint.start_from(Path(s.start), self.model, self.statistics, s.log_deviation)
         if s.imitate is not None:
             imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.copied)

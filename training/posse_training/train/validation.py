@@ -1,4 +1,4 @@
-"""What a run is judged by: scores on validation worlds."""
+"""What a run is judged and normalised by: validation scores and first input statistics."""
 
 from __future__ import annotations
 
@@ -12,10 +12,30 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import mean
 from posse_training.train.display import Display
+from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import TARGET, load_own, pairings
+from posse_training.train.worlds import TARGET, load_own, make_env, pairings
 
 VALIDATION_SEED: Final = 0
+_WARM_WORLDS: Final = 32
+_WARM_REACH: Final = 0.1  # of random outputs that are added to an adviser's proposals
+_HELD: Final = 20  # steps for which a random action is held, so that trackers move somewhere
+
+
+def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> None:
+    """Gather input statistics from one episode of random actions in a few worlds.
+
+    Without them the first updates learn from inputs of very different sizes, and the run lags behind for millions of
+    steps.
+    """
+    warm = make_env(replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings)))))
+    generator = np.random.default_rng(settings.seed)
+    statistics.add(warm.reset())
+    reach = 1.0 if settings.advise is None else _WARM_REACH
+    for step in range(max(batch.scenario.horizon for batch in warm.batches)):
+        if step % _HELD == 0:
+            actions = generator.uniform(-reach, reach, (warm.num_envs, *warm.action_space.shape)).astype(np.float32)
+        statistics.add(np.asarray(warm.step(actions)[0]))
 
 
 def score_beside(settings: TrainSettings, display: Display) -> float | None:
