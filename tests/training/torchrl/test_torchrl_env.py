@@ -126,25 +126,6 @@ def test_what_was_returned_is_never_overwritten() -> None:
         assert torch.equal(tensor, copy)
 
 
-def test_no_copy_on_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    env = PosseEnv("constant", WORLDS)
-    carried = env.reset()
-    returned = []
-    step = env.batch.step
-
-    def remember(actions: npt.ArrayLike) -> object:
-        outcome = step(actions)
-        returned.append(outcome)
-        return outcome
-
-    monkeypatch.setattr(env.batch, "step", remember)
-    following = env.step(act(carried, some_actions(env.batch.action_shape, 1)[0]))
-    observations, rewards, *_ = returned[0]
-    now = following["next", "agents"]
-    assert now["observation"].data_ptr() == observations.ctypes.data
-    assert now["reward"].data_ptr() == rewards.ctypes.data
-
-
 def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     env = PosseEnv("field", WORLDS)
     carried = env.reset()
@@ -196,18 +177,6 @@ def test_a_seed_gives_the_worlds_of_that_seed_from_the_start() -> None:
     np.testing.assert_array_equal(seeded, posse.batch("constant", WORLDS, seed=9).reset())
     following = env.reset()["agents", "observation"].numpy()  # the next episode, not the same again
     assert (following != seeded).any()
-
-
-def test_start_poses_can_be_given() -> None:
-    env = PosseEnv("constant", WORLDS)
-    env.reset(options={"target_pose": [1.0, 2.0, 0.5]})
-    np.testing.assert_array_equal(env.batch.state["world_x"], np.full(WORLDS, 1.0, np.float32))
-
-
-def test_settings_reach_the_batch() -> None:
-    env = PosseEnv("constant", 1, seed=4, first_world=17, split="test", num_trackers=3)
-    batch = posse.batch("constant", 20, seed=4, split="test", num_trackers=3)
-    np.testing.assert_array_equal(env.reset()["agents", "observation"].numpy(), batch.reset()[17:18])
 
 
 def test_a_choice_of_autoreset_is_refused() -> None:

@@ -110,19 +110,6 @@ def test_killed_before_the_first_checkpoint_it_starts_anew(tmp_path: Path, monke
     assert_equal(numbers(tmp_path / "whole"), numbers(tmp_path / "cut"))
 
 
-def test_checkpoints_are_no_further_apart_than_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[int] = []
-    write = checkpoint.write_checkpoint
-
-    def note(folder: Path, state: Any) -> None:
-        seen.append(state["model"]["num_timesteps"])
-        write(folder, state)
-
-    monkeypatch.setattr(checkpoint, "write_checkpoint", note)
-    train(small(tmp_path / "run"), console=quiet())
-    assert seen == [0, 320, 640, 960, 1280]
-
-
 def test_a_finished_training_can_be_gone_on_with_for_longer(tmp_path: Path) -> None:
     train(small(tmp_path / "run"), console=quiet())
     resume(tmp_path / "run", console=quiet(), steps=1920)

@@ -122,16 +122,6 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
     np.testing.assert_array_equal(dones.reshape(4, 5).all(axis=1), [True, False, False, False])
 
 
-def test_more_worlds_than_steps_all_end() -> None:
-    env = make(worlds=2 * HORIZON + 1, staggered=True, num_trackers=1)
-    env.reset()
-    ended = np.zeros(env.num_envs, bool)
-    for _ in range(HORIZON):
-        _, _, dones, _ = move(env, np.zeros((env.num_envs, 2), np.float32))
-        ended |= dones
-    assert ended.all()
-
-
 def test_nothing_returned_is_overwritten_or_shared() -> None:
     env = make(worlds=2, staggered=True)
     kept: list[tuple[Any, ...]] = [(env.reset(),)]

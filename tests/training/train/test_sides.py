@@ -99,7 +99,7 @@ def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
     assert [batch.num_worlds for batch in env.batches] == [6, 3]
     assert [batch.first_world for batch in env.batches] == [0, 6]
     assert env.num_envs == 9, "one slot for each target"
-    assert env.action_shape == (2,)
+    assert env.action_length == 2
     weights = dict(env.batches[0].scenario.target_reward_weights)
     assert weights == {"team": -1.0, "contact": -0.5}
     observations = env.reset()

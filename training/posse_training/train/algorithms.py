@@ -89,8 +89,7 @@ def _td3(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     from stable_baselines3 import TD3
     from stable_baselines3.common.noise import NormalActionNoise
 
-    shape = env.action_space.shape
-    noise = NormalActionNoise(np.zeros(shape), np.full(shape, _EXPLORATION))
+    noise = NormalActionNoise(np.zeros(env.action_length), np.full(env.action_length, _EXPLORATION))
     return TD3("MlpPolicy", env, action_noise=noise, **_off_policy(s))
 
 

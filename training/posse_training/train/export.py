@@ -16,7 +16,6 @@ from torch import nn
 
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_baselines.learned.advice import Advising
 from posse_training.provenance import commit
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import LIMIT, Normaliser
@@ -38,10 +37,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
     """
     algorithm = ALGORITHMS[settings.algorithm]
     layers = [module for module in algorithm.actor(model.policy) if isinstance(module, nn.Linear)]
-    adviser = make_adviser(settings)
-    inputs = encoding.size
-    if adviser is not None:
-        inputs += Advising(adviser, settings.correction, believes=encoding.believes).inputs
+    inputs = layers[0].in_features  # behind them, a critic reads the state of the world
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     network = Network(
         mean=_numbers(normaliser.mean)[:inputs],
@@ -52,7 +48,7 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         activation=settings.activation,
         output=algorithm.bound,
     )
-    return LearnedPolicy(network, encoding, card, adviser, settings.correction, settings.safeguard)
+    return LearnedPolicy(network, encoding, card, make_adviser(settings), settings.correction, settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

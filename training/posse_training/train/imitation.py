@@ -73,8 +73,8 @@ def imitate(
             first_world += worlds
         rounds += played
         if k == 0:
-            for inputs, *_ in played:
-                statistics.add(inputs)
+            for rows, *_ in played:
+                statistics.add(rows)
             statistics.apply(policy)
         inputs, actions, _ = _together(rounds)
         error = _fit(policy, optimiser, generator, inputs, actions, _mean_action)

@@ -34,7 +34,7 @@ def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> 
     reach = 1.0 if settings.advise is None else _WARM_REACH
     for step in range(max(batch.scenario.horizon for batch in warm.batches)):
         if step % _HELD == 0:
-            actions = generator.uniform(-reach, reach, (warm.num_envs, *warm.action_space.shape)).astype(np.float32)
+            actions = generator.uniform(-reach, reach, (warm.num_envs, warm.action_length)).astype(np.float32)
         statistics.add(np.asarray(warm.step(actions)[0]))
 
 

@@ -50,6 +50,7 @@ class TeamVecEnv(VecEnv):
         staggered: Shorten the first episodes.
 
     Attributes:
+        action_length: Numbers of an action, 2 + m.
         size: Numbers of an observation.
         private_size: How many of them are the tracker's own; the rest is the state.
 
@@ -69,7 +70,7 @@ class TeamVecEnv(VecEnv):
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
-        length = _action_length(batches, advising)
+        self.action_length = _action_length(batches, advising)
         self.encoding = encoding
         self.staggered = staggered
         scenarios = [batch.scenario for batch in batches]
@@ -83,7 +84,9 @@ class TeamVecEnv(VecEnv):
         self.private_size = self._groups[0].private_size
         self.size = self._groups[0].size
         super().__init__(
-            slots, spaces.Box(-np.inf, np.inf, (self.size,), np.float32), spaces.Box(-1.0, 1.0, (length,), np.float32)
+            slots,
+            spaces.Box(-np.inf, np.inf, (self.size,), np.float32),
+            spaces.Box(-1.0, 1.0, (self.action_length,), np.float32),
         )
 
     @property
@@ -169,10 +172,6 @@ class TeamVecEnv(VecEnv):
     def close(self) -> None:
         """Do nothing: worlds hold only memory."""
 
-    def get_images(self) -> Sequence[npt.NDArray[Any] | None]:
-        """Return no pictures; :mod:`posse.rendering.renderer` draws batches."""
-        return [None] * self.num_envs
-
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return an attribute of each slot's batch."""
         chosen = self._batches_of(indices)
@@ -233,18 +232,7 @@ def _action_length(batches: Sequence[Batch], advising: Advising | None) -> int:
 class _SlotGroup:
     """A batch of E worlds of N trackers as E x N slots; slot ``e * N + i`` is tracker i of world e.
 
-    Args:
-        batch: The worlds.
-        encoding: Which inputs are read from an observation.
-        advising: Adviser whose proposals are appended to the observations, if any.
-        safeguard: Whether actions are wanted velocities.
-        state: Writes the state of the world behind them, if given.
-        first: Number of the group's first slot.
-
-    Attributes:
-        slots: The group's slots among those of all groups.
-        private_size: Numbers of an observation that are the tracker's own.
-        size: Numbers of an observation, the state included.
+    The arguments are those of :class:`TeamVecEnv`; ``first`` is the number of the group's first slot.
     """
 
     def __init__(
