@@ -20,7 +20,8 @@ from posse_baselines import load
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import mean
 from posse_training.provenance import commit
-from posse_training.train.settings import LAST, SETTINGS, TrainSettings, default_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import LAST, SETTINGS, TrainSettings
 from posse_training.train.train import resume, train
 
 TABLE: Final = Path(__file__).parent / "algorithms.csv"
@@ -33,7 +34,7 @@ CHANGES: Final[dict[str, dict[str, Any]]] = {
     "mappo": {"algorithm": "mappo"},
     "sac": {"algorithm": "sac"},
     "td3": {"algorithm": "td3"},
-    "ppo-imitation": {"imitate": "ddcs-tuned"},
+    "ppo-imitation": {"imitate": "ddcs-tuned", "safeguard": False},
 }
 """Settings of each algorithm beyond the defaults of its class."""
 OFF_POLICY: Final = ("sac", "td3")

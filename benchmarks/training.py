@@ -12,7 +12,8 @@ import tyro
 from rich.console import Console
 
 from posse_baselines import load
-from posse_training.train.settings import TrainSettings, default_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import TrainSettings
 from posse_training.train.train import train
 from posse_training.train.validation import validate
 
@@ -25,7 +26,7 @@ class Settings:
     """Agent-steps of plain PPO to measure the throughput of."""
     threads: int = 1
     """Threads of torch; the default of ``posse train`` is 1."""
-    beat_steps: int = 2_000_000
+    beat_steps: int = 20_000_000
     """Agent-steps of a training with the default settings, to beat the tuned script; 0: none."""
     seed: int = 1
     """Training seed of that."""

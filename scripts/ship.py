@@ -30,7 +30,8 @@ from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import difference, mean
 from posse_training.provenance import commit
-from posse_training.train.settings import BEST, SETTINGS, TrainSettings, default_settings, read_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import BEST, SETTINGS, TrainSettings, read_settings
 
 SPLIT: Final = "validation"
 CHOICE_SEED: Final = 1  # seed 0 is evaluated during training
@@ -224,7 +225,7 @@ def command_of(settings: TrainSettings) -> str:
     the training that found them, so the commit of the training may lack them.
     """
     which, side = (settings.scenario, settings.algorithm), settings.side
-    default = default_settings(*which, side=side).to_dict()
+    default = default_settings(*which, side=side, preset="residual").to_dict()
     of_all = default_settings(*which, side=side, preset="nothing").to_dict()
     stated = {"scenario", "algorithm", "steps", "seed"}
     if side == "target":

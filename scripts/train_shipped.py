@@ -13,7 +13,8 @@ import tyro
 from rich.console import Console
 
 from posse_training.errors import SettingsError
-from posse_training.train.settings import LAST, SETTINGS, TrainSettings, default_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import LAST, SETTINGS, TrainSettings
 from posse_training.train.train import resume, train
 
 ALGORITHMS: Final = {
@@ -48,7 +49,11 @@ def all_runs(settings: Settings) -> list[TrainSettings]:
             known = ", ".join(ALGORITHMS)
             raise SettingsError(f"only={name!r:.80} has no learned team of its own; those that have: {known}")
     return [
-        replace(default_settings(name, ALGORITHMS[name]), seed=seed, folder=settings.folder / f"{name}-{seed}")
+        replace(
+            default_settings(name, ALGORITHMS[name], preset="residual"),
+            seed=seed,
+            folder=settings.folder / f"{name}-{seed}",
+        )
         for seed in settings.seeds or range(1, 1 + max(SEEDS.values()))
         for name in settings.only
         if settings.seeds or seed <= SEEDS.get(name, 3)

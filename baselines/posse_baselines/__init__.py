@@ -17,6 +17,7 @@ from posse_baselines.playing import (
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin, from_function
 from posse_baselines.registry import Target, load, load_target, policy_names, target_names
+from posse_baselines.safeguard import Safeguard
 from posse_baselines.tracker_env import register
 
 register()
@@ -29,6 +30,7 @@ __all__ = [
     "Policy",
     "PolicyError",
     "Recorder",
+    "Safeguard",
     "StateReader",
     "Target",
     "Trajectory",

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 import posse
-from posse_training.train.settings import default_settings
+from posse_training.train.presets import default_settings
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -38,10 +38,10 @@ def all_settings() -> str:
 
 def training_defaults() -> str:
     """Return the settings of a training by ``ppo`` that differ most between scenarios."""
-    names = ("steps", "encoding", "advise", "correction", "contact_bound")
+    names = ("steps", "encoding", "advise", "correction")
     rows = []
     for scenario in posse.scenario_names():
-        chosen = default_settings(scenario).to_dict()
+        chosen = default_settings(scenario, preset="residual").to_dict()
         shown = {name: "" if chosen[name] is None else code(chosen[name]) for name in names}
         if chosen["advise"] is None:
             shown["correction"] = ""

@@ -7,7 +7,8 @@ from posse_training.sb3 import TeamVecEnv, from_sb3
 
 batch = posse.batch("smart", num_worlds=8, autoreset="disabled")
 encoding = Encoding.of(batch.layout)
-env = TeamVecEnv([batch], encoding)  # 8 worlds of 5 trackers: 40 environments, one policy
+# 8 worlds of 5 trackers: 40 environments, one policy, whose actions are velocities behind the safeguard.
+env = TeamVecEnv([batch], encoding, safeguard=True)
 model = PPO("MlpPolicy", env, n_steps=32, batch_size=320, device="cpu").learn(2560)
-policy = from_sb3(model, encoding=encoding)
+policy = from_sb3(model, encoding=encoding, safeguard=True)
 print(evaluate(policy, "smart", episodes=10).estimate("score"))

@@ -13,7 +13,7 @@ from posse_training.train import default_settings
 from posse_training.train.train import train
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--steps", type=int, default=2_000_000)
+parser.add_argument("--steps", type=int, default=8_000_000)
 parser.add_argument("--folder", type=Path, default=Path("runs/tutorials/first"))
 parser.add_argument("--episodes", type=int, default=200)
 arguments = parser.parse_args()

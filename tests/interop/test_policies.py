@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
-from sb3_contrib import TQC
 from stable_baselines3 import DQN, PPO
-from stable_baselines3.common.base_class import BaseAlgorithm
 
 import posse
 from posse.adapters.actions import MOTIONS
 from posse_baselines import PolicyError, begin, from_function, load
 from posse_baselines.learned import Encoding
+from posse_baselines.safeguard import Guard
 from posse_training.sb3 import TeamVecEnv, from_sb3
 
 
@@ -65,21 +63,16 @@ def test_encoded_observations() -> None:
         acted(from_sb3(model))
 
 
-def test_files(tmp_path: Path) -> None:
-    env = gymnasium.make("posse/Team-v0")
-    model = PPO("MlpPolicy", env, device="cpu")
-    model.save(tmp_path / "mine.zip")
-    loaded = from_sb3(tmp_path / "mine")
-    assert loaded.name == "mine"
-    np.testing.assert_array_equal(acted(loaded)[1], acted(from_sb3(model))[1])
-    TQC("MlpPolicy", env, device="cpu", buffer_size=10).save(tmp_path / "tqc.zip")
-    with pytest.raises(PolicyError, match="algorithm=TQC"):
-        from_sb3(tmp_path / "tqc.zip")
-    assert isinstance(from_sb3(tmp_path / "tqc.zip", algorithm=TQC).model, BaseAlgorithm)
-    (tmp_path / "bad.zip").write_bytes(b"PK nothing")
-    for bad, message in (("bad.zip", "is not a model"), ("none.zip", "there is no model file")):
-        with pytest.raises(PolicyError, match=message):
-            from_sb3(tmp_path / bad)
+def test_behind_the_safeguard() -> None:
+    batch = posse.batch("constant", 2, autoreset="disabled")
+    encoding = Encoding.of(batch.layout)
+    env = TeamVecEnv([batch], encoding, safeguard=True)
+    model = PPO("MlpPolicy", env, n_steps=8, batch_size=80, device="cpu")
+    observations, actions = acted(from_sb3(model, encoding=encoding, safeguard=True))
+    guard = Guard(batch.layout, len(observations))
+    guard.follow(observations)
+    wanted = model.predict(observations.reshape(10, -1), deterministic=True)[0].reshape(2, 5, 2)
+    np.testing.assert_array_equal(actions, guard.actions(wanted))
 
 
 def test_a_function_plays() -> None:

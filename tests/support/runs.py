@@ -90,6 +90,13 @@ BELIEVING: dict[str, Any] = {
     "advise": "ddcs-tuned",
     "correction": "velocity",
     "encoding": "belief",
-    "contact_bound": 0.03,
+    "end_on_contact": True,
 }
-"""With the settings of the shipped trainings: adviser, belief, bound on contact."""
+"""With the settings of a correction: adviser, belief, a contact ends an episode."""
+GUARDED: dict[str, Any] = {
+    "scenario": "smart",
+    "safeguard": True,
+    "end_on_contact": True,
+    "overrides": {"horizon": HORIZON, "settle_time": 1.0},
+}
+"""From nothing, behind the safeguard."""

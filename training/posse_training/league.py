@@ -26,7 +26,8 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked, read_json
-from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, default_settings, read_settings
+from posse_training.train.presets import default_settings
+from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, read_settings
 
 FILE: Final = "league.json"
 MATRIX: Final = "matrix.csv"
@@ -236,7 +237,7 @@ class League:
             return
         start = next((m.run for m in reversed(own) if m.run is not None), None)
         values = {
-            **default_settings(s.scenario, side=side).to_dict(),
+            **default_settings(s.scenario, side=side, preset="residual").to_dict(),
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,

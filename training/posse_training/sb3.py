@@ -5,17 +5,13 @@ Needs the extra ``training``.
 
 from __future__ import annotations
 
-import json
-import zipfile
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from posse_training.errors import require
 
 require("training", "torch", "stable_baselines3")
 
 import numpy as np  # noqa: E402
-import stable_baselines3  # noqa: E402
 from gymnasium import spaces  # noqa: E402
 from stable_baselines3.common.base_class import BaseAlgorithm  # noqa: E402
 from stable_baselines3.common.vec_env import VecNormalize  # noqa: E402
@@ -26,30 +22,20 @@ from posse.numeric import BoolArray, FloatArray  # noqa: E402
 from posse_baselines import PolicyError  # noqa: E402
 from posse_baselines.learned import Encoder, Encoding  # noqa: E402
 from posse_baselines.policy import BasePolicy, check_fits, check_observations  # noqa: E402
+from posse_baselines.safeguard import Guard  # noqa: E402
 from posse_training.train.vec_env import TeamVecEnv  # noqa: E402
 
 __all__ = ["ModelPolicy", "TeamVecEnv", "from_sb3"]
 
-_MARKS: Final = {
-    "clip_range": "PPO",
-    "gae_lambda": "A2C",
-    "target_policy_noise": "TD3",
-    "exploration_fraction": "DQN",
-    "target_entropy": "SAC",
-}
-"""Settings by which a file's algorithm is known, in the order in which they are looked for."""
-_OTHERS: Final = ("_last_lstm_states", "top_quantiles_to_drop_per_net", "cg_max_steps", "delta_std")
-"""Settings of algorithms that sb3-contrib has."""
-
 
 def from_sb3(
-    model: BaseAlgorithm | str | Path,
+    model: BaseAlgorithm,
     *,
     name: str | None = None,
     message_size: int = 0,
     encoding: Encoding | None = None,
     normalize: VecNormalize | None = None,
-    algorithm: type[BaseAlgorithm] | None = None,
+    safeguard: bool = False,
     deterministic: bool = True,
 ) -> ModelPolicy:
     """Return a policy that plays what a stable-baselines3 model has learned.
@@ -60,24 +46,20 @@ def from_sb3(
     policies: their states restart with the episode.
 
     Args:
-        model: A model, or the file that its ``save()`` wrote. A file **runs code** when it is
-            loaded, as every pickle does: load none that you do not trust.
-        name: Its name in results; default: the file's, or the algorithm's.
+        model: A model; one from a file is ``PPO.load(path)``, by the class of its algorithm.
+        name: Its name in results; default: the algorithm's.
         message_size: Numbers of a message in the observations that it learned on, 0 in
             ``posse/Solo-v0`` and ``posse/Team-v0`` by default, what the team-mates need in
             ``posse/Tracker-v0``. A model whose action lacks the message says zeros.
         encoding: How observations were encoded for it, where it learned in ``TeamVecEnv``.
         normalize: The wrapper whose statistics it learned with, if any.
-        algorithm: Its class, for files of other algorithms than stable-baselines3's own.
+        safeguard: Whether it learned behind the safeguard, as in ``TeamVecEnv(..., safeguard=True)``.
         deterministic: Whether it plays the mode of its distribution.
 
     Raises:
-        PolicyError: A file that cannot be loaded, or spaces that no environment of posse has.
+        PolicyError: Spaces that no environment of posse has.
     """
-    if isinstance(model, (str, Path)):
-        name = Path(model).stem if name is None else name
-        model = _load(Path(model), algorithm)
-    return ModelPolicy(model, name or type(model).__name__, message_size, encoding, normalize, deterministic)
+    return ModelPolicy(model, name or type(model).__name__, message_size, encoding, normalize, safeguard, deterministic)
 
 
 class ModelPolicy(BasePolicy):
@@ -90,6 +72,7 @@ class ModelPolicy(BasePolicy):
         message_size: int,
         encoding: Encoding | None,
         normalize: VecNormalize | None,
+        safeguard: bool,
         deterministic: bool,
     ) -> None:
         self.model = model
@@ -97,6 +80,7 @@ class ModelPolicy(BasePolicy):
         self.message_size = message_size
         self._encoding = encoding
         self._normalize = normalize
+        self._safeguard = safeguard
         self._deterministic = deterministic
         shape = model.observation_space.shape
         if shape is None or len(shape) not in (1, 2) or (encoding is not None and len(shape) == 2):
@@ -108,7 +92,7 @@ class ModelPolicy(BasePolicy):
         self._whole_team = len(shape) == 2
 
     def begin(self, layout: ObservationLayout, num_worlds: int) -> Any:
-        """Return the memory: the layout, how observations are encoded, and a network's states.
+        """Return the memory: the layout, how observations are encoded, the safeguard, and a network's states.
 
         Raises:
             PolicyError: Observations are of another length than those that the model learned on.
@@ -126,16 +110,19 @@ class ModelPolicy(BasePolicy):
                 "its settings"
             )
         rows = num_worlds * (1 if self._whole_team else layout.scenario.num_trackers)
-        return layout, num_worlds, encoder, None, np.ones(rows, np.bool_)
+        guard = Guard(layout, num_worlds) if self._safeguard else None
+        return layout, num_worlds, encoder, guard, None, np.ones(rows, np.bool_)
 
     def restart(self, memory: Any, mask: BoolArray) -> Any:
         """Return the memory with recurrent networks restarted in the worlds of a mask (E,)."""
-        *rest, begins = memory
-        return (*rest, begins | np.repeat(mask, len(begins) // len(mask)))
+        *rest, guard, states, begins = memory
+        if guard is not None:
+            guard.restart(mask)
+        return (*rest, guard, states, begins | np.repeat(mask, len(begins) // len(mask)))
 
     def act(self, observations: FloatArray, memory: Any) -> tuple[FloatArray, Any]:
         """Return actions (E, N, 2 + m) for observations (E, N, F)."""
-        layout, worlds, encoder, states, begins = memory
+        layout, worlds, encoder, guard, states, begins = memory
         seen = check_observations(self, observations, worlds, layout)
         trackers = seen.shape[1]
         if encoder is not None:
@@ -148,39 +135,7 @@ class ModelPolicy(BasePolicy):
         motions = motions.reshape(worlds, trackers, -1)
         actions = np.zeros((worlds, trackers, 2 + layout.scenario.message_size), np.float32)
         actions[..., : motions.shape[-1]] = motions
-        return actions, (layout, worlds, encoder, states, np.zeros_like(begins))
-
-
-def _load(path: Path, algorithm: type[BaseAlgorithm] | None) -> BaseAlgorithm:
-    """Return the model of a file.
-
-    Raises:
-        PolicyError: As :func:`from_sb3`.
-    """
-    if not path.suffix:
-        path = path.with_suffix(".zip")
-    if not path.is_file():
-        raise PolicyError(f"there is no model file {str(path)!r}")
-    kind = algorithm or _algorithm_of(path)
-    try:
-        return kind.load(path, device="cpu")
-    except Exception as error:  # whatever a damaged file makes the library raise
-        raise PolicyError(
-            f"{str(path)!r} cannot be loaded as a model of {kind.__name__} ({type(error).__name__}: {error!s:.200})"
-        ) from error
-
-
-def _algorithm_of(path: Path) -> type[BaseAlgorithm]:
-    """Return the class of the algorithm whose settings a file holds; runs none of its code."""
-    try:
-        with zipfile.ZipFile(path) as file:
-            settings = json.loads(file.read("data"))
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise PolicyError(f"{str(path)!r} is not a model of stable-baselines3: {error}") from error
-    for mark, name in _MARKS.items():
-        if mark in settings and not any(other in settings for other in _OTHERS):
-            found: type[BaseAlgorithm] = getattr(stable_baselines3, name)
-            return found
-    raise PolicyError(
-        f"{str(path)!r} is a model of another library's algorithm: name its class, from_sb3(path, algorithm=TQC)"
-    )
+        if guard is not None:
+            guard.follow(observations)
+            actions = guard.actions(actions)
+        return actions, (layout, worlds, encoder, guard, states, np.zeros_like(begins))

@@ -27,6 +27,7 @@ from posse_baselines.learned.inputs import Encoder, Encoding
 from posse_baselines.learned.network import Network, forward
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, check_observations
+from posse_baselines.safeguard import Guard
 
 FORMAT: Final = 1
 """Version of the policy file's format."""
@@ -43,6 +44,7 @@ class _Memory(NamedTuple):
     robots: int
     encoder: Encoder
     adviser: Memory
+    guard: Guard | None
 
 
 class LearnedPolicy(OwnArrays, BasePolicy):
@@ -55,6 +57,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         adviser: Scripted policy whose proposals the network refines, if any
             (:mod:`posse_baselines.learned.advice`).
         correction: What the network's output corrects: ``"motion"`` or ``"velocity"``.
+        safeguard: Whether its actions are wanted velocities, which the safeguard carries out
+            (:mod:`posse_baselines.safeguard`).
 
     Attributes:
         trained_splits: Splits whose worlds it was trained on; evaluations refuse them.
@@ -71,6 +75,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         card: Mapping[str, Any],
         adviser: Policy | None = None,
         correction: str = "motion",
+        safeguard: bool = False,
     ) -> None:
         if adviser is None and encoding.believes:
             raise PolicyError("a policy that reads an adviser's belief needs an adviser")
@@ -91,6 +96,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         self.message_size = max(
             network.outputs - MOTION, encoding.message_size, adviser.message_size if adviser is not None else 0
         )
+        self.safeguard = safeguard
         self._flat = network.flat()
         self._set_card(card)
 
@@ -126,7 +132,8 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         super().begin(layout, num_worlds)
         robots = 1 if self.side == "target" else layout.scenario.num_trackers
         adviser_memory = None if self.adviser is None else self.adviser.begin(layout, num_worlds)
-        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), adviser_memory)
+        guard = Guard(layout, num_worlds) if self.safeguard else None
+        return _Memory(layout, num_worlds, robots, Encoder(self.encoding, layout), adviser_memory, guard)
 
     def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
         """Return the most likely actions (E, N, 2 + m) for observations (E, N, F).
@@ -140,6 +147,9 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             outputs = forward(self._flat, m.encoder.encode(observations))
             actions = np.zeros((*team, MOTION + m.layout.scenario.message_size), np.float32)
             actions[..., : outputs.shape[1]] = outputs.reshape(*team, -1)
+            if m.guard is not None:
+                m.guard.follow(observations)
+                actions = m.guard.actions(actions)
             return actions, m
         further, asked, advised = self._advising.ask(observations, m.adviser)
         inputs = np.concatenate([m.encoder.encode(observations), further.reshape(-1, further.shape[-1])], axis=1)
@@ -148,13 +158,18 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         return actions, m._replace(adviser=advised)
 
     def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memory with the adviser restarted in the worlds of a mask (E,)."""
+        """Return the memory with adviser and safeguard restarted in the worlds of a mask (E,)."""
+        if memory.guard is not None:
+            memory.guard.restart(mask)
         if self.adviser is None:
             return memory
         return memory._replace(adviser=self.adviser.restart(memory.adviser, mask))
 
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the adviser's memory as arrays by name; views, not copies."""
+        """Return the memory of adviser or safeguard as arrays by name; views, not copies."""
+        if memory.guard is not None:
+            found: dict[str, npt.NDArray[Any]] = memory.guard.arrays()
+            return found
         return {} if self._advising is None else self._advising.adviser.arrays(memory.adviser)
 
     def annotations(self, memory: Memory) -> Annotations:
@@ -176,6 +191,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             "card": self.card,
             "adviser": None if self.adviser is None else self.adviser.name,
             "correction": "motion" if self._advising is None else self._advising.correction,
+            "safeguard": self.safeguard,
         }
         path.parent.mkdir(parents=True, exist_ok=True)
         write_policy_file(path, self.network.tensors(), description)
@@ -218,6 +234,7 @@ class LearnedPolicy(OwnArrays, BasePolicy):
                 description["card"],
                 None if adviser is None else SCRIPTED[adviser](),
                 str(description["correction"]),
+                bool(description.get("safeguard", False)),
             )
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from error

@@ -6,7 +6,6 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from posse_baselines import from_function, load
@@ -97,8 +96,6 @@ def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest
     assert "holds a run with another" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["/nowhere/team.safetensors", "../team.safetensors"])
-def test_a_policy_file_is_not_written_outside_of_the_workers_folder(name: str) -> None:
-    named = {name: np.zeros(1, np.uint8)}
-    with pytest.raises(ClusterError, match=f"has no {name}, which the training reads: name it by"):
-        train_on_worker("seed 1", TrainSettings(), {}, named)
+def test_a_node_that_does_not_share_the_file_system_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ClusterError, match=r"has no folder .*elsewhere: train on a file system that all nodes share"):
+        train_on_worker(TrainSettings(), tmp_path / "elsewhere")

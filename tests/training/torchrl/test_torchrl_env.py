@@ -14,6 +14,8 @@ from torchrl.envs.utils import check_env_specs
 import posse
 from posse.adapters.actions import MOTIONS
 from posse.signals.global_state import StateLayout
+from posse_baselines import PolicyError
+from posse_baselines.safeguard import Guard
 from posse_training.torchrl.env import PosseEnv
 
 WORLDS = 6
@@ -78,6 +80,24 @@ def test_steps_equal_those_of_the_batch() -> None:
         np.testing.assert_array_equal(now["score"].squeeze(-1).numpy(), infos["score"])
 
 
+def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
+    env = PosseEnv("smart", WORLDS, seed=5, safeguard=True, **SHORT)
+    batch = posse.batch("smart", WORLDS, seed=5, autoreset="disabled", **SHORT)
+    guard = Guard(batch.layout, WORLDS)
+    carried, seen = env.reset(), batch.reset()
+    for wanted in some_actions(batch.action_shape, 30):
+        guard.follow(seen)
+        seen, _, _, truncated, _ = batch.step(guard.actions(wanted))
+        following, carried = env.step_and_maybe_reset(act(carried, wanted))
+        np.testing.assert_array_equal(following["next", "agents", "observation"].numpy(), seen)
+        if truncated.any():
+            seen = batch.reset(options={"reset_mask": truncated})
+            guard.restart(truncated)
+    check_env_specs(env, seed=1)
+    with pytest.raises(PolicyError, match="discrete actions are no velocities"):
+        PosseEnv("smart", WORLDS, safeguard=True, discrete_actions=True)
+
+
 def test_rows_of_a_target_that_is_an_agent_come_last() -> None:
     settings: dict[str, Any] = {"target_motion": "agent", "num_trackers": 3}
     env = PosseEnv("constant", WORLDS, seed=5, **settings)
@@ -104,25 +124,6 @@ def test_what_was_returned_is_never_overwritten() -> None:
         del following
     for tensor, copy in zip(kept, copies, strict=True):
         assert torch.equal(tensor, copy)
-
-
-def test_no_copy_on_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    env = PosseEnv("constant", WORLDS)
-    carried = env.reset()
-    returned = []
-    step = env.batch.step
-
-    def remember(actions: npt.ArrayLike) -> object:
-        outcome = step(actions)
-        returned.append(outcome)
-        return outcome
-
-    monkeypatch.setattr(env.batch, "step", remember)
-    following = env.step(act(carried, some_actions(env.batch.action_shape, 1)[0]))
-    observations, rewards, *_ = returned[0]
-    now = following["next", "agents"]
-    assert now["observation"].data_ptr() == observations.ctypes.data
-    assert now["reward"].data_ptr() == rewards.ctypes.data
 
 
 def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
@@ -176,18 +177,6 @@ def test_a_seed_gives_the_worlds_of_that_seed_from_the_start() -> None:
     np.testing.assert_array_equal(seeded, posse.batch("constant", WORLDS, seed=9).reset())
     following = env.reset()["agents", "observation"].numpy()  # the next episode, not the same again
     assert (following != seeded).any()
-
-
-def test_start_poses_can_be_given() -> None:
-    env = PosseEnv("constant", WORLDS)
-    env.reset(options={"target_pose": [1.0, 2.0, 0.5]})
-    np.testing.assert_array_equal(env.batch.state["world_x"], np.full(WORLDS, 1.0, np.float32))
-
-
-def test_settings_reach_the_batch() -> None:
-    env = PosseEnv("constant", 1, seed=4, first_world=17, split="test", num_trackers=3)
-    batch = posse.batch("constant", 20, seed=4, split="test", num_trackers=3)
-    np.testing.assert_array_equal(env.reset()["agents", "observation"].numpy(), batch.reset()[17:18])
 
 
 def test_a_choice_of_autoreset_is_refused() -> None:

@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 import posse
 from posse_baselines.learned import Encoder, Encoding
+from posse_baselines.safeguard import Guard
 from posse_training.train.networks import Normaliser
 from posse_training.train.vec_env import TeamVecEnv
 
@@ -64,6 +65,25 @@ def test_slots_are_trackers_and_ends_hold_the_last_observation() -> None:
             assert all(told == {} for told in infos)
 
 
+def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
+    settings: dict[str, Any] = {"seed": 5, "horizon": HORIZON, "settle_time": 0.5}
+    batches = [posse.batch("smart", 3, autoreset="disabled", **settings) for _ in range(2)]
+    env = TeamVecEnv([batches[0]], Encoding.of(batches[0].layout), safeguard=True, staggered=False)
+    guard = Guard(batches[1].layout, 3)
+    env.reset()
+    seen = batches[1].reset()
+    generator = np.random.default_rng(1)
+    for _ in range(2 * HORIZON):
+        wanted = draw(env, generator)
+        observations, _, dones, _ = move(env, wanted)
+        guard.follow(seen)
+        seen, *_ = batches[1].step(guard.actions(wanted.reshape(3, 5, 2)))
+        if dones.any():
+            seen = batches[1].reset(options={"reset_mask": np.ones(3, np.bool_)})
+            guard.restart(np.ones(3, np.bool_))
+        np.testing.assert_array_equal(observations.reshape(3, 5, -1), seen)
+
+
 def test_a_contact_that_ends_an_episode_is_no_truncation() -> None:
     env = make(terminate_on_contact=True, horizon=400, num_trackers=2, start_distance=(0.5, 1.0))
     env.reset()
@@ -100,16 +120,6 @@ def test_first_episodes_are_shortened_to_spread_the_ends() -> None:
     for _ in range(HORIZON // 4):
         _, _, dones, _ = move(env, draw(env, generator))
     np.testing.assert_array_equal(dones.reshape(4, 5).all(axis=1), [True, False, False, False])
-
-
-def test_more_worlds_than_steps_all_end() -> None:
-    env = make(worlds=2 * HORIZON + 1, staggered=True, num_trackers=1)
-    env.reset()
-    ended = np.zeros(env.num_envs, bool)
-    for _ in range(HORIZON):
-        _, _, dones, _ = move(env, np.zeros((env.num_envs, 2), np.float32))
-        ended |= dones
-    assert ended.all()
 
 
 def test_nothing_returned_is_overwritten_or_shared() -> None:

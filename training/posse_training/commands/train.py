@@ -14,7 +14,8 @@ import tyro
 from posse_training.errors import require
 from posse_training.files import read_json
 from posse_training.parallel import RayOption, address_of
-from posse_training.train.settings import Preset, TrainSettings, default_settings, opponents_of
+from posse_training.train.presets import Preset, default_settings
+from posse_training.train.settings import TrainSettings, opponents_of
 
 _NEEDED = ("training", "torch", "stable_baselines3")
 
@@ -26,16 +27,16 @@ class _Which:
     scenario: str = "smart"
     algorithm: str = "ppo"
     side: str = "trackers"
-    preset: Preset = "residual"
+    preset: Preset = "nothing"
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Arguments(TrainSettings):
     """Settings of a training, and how often and where it is made."""
 
-    preset: Preset = "residual"
-    """Default settings: learn a correction of a scripted team, where the scenario has such defaults
-    and the algorithm is on policy; or learn from nothing, that is from random weights."""
+    preset: Preset = "nothing"
+    """Default settings: learn from nothing, that is from random weights; or learn a correction of a scripted team,
+    where the scenario has such defaults and the algorithm is on policy."""
     seeds: tuple[int, ...] = ()
     """Seeds of several runs, in turn, or with --ray at once; the same command again resumes them."""
     ray: RayOption = None
@@ -55,8 +56,6 @@ class _Resume:
     """Run folder."""
     steps: int | None = None
     """Total steps to train for; default: as the run was started with."""
-    trust_code: bool = False
-    """Import policies that the folder's settings.json names as package.module:Class."""
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -67,7 +66,7 @@ def main(arguments: Sequence[str]) -> None:
         from posse_training.train.train import resume
 
         with _how_to_resume(run.resume):
-            path = resume(run.resume, steps=run.steps, trust_code=run.trust_code)
+            path = resume(run.resume, steps=run.steps)
         print(_what_next(path))
         return
     asked = [a for a in arguments if a not in ("-h", "--help")]

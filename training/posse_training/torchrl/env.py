@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
@@ -26,6 +27,8 @@ from torchrl.envs import EnvBase
 import posse
 from posse.adapters.actions import MOTIONS, agent_names, single_action_space
 from posse.signals.global_state import StateLayout
+from posse_baselines import PolicyError
+from posse_baselines.safeguard import Guard
 
 TRACKERS: Final = "agents"
 """Group of the trackers, named as in TorchRL's multi-agent examples."""
@@ -48,6 +51,8 @@ class PosseEnv(EnvBase):
             for centralized critics.
         discrete_actions: Whether actions are numbers of
             :data:`posse.adapters.actions.MOTIONS`, as in the other environments.
+        safeguard: Whether the trackers' actions are wanted velocities, which the safeguard carries out
+            (:mod:`posse_baselines.safeguard`).
         settings: As for :func:`posse.batch`: ``seed``, ``split``, ``first_world``, ``num_threads``,
             and any setting of the scenario, but not ``autoreset``.
 
@@ -57,6 +62,7 @@ class PosseEnv(EnvBase):
 
     Raises:
         TypeError: ``autoreset`` among the settings.
+        PolicyError: ``safeguard`` with discrete actions, which are no velocities.
         ScenarioError: ``discrete_actions`` with messages, which are not discrete.
         ValueError: As :func:`posse.batch`.
     """
@@ -69,6 +75,7 @@ class PosseEnv(EnvBase):
         device: torch.device | str = "cpu",
         state: bool = False,
         discrete_actions: bool = False,
+        safeguard: bool = False,
         **settings: Any,
     ) -> None:
         if "autoreset" in settings:
@@ -81,6 +88,9 @@ class PosseEnv(EnvBase):
         super().__init__(device=device, batch_size=(num_worlds,))
         self._state_layout = StateLayout(self.batch.scenario) if state else None
         self._motions = torch.from_numpy(MOTIONS).to(self.device) if discrete_actions else None
+        if safeguard and discrete_actions:
+            raise PolicyError("discrete actions are no velocities: set safeguard or discrete_actions to False")
+        self._guard = Guard(self.batch.layout, num_worlds) if safeguard else None
         trackers = self.batch.scenario.num_trackers
         names = agent_names(self.batch.scenario)
         self._rows = {TRACKERS: slice(0, trackers)}
@@ -132,14 +142,19 @@ class PosseEnv(EnvBase):
         options = kwargs.get("options")
         all_worlds = False
         marks = None if tensordict is None else tensordict.get("_reset", None)
+        mask = np.ones(self.batch.num_worlds, np.bool_)
         if marks is not None and not bool(marks.all()):
-            options = {**(options or {}), "reset_mask": self._array(marks.reshape(self.batch.num_worlds))}
+            mask = self._array(marks.reshape(self.batch.num_worlds))
+            options = {**(options or {}), "reset_mask": mask}
             seed = kwargs.get("seed")
         else:
             seed, all_worlds = kwargs.get("seed", self._seed), True
         observations = self.batch.reset(seed=seed, options=options)
         if all_worlds:
             self._seed = None
+        if self._guard is not None:
+            self._guard.restart(mask)
+            self._guard.follow(observations[:, self._rows[TRACKERS]])
         return self._pack(observations)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -153,7 +168,13 @@ class PosseEnv(EnvBase):
         together = actions[0] if len(actions) == 1 else torch.cat(actions, dim=1)
         if self._motions is not None:
             together = self._motions[together]
-        observations, rewards, *_ = self.batch.step(self._array(together.detach()))
+        actions_of_all = self._array(together.detach())
+        if self._guard is not None:
+            motions = self._guard.actions(actions_of_all[:, self._rows[TRACKERS]])
+            actions_of_all = np.concatenate([motions, actions_of_all[:, motions.shape[1] :]], axis=1)
+        observations, rewards, *_ = self.batch.step(actions_of_all)
+        if self._guard is not None:
+            self._guard.follow(observations[:, self._rows[TRACKERS]])
         packed = self._pack(observations)
         each = self._tensor(rewards).unsqueeze(-1)
         for group, part in self._rows.items():

@@ -1,6 +1,6 @@
 """The algorithms: one entry of a table and one function for each.
 
-Importing this module does not import torch: ``posse train --help`` lists the algorithms without it.
+Importing this module does not import torch, so that ``posse train --help`` is fast.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from posse_training.errors import SettingsError
+from posse_training.train.settings import TrainSettings
+
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
     from torch import nn
 
-    from posse_training.train.settings import TrainSettings
     from posse_training.train.vec_env import TeamVecEnv
 
 _ADAM_EPSILON: Final = 1e-5  # the default of stable-baselines3's PPO
@@ -43,16 +45,16 @@ class Algorithm:
 
 
 def _ppo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
-    return _any_ppo(s, env, "MlpPolicy", {"net_arch": list(s.hidden)})
+    return _any_ppo(s, env, "MlpPolicy")
 
 
 def _mappo(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     from posse_training.train.networks import CentralizedCriticPolicy
 
-    return _any_ppo(s, env, CentralizedCriticPolicy, {"private_size": env.private_size, "hidden": s.hidden})
+    return _any_ppo(s, env, CentralizedCriticPolicy, private_size=env.private_size)
 
 
-def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, network: dict[str, Any]) -> BaseAlgorithm:
+def _any_ppo(s: TrainSettings, env: TeamVecEnv, policy: Any, **network: Any) -> BaseAlgorithm:
     from stable_baselines3 import PPO
     from torch import nn
 
@@ -87,8 +89,7 @@ def _td3(s: TrainSettings, env: TeamVecEnv) -> BaseAlgorithm:
     from stable_baselines3 import TD3
     from stable_baselines3.common.noise import NormalActionNoise
 
-    shape = env.action_shape
-    noise = NormalActionNoise(np.zeros(shape), np.full(shape, _EXPLORATION))
+    noise = NormalActionNoise(np.zeros(env.action_length), np.full(env.action_length, _EXPLORATION))
     return TD3("MlpPolicy", env, action_noise=noise, **_off_policy(s))
 
 
@@ -98,21 +99,25 @@ def _off_policy(s: TrainSettings) -> dict[str, Any]:
         "learning_starts": s.learning_starts,
         "batch_size": s.minibatch,
         "gradient_steps": s.gradients,
-        "policy_kwargs": _network(s, net_arch=list(s.hidden)),
+        "policy_kwargs": _network(s),
         **_common(s),
     }
 
 
 def _common(s: TrainSettings) -> dict[str, Any]:
-    return {"learning_rate": _LearningRate(s), "gamma": s.discount, "seed": s.seed, "device": "cpu"}
+    from stable_baselines3.common.utils import LinearSchedule
+
+    rate = LinearSchedule(s.learning_rate, s.final_learning_rate, 1.0)
+    return {"learning_rate": rate, "gamma": s.discount, "seed": s.seed, "device": "cpu"}
 
 
 def _network(s: TrainSettings, **further: Any) -> dict[str, Any]:
     """Return the arguments of a policy's networks."""
     from posse_training.train.networks import ACTIVATIONS, Normaliser
 
-    adam = {"fused": True, "eps": _ADAM_EPSILON} if s.on_policy else {"fused": True}
+    adam = {"fused": True, "eps": _ADAM_EPSILON} if ALGORITHMS[s.algorithm].on_policy else {"fused": True}
     return {
+        "net_arch": list(s.hidden),
         "activation_fn": ACTIVATIONS[s.activation],
         "features_extractor_class": Normaliser,
         "optimizer_kwargs": adam,
@@ -147,16 +152,28 @@ ALGORITHMS: Final = {
 """By name; a new algorithm is an entry here, and the function that makes it."""
 
 
-class _LearningRate:
-    """A learning rate that falls linearly from the start to the end of training."""
+def algorithm_of(name: str) -> Algorithm:
+    """Return an algorithm by name.
 
-    def __init__(self, settings: TrainSettings) -> None:
-        self._first, self._last = settings.learning_rate, settings.final_learning_rate
+    Raises:
+        SettingsError: It is unknown.
+    """
+    if name not in ALGORITHMS:
+        raise SettingsError(f"unknown algorithm {name!r:.80}; algorithms are: {', '.join(ALGORITHMS)}")
+    return ALGORITHMS[name]
 
-    def __call__(self, remaining: float) -> float:
-        # Rollouts are completed, so the last one may end after the requested steps.
-        left = max(0.0, remaining)
-        return self._last + left * (self._first - self._last)
+
+def check_algorithm(settings: TrainSettings) -> None:
+    """Raise if the algorithm is unknown, or cannot learn with these settings.
+
+    Raises:
+        SettingsError: The message names the setting.
+    """
+    name, kind = settings.algorithm, algorithm_of(settings.algorithm)
+    if settings.imitate is not None and not kind.on_policy:
+        raise SettingsError(f"imitate={settings.imitate!r} needs algorithm ppo or mappo, not {name}: leave it out")
+    if settings.side == "target" and kind.reads_state:
+        raise SettingsError(f"algorithm={name!r} does not go with side='target', which observes everything: use ppo")
 
 
 def even_minibatch(rows: int, wanted: int) -> int:

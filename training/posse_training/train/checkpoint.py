@@ -1,21 +1,16 @@
 """What a run keeps on disk: its folder, its settings, its learning curve and its checkpoint.
 
-A checkpoint is one file of tensors and plain values, protected by a digest; reading one runs no code
-(``torch.load`` with ``weights_only``). A new one replaces the last one atomically, so that a whole
-one exists whenever the process is killed.
+A checkpoint is one file of tensors and plain values; reading one runs no code (``torch.load`` with ``weights_only``). A
+new one replaces the last one atomically, so that a whole one exists whenever the process is killed.
 """
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import functools
-import hashlib
 import io
 import json
-import random
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -27,7 +22,6 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from posse_baselines.files import write_atomically
 from posse_training.errors import CheckpointError, RunFolderError
-from posse_training.files import locked
 from posse_training.train.networks import RunningStatistics
 from posse_training.train.settings import SETTINGS, Point, TrainSettings
 
@@ -39,7 +33,6 @@ CHECKPOINT: Final = "checkpoint.pt"
 POINT: Final = ("steps", "seconds", "safe_score", "low", "high", "score", "contact_free")
 """Of the curve: agent steps, s, mean safe score and its 95 % interval, mean score, share of episodes."""
 _REPLAY: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-_DIGEST: Final = hashlib.sha256().digest_size
 
 
 @dataclass
@@ -53,26 +46,11 @@ class Progress:
     curve: list[Point] = field(default_factory=list)
 
 
-@contextlib.contextmanager
-def locked_run(folder: Path) -> Iterator[None]:
-    """Hold a run folder, made if missing.
-
-    Raises:
-        RunFolderError: Another process holds it (the message names it), or it cannot be written to.
-    """
-    with contextlib.ExitStack() as stack:
-        try:
-            stack.enter_context(locked(folder))
-        except OSError as error:
-            raise RunFolderError(f"cannot write to run folder {folder}: {error}") from error
-        yield
-
-
 def open_run(folder: Path, settings: TrainSettings, resume: bool) -> State | None:
     """Write the settings to a run folder; return its checkpoint, or ``None`` to start from scratch.
 
     Raises:
-        RunFolderError: It holds a run that is not to be resumed, or it cannot be written to.
+        RunFolderError: It holds a run that is not to be resumed.
         CheckpointError: Its checkpoint is damaged.
     """
     saved = None
@@ -86,10 +64,7 @@ def open_run(folder: Path, settings: TrainSettings, resume: bool) -> State | Non
             "or choose another --folder"
         )
     text = json.dumps({**settings.to_dict(), "folder": None}, indent=2) + "\n"
-    try:
-        write_atomically(folder / SETTINGS, text.encode())
-    except OSError as error:
-        raise RunFolderError(f"cannot write to run folder {folder}: {error}") from error
+    write_atomically(folder / SETTINGS, text.encode())
     return saved
 
 
@@ -103,23 +78,10 @@ def as_csv(curve: Iterable[Point]) -> bytes:
 
 
 def write_checkpoint(folder: Path, state: State) -> None:
-    """Write a checkpoint.
-
-    Raises:
-        CheckpointError: It could not be written; the last one is unchanged.
-    """
-    text = io.BytesIO()
-    torch.save(state, text)
-    content = text.getvalue()
-    path = folder / CHECKPOINT
-    try:
-        write_atomically(path, hashlib.sha256(content).digest() + content)
-    except OSError as error:
-        kept = "the last one is kept" if path.is_file() else "there is no earlier one"
-        raise CheckpointError(
-            f"cannot write checkpoint {path}: {error.strerror or error}; {kept}. Make room, then "
-            f"resume with: posse train --resume {folder}"
-        ) from error
+    """Write a checkpoint; the last one stays if that fails."""
+    content = io.BytesIO()
+    torch.save(state, content)
+    write_atomically(folder / CHECKPOINT, content.getvalue())
 
 
 def read_checkpoint(folder: Path) -> State:
@@ -131,13 +93,13 @@ def read_checkpoint(folder: Path) -> State:
     path = folder / CHECKPOINT
     if not path.is_file():
         raise CheckpointError(f"{folder} has no {CHECKPOINT}: start the training again")
-    whole = path.read_bytes()
-    if hashlib.sha256(whole[_DIGEST:]).digest() != whole[:_DIGEST]:
+    try:
+        state: State = torch.load(path, weights_only=True)
+    except Exception as error:  # whatever a damaged file makes torch raise
         raise CheckpointError(
-            f"checkpoint {path} is damaged: its digest does not match its contents. The run cannot be resumed from "
-            "it; the policies in the folder are separate files"
-        )
-    state: State = torch.load(io.BytesIO(whole[_DIGEST:]), weights_only=True)
+            f"checkpoint {path} is damaged ({error!s:.100}). The run cannot be resumed from it; the policies in the "
+            "folder are separate files"
+        ) from error
     return state
 
 
@@ -181,16 +143,11 @@ def arrays_of(tensors: Mapping[str, torch.Tensor]) -> dict[str, npt.NDArray[Any]
 def random_state() -> State:
     """Return the state of every global random generator that training draws from."""
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 (SB3 draws from it)
-    return {
-        "python": random.getstate(),
-        "numpy": (str(name), torch.from_numpy(np.asarray(keys)), *rest),
-        "torch": torch.get_rng_state(),
-    }
+    return {"numpy": (str(name), torch.from_numpy(np.asarray(keys)), *rest), "torch": torch.get_rng_state()}
 
 
 def restore_random_state(state: State) -> None:
     """Set the generators to the state of :func:`random_state`."""
-    random.setstate(state["python"])
     name, keys, *rest = state["numpy"]
     np.random.set_state((name, keys.numpy(), *rest))  # noqa: NPY002
     torch.set_rng_state(state["torch"])
@@ -204,11 +161,7 @@ def model_state(model: BaseAlgorithm) -> State:
         "parts": {name: _find(model, name).state_dict() for name in names},
         "tensors": {name: _find(model, name).detach() for name in tensors},
         "num_timesteps": model.num_timesteps,
-        "episode_num": model._episode_num,
         "n_updates": model._n_updates,
-        "progress": model._current_progress_remaining,
-        "episodes": list(model.ep_info_buffer or ()),
-        "successes": [bool(success) for success in model.ep_success_buffer or ()],
         "action_space": model.action_space.np_random.bit_generator.state,
         "last": tensors_of(arrays),
     }
@@ -227,11 +180,7 @@ def restore_model(model: BaseAlgorithm, state: State) -> None:
     for name in tensors:
         _find(model, name).data.copy_(state["tensors"][name])
     model.num_timesteps = state["num_timesteps"]
-    model._episode_num = state["episode_num"]
     model._n_updates = state["n_updates"]
-    model._current_progress_remaining = state["progress"]
-    model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
-    model.ep_success_buffer = deque(state["successes"], maxlen=model._stats_window_size)
     model.action_space.np_random.bit_generator.state = state["action_space"]
     last = arrays_of(state["last"])
     model._last_obs, model._last_episode_starts = last["obs"], last["starts"]

@@ -13,7 +13,6 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.logger import Logger, configure
 
-from posse_training.train.contact_bound import ContactBound
 from posse_training.train.settings import Point, TrainSettings
 
 
@@ -23,13 +22,15 @@ class Display:
     Args:
         settings: Of the run.
         console: Where to show it.
+
+    Attributes:
+        beside: Safe score of ``settings.beside`` on the same worlds, if known.
     """
 
     def __init__(self, settings: TrainSettings, console: Console) -> None:
+        self.beside: float | None = None
         self._settings = settings
         self._started, self._from_steps, self._steps = time.monotonic(), 0, 0
-        self._bound = ""
-        self._beside: float | None = None
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -56,30 +57,18 @@ class Display:
         """Print how many rounds of imitation are done, and the mean squared error of the last."""
         self.note(f"copying {self._settings.imitate}: {done} of {rounds} rounds, squared error {error:.4f}")
 
-    def beside(self, score: float | None) -> None:
-        """Take the safe score of ``settings.beside`` on the same worlds."""
-        self._beside = score
-
     def begin(self, steps: int, total: int) -> None:
-        """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps.
-
-        The total includes the rollout that is completed at the end.
-        """
+        """Start the clock: training begins, or resumes after ``steps`` of ``total`` steps."""
         if total != self._settings.steps:
             self.note(f"rollouts are completed: {total:,} steps in all")
         self._started, self._from_steps, self._steps = time.monotonic(), steps, steps
         self._bar.reset(self._task, total=total, completed=steps)
 
-    def progress(self, steps: int, training_score: float | None, bound: ContactBound | None = None) -> None:
-        """Show the steps made, the mean score of the latest training episodes, and contacts."""
+    def progress(self, steps: int, training_score: float | None) -> None:
+        """Show the steps made, and the mean score of the latest training episodes."""
         self._steps = steps
-        if bound is not None and bound.share is not None:
-            self._bound = (
-                f", contact in {bound.share:.1%} of episodes "
-                f"(bound {bound.bound:.1%}, multiplier {bound.multiplier:.2f})"
-            )
         score = "" if training_score is None else f", training score {training_score:.3f}"
-        self._bar.update(self._task, completed=steps, state=score + self._bound)
+        self._bar.update(self._task, completed=steps, state=score)
 
     def evaluated(self, point: Point) -> None:
         """Print results on the validation worlds, after as many steps as they say."""
@@ -88,11 +77,11 @@ class Display:
             f"[{point['low']:.3f}, {point['high']:.3f}], score {point['score']:.3f}, "
             f"contact-free {point['contact_free']:.2f}"
         )
-        if self._beside is not None:
-            line += f", {self._settings.beside} {self._beside:.3f}"
+        if self.beside is not None:
+            line += f", {self._settings.beside} {self.beside:.3f}"
         made = self._steps - self._from_steps
         rate = f", {made / (time.monotonic() - self._started):,.0f} steps/s" if made else ""
-        self.note(line + self._bound + rate)
+        self.note(line + rate)
 
 
 def make_logger(folder: Path, settings: TrainSettings) -> Logger:

@@ -16,14 +16,11 @@ from torch import nn
 
 import posse
 from posse_baselines.learned import Encoding, LearnedPolicy, Network
-from posse_baselines.learned.advice import Advising
 from posse_training.provenance import commit
 from posse_training.train.algorithms import ALGORITHMS
-from posse_training.train.networks import LIMIT, Normaliser, QuickTanh
+from posse_training.train.networks import LIMIT, Normaliser
 from posse_training.train.settings import TrainSettings
 from posse_training.train.worlds import make_adviser
-
-_NAMES: dict[type[nn.Module], str] = {nn.Tanh: "tanh", QuickTanh: "tanh", nn.ReLU: "relu"}
 
 
 def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, card: Mapping[str, Any]) -> LearnedPolicy:
@@ -37,20 +34,10 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         settings: Of the run.
         encoding: Which inputs the model reads from an observation.
         card: The policy's card.
-
-    Raises:
-        TypeError: The model's networks are not plain ones that a policy file holds.
     """
     algorithm = ALGORITHMS[settings.algorithm]
-    modules = algorithm.actor(model.policy)
-    layers = [module for module in modules if isinstance(module, nn.Linear)]
-    between = {type(m) for m in modules[:-1] if not isinstance(m, (nn.Linear, nn.Flatten))}
-    if len(between) > 1 or not between <= set(_NAMES):
-        raise TypeError(f"no policy file holds layers of {sorted(t.__name__ for t in between)}")
-    adviser = make_adviser(settings)
-    inputs = encoding.size
-    if adviser is not None:
-        inputs += Advising(adviser, settings.correction, believes=encoding.believes).inputs
+    layers = [module for module in algorithm.actor(model.policy) if isinstance(module, nn.Linear)]
+    inputs = layers[0].in_features  # behind them, a critic reads the state of the world
     normaliser = next(m for m in model.policy.modules() if isinstance(m, Normaliser))
     network = Network(
         mean=_numbers(normaliser.mean)[:inputs],
@@ -58,10 +45,10 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         limit=LIMIT,
         weights=tuple(_numbers(layer.weight) for layer in layers),
         biases=tuple(_numbers(layer.bias) for layer in layers),
-        activation=_NAMES[between.pop()] if between else "relu",
+        activation=settings.activation,
         output=algorithm.bound,
     )
-    return LearnedPolicy(network, encoding, card, adviser, settings.correction)
+    return LearnedPolicy(network, encoding, card, make_adviser(settings), settings.correction, settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

@@ -1,21 +1,20 @@
 """A warm start: the policy begins as a copy of another one.
 
-Dataset aggregation (Ross, Gordon and Bagnell, 2011): in the first round the expert acts and is
-copied; in later rounds the copy acts in more and more of the worlds, labelled with the expert's
-actions. The copy is thus right in the states that *it* visits. At the end the value function is
-fitted to the copy's returns; otherwise the first updates would undo the copy.
+Dataset aggregation (Ross, Gordon and Bagnell, 2011): in the first round the expert acts and is copied; in later rounds
+the copy acts in more and more of the worlds, labelled with the expert's actions. The copy is thus right in the states
+that *it* visits. At the end the value function is fitted to the copy's returns; otherwise the first updates would undo
+the copy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
+from torch.nn.functional import mse_loss
 
 import posse
 from posse import Scenario
@@ -37,6 +36,9 @@ _LEARNING_RATE: Final = 1e-3
 _EVERY: Final = 5  # every fifth control step is kept, since successive steps are similar
 _SETTLED: Final = 3.0  # discounted horizons before the end from which returns are incomplete
 
+Rows = tuple[FloatArray, FloatArray, FloatArray]
+"""Inputs, the expert's actions, and returns (NaN where incomplete): a row for each world, tracker and kept step."""
+
 
 def imitate(
     model: BaseAlgorithm,
@@ -49,59 +51,52 @@ def imitate(
     """Make a PPO model's policy a copy of the expert.
 
     Args:
-        model: A stable-baselines3 model; its networks and normaliser are changed, its optimiser is
-            not.
+        model: A stable-baselines3 model; its networks and normaliser are changed, its optimiser is not.
         settings: Of the training.
         encoding: Which inputs the model reads from an observation.
         expert: The policy to copy.
         statistics: Input statistics; those of the first round are added.
-        report: Called after each round with its number, the number of rounds and the mean squared
-            error.
+        report: Called after each round with its number, the number of rounds and the mean squared error.
     """
     policy: Any = model.policy
     generator = np.random.default_rng(settings.seed)
     optimiser = torch.optim.Adam(policy.parameters(), lr=_LEARNING_RATE)
-    rounds = []
+    worlds = max(1, WORLDS // len(settings.scenarios))
+    first_world = FIRST_WORLD
     total = settings.imitate_rounds
+    rounds: list[Rows] = []
     for k in range(total):
-        share = 1.0 - k / max(1, total - 1)
-        scenarios = settings.scenarios
-        worlds = max(1, WORLDS // len(scenarios))
-        played = [
-            _play_round(
-                policy,
-                settings,
-                encoding,
-                expert,
-                scenario,
-                generator,
-                share,
-                worlds,
-                FIRST_WORLD + (k * len(scenarios) + s) * worlds,
-            )
-            for s, scenario in enumerate(scenarios)
-        ]
+        played: list[Rows] = []
+        for scenario in settings.scenarios:
+            by_expert = generator.random(worlds) < 1.0 - k / max(1, total - 1)
+            played.append(_play_round(policy, settings, encoding, expert, scenario, by_expert, first_world))
+            first_world += worlds
         rounds += played
         if k == 0:
-            for part in played:
-                statistics.add(part.inputs)
+            for rows, *_ in played:
+                statistics.add(rows)
             statistics.apply(policy)
-        inputs = torch.from_numpy(np.concatenate([r.inputs for r in rounds]))
-        actions = torch.from_numpy(np.concatenate([r.actions for r in rounds]))
-        error = 0.0
-        for _ in range(_passes(len(inputs))):
-            error = _fit(policy, optimiser, generator, inputs, actions, _action_error)
+        inputs, actions, _ = _together(rounds)
+        error = _fit(policy, optimiser, generator, inputs, actions, _mean_action)
         report(k + 1, total, error)
-    inputs = torch.from_numpy(np.concatenate([r.value_inputs for r in played]))
-    returns = torch.from_numpy(np.concatenate([r.returns for r in played]))
-    if len(inputs):
-        for _ in range(_passes(len(inputs))):
-            _fit(policy, optimiser, generator, inputs, returns, _value_error)
+    inputs, _, returns = _together(played)
+    known = ~returns.isnan()
+    if known.any():
+        _fit(policy, optimiser, generator, inputs[known], returns[known], _value)
 
 
-def _passes(rows: int) -> int:
-    """Return the number of passes over a round's data."""
-    return -(-_GRADIENTS // -(-rows // _MINIBATCH))
+def _mean_action(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
+    mean: torch.Tensor = policy.get_distribution(inputs).distribution.mean
+    return mean
+
+
+def _value(policy: Any, inputs: torch.Tensor) -> torch.Tensor:
+    value: torch.Tensor = policy.predict_values(inputs).flatten()
+    return value
+
+
+def _together(parts: list[Rows]) -> tuple[torch.Tensor, ...]:
+    return tuple(torch.from_numpy(np.concatenate(column)) for column in zip(*parts, strict=True))
 
 
 def _fit(
@@ -110,38 +105,21 @@ def _fit(
     generator: np.random.Generator,
     inputs: torch.Tensor,
     targets: torch.Tensor,
-    error_of: Callable[[Any, torch.Tensor, torch.Tensor], torch.Tensor],
+    predict: Callable[[Any, torch.Tensor], torch.Tensor],
 ) -> float:
-    """Make one pass over the data in random order; return the mean error."""
-    order = torch.from_numpy(generator.permutation(len(inputs)))
-    total = 0.0
-    for rows in torch.split(order, _MINIBATCH):
-        error = error_of(policy, inputs[rows], targets[rows])
-        optimiser.zero_grad()
-        error.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
-        optimiser.step()
-        total += error.item() * len(rows)
-    return total / len(inputs)
-
-
-def _action_error(policy: Any, inputs: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
-    mean = policy.get_distribution(inputs).distribution.mean
-    return torch.nn.functional.mse_loss(mean, actions)
-
-
-def _value_error(policy: Any, inputs: torch.Tensor, returns: torch.Tensor) -> torch.Tensor:
-    return torch.nn.functional.mse_loss(policy.predict_values(inputs).flatten(), returns)
-
-
-@dataclass
-class _Round:
-    """The data of one round, rows of all worlds and trackers."""
-
-    inputs: FloatArray
-    actions: FloatArray
-    value_inputs: FloatArray
-    returns: FloatArray
+    """Pass over the rows in random order until there were enough gradients; return the last pass's mean error."""
+    rows = len(inputs)
+    passes = -(-_GRADIENTS // -(-rows // _MINIBATCH))
+    for _ in range(passes):
+        total = 0.0
+        for chosen in torch.split(torch.from_numpy(generator.permutation(rows)), _MINIBATCH):
+            error = mse_loss(predict(policy, inputs[chosen]), targets[chosen])
+            optimiser.zero_grad()
+            error.backward()  # type: ignore[no-untyped-call]
+            torch.nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
+            optimiser.step()
+            total += error.item() * len(chosen)
+    return total / rows
 
 
 def _play_round(
@@ -150,22 +128,18 @@ def _play_round(
     encoding: Encoding,
     expert: Policy,
     scenario: Scenario,
-    generator: np.random.Generator,
-    share: float,
-    worlds: int,
+    by_expert: Any,
     first_world: int,
-) -> _Round:
-    """Play one episode in each world; the expert acts in a share of them, the copy in the rest."""
-    parts = 2 + settings.message_size
+) -> Rows:
+    """Play one episode in each world; the expert acts where ``by_expert`` (E,) says so, the copy in the rest."""
+    parts, worlds, trackers = 2 + settings.message_size, len(by_expert), scenario.num_trackers
     longest = max(settings.message_size, expert.message_size)
     batch = posse.Batch(scenario.replace(message_size=longest), worlds, seed=settings.seed, first_world=first_world)
-    state = _state_writer(batch, settings)
     encoder = Encoder(encoding, batch.layout)
+    state = StateWriter(batch, settings.scenarios) if ALGORITHMS[settings.algorithm].reads_state else None
     size = encoding.size + (state.size if state else 0)
-    by_expert = generator.random(worlds) < share
     observations = batch.reset()
     memory = begin(expert, batch)
-    trackers = scenario.num_trackers
     inputs, chosen, rewards = [], [], []
     for _ in range(scenario.horizon):
         x = np.empty((worlds * trackers, size), np.float32)
@@ -177,11 +151,10 @@ def _play_round(
         if not by_expert.all():
             with torch.no_grad():
                 own = policy._predict(torch.from_numpy(x), deterministic=False).numpy()
-            own = own.reshape(worlds, trackers, parts)[~by_expert]
-            actions[~by_expert, :, :parts] = np.clip(own, -1, 1)
             # The expert's messages are sent as well: its labels are those of a team of its own.
-            sent = expert.message_size
-            actions[~by_expert, :, 2 : 2 + sent] = wanted[~by_expert, :, 2 : 2 + sent]
+            said = actions[..., 2 : 2 + expert.message_size].copy()
+            actions[~by_expert, :, :parts] = np.clip(own.reshape(worlds, trackers, parts)[~by_expert], -1, 1)
+            actions[..., 2 : 2 + expert.message_size] = said
         observations, reward, terminated, truncated, _ = batch.step(actions)
         inputs.append(x)
         chosen.append(wanted[:, :, :parts].reshape(-1, parts))
@@ -189,31 +162,13 @@ def _play_round(
         if (terminated | truncated).all():
             break
     returns = _returns(rewards, settings.discount)
-    complete = int(len(inputs) - _SETTLED / max(1e-3, 1 - settings.discount))
-    kept = inputs[::_EVERY]
-    known = max(0, -(-complete // _EVERY))
-    return _Round(
-        np.concatenate(kept),
-        np.concatenate(chosen[::_EVERY]),
-        np.concatenate([*kept[:known], np.empty((0, size), np.float32)]),
-        returns[::_EVERY][:known].reshape(-1),
-    )
+    returns[max(0, int(len(inputs) - _SETTLED / max(1e-3, 1 - settings.discount))) :] = np.nan
+    return np.concatenate(inputs[::_EVERY]), np.concatenate(chosen[::_EVERY]), returns[::_EVERY].reshape(-1)
 
 
-def _state_writer(batch: posse.Batch, settings: TrainSettings) -> StateWriter | None:
-    """Return a writer of states of the size that the model's own worlds have; None: not needed."""
-    if not ALGORITHMS[settings.algorithm].reads_state:
-        return None
-    return StateWriter(
-        batch, max(s.num_trackers for s in settings.scenarios), max(s.num_obstacles for s in settings.scenarios)
-    )
-
-
-def _returns(rewards: list[FloatArray], discount: float) -> npt.NDArray[np.float32]:
+def _returns(rewards: list[FloatArray], discount: float) -> FloatArray:
     """Return discounted returns (steps, rows) of rewards (rows,) by step."""
-    returns = np.zeros((len(rewards), len(rewards[0])), np.float32)
-    ahead: npt.NDArray[np.float32] = np.zeros(len(rewards[0]), np.float32)
-    for t in reversed(range(len(rewards))):
-        ahead = rewards[t] + np.float32(discount) * ahead
-        returns[t] = ahead
+    returns = np.array(rewards, np.float32)
+    for t in reversed(range(len(rewards) - 1)):
+        returns[t] += np.float32(discount) * returns[t + 1]
     return returns

@@ -1,4 +1,4 @@
-"""The layers and networks of a model: input normalisation, the critic of mappo, and a faster tanh."""
+"""The layers of a model: input normalisation, the actor and critic of mappo, and a faster tanh."""
 
 from __future__ import annotations
 
@@ -85,57 +85,39 @@ class RunningStatistics:
         Raises:
             ValueError: They are of another size.
         """
-        for name in ("mean", "variance"):
-            if saved[name].shape != self.mean.shape:
-                raise ValueError(f"{name} has the shape {saved[name].shape}, wanted {self.mean.shape}")
+        if saved["mean"].shape != self.mean.shape:
+            raise ValueError(f"the mean has the shape {saved['mean'].shape}, wanted {self.mean.shape}")
         self.count = float(saved["count"][0])
         self.mean, self.variance = saved["mean"].copy(), saved["variance"].copy()
 
 
-class SplitNetworks(nn.Module):
-    """A policy network on the first numbers of the input, a value network on all of them."""
+class Front(nn.Module):
+    """A layer that passes on the first numbers of its input."""
 
-    def __init__(self, size: int, private_size: int, hidden: list[int], activation: type[nn.Module]) -> None:
+    def __init__(self, size: int) -> None:
         super().__init__()
-        self.private_size = private_size
-        self.latent_dim_pi = self.latent_dim_vf = hidden[-1]
-        self.policy_net = nn.Sequential(*create_mlp(private_size, 0, hidden, activation))
-        self.value_net = nn.Sequential(*create_mlp(size, 0, hidden, activation))
+        self.size = size
 
-    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the latent vectors of policy and value."""
-        return self.forward_actor(features), self.forward_critic(features)
-
-    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the policy's latent vector, a function of the tracker's own numbers only."""
-        latent: torch.Tensor = self.policy_net(features[:, : self.private_size])
-        return latent
-
-    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the value's latent vector."""
-        latent: torch.Tensor = self.value_net(features)
-        return latent
+    def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+        """Return the first ``size`` columns."""
+        return inputs[:, : self.size]
 
 
 class CentralizedCriticPolicy(ActorCriticPolicy):
-    """An actor and a critic; only the critic reads the state of the world.
+    """An actor that reads the first ``private_size`` numbers of an observation, and a critic that reads all of them.
 
-    Args:
-        *args: Arguments of stable-baselines3's actor-critic policy.
-        private_size: Numbers at the front of an observation that the actor reads.
-        hidden: Widths of the hidden layers of both networks.
-        **kwargs: Arguments of stable-baselines3's actor-critic policy.
+    What is behind these is the state of the world. Further arguments are those of stable-baselines3's policy.
     """
 
-    def __init__(self, *args: Any, private_size: int, hidden: tuple[int, ...] = (64, 64), **kwargs: Any) -> None:
+    def __init__(self, *args: Any, private_size: int, **kwargs: Any) -> None:
         self.private_size = private_size
-        self.hidden = list(hidden)
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = SplitNetworks(  # type: ignore[assignment]
-            self.features_dim, self.private_size, self.hidden, self.activation_fn
-        )
+        super()._build_mlp_extractor()
+        hidden: Any = self.net_arch
+        layers = create_mlp(self.private_size, 0, hidden, self.activation_fn)
+        self.mlp_extractor.policy_net = nn.Sequential(Front(self.private_size), *layers)
 
 
 # A rollout of PPO and its updates take 10 % less time than with nn.Tanh: user time on ``smart`` with its defaults, one

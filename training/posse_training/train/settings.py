@@ -1,28 +1,20 @@
-"""The settings of a training run: one typed, frozen class, and its defaults by scenario and algorithm."""
+"""The settings of a training run: one typed, frozen class; :mod:`posse_training.train.presets` has its defaults."""
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
-
-import tyro
+from typing import Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
 
 from posse import Scenario, ScenarioError, get_scenario
-from posse_baselines import PolicyError, load, target_names
-from posse_baselines.fields import check, choice, number, optional
-from posse_baselines.registry import ships_or_is_file
+from posse_baselines import PolicyError, load
+from posse_baselines.fields import check, number, optional
 from posse_training.errors import SettingsError
 from posse_training.files import read_json
-from posse_training.train.algorithms import ALGORITHMS
 
-Preset = Literal["residual", "nothing"]
 Point = dict[str, float]
 """Results of an evaluation, by the columns of ``curve.csv``."""
 
@@ -31,7 +23,6 @@ BEST: Final = "best.safetensors"
 LAST: Final = "last.safetensors"
 CURVE: Final = "curve.csv"
 """Files of a run folder; the checkpoint is one more."""
-_LONGEST: Final = 4096  # characters of a text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,10 +37,8 @@ class TrainSettings:
 
     scenario: str = "smart"
     """Scenario to train on, or several separated by commas."""
-    algorithm: Annotated[str, tyro.conf.arg(metavar="{" + ",".join(ALGORITHMS) + "}")] = choice(
-        "ppo", tuple(ALGORITHMS)
-    )
-    """mappo is ppo with a value function that reads the state of the world."""
+    algorithm: str = "ppo"
+    """ppo, mappo (ppo with a value function that reads the state of the world), sac or td3."""
     steps: int = number(20_000_000, "", 1, 10**12)
     """Steps to train for, at least; rollouts are completed."""
     seed: int = number(1, "", 0, 2**32 - 1)
@@ -80,6 +69,12 @@ class TrainSettings:
     """Settings of the scenario to change, by name."""
     reward_weights: dict[str, float] = field(default_factory=dict)
     """Weight of each reward term; default: the scenario's own."""
+
+    end_on_contact: bool = False
+    """A contact ends the training episode, so that the return of the rewards that follow is lost, as it is of the
+    safe score. Evaluations go on."""
+    safeguard: bool = False
+    """The action is a wanted velocity, which the safeguard of the script carries out."""
 
     # The networks
     encoding: Literal["plain", "slots", "belief"] = "slots"
@@ -136,9 +131,6 @@ class TrainSettings:
     correction: Literal["motion", "velocity"] = "motion"
     """The output corrects the adviser's action, or its wanted velocity before its safeguard."""
 
-    contact_bound: float | None = optional(0.001, 1)
-    """Largest share of training episodes with contact: contacts cost more while it is exceeded."""
-
     # Evaluation, checkpoints and logs
     evaluate_every: int = number(1_000_000, "", 1, 10**15)
     """Steps between two evaluations on validation worlds."""
@@ -176,16 +168,6 @@ class TrainSettings:
         return tuple(found)
 
     @property
-    def on_policy(self) -> bool:
-        """Whether the algorithm learns from its latest rollout only."""
-        return ALGORITHMS[self.algorithm].on_policy
-
-    def steps_made(self, num_envs: int) -> int:
-        """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
-        at_once = num_envs * (self.rollout if self.on_policy else 1)
-        return -(-self.steps // at_once) * at_once
-
-    @property
     def run_folder(self) -> Path:
         """The folder that the run is written to."""
         return self.folder or Path("runs/train") / self.name
@@ -209,8 +191,6 @@ class TrainSettings:
         Raises:
             SettingsError: An unknown setting, or an invalid value.
         """
-        if not isinstance(values, Mapping):
-            raise SettingsError(f"settings must map names to values, got {values!r:.80}")
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
@@ -229,35 +209,22 @@ def opponents_of(against: str | None) -> dict[str, int]:
     return dict(Counter(name.strip() for name in against.split(",")) if against else {})
 
 
-@functools.cache
-def _types() -> dict[str, Any]:
-    return get_type_hints(TrainSettings)
-
-
 def _check_each(s: TrainSettings) -> None:
-    """Raise if a setting is of a wrong type or out of its range."""
+    """Raise if a setting is out of its range."""
     try:
         check(s)
     except ValueError as error:
         raise SettingsError(str(error)) from None
-    for name, kind in _types().items():
+    for name, kind in get_type_hints(TrainSettings).items():
         value = getattr(s, name)
         if get_origin(kind) is Literal and value not in get_args(kind):
             _fail(name, value, f"known: {', '.join(get_args(kind))}")
-        text = kind is str or (kind == str | None and value is not None)
-        if text and not (isinstance(value, str) and 1 <= len(value) <= _LONGEST and "\0" not in value):
-            _fail(name, value, f"it must be a text of 1 to {_LONGEST} characters")
         if get_origin(kind) is dict and not isinstance(value, dict):
             _fail(name, value, "it must map names to values")
-    for name, least, most, widest in (("hidden", 1, 16, 8192), ("team_sizes", 0, 100, 4096)):
+    for name in ("hidden", "team_sizes"):
         value = getattr(s, name)
-        if not isinstance(value, tuple) or not least <= len(value) <= most:
-            _fail(name, value, f"it must name {least} to {most} numbers")
-        for size in value:
-            if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= widest:
-                _fail(name, size, f"it must be a whole number in [1, {widest}]")
-    if s.folder is not None and not isinstance(s.folder, Path):
-        _fail("folder", s.folder, "it must be a path")
+        if not isinstance(value, tuple) or not all(type(size) is int and size >= 1 for size in value):
+            _fail(name, value, "it must be whole numbers of at least 1")
 
 
 def _fail(name: str, value: Any, why: str) -> NoReturn:
@@ -266,13 +233,6 @@ def _fail(name: str, value: Any, why: str) -> NoReturn:
 
 def _check_together(s: TrainSettings) -> None:
     """Raise if settings that are valid on their own exclude each other."""
-    if s.contact_bound is not None and not s.on_policy:
-        raise SettingsError(
-            f"contact_bound={s.contact_bound} needs algorithm ppo or mappo, not {s.algorithm}: "
-            "set a weight of the reward term contact instead"
-        )
-    if s.imitate is not None and not s.on_policy:
-        raise SettingsError(f"imitate={s.imitate!r} needs algorithm ppo or mappo, not {s.algorithm}: leave it out")
     if s.final_log_deviation is not None and s.final_log_deviation > s.log_deviation:
         raise SettingsError(
             f"final_log_deviation={s.final_log_deviation} must not exceed "
@@ -284,6 +244,11 @@ def _check_together(s: TrainSettings) -> None:
         raise SettingsError(
             f"advise={s.advise!r} goes with neither imitate nor message_size: the policy begins as "
             "its adviser, which sends the messages"
+        )
+    if s.safeguard and (s.advise is not None or s.imitate is not None):
+        raise SettingsError(
+            "safeguard=True goes with neither advise nor imitate, whose actions are not wanted velocities: "
+            "use --no-safeguard; a correction of the adviser's velocity is safeguarded by the adviser"
         )
     if s.side == "target":
         _check_target(s)
@@ -303,15 +268,14 @@ def _check_target(s: TrainSettings) -> None:
     """Raise if settings do not fit a target that learns."""
     if s.against is None:
         raise SettingsError("side='target' needs the teams that chase it: set against, for example to ddcs-tuned")
-    for name, wanted in (("imitate", None), ("advise", None), ("message_size", 0), ("encoding", "plain")):
+    wanted = {"imitate": None, "advise": None, "message_size": 0, "encoding": "plain", "safeguard": False}
+    for name, needed in wanted.items():
         value = getattr(s, name)
-        if value != wanted:
+        if value != needed:
             raise SettingsError(
-                f"{name}={value!r} does not go with side='target', which needs {wanted!r}: a "
+                f"{name}={value!r} does not go with side='target', which needs {needed!r}: a "
                 "target has no team, no slots and no messages"
             )
-    if s.algorithm == "mappo":
-        raise SettingsError("algorithm='mappo' does not go with side='target', which observes everything: use ppo")
 
 
 _ELSEWHERE = {
@@ -324,84 +288,22 @@ _ELSEWHERE = {
 }
 
 
-def default_settings(
-    scenario: str = "smart", algorithm: str = "ppo", *, side: str = "trackers", preset: Preset = "residual"
-) -> TrainSettings:
-    """Return the default settings of a scenario.
-
-    They are kept in ``posse_training/defaults``: ``all.toml`` holds for every scenario, and the file
-    of a scenario for the preset ``"residual"``. In each, the table ``all`` holds for every
-    algorithm, ``on-policy`` and ``off-policy`` for those, and a table that is named after an
-    algorithm for it alone.
-
-    Args:
-        scenario: A scenario's name, or several separated by commas.
-        algorithm: One of the algorithms.
-        side: What learns; the defaults of a target are in ``target.toml``, whatever the preset.
-        preset: ``"residual"``: learn a correction of a scripted team, on policy and where the
-            scenario has a file; ``"nothing"``: learn from random weights.
-
-    Raises:
-        SettingsError: An unknown algorithm, or an invalid default.
-    """
-    if algorithm not in ALGORITHMS:
-        raise SettingsError(f"unknown algorithm {algorithm!r:.80}; algorithms are: {', '.join(ALGORITHMS)}")
-    values: dict[str, Any] = {"scenario": scenario, "algorithm": algorithm}
-    if side == "target":  # its opponents are for the user to name
-        values |= {"side": side, "against": "ddcs-distributed"}
-    folder = resources.files("posse_training") / "defaults"
-    files = [folder / "all.toml"]
-    if side == "target":
-        files.append(folder / "target.toml")
-    elif preset == "residual":
-        name = "mixture.toml" if "," in scenario else f"{scenario}.toml"
-        files += [file for file in folder.iterdir() if file.name == name]
-    for file in files:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-        for table in ("all", "on-policy" if ALGORITHMS[algorithm].on_policy else "off-policy", algorithm):
-            values.update(tables.get(table, {}))
-    return TrainSettings.from_dict(values)
-
-
 def best_policy(folder: Path) -> Path:
     """Return the file of a finished run's best policy; of its last one if it never was evaluated."""
     return folder / (BEST if (folder / BEST).is_file() else LAST)
 
 
-def read_settings(path: Path, *, trust_code: bool = False) -> TrainSettings:
+def read_settings(path: Path) -> TrainSettings:
     """Return the settings of a run folder's ``settings.json``.
 
-    Args:
-        path: The file.
-        trust_code: Accept policies named ``package.module:Class``, whose code is then imported.
-
     Raises:
-        SettingsError: There is no such file, it is damaged, or it names code to import.
+        SettingsError: There is no such file, or it is damaged.
     """
     try:
-        values = read_json(path)
-        if not trust_code:
-            _refuse_code(path, values)
-        return TrainSettings.from_dict(values)
+        return TrainSettings.from_dict(read_json(path))
     except FileNotFoundError:
         raise SettingsError(f"{path.parent} is not a run folder: it has no {path.name}") from None
     except (SettingsError, ScenarioError, PolicyError):
         raise
-    except (OSError, TypeError, ValueError) as error:
+    except (AttributeError, OSError, TypeError, ValueError) as error:
         raise SettingsError(f"{path} is damaged: {error}") from error
-
-
-def _refuse_code(path: Path, values: Any) -> None:
-    """Raise if a settings file names a policy that is neither shipped nor a policy file."""
-    if not isinstance(values, Mapping):
-        return
-    named = [(name, values.get(name)) for name in ("advise", "imitate", "beside")]
-    against = values.get("against")
-    several = opponents_of(against) if isinstance(against, str) else {}
-    for name, policy in (*named, *(("against", each) for each in several)):
-        if policy is not None and not ships_or_is_file(policy) and policy not in target_names():
-            raise SettingsError(
-                f"{path} names {policy!r:.80} as {name!r}, which is neither a shipped policy nor a "
-                "policy file. To load it would import code that a file asks for. If you trust the "
-                "file, resume with --trust-code"
-            )

@@ -15,13 +15,13 @@ from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
-from posse_baselines import PolicyError, load
+from posse_baselines import load
 from posse_baselines.files import write_atomically
-from posse_training.errors import CheckpointError, DivergedError, SettingsError
+from posse_training.errors import CheckpointError, DivergedError, RunFolderError, SettingsError
+from posse_training.files import InUseError, locked
 from posse_training.train import checkpoint
-from posse_training.train.algorithms import ALGORITHMS
+from posse_training.train.algorithms import ALGORITHMS, check_algorithm
 from posse_training.train.checkpoint import Progress, State, arrays_of, tensors_of
-from posse_training.train.contact_bound import ContactBound
 from posse_training.train.display import Display, make_logger
 from posse_training.train.export import export, make_card
 from posse_training.train.imitation import imitate
@@ -33,11 +33,6 @@ from posse_training.train.worlds import check_opponents, load_own, make_adviser,
 
 _STATISTICS_EVERY: Final = 8  # every eighth step of a rollout is added to the statistics
 _APPLY_EVERY: Final = 100  # rollouts off policy, which are one step each
-_NOT_FINITE: Final = (  # of messages
-    "found invalid values",
-    "= nan is not a number",
-    "must be finite",
-)
 
 
 def train(
@@ -55,13 +50,16 @@ def train(
         SettingsError: A package that is not installed.
         PolicyError: An unknown policy, or one that cannot be an adviser.
         RunFolderError: The folder is in use, or already holds a run.
-        CheckpointError: A checkpoint cannot be written or read.
+        CheckpointError: A checkpoint cannot be read.
         DivergedError: The networks give numbers that are not finite.
     """
     check_before(settings)
     folder = settings.run_folder
     with contextlib.ExitStack() as stack:
-        stack.enter_context(checkpoint.locked_run(folder))
+        try:
+            stack.enter_context(locked(folder))
+        except InUseError as error:
+            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --folder") from error
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
         display = stack.enter_context(Display(settings, console or Console()))
@@ -69,41 +67,46 @@ def train(
         env = make_env(settings, num_threads)
         model = ALGORITHMS[settings.algorithm].make(settings, env)
         model.set_logger(make_logger(folder, settings))
-        display.beside(score_beside(settings, display))
+        display.beside = score_beside(settings, display)
         run = Run(settings, folder, env, model, display)
         if saved is None:
             run.begin()
         else:
             run.restore(saved)
-        display.begin(model.num_timesteps, settings.steps_made(env.num_envs))
+        display.begin(model.num_timesteps, steps_made(settings, env.num_envs))
         try:
             # In turn: run._on_rollout_start, a rollout, run._on_rollout_end, updates of the networks.
             model.learn(settings.steps - model.num_timesteps, callback=run, reset_num_timesteps=saved is None)
             run.finish()
-        except (ValueError, PolicyError) as error:  # also of torch's distributions, and of an export
-            if not any(text in str(error) for text in _NOT_FINITE):
-                raise
-            raise run.divergence() from error
+        except ValueError as error:  # torch's distributions refuse numbers that are not finite
+            run.check_finite(error)
+            raise
     return best_policy(folder)
 
 
-def resume(folder: Path, *, console: Console | None = None, steps: int | None = None, trust_code: bool = False) -> Path:
+def resume(folder: Path, *, console: Console | None = None, steps: int | None = None) -> Path:
     """Resume the training of a run folder; see :func:`train`.
 
     Args:
         folder: The run folder.
         console: Where to show progress.
         steps: Total steps to train for, instead of those that the run was started with.
-        trust_code: Import policies that the folder's settings name as ``package.module:Class``.
     """
-    settings = replace(read_settings(folder / SETTINGS, trust_code=trust_code), folder=folder)
+    settings = replace(read_settings(folder / SETTINGS), folder=folder)
     if steps is not None:
         settings = replace(settings, steps=steps)
     return train(settings, console=console, resume=True)
 
 
+def steps_made(settings: TrainSettings, num_envs: int) -> int:
+    """Return the steps that a run makes: whole rollouts, or whole steps of all worlds."""
+    at_once = num_envs * (settings.rollout if ALGORITHMS[settings.algorithm].on_policy else 1)
+    return -(-settings.steps // at_once) * at_once
+
+
 def check_before(settings: TrainSettings) -> None:
     """Raise what can be known to be wrong before the run folder is made."""
+    check_algorithm(settings)
     if settings.wandb is not None and importlib.util.find_spec("wandb") is None:
         raise SettingsError(f"wandb={settings.wandb!r} needs Weights & Biases: pip install wandb, or leave it out")
     make_adviser(settings)
@@ -120,7 +123,6 @@ class Run(BaseCallback):
 
     Attributes:
         at: How far it is.
-        bound: The bound on contact, if there is one.
     """
 
     def __init__(
@@ -128,14 +130,13 @@ class Run(BaseCallback):
     ) -> None:
         super().__init__()
         self.settings, self.folder, self.env, self.model, self.display = settings, folder, env, model, display
-        self.statistics = RunningStatistics(env.observation_size)
-        self.bound = None if settings.contact_bound is None else ContactBound(settings.contact_bound)
+        self.on_policy = ALGORITHMS[settings.algorithm].on_policy
+        self.statistics = RunningStatistics(env.size)
         # A copy or an adviser may already be better than what a short run makes of it.
         warm = settings.imitate is not None or settings.advise is not None
         self.at = Progress(next_evaluation=0 if warm else settings.evaluate_every)
         self._started = time.monotonic()
         self._saved_at: int | None = None  # steps at the last checkpoint
-        self._set_contact_cost()
 
     def begin(self) -> None:
         """Take what the model begins with: input statistics, another run's networks, a copy of a policy."""
@@ -144,7 +145,6 @@ class Run(BaseCallback):
             first_statistics(s, self.statistics)
         else:
             checkpoint.start_from(Path(s.start), self.model, self.statistics, s.log_deviation)
-        self.statistics.apply(self.model.policy)
         if s.imitate is not None:
             imitate(self.model, s, self.env.encoding, load(s.imitate), self.statistics, self.display.copied)
 
@@ -161,9 +161,6 @@ class Run(BaseCallback):
             checkpoint.restore_random_state(state["random"])
             self.at, self._saved_at = Progress(**state["progress"]), self.model.num_timesteps
             self._started -= self.at.seconds
-            if self.bound is not None:
-                self.bound.restore(state["contact_bound"])
-            self._set_contact_cost()
         except Exception as error:  # whatever a state of other settings raises
             raise CheckpointError(
                 f"the checkpoint in {self.folder} does not fit its settings: {error!s:.300}. "
@@ -173,16 +170,16 @@ class Run(BaseCallback):
     def _on_rollout_start(self) -> None:
         """Between the updates and the next rollout, where a run can be interrupted and resumed."""
         s, steps = self.settings, self.model.num_timesteps
-        if s.final_log_deviation is not None and s.on_policy:
+        if s.final_log_deviation is not None and self.on_policy:
             limit = s.log_deviation + min(1.0, steps / s.steps) * (s.final_log_deviation - s.log_deviation)
             policy: Any = self.model.policy
             with torch.no_grad():
                 policy.log_std.clamp_(max=limit)
         self._show()
-        if s.on_policy or self.at.rollouts % _APPLY_EVERY == 0:
+        if self.on_policy or self.at.rollouts % _APPLY_EVERY == 0:
             self.statistics.apply(self.model.policy)
         if steps >= min(self.at.next_evaluation, self.at.next_checkpoint):
-            self._check_finite()
+            self.check_finite()
         if steps >= self.at.next_evaluation:
             self.at.next_evaluation = (steps // s.evaluate_every + 1) * s.evaluate_every
             self._evaluate()
@@ -194,28 +191,22 @@ class Run(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        """Between a rollout and the updates: statistics, reward terms, and the cost of contact."""
+        """Between a rollout and the updates: statistics and reward terms."""
         buffer = getattr(self.model, "rollout_buffer", None)
         if buffer is not None:
             self.statistics.add(buffer.observations[::_STATISTICS_EVERY])
         elif self.at.rollouts % _STATISTICS_EVERY == 0:
             self.statistics.add(np.asarray(self.model._last_obs))
         self.at.rollouts += 1
-        steps = self.settings.rollout if self.settings.on_policy else 1
+        steps = self.settings.rollout if self.on_policy else 1
         for name, total in self.env.take_terms().items():
             self.logger.record_mean(f"reward/{name}", total / steps)
-        first, episodes = self.env.take_contacts()
-        if self.bound is not None:
-            self.bound.update(first, episodes)
-            self._set_contact_cost()
-            self.logger.record("contact/share", self.bound.share)
-            self.logger.record("contact/multiplier", self.bound.multiplier)
 
     def finish(self) -> None:
         """Evaluate once more, and write the last policy and checkpoint."""
         self._show()
         self.statistics.apply(self.model.policy)
-        self._check_finite()
+        self.check_finite()
         if not self.at.curve or self.at.curve[-1]["steps"] < self.model.num_timesteps:
             self._evaluate()
         self._write(LAST)
@@ -240,57 +231,47 @@ class Run(BaseCallback):
             "model": checkpoint.model_state(self.model),
             "random": checkpoint.random_state(),
             "progress": {**vars(self.at), "seconds": self._seconds},
-            "contact_bound": None if self.bound is None else self.bound.save(),
         }
         checkpoint.write_checkpoint(self.folder, state)
         self._saved_at = self.model.num_timesteps
 
     def _write(self, name: str | None) -> None:
         """Write the curve, and the policy under a name if there is one."""
-        try:
-            write_atomically(self.folder / CURVE, checkpoint.as_csv(self.at.curve))
-            if name is not None:
-                self._policy().save(self.folder / name)
-        except OSError as error:
-            raise CheckpointError(
-                f"cannot write to {self.folder}: {error.strerror or error}. Make room, then resume "
-                f"with: posse train --resume {self.folder}"
-            ) from error
+        write_atomically(self.folder / CURVE, checkpoint.as_csv(self.at.curve))
+        if name is not None:
+            self._policy().save(self.folder / name)
 
     def _policy(self) -> Any:
         card = make_card(self.settings, steps=self.model.num_timesteps, curve=self.at.curve)
         return export(self.model, self.settings, self.env.encoding, card)
-
-    def _set_contact_cost(self) -> None:
-        if self.bound is not None:
-            self.env.set_contact_cost(self.bound.multiplier)
 
     def _show(self) -> None:
         episodes = self.model.ep_info_buffer or ()
         score = float(np.mean([e["score"] for e in episodes])) if episodes else None
         if score is not None:
             self.logger.record("training/score", score)
-        self.display.progress(self.model.num_timesteps, score, self.bound)
+        self.display.progress(self.model.num_timesteps, score)
 
     @property
     def _seconds(self) -> float:
         return time.monotonic() - self._started
 
-    def _check_finite(self) -> None:
-        """Raise before numbers that are not finite are evaluated or saved."""
-        if not all(bool(torch.isfinite(tensor).all()) for tensor in self.model.policy.state_dict().values()):
-            raise self.divergence()
+    def check_finite(self, cause: Exception | None = None) -> None:
+        """Raise where the networks hold numbers that are not finite, before these are evaluated or saved.
 
-    def divergence(self) -> DivergedError:
-        """Return what happened, what is kept, and what to do, where networks are not finite."""
+        Raises:
+            DivergedError: The message says what is kept.
+        """
+        if all(bool(torch.isfinite(tensor).all()) for tensor in self.model.policy.state_dict().values()):
+            return
         kept = "nothing was saved before"
         if self._saved_at is not None:
             kept = f"the checkpoint at {self._saved_at:,} steps is kept"
             if self.at.curve:
                 best = max(self.at.curve, key=lambda point: point["safe_score"])
                 kept += f", and {BEST} of {int(best['steps']):,} steps"
-        return DivergedError(
+        raise DivergedError(
             f"the training diverged at {self.model.num_timesteps:,} steps: its networks give "
             f"numbers that are not finite; {kept}. Lower --learning-rate, or --log-deviation, and "
             "train again in another --folder"
-        )
+        ) from cause

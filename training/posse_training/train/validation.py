@@ -23,16 +23,18 @@ _HELD: Final = 20  # steps for which a random action is held, so that trackers m
 
 
 def first_statistics(settings: TrainSettings, statistics: RunningStatistics) -> None:
-    """Gather input statistics from one episode of random actions in a few worlds."""
-    few = replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings))))
-    warm = make_env(few)
+    """Gather input statistics from one episode of random actions in a few worlds.
+
+    Without them the first updates learn from inputs of very different sizes, and the run lags behind for millions of
+    steps.
+    """
+    warm = make_env(replace(settings, num_worlds=max(_WARM_WORLDS, len(pairings(settings)))))
     generator = np.random.default_rng(settings.seed)
     statistics.add(warm.reset())
-    shape = (warm.num_envs, *warm.action_shape)
     reach = 1.0 if settings.advise is None else _WARM_REACH
     for step in range(max(batch.scenario.horizon for batch in warm.batches)):
         if step % _HELD == 0:
-            actions = generator.uniform(-reach, reach, shape).astype(np.float32)
+            actions = generator.uniform(-reach, reach, (warm.num_envs, warm.action_length)).astype(np.float32)
         statistics.add(np.asarray(warm.step(actions)[0]))
 
 

@@ -20,6 +20,7 @@ from posse import Batch, PairedBatch, Snapshot
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.advice import MOTION, Advice, Advising
+from posse_baselines.safeguard import Guard
 from posse_training.train.world_state import StateWriter
 
 _NEVER: Final = -1
@@ -42,12 +43,16 @@ class TeamVecEnv(VecEnv):
         encoding: Which inputs are read from an observation.
         advising: Adviser whose proposals are appended to the observations, and corrected by the
             actions (2,) (:mod:`posse_baselines.learned.advice`).
+        safeguard: Whether actions are wanted velocities, which the safeguard carries out
+            (:mod:`posse_baselines.safeguard`).
         see_state: Append the state of the world, for a centralized critic
             (:mod:`posse_training.train.world_state`).
         staggered: Shorten the first episodes.
 
     Attributes:
-        private_size: Numbers of an observation that are the tracker's own; the rest is the state.
+        action_length: Numbers of an action, 2 + m.
+        size: Numbers of an observation.
+        private_size: How many of them are the tracker's own; the rest is the state.
 
     Raises:
         ValueError: No batch, one that resets itself, a target that is an agent, or batches whose
@@ -61,39 +66,28 @@ class TeamVecEnv(VecEnv):
         encoding: Encoding,
         *,
         advising: Advising | None = None,
+        safeguard: bool = False,
         see_state: bool = False,
         staggered: bool = True,
     ) -> None:
-        lengths = _check(batches, advising)
+        self.action_length = _action_length(batches, advising)
         self.encoding = encoding
         self.staggered = staggered
-        places = max(batch.scenario.num_trackers for batch in batches)
-        obstacles = max(batch.scenario.num_obstacles for batch in batches)
+        scenarios = [batch.scenario for batch in batches]
         self._groups: list[_SlotGroup] = []
         slots = 0
         for batch in batches:
-            state = StateWriter(batch, places, obstacles) if see_state else None
-            group = _SlotGroup(batch, encoding, advising, state, slots)
+            state = StateWriter(batch, scenarios) if see_state else None
+            group = _SlotGroup(batch, encoding, advising, safeguard, state, slots)
             self._groups.append(group)
             slots = group.slots.stop
         self.private_size = self._groups[0].private_size
-        self._size = self._groups[0].size
-        self._actions = np.zeros((slots, *lengths), np.float32)
+        self.size = self._groups[0].size
         super().__init__(
             slots,
-            spaces.Box(-np.inf, np.inf, (self._size,), np.float32),
-            spaces.Box(-1.0, 1.0, tuple(lengths), np.float32),
+            spaces.Box(-np.inf, np.inf, (self.size,), np.float32),
+            spaces.Box(-1.0, 1.0, (self.action_length,), np.float32),
         )
-
-    @property
-    def observation_size(self) -> int:
-        """Numbers in an observation, the state included if it is appended."""
-        return self._size
-
-    @property
-    def action_shape(self) -> tuple[int, ...]:
-        """Shape of one slot's action, (2 + m,)."""
-        return self._actions.shape[1:]
 
     @property
     def batches(self) -> tuple[Batch, ...]:
@@ -108,7 +102,7 @@ class TeamVecEnv(VecEnv):
         """
         if any(options != self._options[0] for options in self._options):
             raise ValueError("slots of one world share its reset: give all slots equal options")
-        observations = np.empty((self.num_envs, self._size), np.float32)
+        observations = np.empty((self.num_envs, self.size), np.float32)
         for group in self._groups:
             out = observations[group.slots]
             group.reset(self._seeds[0], self._options[0], self.staggered, out)
@@ -128,7 +122,7 @@ class TeamVecEnv(VecEnv):
         ``terminal_observation`` (size,), ``TimeLimit.truncated``, and for whole episodes
         ``episode`` (return, length, score), ``metrics`` and ``is_success`` (the team settled).
         """
-        observations = np.empty((self.num_envs, self._size), np.float32)
+        observations = np.empty((self.num_envs, self.size), np.float32)
         rewards = np.empty(self.num_envs, np.float32)
         dones = np.zeros(self.num_envs, np.bool_)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -138,32 +132,18 @@ class TeamVecEnv(VecEnv):
             group.step(self._actions[s], observations[s], rewards[s], dones[s], mine)
         return observations, rewards, dones, infos
 
-    def set_contact_cost(self, cost: float) -> None:
-        """Set what each contact subtracts from the reward of the tracker that makes it."""
-        for group in self._groups:
-            group.contact_cost = cost
-
-    def take_contacts(self) -> tuple[int, float]:
-        """Return how many episodes had their first contact since the last call.
-
-        And how many whole episodes the steps since then amount to.
-        """
-        counts = [group.take_contacts() for group in self._groups]
-        return sum(first for first, _ in counts), sum(episodes for _, episodes in counts)
-
     def take_terms(self) -> dict[str, float]:
         """Return each reward term per tracker, unscaled, summed over the steps since the last call.
 
         A term that some batches lack is averaged over the others.
         """
-        sums: dict[str, float] = {}
-        slots: dict[str, float] = {}
+        sums: dict[str, tuple[float, int]] = {}
         for group in self._groups:
-            terms, count = group.take_terms()
-            for name, total in terms.items():
-                sums[name] = sums.get(name, 0.0) + count * total
-                slots[name] = slots.get(name, 0.0) + count
-        return {name: total / slots[name] for name, total in sums.items()}
+            count = group.slots.stop - group.slots.start
+            for name, term in group.take_terms().items():
+                total, slots = sums.get(name, (0.0, 0))
+                sums[name] = total + count * term, slots + count
+        return {name: total / slots for name, (total, slots) in sums.items()}
 
     def save(self) -> dict[str, npt.NDArray[Any]]:
         """Return the complete state of the vector as arrays by name."""
@@ -191,10 +171,6 @@ class TeamVecEnv(VecEnv):
 
     def close(self) -> None:
         """Do nothing: worlds hold only memory."""
-
-    def get_images(self) -> Sequence[npt.NDArray[Any] | None]:
-        """Return no pictures; :mod:`posse.rendering.renderer` draws batches."""
-        return [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return an attribute of each slot's batch."""
@@ -234,8 +210,8 @@ class TeamVecEnv(VecEnv):
         return [owners[slot] for slot in self._get_indices(indices)]
 
 
-def _check(batches: Sequence[Batch], advising: Advising | None) -> set[int]:
-    """Return the length of an action, as a set of one."""
+def _action_length(batches: Sequence[Batch], advising: Advising | None) -> int:
+    """Return the length of an action; raise if the batches do not go together."""
     if not batches:
         raise ValueError("no batches given: a vector of slots needs at least one")
     for batch in batches:
@@ -250,28 +226,23 @@ def _check(batches: Sequence[Batch], advising: Advising | None) -> set[int]:
     lengths = {MOTION} if advising else {batch.action_shape[2] for batch in batches}
     if len(lengths) > 1:
         raise ValueError(f"batches have actions of different lengths: {sorted(lengths)}")
-    return lengths
+    return lengths.pop()
 
 
 class _SlotGroup:
     """A batch of E worlds of N trackers as E x N slots; slot ``e * N + i`` is tracker i of world e.
 
-    Args:
-        batch: The worlds.
-        encoding: Which inputs are read from an observation.
-        advising: Adviser whose proposals are appended to the observations, if any.
-        state: Writes the state of the world behind them, if given.
-        first: Number of the group's first slot.
-
-    Attributes:
-        slots: The group's slots among those of all groups.
-        private_size: Numbers of an observation that are the tracker's own.
-        size: Numbers of an observation, the state included.
-        contact_cost: Subtracted from a tracker's reward for each contact that it makes.
+    The arguments are those of :class:`TeamVecEnv`; ``first`` is the number of the group's first slot.
     """
 
     def __init__(
-        self, batch: Batch, encoding: Encoding, advising: Advising | None, state: StateWriter | None, first: int
+        self,
+        batch: Batch,
+        encoding: Encoding,
+        advising: Advising | None,
+        safeguard: bool,
+        state: StateWriter | None,
+        first: int,
     ) -> None:
         self.batch = batch
         worlds, trackers = batch.num_worlds, batch.action_shape[1]
@@ -282,13 +253,11 @@ class _SlotGroup:
         self._encoder = Encoder(encoding, batch.layout)
         self._state = state
         self._advice = Advice(advising, batch) if advising else None
+        self._guard = Guard(batch.layout, worlds) if safeguard else None
         # Step at which a world's shortened first episode ends, (E,); -1 once it has ended.
         self._cut_at = np.full(worlds, _NEVER)
-        # Rewards of the present episode so far, (E, N), without the cost of contacts.
+        # Rewards of the present episode so far, (E, N).
         self._returns = np.zeros((worlds, trackers))
-        self.contact_cost = 0.0
-        self._touched = np.zeros(worlds, np.bool_)  # whether the present episode had a contact
-        self._counted = np.zeros(2, np.int64)  # first contacts, and steps of worlds
         self._terms = np.zeros(len(batch.term_names))  # means over the trackers, summed over steps
 
     def reset(self, seed: int | None, options: Any, staggered: bool, out: FloatArray) -> None:
@@ -298,14 +267,21 @@ class _SlotGroup:
         horizon.
         """
         raw = self.batch.reset(seed=seed, options=options)
-        self._returns[:] = 0
-        self._touched[:] = False
+        worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
+        self._begin(raw, np.ones(worlds, np.bool_))
         if staggered:
-            worlds, horizon = self.batch.num_worlds, self.batch.scenario.horizon
             self._cut_at = np.maximum(1, (np.arange(worlds) + 1) * horizon // worlds)
-        if self._advice is not None:
-            self._advice.restart(raw, np.ones(self.batch.num_worlds, np.bool_))
         self._encode(raw, out)
+
+    def _begin(self, raw: FloatArray, mask: BoolArray) -> None:
+        """Begin an episode in the worlds of a mask (E,), whose first observations are among ``raw``."""
+        if self._advice is not None:
+            self._advice.restart(raw, mask)
+        if self._guard is not None:
+            self._guard.restart(mask)
+            self._guard.follow(raw)
+        self._returns[mask] = 0
+        self._cut_at[mask] = _NEVER
 
     def step(
         self,
@@ -320,50 +296,30 @@ class _SlotGroup:
         actions = actions.reshape(*batch.action_shape[:2], -1)
         if self._advice is not None:
             actions = self._advice.actions(actions)
+        if self._guard is not None:
+            actions = self._guard.actions(actions)
         raw, reward, terminated, truncated, told = batch.step(actions)
         self._returns += reward
-        contacts = told["reward/contact"]
-        rewards[:] = (reward - np.float32(self.contact_cost) * contacts).reshape(-1)
-        self._count(contacts)
+        rewards[:] = reward.reshape(-1)
         self._terms += [float(told[f"reward/{name}"].mean()) for name in batch.term_names]
         over = terminated | truncated
         ended = over | (batch.worlds["step"] == self._cut_at)
         if self._advice is not None:
             self._advice.follow(raw)
+        if self._guard is not None:
+            self._guard.follow(raw)
         if ended.any():
             dones[:] = np.repeat(ended, batch.action_shape[1])
             self._report(raw, ended, terminated, over, infos)
             raw = batch.reset(options={"reset_mask": ended})
-            if self._advice is not None:
-                self._advice.restart(raw, ended)
-            self._returns[ended] = 0
-            self._touched[ended] = False
-            self._cut_at[ended] = _NEVER
+            self._begin(raw, ended)
         self._encode(raw, observations)
 
-    def _count(self, contacts: FloatArray) -> None:
-        """Count the worlds whose episode has its first contact in this step."""
-        touching = np.asarray((contacts > 0).any(axis=1))
-        self._counted += np.array([np.sum(touching & ~self._touched), len(touching)])
-        self._touched |= touching
-
-    def take_contacts(self) -> tuple[int, float]:
-        """Return how many episodes had their first contact since the last call.
-
-        And how many whole episodes the steps since then amount to.
-        """
-        first, steps = (int(number) for number in self._counted)
-        self._counted[:] = 0
-        return first, steps / self.batch.scenario.horizon
-
-    def take_terms(self) -> tuple[dict[str, float], float]:
-        """Return each reward term per tracker and step, summed over the steps since the last call.
-
-        And the number of trackers, by which groups are weighted.
-        """
+    def take_terms(self) -> dict[str, float]:
+        """Return each reward term per tracker, summed over the steps since the last call."""
         terms = dict(zip(self.batch.term_names, self._terms.tolist(), strict=True))
         self._terms[:] = 0
-        return terms, float(self.slots.stop - self.slots.start)
+        return terms
 
     def _encode(self, raw: FloatArray, out: FloatArray, worlds: Any = _ALL) -> None:
         """Write the observations of all slots, or of those of some worlds, to ``out``."""
@@ -404,14 +360,10 @@ class _SlotGroup:
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return every array by name; views, not copies, without padding between fields."""
-        own = {
-            "cut_at": self._cut_at,
-            "returns": self._returns,
-            "touched": self._touched,
-            "counted": self._counted,
-            "terms": self._terms,
-        }
+        own = {"cut_at": self._cut_at, "returns": self._returns, "terms": self._terms}
         memory = self._advice.arrays() if self._advice is not None else {}
+        if self._guard is not None:
+            own |= {f"guard.{name}": array for name, array in self._guard.arrays().items()}
         advice = {f"advice.{name}": array for name, array in memory.items()}
         return {**self.batch.arrays.by_name(), **_arrays_inside(self.batch), **advice, **own}
 

@@ -6,11 +6,12 @@ position in the plane. The tracker whose value is estimated comes first, the oth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from posse import Batch
+from posse import Batch, Scenario
 from posse.numeric import FloatArray, Records, kernel
 from posse.rules import NEVER, config_record, place
 
@@ -62,15 +63,15 @@ class StateWriter:
 
     Args:
         batch: The worlds.
-        places: Number of trackers in a state; missing ones are zeros.
-        obstacles: Number of obstacles in a state; missing ones are zeros.
+        scenarios: States have places for the most trackers and obstacles that any of these has; missing ones are zeros.
     """
 
-    def __init__(self, batch: Batch, places: int, obstacles: int) -> None:
+    def __init__(self, batch: Batch, scenarios: Sequence[Scenario]) -> None:
         self._batch = batch
         self._config = config_record(batch.scenario)
-        self._places = places
-        self.size = TARGET_SIZE + places * TRACKER_SIZE + obstacles * OBSTACLE_SIZE
+        self._places = max(scenario.num_trackers for scenario in scenarios)
+        obstacles = max(scenario.num_obstacles for scenario in scenarios)
+        self.size = TARGET_SIZE + self._places * TRACKER_SIZE + obstacles * OBSTACLE_SIZE
         """Numbers in a state."""
 
     def write(self, out: FloatArray, worlds: Any = slice(None)) -> None:

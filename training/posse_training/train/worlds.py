@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import posse
 from posse import ObservationLayout, Scenario
@@ -18,20 +17,15 @@ from posse_training.train.vec_env import TeamVecEnv
 TARGET = "target"
 
 
-@dataclass(frozen=True)
-class Pairing:
-    """A scenario and an opponent.
-
-    Attributes:
-        scenario: With the opponent's target, or messages.
-        opponent: A team's policy where the target learns, else a target; ``None``: the scenario's
-            own target.
-        share: How many parts of the worlds it gets.
-    """
+class Pairing(NamedTuple):
+    """A scenario and an opponent."""
 
     scenario: Scenario
+    """With the opponent's target, or messages."""
     opponent: Policy | Target | None
+    """A team's policy where the target learns, else a target; ``None``: the scenario's own target."""
     share: int = 1
+    """How many parts of the worlds it gets."""
 
 
 def check_opponents(settings: TrainSettings) -> None:
@@ -43,12 +37,9 @@ def check_opponents(settings: TrainSettings) -> None:
     for pairing in pairings(settings):
         moved = pairing.opponent
         policy = moved.policy if isinstance(moved, Target) else moved
-        if policy is None:
-            continue
-        if getattr(policy, "reads_state", False) or not hasattr(policy, "arrays"):
-            name = getattr(moved, "name", "")
+        if policy is not None and (getattr(policy, "reads_state", False) or not hasattr(policy, "arrays")):
             raise PolicyError(
-                f"{name!r} cannot be trained against: it reads the state of the worlds, or its "
+                f"{getattr(moved, 'name', '')!r} cannot be trained against: it reads the state of the worlds, or its "
                 "memory cannot be saved (it has no method arrays)"
             )
 
@@ -82,12 +73,16 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
         SettingsError: Fewer worlds than scenarios and opponents.
     """
     batches = _make_batches(settings, num_threads)
-    encoding = _encoding_of(settings, batches)
+    layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
+    if settings.side == TARGET:  # it hears no messages
+        layout = ObservationLayout(layout.scenario.replace(message_size=0))
+    encoding = Encoding.of(layout, settings.encoding, settings.num_neighbours)
     adviser = make_adviser(settings)
     return TeamVecEnv(
         batches,
         encoding,
         advising=(Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None),
+        safeguard=settings.safeguard,
         see_state=ALGORITHMS[settings.algorithm].reads_state,
     )
 
@@ -100,9 +95,8 @@ def make_adviser(settings: TrainSettings) -> Adviser | None:
     """
     if settings.advise is None:
         return None
-    return check_adviser(
-        settings.advise, load(settings.advise), settings.correction, believes=settings.encoding == "belief"
-    )
+    policy, believes = load(settings.advise), settings.encoding == "belief"
+    return check_adviser(settings.advise, policy, settings.correction, believes=believes)
 
 
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
@@ -118,14 +112,16 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
         )
     batches = []
     for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
-        inside: dict[str, Any] = {}
+        scenario, inside = pair.scenario, dict[str, Any]()
+        if settings.end_on_contact:
+            scenario = scenario.replace(terminate_on_contact=True)
         if settings.side == TARGET:
             inside = {"team_policy": pair.opponent}
         elif isinstance(pair.opponent, Target) and pair.opponent.policy is not None:
             inside = {"target_policy": pair.opponent.policy}
         batches.append(
             posse.batch(
-                pair.scenario,
+                scenario,
                 last - first,
                 seed=settings.seed,
                 first_world=first,
@@ -135,14 +131,6 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
             )
         )
     return batches
-
-
-def _encoding_of(settings: TrainSettings, batches: list[posse.Batch]) -> Encoding:
-    """Return what the networks read; a target hears no messages."""
-    layout = max((batch.layout for batch in batches), key=lambda layout: layout.neighbours)
-    if settings.side == TARGET:
-        layout = ObservationLayout(layout.scenario.replace(message_size=0))
-    return Encoding.of(layout, settings.encoding, settings.num_neighbours)
 
 
 def load_own(settings: TrainSettings, name: str) -> Any:

@@ -1,0 +1,194 @@
+"""The script's safeguard as an action layer, which any learner can train behind.
+
+An action becomes a wanted velocity, ahead and to the left of the robot, as shares of its greatest speed. The layer
+makes it safe and carries it out as speed and turn rate; the message behind it passes unchanged. Of the script only
+the monitoring of the surroundings and the safeguard run, with the settings that ``ddcs-tuned`` has for the scenario:
+without a wanted velocity a robot stays where it is, but for what it evades.
+
+:func:`Safeguard` puts the layer before an environment, :class:`Guard` is the layer itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from pettingzoo import ParallelEnv
+from pettingzoo.utils import BaseParallelWrapper
+
+from posse import ObservationLayout
+from posse.numeric import BoolArray, FloatArray, OwnArrays, kernel, over_worlds
+from posse_baselines.ddcs.memory import (
+    MATE,
+    MATE_AT_START,
+    MIND,
+    MIND_AT_START,
+    Minds,
+    Team,
+    Work,
+    read_body,
+    team_of,
+    work_for,
+)
+from posse_baselines.ddcs.monitoring import update_mates, watch_target
+from posse_baselines.ddcs.surroundings import surround
+from posse_baselines.laws.geometry import length, scaled
+from posse_baselines.laws.guidance import regulate, write_motion
+from posse_baselines.laws.safeguard import safe_velocity
+from posse_baselines.policy import PolicyError
+from posse_baselines.tuned import TunedDDCS
+
+
+class Guard(OwnArrays):
+    """The safeguard of R robots in each of E worlds, and what it remembers of their surroundings.
+
+    Args:
+        layout: Of the observations.
+        num_worlds: E.
+        robots: R, the robots that it moves; default: all trackers.
+    """
+
+    def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
+        scenario = layout.scenario
+        n = scenario.num_trackers
+        robots = n if robots is None else robots
+        self._minds = Minds(
+            team_of(layout, TunedDDCS("ddcs-tuned").settings_for(scenario)),
+            np.empty((num_worlds, robots), MIND),
+            np.empty((num_worlds, robots, n), MATE),
+            np.empty((num_worlds, robots, 0), np.uint16),
+        )
+        self._observed = np.zeros((num_worlds, robots, layout.size), np.float32)
+        self.restart(np.ones(num_worlds, np.bool_))
+
+    def follow(self, observations: FloatArray) -> None:
+        """Take the observations (E, R, F) of a control step, before :meth:`actions`."""
+        self._observed[...] = observations
+
+    def restart(self, mask: BoolArray) -> None:
+        """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""
+        self._minds.me[mask], self._minds.mates[mask] = MIND_AT_START, MATE_AT_START
+
+    def actions(self, wanted: npt.ArrayLike) -> FloatArray:
+        """Return the actions (E, R, 2 + m) that carry out wanted velocities (E, R, 2 + m) safely.
+
+        To be called once a control step.
+
+        Raises:
+            ValueError: A wanted velocity that is not finite.
+        """
+        actions = np.array(wanted, np.float32, order="C")
+        if not np.isfinite(actions).all():
+            raise ValueError("a wanted velocity must be finite")
+        work = work_for(self._minds.mates.shape[2])
+        over_worlds(_guard_all, (self._minds, work, self._observed, actions), *self._minds.me.shape)
+        return actions
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return what it remembers as arrays (E, ...) by name; views, not copies."""
+        arrays: dict[str, npt.NDArray[Any]] = {"observed": self._observed}
+        for name, records in (("me", self._minds.me), ("mates", self._minds.mates)):
+            arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
+        return arrays
+
+
+@kernel
+def _guard_all(
+    minds: Minds, work: Work, observations: FloatArray, actions: FloatArray, thread: int, first: int, end: int
+) -> None:
+    """Write the motions of a share of the worlds, in the place of the wanted velocities."""
+    shared = minds.team
+    team = Team(shared.at[0], shared.world[0], shared.settings[0], shared.slots, shared.outermost, shared.beams)
+    discs, plays = work.discs[thread], work.plays[thread]
+    for e in range(first, end):
+        for i in range(observations.shape[1]):
+            me, mates, row, action = minds.me[e, i], minds.mates[e, i], observations[e, i], actions[e, i]
+            read_body(team, me, row)
+            watch_target(team, me, row)
+            update_mates(team, me, mates, row)
+            wanted = complex(float(action[0]), float(action[1]))
+            wanted = scaled(wanted * me.heading, me.max_speed / max(1.0, length(wanted)))
+            velocity, _ = safe_velocity(me, discs[: surround(team, me, mates, row, discs)], wanted, plays)
+            speed, omega = regulate(me, velocity, 0.0)
+            write_motion(action, speed, omega, me.max_speed, me.max_omega)
+            me.step += 1
+
+
+def Safeguard(env: Any) -> Any:  # noqa: N802 (used as a wrapper's class is)
+    """Return an environment of posse whose actions are wanted velocities, behind the safeguard.
+
+    Args:
+        env: A PettingZoo parallel environment, whose trackers are guarded and whose target, if it is an agent, is
+            not; or one of ``posse/Team-v0``, ``posse/Solo-v0`` and ``posse/Tracker-v0``.
+
+    Raises:
+        PolicyError: Discrete actions, which are no velocities.
+        TypeError: Something else.
+    """
+    if isinstance(env, ParallelEnv):
+        return _GuardedParallelEnv(env)
+    if isinstance(env, gymnasium.Env):
+        return _GuardedEnv(env)
+    raise TypeError(f"{env!r:.80} is neither a parallel environment of PettingZoo nor an environment of Gymnasium")
+
+
+def _check_continuous(space: spaces.Space[Any]) -> None:
+    if not isinstance(space, spaces.Box):
+        raise PolicyError(f"actions {space} are no velocities: make the environment with discrete_actions=False")
+
+
+class _GuardedEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """A Gymnasium environment behind the safeguard."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        super().__init__(env)
+        _check_continuous(env.action_space)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        rows = np.atleast_2d(observation)
+        self._guard = Guard(self.get_wrapper_attr("layout"), 1, len(rows))
+        self._guard.follow(rows[None])
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Advance by one control step with wanted velocities."""
+        wanted = np.asarray(action, np.float32)
+        motion = self._guard.actions(np.atleast_2d(wanted)[None])
+        observation, *rest = self.env.step(motion.reshape(wanted.shape))
+        self._guard.follow(np.atleast_2d(observation)[None])
+        return observation, *rest
+
+
+class _GuardedParallelEnv(BaseParallelWrapper[str, Any, Any]):
+    """A PettingZoo environment whose trackers are behind the safeguard."""
+
+    def __init__(self, env: ParallelEnv[str, Any, Any]) -> None:
+        super().__init__(env)
+        for agent in env.possible_agents:
+            _check_continuous(env.action_space(agent))
+        self._trackers = [agent for agent in env.possible_agents if agent.startswith("tracker_")]
+
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
+        """Start an episode."""
+        observations, infos = self.env.reset(seed=seed, options=options)
+        self._guard = Guard(self.env.unwrapped.layout, 1)
+        self._observe(observations)
+        return observations, infos
+
+    def step(self, actions: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
+        """Advance by one control step with wanted velocities of the trackers."""
+        wanted = np.stack([np.asarray(actions[agent], np.float32) for agent in self._trackers])
+        motions = self._guard.actions(wanted[None])[0]
+        guarded = {**actions, **dict(zip(self._trackers, motions, strict=True))}
+        result: tuple[Any, Any, Any, Any, Any] = self.env.step(guarded)
+        self._observe(result[0])
+        return result
+
+    def _observe(self, observations: Mapping[str, Any]) -> None:
+        self._guard.follow(np.stack([observations[agent] for agent in self._trackers])[None])

@@ -1,0 +1,125 @@
+"""The safeguard as an action layer: nothing else of the script moves a robot, and robots do not touch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from tests.support.learned import network_for
+
+import posse
+from posse_baselines import PolicyError, Safeguard, load, rollout
+from posse_baselines.learned import Encoding, LearnedPolicy
+from posse_baselines.safeguard import Guard
+
+
+def guarded(scenario: str, **changes: Any) -> LearnedPolicy:
+    """A policy behind the safeguard whose untrained network gives small numbers."""
+    encoding = Encoding.of(posse.ObservationLayout(posse.get_scenario(scenario)), "slots")
+    network = network_for(encoding.size, **changes)
+    small = tuple(np.float32(1e-3) * weight for weight in network.weights)
+    network = type(network)(**{**vars(network), "weights": small})
+    return LearnedPolicy(network, encoding, {"name": "untrained"}, safeguard=True)
+
+
+@pytest.mark.parametrize("scenario", ["smart", "search", "obstacles", "radio", "field"])
+def test_an_untrained_network_goes_nowhere(scenario: str) -> None:
+    batch = posse.batch(scenario, 16, seed=3, horizon=200)
+    played = rollout(batch, guarded(scenario), ["tracker_pose"])
+    assert played.metrics["score"].mean() < 0.01
+    gone = np.linalg.norm(np.diff(played["tracker_pose"][..., :2], axis=0), axis=-1).sum(axis=0)
+    assert np.median(gone) < 0.2, "nothing of the script's guidance moves it"
+
+
+def full_speed(safe: bool) -> tuple[float, float]:
+    """Drive at full speed towards the common middle; return the share of worlds with contact, and the way, m."""
+    settings: dict[str, Any] = {"seed": 1, "num_trackers": 4, "horizon": 100, "settle_time": 1.0}
+    batch = posse.batch("constant", 20, start_distance=(2.0, 3.0), autoreset="disabled", **settings)
+    observations = batch.reset()
+    guard = Guard(batch.layout, 20)
+    middle = np.stack([batch.arrays.tracker["x"], batch.arrays.tracker["y"]], axis=-1).mean(axis=1, keepdims=True)
+    way = 0.0
+    for _ in range(100):
+        views = batch.layout.views(observations)
+        at = np.stack([batch.arrays.tracker["x"], batch.arrays.tracker["y"]], axis=-1)
+        c, s = views["heading"][..., 0], views["heading"][..., 1]
+        d = (middle - at) / np.maximum(np.linalg.norm(middle - at, axis=-1, keepdims=True), 1e-6)
+        wanted = np.stack([d[..., 0] * c + d[..., 1] * s, d[..., 1] * c - d[..., 0] * s], axis=-1)
+        guard.follow(observations)
+        actions = guard.actions(wanted)
+        if not safe:
+            turn = np.arctan2(wanted[..., 1], wanted[..., 0]) / batch.scenario.control_step
+            ahead = 2 * np.clip(wanted[..., 0], 0, 1) - 1
+            actions = np.stack([ahead, np.clip(turn / batch.scenario.tracker_turn_rate, -1, 1)], -1).astype(np.float32)
+        observations, *_ = batch.step(actions)
+        way += float(views["speed"].mean()) * batch.scenario.control_step
+    return float((batch.metrics()["contact_free"] == 0).mean()), way
+
+
+def test_it_keeps_robots_apart_that_want_the_same_place() -> None:
+    (bare, far), (safe, way) = full_speed(False), full_speed(True)
+    assert bare == 1.0
+    assert safe <= 0.1
+    assert way > 0.2 * far
+
+
+def test_a_policy_file_plays_behind_the_layer_it_was_trained_behind(tmp_path: Path) -> None:
+    policy = guarded("smart")
+    policy.save(tmp_path / "policy.safetensors")
+    again = load(tmp_path / "policy.safetensors")
+    assert again.safeguard  # type: ignore[attr-defined]
+    mine, its = (rollout(posse.batch("smart", 3, seed=1), p, ["actions"], steps=20)["actions"] for p in (policy, again))
+    np.testing.assert_array_equal(mine, its)
+
+
+def test_environments_do_as_the_batch_does() -> None:
+    """PettingZoo, Gymnasium and the layer itself make the same motions of the same velocities."""
+    batch = posse.batch("smart", 1, seed=5, message_size=1, autoreset="disabled")
+    team = Safeguard(gymnasium.make("posse/Team-v0", scenario="smart", seed=5, message_size=1))
+    parallel = Safeguard(posse.parallel_env("smart", seed=5, message_size=1))
+    generator = np.random.default_rng(0)
+    for _ in range(2):  # episodes
+        seen, guard = batch.reset(), Guard(batch.layout, 1)
+        seen_team, _ = team.reset()
+        seen_each, _ = parallel.reset()
+        for _ in range(30):
+            wanted = generator.uniform(-1, 1, (5, 3)).astype(np.float32)
+            guard.follow(seen)
+            seen, *_ = batch.step(guard.actions(wanted[None]))
+            seen_team, *_ = team.step(wanted)
+            seen_each, *_ = parallel.step({f"tracker_{i}": wanted[i] for i in range(5)})
+            np.testing.assert_array_equal(seen[0], seen_team)
+            np.testing.assert_array_equal(seen[0], np.stack(list(seen_each.values())))
+
+
+def test_one_tracker_and_a_target_that_is_an_agent() -> None:
+    solo = Safeguard(gymnasium.make("posse/Solo-v0", scenario="smart"))
+    mate = Safeguard(gymnasium.make("posse/Tracker-v0", scenario="smart", number=2))
+    for env in (solo, mate):
+        env.reset(seed=1)
+        for _ in range(5):
+            observation, *_ = env.step(np.zeros(2, np.float32))
+        assert env.observation_space.contains(observation)
+    duel = Safeguard(posse.parallel_env("smart", target="agent"))
+    duel.reset(seed=1)
+    actions = {agent: np.zeros(2, np.float32) for agent in duel.agents}
+    actions["target_0"] = np.ones(2, np.float32)
+    for _ in range(5):
+        duel.step(actions)
+    assert duel.unwrapped.batch.worlds["speed"][0] > 0.1, "the target is not guarded"
+    assert duel.unwrapped.batch.arrays.tracker["speed"].max() == 0
+
+
+def test_what_cannot_be_guarded() -> None:
+    with pytest.raises(PolicyError, match="discrete_actions=False"):
+        Safeguard(posse.parallel_env("smart", discrete_actions=True))
+    with pytest.raises(PolicyError, match="discrete_actions=False"):
+        Safeguard(gymnasium.make("posse/Team-v0", discrete_actions=True))
+    with pytest.raises(TypeError, match="neither"):
+        Safeguard(3)
+    batch = posse.batch("smart", 1)
+    with pytest.raises(ValueError, match="finite"):
+        Guard(batch.layout, 1).actions(np.full((1, 5, 2), np.nan))
