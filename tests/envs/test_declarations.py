@@ -50,7 +50,6 @@ MISTAKES: Final = {
     MOTION.format(', memory=[posse.Memory("m", "1", 0, float("inf"), "?")]', "", "pass"): r"high=inf of memory 'm'",
     MOTION.format(', memory=[posse.Memory("m", "1", 0, lambda s: s.arena, "?")]', "", "pass"): r"high=inf of memory",
     MOTION.format(', draw=print', "", "pass"): r"built-in function print>: declare a function, made by def",
-    MOTION.format(", mirrored=1", "", "pass"): r"mirrored=1 must be True or False",
     METRIC.format('"m", per="second"'): r"metric own \(main.py:1\): unknown per='second'; allowed: step, tracker_step",
     METRIC.format('"m", per=["step"]'): r"unknown per=\['step'\]; allowed",
     SENSOR.format("c", '"own", fix="range"'): r"sensor own \(main.py:3\): unknown fix='range'; allowed: pos",

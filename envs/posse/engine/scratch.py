@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from posse.rules.scratch import MOVING, SENSING, WORLD_FIELDS, scratch_record
+from posse.rules.scratch import RULES, scratch_record
 from posse.signals.views import OBSERVING
 
-_KEPT: Final = (
-    ("prepared", 8),  # not 0 once the values common to all worlds are written
-    *WORLD_FIELDS,
-)
+_PREPARED: Final = ("prepared", 8)  # not 0 once the values common to all worlds are written
 
-SCRATCH: Final = scratch_record(_KEPT, MOVING, SENSING, OBSERVING)
+SCRATCH: Final = scratch_record(_PREPARED, *RULES, *OBSERVING)

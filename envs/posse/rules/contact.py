@@ -28,13 +28,11 @@ from posse.numeric import (
     load,
     root,
 )
-from posse.rules.discs import A_LITTLE_MORE, FAR, TOUCHING_GAP, blocks, obstacle_within
+from posse.rules.discs import FAR, TOUCHING_GAP, blocks, obstacle_within
 from posse.rules.state import BIT, NO_BITS
 
 BLOCKING_GAP: Final = np.float32(0.0005)
 """Width of the gap at which a move stops, m."""
-
-_SURELY_APART: Final = np.float32(0.01)  # m; far more than a touch and all rounding
 
 _TINY: Final = np.float32(1e-30)  # m²; a move so short meets nothing
 _FIRST_WALL: Final = 60
@@ -76,14 +74,9 @@ def free_of_robots(
 
     The positions of ``count`` robots are in ``xs`` and ``ys``; the robot itself may be among them.
     """
-    reach = c.robot_radius + c.robot_radius + BLOCKING_GAP
-    within = (reach + abs(dx) + abs(dy)) * A_LITTLE_MORE
-    share = ONE
-    for block in range(blocks(count)):
-        other_x, other_y = load(xs, WIDTH * block), load(ys, WIDTH * block)
-        rx, ry = x - other_x, y - other_y
-        if bits((rx * rx + ry * ry < within * within) & (rx * dx + ry * dy < ZERO)) != 0:
-            share = min(share, least(free_share(x, y, dx, dy, other_x, other_y, reach)))
+    reach, share = c.robot_radius + c.robot_radius + BLOCKING_GAP, ONE
+    for k in range(0, WIDTH * blocks(count), WIDTH):
+        share = min(share, least(free_share(x, y, dx, dy, load(xs, k), load(ys, k), reach)))
     return np.float32(share)
 
 
@@ -128,19 +121,14 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
             wall = inner - max(abs(t.x), abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= t.max_speed * c.control_step + TOUCHING_GAP
-        near = s.excess[i] <= ZERO or wall_near
-        if not near:
-            if t.near:
-                t.touching_trackers, t.touching_obstacles = NO_BITS, NO_BITS
-                t.near, t.touching, t.onsets = 0, 0, 0
-            continue
-        t.near, t.onsets = 1, 0
-        dx, dy, reach = w.x - t.x, w.y - t.y, touch + (t.max_speed + c.target_speed) * c.control_step
-        target_near = target_near or dx * dx + dy * dy <= reach * reach
-        if min(s.gap[i], wall) > _SURELY_APART:
+        t.near, t.onsets = s.excess[i] <= ZERO or wall_near, 0
+        if t.near:
+            dx, dy, reach = w.x - t.x, w.y - t.y, touch + (t.max_speed + c.target_speed) * c.control_step
+            target_near = target_near or dx * dx + dy * dy <= reach * reach
+            if meet_closely(c, w, t, obstacles, i, s):
+                target_touching |= BIT << np.uint64(i)
+        else:
             t.touching_trackers, t.touching_obstacles, t.touching = NO_BITS, NO_BITS, 0
-        elif meet_closely(c, w, t, obstacles, i, s):
-            target_touching |= BIT << np.uint64(i)
     w.touching = target_touching
     w.onsets = w.contacts_target - before
     w.near = target_near
@@ -152,6 +140,16 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         near_any = near_wall or obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.robot_radius + way)
         w.near = c.target_agent != 0 or near_any
     w.least_gap = smallest
+
+
+@compiled
+def ones(mask: np.uint64) -> int:
+    """Return the number of bits that are set."""
+    count = 0
+    while mask != NO_BITS:
+        mask &= mask - BIT
+        count += 1
+    return count
 
 
 @compiled(out_of_line=True)
@@ -173,12 +171,8 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         found |= bits((x * x + y * y <= touch * touch) & other) << j
     touching = np.uint64(found) & ~bit
     begun = touching & ~t.touching_trackers
-    while begun != NO_BITS:
-        first = begun & (~begun + BIT)
-        begun ^= first
-        t.onsets += 1
-        if first > bit:
-            w.contacts_tracker += 1
+    t.onsets += ones(begun)
+    w.contacts_tracker += ones(begun >> np.uint64(i))  # each pair once
     t.touching_trackers = touching
     # Obstacles and walls.
     touching = NO_BITS
@@ -192,11 +186,9 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         for k, along in enumerate((t.x, -t.x, t.y, -t.y)):
             if along >= inner:
                 touching |= BIT << np.uint64(_FIRST_WALL + k)
-    begun = touching & ~t.touching_obstacles
-    while begun != NO_BITS:
-        begun &= begun - BIT
-        t.onsets += 1
-        w.contacts_obstacle += 1
+    begun = ones(touching & ~t.touching_obstacles)
+    t.onsets += begun
+    w.contacts_obstacle += begun
     t.touching_obstacles = touching
     t.touching = touches_target or (t.touching_trackers | touching) != NO_BITS
     return bool(touches_target)

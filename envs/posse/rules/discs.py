@@ -38,7 +38,6 @@ TOUCHING_GAP: Final = np.float32(0.001)
 
 FAR: Final = np.float32(1e9)
 _MINUS_ONE: Final = np.float32(-1.0)
-A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
@@ -71,18 +70,10 @@ def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
         s.index[k] = np.float32(k)
     for k in range(DISCS):
         s.radius[k] = c.robot_radius
-        s.sonar_reach2[k] = sonar_reach2(c, c.robot_radius)
     count = beams.shape[1]
     for k in range(WIDTH * blocks(count)):
         s.beam_cos[k] = beams[0, k] if k < count else ZERO
         s.beam_sin[k] = beams[1, k] if k < count else ZERO
-
-
-@compiled
-def sonar_reach2(c: Record, radius: np.float32) -> np.float32:
-    """Return the squared distance of centres within which the sonar may detect a disc."""
-    within = (c.sonar_range + c.robot_radius + radius) * A_LITTLE_MORE
-    return np.float32(within * within)
 
 
 @compiled
@@ -131,15 +122,12 @@ def lay_out(c: Record, w: Record, trackers: Records, obstacles: Records, s: Reco
         tracker, target = number < np.float32(n), number == np.float32(n)
         store(s.x, j, choose(tracker, pose.x, choose(target, w.x, FAR)))
         store(s.y, j, choose(tracker, pose.y, choose(target, w.y, FAR)))
-    count = num_discs(c)
-    if count > n + 1:
-        for k in range(natural(c.num_obstacles)):
-            o = obstacles[k]
-            j = n + 1 + k
-            s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
-            s.sonar_reach2[j] = sonar_reach2(c, o.radius)
-        store(s.x, count, eight(FAR))
-        store(s.y, count, eight(FAR))
+    for k in range(natural(c.num_obstacles)):
+        o = obstacles[k]
+        j = n + 1 + k
+        s.x[j], s.y[j], s.radius[j] = o.x, o.y, o.radius
+    store(s.x, num_discs(c), eight(FAR))
+    store(s.y, num_discs(c), eight(FAR))
 
 
 @compiled

@@ -26,16 +26,6 @@ _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
 
 @compiled
-def half_turn(turn_rate: np.float32, time: np.float32) -> tuple[np.float32, np.float32, np.float32]:
-    """Return (cos h, sin h, sin h / h) of half the turn, h = ω dt / 2, for |h| ≤ 0.5."""
-    h = HALF * turn_rate * time
-    h2 = h * h
-    sinc = ONE - h2 * _C6 * (ONE - h2 * _C20 * (ONE - h2 * _C42))
-    cosine = ONE - h2 * HALF * (ONE - h2 * _C12 * (ONE - h2 * _C30 * (ONE - h2 * _C56)))
-    return cosine, h * sinc, sinc
-
-
-@compiled
 def arc(
     cosine: np.float32, sine: np.float32, speed: np.float32, turn_rate: np.float32, time: np.float32
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
@@ -43,7 +33,10 @@ def arc(
 
     The chord of the arc has the length V dt sin(h) / h and the direction θ + h, h = ω dt / 2.
     """
-    ch, sh, sinc = half_turn(turn_rate, time)
+    h = HALF * turn_rate * time
+    h2 = h * h
+    sinc = ONE - h2 * _C6 * (ONE - h2 * _C20 * (ONE - h2 * _C42))  # sin(h) / h, for |h| ≤ 0.5
+    ch, sh = ONE - h2 * HALF * (ONE - h2 * _C12 * (ONE - h2 * _C30 * (ONE - h2 * _C56))), h * sinc
     chord = speed * time * sinc
     middle_c = cosine * ch - sine * sh
     middle_s = sine * ch + cosine * sh

@@ -46,20 +46,13 @@ def occupy(c: Record, w: Record, trackers: Records, slots: Records, s: Record) -
                 taken |= bit
                 occupied += 1
                 t.slot = best
-    for first in range(0, n if taken != NO_BITS else 0, WIDTH):
-        last = min(first + WIDTH, n)
-        looking = False  # whether the nearest slot of any is occupied by another
-        for i in range(first, last):
-            if trackers[i].slot < 0 and s.slot[i] >= ZERO:
-                looking |= taken & (BIT << np.uint64(s.slot[i])) != NO_BITS
-        if looking:
-            find_slots(c, w, first, slots, taken, s)
-            for i in range(first, last):
-                t = trackers[i]
-                if t.slot < 0 and s.slot[i] >= ZERO:
-                    t.slot_distance = s.slot_distance[i]
+    if taken != NO_BITS:
+        for block in range(blocks(n)):
+            find_slots(c, w, WIDTH * block, slots, taken, s)
     for i in range(c.num_trackers):
         t = trackers[i]
+        if t.slot < 0 and s.slot[i] >= ZERO:
+            t.slot_distance = s.slot_distance[i]
         t.slot_progress -= t.slot_distance
     w.score = ZERO
     if w.working > 0:

@@ -16,7 +16,7 @@ from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled
 from posse.rules.discs import obstacle_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
-from posse.rules.targets.steering import has_free_circle
+from posse.rules.targets.steering import free_circles
 from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import START_CLEARANCE
 
@@ -58,8 +58,7 @@ def target_can_turn(c: Record, w: Record, obstacles: Records, allowance: np.floa
     """Return whether a turning circle of a scripted target in an arena is free, but for an allowance, m."""
     if not c.walled or c.target_agent != 0:
         return True
-    left = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, ONE, allowance)
-    right = has_free_circle(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, -ONE, allowance)
+    left, right = free_circles(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, allowance)
     return bool(left or right)
 
 
@@ -140,7 +139,7 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
         t.sees, t.touching, t.onsets = 0, 0, 0
         t.touching_trackers, t.touching_obstacles = np.uint64(0), np.uint64(0)
         t.fix_step = -1
-        t.fix.x, t.fix.y, t.fix_vx, t.fix_vy = ZERO, ZERO, ZERO, ZERO
+        t.fix.x, t.fix.y, t.fix.vx, t.fix.vy = ZERO, ZERO, ZERO, ZERO
         t.fix.cos, t.fix.sin, t.fix.frame_cos, t.fix.frame_sin = ONE, ZERO, ONE, ZERO
         t.slot, t.could_arrive = -1, 0
         t.slot_distance, t.slot_progress = ZERO, ZERO

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ def _record(*fields: tuple[str, Any]) -> np.dtype[Any]:
     return np.dtype((np.record, np.dtype(list(fields), align=True)))
 
 
-_F, _I, _U, _S = np.float32, np.int32, np.uint64, np.int16
+_F, _I, _U = np.float32, np.int32, np.uint64
 
 _NUMERIC: Final = {"int": _I, "bool": _I, "float": _F}
 
@@ -65,7 +66,6 @@ def _smoothing(s: Scenario) -> float:
 _Numbers = dict[str, tuple[type, Callable[[Scenario], Any]]]
 
 DERIVED: Final[_Numbers] = {
-    "num_agents": (_I, lambda s: s.num_agents),
     "neighbours": (_I, lambda s: s.neighbours),
     "physics_steps": (_I, lambda s: s.physics_steps),
     "settle_steps": (_I, lambda s: max(1, round(s.settle_time / s.control_step))),
@@ -104,24 +104,16 @@ DERIVED: Final[_Numbers] = {
 """What kernels read of a scenario beside its numbers: type and value."""
 
 
-def _number(name: str, place: int | None = None) -> Callable[[Scenario], Any]:
-    """Return the function that reads a setting; of a pair, its number at a place."""
-
-    def read(s: Scenario) -> Any:
-        value = getattr(s, name) if place is None else getattr(s, name)[place]
-        return FAR if value == math.inf else value
-
-    return read
-
-
 def _numbers() -> _Numbers:
     """Return all numbers that kernels read of a scenario: type and value."""
     numbers: _Numbers = {}
     for name, setting in Scenario.settings().items():
+        read = attrgetter(name)
         if setting.kind in _NUMERIC:
-            numbers[name] = _NUMERIC[setting.kind], _number(name)
+            numbers[name] = _NUMERIC[setting.kind], read
         elif setting.kind == "tuple[float, float]":
-            numbers[f"{name}_least"], numbers[f"{name}_most"] = (_F, _number(name, 0)), (_F, _number(name, 1))
+            numbers[f"{name}_least"] = _F, lambda s, read=read: read(s)[0]
+            numbers[f"{name}_most"] = _F, lambda s, read=read: read(s)[1]
     return {**numbers, **DERIVED}
 
 
@@ -224,14 +216,14 @@ class Condition(NamedTuple):
 class Fix(NamedTuple):
     """The fixes of eight trackers, in the common frame; a sensor of bearings gives the first two alone."""
 
-    fix_x: Lanes  # where the target was, m; a bearing: a unit vector
-    fix_y: Lanes
-    fix_cos: Lanes  # its heading; a bearing: 0
-    fix_sin: Lanes
-    fix_frame_cos: Lanes  # the slot frame ψ; a bearing: 0
-    fix_frame_sin: Lanes
-    fix_vx: Lanes  # m/s, from successive fixes
-    fix_vy: Lanes
+    x: Lanes  # where the target was, m; a bearing: a unit vector
+    y: Lanes
+    cos: Lanes  # its heading; a bearing: 0
+    sin: Lanes
+    frame_cos: Lanes  # the slot frame ψ; a bearing: 0
+    frame_sin: Lanes
+    vx: Lanes  # m/s, from successive fixes
+    vy: Lanes
 
 
 class Heard(NamedTuple):
@@ -247,7 +239,7 @@ class Heard(NamedTuple):
     unused: Lanes  # makes a block of eight
 
 
-FIX_RECORD: Final = _record(*((name.removeprefix("fix_"), _F) for name in Fix._fields[:6]))
+FIX_RECORD: Final = _record(*((name, _F) for name in Fix._fields))
 """A fix of the target: a position or a bearing, depending on the sensor (:mod:`posse.rules.senses.declaration`)."""
 
 TRACKER: Final = _record(
@@ -256,19 +248,18 @@ TRACKER: Final = _record(
     ("per_turn_rate", _F),  # 1 / max_speed, 1 / max_turn_rate
     ("breaks_at", _I),  # control step at which it will break (break_choice "drawn", "given")
     *((name, _I) for name in Condition._fields),
-    ("slot", _S),  # number of the slot that it occupies; -1: none
-    ("could_arrive", _S),  # 1: on a straight line at full speed it could have reached a slot
+    ("slot", _I),  # number of the slot that it occupies; -1: none
+    ("could_arrive", _I),  # 1: on a straight line at full speed it could have reached a slot
     ("touching_trackers", _U),
     ("touching_obstacles", _U),  # bit masks; bits 60 to 63: walls
     ("fix", FIX_RECORD),  # its best fix of the target, from its sensor or by radio
-    *((name, _F) for name in Fix._fields[6:]),
     # inputs of score and rewards, with slot and could_arrive
     ("slot_distance", _F),  # to the nearest slot that no other tracker occupies
     ("slot_progress", _F),  # decrease of slot_distance in this step
     ("start_x", _F),
     ("start_y", _F),
 )
-"""One tracker: :class:`Pose`, :class:`Condition`, :class:`Fix` and more."""
+"""One tracker: :class:`Pose`, :class:`Condition`, its fix and more."""
 
 OBSTACLE: Final = _record(("x", _F), ("y", _F), ("radius", _F))
 
@@ -282,7 +273,7 @@ BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
     *((name, _F) for name in Pose._fields[:6]),
     ("fix_step", _I),
-    ("fix", FIX_RECORD),
+    ("fix", FIX_RECORD),  # a receiver works out the velocity from its own previous fix
 )
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
 
@@ -389,6 +380,7 @@ def beam_directions(scenario: Scenario) -> FloatArray:
 def config_record(scenario: Scenario) -> Records:
     """Return the scenario for kernels, an array of one :data:`CONFIG`."""
     config = np.zeros(1, CONFIG)
-    for name, (_, value) in _numbers().items():
-        config[name] = value(scenario)
+    for name, (_, read) in _numbers().items():
+        value = read(scenario)
+        config[name] = FAR if value == math.inf else value
     return config

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-BREAK_CHOICES: Final = ("nearest", "drawn", "given")
-
 MAX_TRACKERS: Final = 64  # contacts and radio links are bits of one 64-bit word
 MAX_OBSTACLES: Final = 60  # the four walls use the last bits
 
@@ -33,7 +31,5 @@ LONGEST_MOVE: Final = 2000.0
 In float32 the squares of the sweep have an error of about 2^-22 d², and hence the contact point of
 discs of radius r one of 2^-22 d² / (4 r): 1.2e-4 m at most.
 """
-LEAST_CHANGE: Final = 16
-"""Least change in a physics step, in spacings of float32: a rounding error of at most 1/32."""
 MOST_WEIGHT: Final = 1e6
 """Greatest weight of a reward term; terms are below 1e4, so sums stay far below 3e38."""

@@ -22,6 +22,8 @@ _PAPER: Final[dict[str, Any]] = {
     "tolerance": 0.2,
 }
 
+_SHORTEST: Final = 1e-9  # s
+
 # The reasons for these settings are in docs/scenarios.md.
 SCENARIOS: Final[dict[str, dict[str, Any]]] = {
     "constant": {"meaning": "The target runs straight on; everybody sees it and hears everybody: a sanity check."},
@@ -142,22 +144,16 @@ def get_scenario(scenario: str | Scenario, *, target: Any = None, **overrides: A
     """
     if isinstance(scenario, Scenario):
         found = scenario
-    elif scenario in tuple(SCENARIOS):  # also of what is not hashable
+    elif isinstance(scenario, str) and scenario in SCENARIOS:
         found = _named(scenario)
     else:
         raise ScenarioError(unknown("scenario", scenario, SCENARIOS))
-    if target is not None:
-        motion = overrides.setdefault("target_motion", "agent")
-        if not isinstance(target, str) or target != "agent":
-            given = f"target={reprlib.repr(target)}"
-            raise ScenarioError(f"{given} is refused: the one choice is 'agent'; target_motion= names a scripted one")
-        if motion != "agent":
-            raise ScenarioError(f"target='agent' and target_motion={reprlib.repr(motion)} exclude each other")
-    if not overrides:
-        return found
+    if target is not None and (target != "agent" or overrides.setdefault("target_motion", "agent") != "agent"):
+        given = f"target={reprlib.repr(target)}"
+        raise ScenarioError(
+            f"{given} is refused: the one choice is 'agent', without target_motion=, which names others"
+        )
     if "horizon" in overrides and "settle_time" not in overrides:
-        settings = Scenario.settings()
-        horizon, step = overrides["horizon"], overrides.get("control_step", found.control_step)
-        steps = settings["horizon"].accept("horizon", horizon)
-        overrides["settle_time"] = min(found.settle_time, steps * settings["control_step"].accept("control_step", step))
-    return found.replace(**overrides)
+        at_once = found.replace(settle_time=_SHORTEST, **overrides)
+        return at_once.replace(settle_time=min(found.settle_time, at_once.duration))
+    return found.replace(**overrides) if overrides else found

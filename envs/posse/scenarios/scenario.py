@@ -9,17 +9,15 @@ import dataclasses
 import functools
 import math
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any
 
 from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, unknown
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
-    BREAK_CHOICES,
     FAR,
     FARTHEST,
-    LEAST_CHANGE,
     LONGEST_MOVE,
     MAX_OBSTACLES,
     MAX_TRACKERS,
@@ -29,7 +27,7 @@ from posse.scenarios.limits import (
     SMALL,
     WIDE,
 )
-from posse.scenarios.setting import ScenarioError, Setting, UnknownSettingError, fail, setting
+from posse.scenarios.setting import Setting, UnknownSettingError, fail, setting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,9 +43,7 @@ class Scenario:
     """
 
     name: str = setting(dataclasses.MISSING, "name in results and policy cards")
-    meaning: str = dataclasses.field(
-        default="", compare=False, metadata={"setting": Setting("what the scenario asks of a team, in one sentence")}
-    )
+    meaning: str = setting("", "what the scenario asks of a team, in one sentence", compare=False)
     version: int = setting(1, "incremented when the behaviour of the named scenario changes", "1", 1, 1e6)
 
     # The team
@@ -73,10 +69,7 @@ class Scenario:
 
     # The target
     target_motion: str = setting(
-        "constant",
-        "how the target moves; agent: a policy controls it",
-        choices=lambda: TARGET_MOTIONS,
-        source="section 2",
+        "constant", "how the target moves; agent: a policy controls it", choices=TARGET_MOTIONS, source="section 2"
     )
     target_speed: float = setting(0.6, "speed of the target; an agent's greatest", "m/s", 0, 1000)
     target_turn_rate: float = setting(1.0, "greatest turn rate of the target", "rad/s", SMALL, WIDE)
@@ -88,14 +81,14 @@ class Scenario:
     formation: str = setting(
         "wedge",
         "wedge: behind the target; ring: around it; rows: compact, behind",
-        choices=lambda: FORMATIONS,
+        choices=FORMATIONS,
         source="section 3.3, figure 6",
     )
     formation_distance: float = setting(
-        1.2, "from the target to the nearest slot (ring: the least radius of the ring)", "m", 0, WIDE, above=True
+        1.2, "from the target to the nearest slot (ring: the least radius of the ring)", "m", 0, FARTHEST, above=True
     )
     formation_spacing: float = setting(
-        1.2, "between neighbouring slots; more than twice the tolerance", "m", 0, WIDE, above=True
+        1.2, "between neighbouring slots; more than twice the tolerance", "m", 0, FARTHEST, above=True
     )
     tolerance: float = setting(0.3, "a slot is occupied when a tracker is within this distance", "m", SMALL, WIDE)
     settle_time: float = setting(
@@ -104,6 +97,7 @@ class Scenario:
         " (get_scenario) at most the length of an episode whose horizon is given without it",
         "s",
         0,
+        1e8,
         above=True,
     )
 
@@ -119,7 +113,7 @@ class Scenario:
     )
     num_obstacles: int = setting(0, "discs in the arena; require an arena", "1", 0, MAX_OBSTACLES)
     obstacle_radius: tuple[float, float] = setting(
-        (0.4, 0.8), "least and greatest radius of an obstacle", "m", 0, 2 * FARTHEST
+        (0.4, 0.8), "least and greatest radius of an obstacle", "m", 0, 2 * FARTHEST, above=True
     )
     obstacle_gap: float = setting(
         1.2, "least clearance between two obstacles, and between an obstacle and a wall", "m", 0, WIDE
@@ -129,7 +123,7 @@ class Scenario:
     )
 
     # Sensing
-    sensor: str = setting("range-bearing", "kind of the target sensor", choices=lambda: SENSORS)
+    sensor: str = setting("range-bearing", "kind of the target sensor", choices=SENSORS)
     sensing_range: float = setting(
         math.inf, "a tracker sees the target up to this distance; inf: at any", "m", 0, WIDE, above=True, infinite=True
     )
@@ -166,7 +160,7 @@ class Scenario:
         "nearest",
         "which one breaks: the nearest to the target at that time (usually the leader), a random"
         " one, or the one given by number",
-        choices=lambda: BREAK_CHOICES,
+        choices=("nearest", "drawn", "given"),
     )
     break_number: int = setting(
         0, "number of the tracker that breaks with break_choice given", "1", 0, MAX_TRACKERS - 1
@@ -206,8 +200,9 @@ class Scenario:
         for name, declared in self.settings().items():
             object.__setattr__(self, name, declared.accept(name, getattr(self, name)))
         # Whether a start can be drawn is found at the reset (posse.rules.start.check_drawn).
-        for check in (_check_team, _check_time, _check_formation, _check_arena, _check_rounding, _check_declarations):
-            check(self)
+        for conflicts in (_in_team, _in_time_and_space, _in_declarations):
+            for name, why in conflicts(self):
+                fail(name, getattr(self, name), why)
 
     @staticmethod
     @functools.cache
@@ -328,121 +323,82 @@ class Scenario:
         return values
 
 
-def _refuse(s: Scenario, name: str, why: str) -> NoReturn:
-    fail(name, getattr(s, name), why)
+_Conflicts = Iterator[tuple[str, str]]
+"""Settings that do not fit the others, and why."""
 
 
-def _check_team(s: Scenario) -> None:
-    n, slowest = s.num_trackers, min(s.tracker_speeds)
-    for name, declared in s.settings().items():
+def _in_team(s: Scenario) -> _Conflicts:
+    for name in ("tracker_speed", "tracker_turn_rate"):
         each = getattr(s, name)
-        if declared.per_tracker and isinstance(each, tuple) and len(each) != n:
-            _refuse(s, name, f"{len(each)} values for num_trackers={n}: give one number, or one for each")
+        if isinstance(each, tuple) and len(each) != s.num_trackers:
+            yield name, f"{len(each)} values for num_trackers={s.num_trackers}: give one number, or one for each"
+    slowest = min(s.tracker_speeds)
     if s.target_speed > 0.9999 * slowest:
         why = "by 0.01 % at least: a slower team cannot catch up (paper, assumption ii)"
-        _refuse(s, "target_speed", f"it must be below tracker_speed={slowest:g}, {why}")
+        yield "target_speed", f"it must be below tracker_speed={slowest:g}, {why}"
     if s.target_least_speed > s.target_speed:
-        _refuse(s, "target_least_speed", f"it must be at most target_speed={s.target_speed:g}")
-    if s.target_speed == 0 and s.target_motion != "constant":
-        _refuse(s, "target_speed", "only a target of constant motion may rest")
-    if s.breaks and s.breaks >= n:
-        _refuse(s, "breaks", f"at most num_trackers - 1 = {n - 1}")
+        yield "target_least_speed", f"it must be at most target_speed={s.target_speed:g}"
+    if s.target_speed < SMALL and s.target_motion != "constant":
+        yield "target_speed", f"only a target of constant motion may rest: choose at least {SMALL:g}"
+    if s.breaks >= s.num_trackers:
+        yield "breaks", f"at most num_trackers - 1 = {s.num_trackers - 1}"
     if s.break_choice == "given" and s.breaks > 1:
-        _refuse(s, "breaks", 'break_choice="given" names one tracker, break_number')
-    if s.break_choice == "given" and s.break_number >= n:
-        _refuse(s, "break_number", f"trackers are 0 to {n - 1}")
-
-
-def _check_time(s: Scenario) -> None:
-    steps = s.control_step / s.physics_step
-    if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
-        _refuse(s, "control_step", f"it must be a whole multiple of physics_step={s.physics_step:g}")
-    for name, rate in (("tracker_turn_rate", max(s.tracker_turn_rates)), ("target_turn_rate", s.target_turn_rate)):
-        turn = rate * s.physics_step
-        if turn > 1.0:
-            most = f"at most 1 is possible: choose physics_step <= {1 / rate:.3g}"
-            _refuse(s, name, f"{rate:g} rad/s turns {turn:.2f} rad in a physics step, {most}")
-    if s.settle_time > s.duration:
-        episode = f"an episode of horizon={s.horizon} steps of {s.control_step:g} s"
-        _refuse(
-            s,
-            "settle_time",
-            f"it is longer than {episode}: set settle_time to at most {s.duration:g}, or raise horizon",
-        )
-
-
-def _check_formation(s: Scenario) -> None:
+        yield "breaks", 'break_choice="given" names one tracker, break_number'
+    if s.break_choice == "given" and s.break_number >= s.num_trackers:
+        yield "break_number", f"trackers are 0 to {s.num_trackers - 1}"
     offsets = s.slot_offsets
     apart = min((math.dist(a, b) for i, a in enumerate(offsets) for b in offsets[:i]), default=math.inf)
     if apart <= 2 * max(s.tolerance, s.robot_radius) + 1e-9:
         limits = f"tolerance={s.tolerance:g} and robot_radius={s.robot_radius:g}"
         why = f"slots of the {s.formation} lie {apart:.3g} m apart, which must be more than twice {limits}"
-        _refuse(s, "formation_spacing", f"{why}: raise it, or lower them")
-    nearest, farthest = min(math.hypot(*slot) for slot in offsets), max(math.hypot(*slot) for slot in offsets)
+        yield "formation_spacing", f"{why}: raise it, or lower them"
+    nearest = min(math.hypot(*slot) for slot in offsets)
     if nearest <= 2 * s.robot_radius:
         why = f"a slot lies {nearest:.3g} m from the target, which robots of robot_radius={s.robot_radius:g} touch"
-        _refuse(s, "formation_distance", f"{why}: raise it")
-    if farthest > FARTHEST:
-        why = f"with formation_distance={s.formation_distance:g} a slot lies {farthest:.3g} m from the target"
-        _refuse(s, "formation_spacing", f"{why}, at most {FARTHEST:g} m is possible: lower them or num_trackers")
+        yield "formation_distance", f"{why}: raise it"
 
 
-def _check_arena(s: Scenario) -> None:
-    if s.position_bound > FARTHEST:
-        raise ScenarioError(
-            f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most "
-            f"{FARTHEST:g} m is possible: lower tracker_speed={max(s.tracker_speeds):g}, "
-            f"horizon={s.horizon}, control_step={s.control_step:g} or "
-            f"start_distance={s.start_distance}, or set an arena"
-        )
-    if s.start_distance[0] <= 2 * s.robot_radius:
-        _refuse(s, "start_distance", f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m")
-    if s.num_obstacles and math.isinf(s.arena):
-        _refuse(s, "num_obstacles", "obstacles need an arena: set arena to its side in m")
-    if s.num_obstacles and s.obstacle_radius[0] <= 0:
-        _refuse(s, "obstacle_radius", "radii must be above 0")
-    if s.target_extent <= 0:
-        why = f"it is too small for a target that needs {s.target_clearance:.3g} m to turn away from a wall"
-        _refuse(s, "arena", f"{why}: raise arena or target_turn_rate, or lower target_speed")
-
-
-def _check_rounding(s: Scenario) -> None:
-    """Raise where float32 in the kernels would be too coarse for the scenario."""
-    fastest = max(s.tracker_speeds)
+def _in_time_and_space(s: Scenario) -> _Conflicts:
+    steps, fastest = s.control_step / s.physics_step, max(s.tracker_speeds)
+    if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+        yield "control_step", f"it must be a whole multiple of physics_step={s.physics_step:g}"
+    for name, rate in (("tracker_turn_rate", max(s.tracker_turn_rates)), ("target_turn_rate", s.target_turn_rate)):
+        turn = rate * s.physics_step
+        if turn > 1.0:
+            most = f"at most 1 is possible: choose physics_step <= {1 / rate:.3g}"
+            yield name, f"{rate:g} rad/s turns {turn:.2f} rad in a physics step, {most}"
     move, longest = fastest * s.physics_step, math.sqrt(LONGEST_MOVE * s.robot_radius)
     if move > longest:
         exact = f"contact of robots of robot_radius={s.robot_radius:g} is exact up to {longest:.3g} m"
         fix = f"choose physics_step <= {longest / fastest:.3g}"
-        _refuse(s, "tracker_speed", f"{fastest:g} m/s moves {move:.3g} m in a physics step, {exact}: {fix}")
-    for name, value, added_to, most in (
-        ("tracker_speed", min(s.tracker_speeds), "a position", s.position_bound),
-        ("target_speed", s.target_speed, "a position", s.position_bound),
-        ("tracker_turn_rate", min(s.tracker_turn_rates), "a heading", 1.0),
-        ("target_turn_rate", s.target_turn_rate, "a heading", 1.0),
-        ("tracker_acceleration", s.tracker_acceleration, "a speed", fastest),
-        ("tracker_turn_acceleration", s.tracker_turn_acceleration, "a turn rate", max(s.tracker_turn_rates)),
-    ):
-        spacing = math.ulp(most) * 2.0**29  # of float32: a double has 29 more bits
-        least = LEAST_CHANGE * spacing / s.physics_step
-        if 0 < value < least:
-            lost = f"adds {value * s.physics_step:.3g} to {added_to} of up to {most:.3g} in a physics step"
-            fix = f"choose {name} >= {least:.3g}, or a longer physics_step={s.physics_step:g}"
-            _refuse(s, name, f"{value:g} {lost}, which float32 loses to rounding: {fix}")
+        yield "tracker_speed", f"{fastest:g} m/s moves {move:.3g} m in a physics step, {exact}: {fix}"
+    if s.settle_time > s.duration:
+        episode = f"an episode of horizon={s.horizon} steps of {s.control_step:g} s"
+        fix = f"set settle_time to at most {s.duration:g}, or raise horizon"
+        yield "settle_time", f"it is longer than {episode}: {fix}"
+    if s.position_bound > FARTHEST:
+        come = f"robots could come {s.position_bound:.3g} m from the origin along an axis, at most {FARTHEST:g} m"
+        others = f"tracker_speed={fastest:g}, control_step={s.control_step:g} or start_distance={s.start_distance}"
+        yield "horizon", f"{come} is possible: lower it, {others}, or set an arena"
+    if s.start_distance[0] <= 2 * s.robot_radius:
+        yield "start_distance", f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m"
+    if s.num_obstacles and math.isinf(s.arena):
+        yield "num_obstacles", "obstacles need an arena: set arena to its side in m"
+    if s.target_extent <= 0:
+        why = f"it is too small for a target that needs {s.target_clearance:.3g} m to turn away from a wall"
+        yield "arena", f"{why}: raise arena or target_turn_rate, or lower target_speed"
 
 
-def _check_declarations(s: Scenario) -> None:
-    for where, names, known in (
-        ("extra_fields", s.extra_fields, FIELDS),
-        ("metrics", s.metrics, METRICS),
-        ("reward_weights", dict(s.reward_weights), REWARD_TERMS),
-        ("target_reward_weights", dict(s.target_reward_weights), REWARD_TERMS),
+def _in_declarations(s: Scenario) -> _Conflicts:
+    of_target = {name: term for name, term in REWARD_TERMS.items() if term.of_target is not None}
+    for where, names, kind, known in (
+        ("extra_fields", s.extra_fields, FIELDS.kind, FIELDS),
+        ("metrics", s.metrics, METRICS.kind, METRICS),
+        ("reward_weights", dict(s.reward_weights), REWARD_TERMS.kind, REWARD_TERMS),
+        ("target_reward_weights", dict(s.target_reward_weights), "term of a target", of_target),
     ):
         for name in names:
             if name not in known:
-                raise ScenarioError(f"in {where}: {known.unknown(name)}")
+                yield where, f"{unknown(kind, name, known)}. To use a declaration of your own, import its module first"
     for name in filter(FIELDS.is_built_in, s.extra_fields):
-        _refuse(s, "extra_fields", f"{name!r} is in every observation: leave it out")
-    of_target = [name for name, term in REWARD_TERMS.items() if term.of_target is not None]
-    for name in dict(s.target_reward_weights):
-        if name not in of_target:
-            raise ScenarioError(f"in target_reward_weights: {unknown('term of a target', name, of_target)}")
+        yield "extra_fields", f"{name!r} is in every observation: leave it out"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import reprlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any, NoReturn
@@ -39,7 +39,7 @@ class Setting:
         high: Greatest value.
         above: Whether the range excludes ``low``.
         infinite: Whether ``math.inf`` is allowed beyond ``high``: no limit.
-        choices: Returns the valid values of a text.
+        choices: The valid values of a text, if not all are.
         source: Section of the paper.
         kind: The annotation of the field, such as ``"int"`` or ``"tuple[float, float]"``.
     """
@@ -50,7 +50,7 @@ class Setting:
     high: float = math.inf
     above: bool = False
     infinite: bool = False
-    choices: Callable[[], Iterable[str]] | None = None
+    choices: Iterable[str] | None = None
     source: str = ""
     kind: str = ""
 
@@ -58,21 +58,16 @@ class Setting:
     def range(self) -> str:
         """The valid values, as text."""
         if self.choices is not None:
-            return ", ".join(f'"{choice}"' for choice in self.choices())
+            return ", ".join(f'"{choice}"' for choice in self.choices)
         if self.kind == "bool":
             return "True or False"
         if math.isinf(self.low):
             return ""
-        interval = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
+        interval = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
         infinite = ", or be inf" if self.infinite else ""
         none = ", or be None" if "None" in self.kind else ""
-        each = ", or one for each tracker" if self.per_tracker else ""
+        each = ", or one for each tracker" if "tuple[float, ...]" in self.kind else ""
         return interval + infinite + none + each
-
-    @property
-    def per_tracker(self) -> bool:
-        """Whether it may be a tuple, one value for each tracker."""
-        return "tuple[float, ...]" in self.kind
 
     def accept(self, name: str, value: object) -> Any:
         """Return a value as the scenario keeps it: Python's numbers for numpy's, tuples for lists.
@@ -80,34 +75,37 @@ class Setting:
         Raises:
             ScenarioError: A wrong type, or out of range; names the setting and its range.
         """
-        is_array = isinstance(value, np.ndarray) and value.ndim > 0
-        several = list(value) if is_array or isinstance(value, (tuple, list)) else None  # type: ignore[call-overload]
-        if value is None and "None" in self.kind:
-            return None
-        if self.kind.startswith("int"):
-            return self._whole(name, value)
-        if self.kind == "tuple[float, float]":
-            return self._pair(name, value, several)
-        if self.per_tracker and several is not None:
-            return tuple(self._number(f"{name}[{k}]", each) for k, each in enumerate(several))
-        if self.kind.startswith("float"):
-            return self._number(name, value)
-        if self.kind == "bool":
-            if not isinstance(value, (bool, np.bool_)):
-                fail(name, value, "it must be True or False")
-            return bool(value)
-        if self.kind == "tuple[str, ...]":
-            names = [value] if several is None else several
-            if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
-                fail(name, value, "it must be a tuple of names, each once")
-            return tuple(names)
-        if self.kind.startswith("Mapping"):
-            return self._weights(name, value)
-        if not isinstance(value, str):
-            fail(name, value, "it must be a string")
-        if self.choices is not None and value not in (known := tuple(self.choices())):
-            raise ScenarioError(unknown(name, value, known))
-        return value
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        match self.kind:
+            case "int":
+                return self._whole(name, value)
+            case "int | None":
+                return None if value is None else self._whole(name, value)
+            case "float":
+                return self._number(name, value)
+            case "float | tuple[float, ...]":
+                return self._numbers(name, value) if isinstance(value, (tuple, list)) else self._number(name, value)
+            case "tuple[float, float]":
+                if not isinstance(value, (tuple, list)) or len(value) != 2:
+                    fail(name, value, f"it must be a tuple (least, greatest), both in {self.range}")
+                least, most = self._numbers(name, value)
+                if least > most:
+                    fail(name, value, "the least must not be above the greatest")
+                return least, most
+            case "bool":
+                if not isinstance(value, (bool, np.bool_)):
+                    fail(name, value, "it must be True or False")
+                return bool(value)
+            case "str":
+                return self._text(name, value)
+            case "tuple[str, ...]":
+                names = tuple(value) if isinstance(value, (tuple, list)) else (value,)
+                if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
+                    fail(name, value, "it must be a tuple of names, each once")
+                return names
+            case _:
+                return self._weights(name, value)
 
     def _whole(self, name: str, value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, Integral) or not self.low <= int(value) <= self.high:
@@ -115,23 +113,21 @@ class Setting:
         return int(value)
 
     def _number(self, name: str, value: object) -> float:
-        try:
-            number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-        except OverflowError:
-            number = math.inf
-        inside = self.low < number if self.above else self.low <= number
-        finite = inside and number <= self.high and math.isfinite(number)
-        if not finite and not (self.infinite and number == math.inf):
-            fail(name, value, f"it must be a number in {self.range}")
-        return number
+        if isinstance(value, Real) and not isinstance(value, bool):
+            inside = self.low < value <= self.high if self.above else self.low <= value <= self.high
+            if inside or (self.infinite and value == math.inf):
+                return float(value)
+        fail(name, value, f"it must be a number in {self.range}")
 
-    def _pair(self, name: str, value: object, several: list[Any] | None) -> tuple[float, float]:
-        if several is None or len(several) != 2:
-            fail(name, value, f"it must be a tuple (least, greatest), both in {self.range}")
-        least, most = (self._number(f"{name}[{k}]", each) for k, each in enumerate(several))
-        if least > most:
-            fail(name, value, "the least must not be above the greatest")
-        return least, most
+    def _numbers(self, name: str, values: Iterable[object]) -> tuple[float, ...]:
+        return tuple(self._number(f"{name}[{k}]", each) for k, each in enumerate(values))
+
+    def _text(self, name: str, value: object) -> str:
+        if not isinstance(value, str):
+            fail(name, value, "it must be a string")
+        if self.choices is not None and value not in self.choices:
+            raise ScenarioError(unknown(name, value, self.choices))
+        return value
 
     def _weights(self, name: str, value: object) -> tuple[tuple[str, float], ...]:
         """Return weights sorted by name, so that equal scenarios compare equal."""
@@ -144,9 +140,8 @@ class Setting:
         return tuple(sorted((term, self._number(f"{name}[{term!r}]", weights[term])) for term in weights))
 
 
-def setting(
-    default: Any, meaning: str, unit: str = "", low: float = -math.inf, high: float = math.inf, **more: Any
-) -> Any:
+def setting(default: Any, meaning: str, *declared: Any, compare: bool = True, **more: Any) -> Any:
     """Return a dataclass field with this default and declaration; see :class:`Setting`."""
-    declaration = Setting(meaning, unit, low, high, **more)
-    return dataclasses.field(default=default, metadata={"setting": declaration})
+    return dataclasses.field(
+        default=default, compare=compare, metadata={"setting": Setting(meaning, *declared, **more)}
+    )

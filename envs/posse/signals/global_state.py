@@ -136,7 +136,7 @@ def _table(s: Scenario) -> list[tuple[str, str, str, _Read]]:
 
 
 def _field(records: Records, name: str) -> _Values:
-    return np.asarray(records["fix"][name.removeprefix("fix_")] if name in _FIX else records[name])
+    return np.asarray(records["fix"][name.removeprefix("fix_")] if name.startswith("fix_") else records[name])
 
 
 def _newest_first(arrays: WorldArrays, ring: _Values) -> _Values:

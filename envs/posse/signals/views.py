@@ -205,7 +205,7 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
     own = Pose(*columns(worlds.tracker, observers, observers.i, POSE))
     fix = Fix(*columns(worlds.tracker, observers, observers.i, FIX))
     condition = Condition(*columns(worlds.tracker, observers, observers.i, CONDITION))
-    dx, dy, fixed_at = fix.fix_x, fix.fix_y, counts(condition.fix_step)
+    dx, dy, fixed_at = fix.x, fix.y, counts(condition.fix_step)
     if c.fix_bearing == 0:
         dx, dy = dx - own.x, dy - own.y
     return View(
@@ -229,12 +229,12 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
         target_dx=dx,
         target_dy=dy,
         target_distance=root(dx * dx + dy * dy),
-        target_cos=fix.fix_cos,
-        target_sin=fix.fix_sin,
-        target_frame_cos=fix.fix_frame_cos,
-        target_frame_sin=fix.fix_frame_sin,
-        target_vx=fix.fix_vx,
-        target_vy=fix.fix_vy,
+        target_cos=fix.cos,
+        target_sin=fix.sin,
+        target_frame_cos=fix.frame_cos,
+        target_frame_sin=fix.frame_sin,
+        target_vx=fix.vx,
+        target_vy=fix.vy,
     )
 
 

@@ -97,33 +97,19 @@ def connected(c: Record, w: Record, trackers: Records) -> bool:
 
     Not for a perfect radio, where it always is.
     """
-    n = c.num_trackers
-    reach2 = c.radio_range * c.radio_range
-    waiting = NO_BITS  # still to be reached
-    first = -1
-    for i in range(n):
+    working = NO_BITS
+    for i in range(c.num_trackers):
         if trackers[i].broken_at == NEVER:
-            if first < 0:
-                first = i
-            else:
-                waiting |= BIT << np.uint64(i)
-    frontier = NO_BITS
-    if first >= 0:
-        frontier = BIT << np.uint64(first)
-    while frontier != NO_BITS and waiting != NO_BITS:
-        reached = NO_BITS
-        for i in range(n):
-            if frontier & (BIT << np.uint64(i)) == NO_BITS:
-                continue
+            working |= BIT << np.uint64(i)
+    reached, before = working & (~working + BIT), NO_BITS  # at first the lowest number
+    while reached != before:
+        before = reached
+        for i in range(c.num_trackers):
             t = trackers[i]
-            if not radio_works(c, w, t):
+            if reached & (BIT << np.uint64(i)) == NO_BITS or not radio_works(c, w, t):
                 continue
-            for j in range(n):
-                bit = BIT << np.uint64(j)
-                if waiting & bit != NO_BITS and radio_works(c, w, trackers[j]):
-                    dx, dy = trackers[j].x - t.x, trackers[j].y - t.y
-                    if dx * dx + dy * dy <= reach2:
-                        reached |= bit
-        waiting &= ~reached
-        frontier = reached
-    return bool(waiting == NO_BITS)
+            for j in range(c.num_trackers):
+                dx, dy = trackers[j].x - t.x, trackers[j].y - t.y
+                if dx * dx + dy * dy <= c.radio_range * c.radio_range and radio_works(c, w, trackers[j]):
+                    reached |= BIT << np.uint64(j)
+    return bool(reached == working)

@@ -26,9 +26,8 @@ from posse.numeric import (
 )
 from posse.rules.discs import FAR, blocks, natural, num_discs
 
-_WORD: Final = 8  # blocks of eight discs in a bit set of 64
-
 _A_LITTLE: Final = np.float32(0.01)  # m; far more than rounding
+_A_LITTLE_MORE: Final = np.float32(1.0001)
 
 Place = tuple[np.float32, np.float32, np.float32, np.float32]
 """x, y, cosine and sine of the heading, of a tracker or the target."""
@@ -86,18 +85,15 @@ def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
 def echo_of_discs(c: Record, robot: Place, number: int, s: Record) -> None:
     """Update the sonar readings with all discs in range."""
     x, y, _, _ = robot
-    discs = blocks(num_discs(c))
-    for first_block in range(0, discs, _WORD):
-        near = 0  # candidate discs as bits, found without a square root
-        for block in range(min(_WORD, discs - first_block)):
-            j = WIDTH * (first_block + block)
-            dx, dy = load(s.x, j) - x, load(s.y, j) - y
-            near |= bits(dx * dx + dy * dy < load(s.sonar_reach2, j)) << (WIDTH * block)
-        own = int(number) - WIDTH * first_block
-        if 0 <= own < WIDTH * _WORD:
-            near &= ~(1 << own)
+    for block in range(blocks(num_discs(c))):
+        j = WIDTH * block
+        dx, dy = load(s.x, j) - x, load(s.y, j) - y
+        reach = (load(s.radius, j) + (c.sonar_range + c.robot_radius)) * _A_LITTLE_MORE
+        near = bits(dx * dx + dy * dy < reach * reach)  # without a square root
         while near != 0:
-            echo_of_disc(c, robot, natural(WIDTH * first_block + lowest_bit(near)), s)
+            disc = natural(j + lowest_bit(near))
+            if disc != number:
+                echo_of_disc(c, robot, disc, s)
             near &= near - 1
 
 

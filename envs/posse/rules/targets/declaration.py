@@ -79,8 +79,6 @@ def target_motion(
     def declare(function: Function) -> Function:
         if draw is not None:
             TARGET_MOTIONS.check_function(draw, ("c", "w"))
-        if not isinstance(mirrored, bool):
-            raise TARGET_MOTIONS.error(function, f"mirrored={mirrored!r} must be True or False")
         _check_memory(function, memory)
         drawing = None if draw is None else compiled(plain(draw))
         return TARGET_MOTIONS.declare(

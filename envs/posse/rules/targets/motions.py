@@ -57,10 +57,8 @@ def walked(value: Any, step: Any, low: Any, high: Any) -> np.float32:
 @target_motion("accelerating", draw=draw_weave, memory=_MEMORY)
 def accelerating(c: Record, w: Record) -> None:
     """Turn rate is a sine whose random amplitude and rate walk slowly, within the turn limit (paper, section 2)."""
-    limit, spread = (
-        c.target_turn_rate,
-        np.float32(math.sqrt(3.0 * c.control_step)),
-    )  # of a uniform step of deviation sqrt(dt)
+    limit = c.target_turn_rate
+    spread = np.float32(math.sqrt(3.0 * c.control_step))  # of a uniform step of deviation sqrt(dt)
     turn = w.weave_amplitude * np.float32(math.sin(w.weave_phase))
     w.weave_phase += w.weave_rate * c.control_step
     if w.weave_phase >= TWO_PI:

@@ -45,6 +45,7 @@ _FAR: Final = np.float32(1e3)  # for an unblocked direction
 _BLOCKED: Final = np.float32(100.0)  # m; penalty of a dart for a collision
 
 _ANGLES: Final = 2 * np.pi * np.arange(SMART_DIRECTIONS) / SMART_DIRECTIONS
+_SIDES: Final = (ONE, -ONE)
 _DIRECTION_COS: Final = np.cos(_ANGLES).astype(np.float32)
 _DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 
@@ -120,39 +121,33 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
     clear = c.robot_radius + c.robot_radius + _CLEARANCE
     # No hysteresis for the initial heading, nor for a choice that ended in contact.
     loyalty = _LOYALTY if w.step > 0 and w.touching == NO_BITS else ZERO
-    # Half the directions; the opposite ones share the square root.
-    ux, uy = load(_DIRECTION_COS, 0), load(_DIRECTION_SIN, 0)
-    ahead, astern = eight(_FAR), eight(_FAR)
-    for i in range(c.num_trackers):
-        t = trackers[i]
-        if t.broken_at != NEVER:
-            # A broken tracker is only an obstacle.
-            px, py = t.x - w.x, t.y - w.y
-            along, across = px * ux + py * uy, px * uy - py * ux
-            met = (across < clear) & (across > -clear)
-            along = along * (a / v)
-            ahead = lesser(ahead, choose(met & (along > ZERO), along, _FAR))
-            astern = lesser(astern, choose(met & (along < ZERO), ZERO - along, _FAR))
-        else:
-            px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
-            py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
-            b = v * (px * ux + py * uy)
-            until = root(b * b + a * (px * px + py * py))
-            ahead, astern = lesser(ahead, until - b), lesser(astern, until + b)
-    same_way = loyalty * (ux * w.goal_cos + uy * w.goal_sin)
-    store(s.worth, 0, ahead * per_a + same_way)
-    store(s.worth, WIDTH, astern * per_a - same_way)
+    for side in range(2):  # half the directions, then the opposite ones
+        ux, uy = _SIDES[side] * load(_DIRECTION_COS, 0), _SIDES[side] * load(_DIRECTION_SIN, 0)
+        latest = eight(_FAR)
+        for i in range(c.num_trackers):
+            t = trackers[i]
+            if t.broken_at != NEVER:
+                # A broken tracker is only an obstacle.
+                px, py = t.x - w.x, t.y - w.y
+                along, across = px * ux + py * uy, px * uy - py * ux
+                met = (across < clear) & (across > -clear) & (along > ZERO)
+                latest = lesser(latest, choose(met, along * (a / v), _FAR))
+            else:
+                px = t.x + _FORESIGHT * t.speed * t.heading_cos - w.x
+                py = t.y + _FORESIGHT * t.speed * t.heading_sin - w.y
+                b = v * (px * ux + py * uy)
+                latest = lesser(latest, root(b * b + a * (px * px + py * py)) - b)
+        store(s.worth, WIDTH * side, latest * per_a + loyalty * (ux * w.goal_cos + uy * w.goal_sin))
     best = np.float32(-1e9)
     for k in range(WIDTH):
-        ux, uy = _DIRECTION_COS[k], _DIRECTION_SIN[k]
         for side in range(2):
+            ux, uy = _SIDES[side] * _DIRECTION_COS[k], _SIDES[side] * _DIRECTION_SIN[k]
             value = s.worth[WIDTH * side + k]
-            if c.walled and value + _LOOKOUT > best:
+            if c.walled:
                 value += free_time(c, w, obstacles, ux, uy)
             if value > best:
                 best = value
                 w.goal_cos, w.goal_sin = ux, uy
-            ux, uy = -ux, -uy
 
 
 @compiled(out_of_line=True)

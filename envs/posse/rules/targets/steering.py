@@ -46,24 +46,28 @@ def mirror_at_walls(c: Record, w: Record) -> None:
 
 
 @compiled
-def has_free_circle(
+def disc_is_free(c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32) -> bool:
+    """Return whether a disc is clear of walls and obstacles; one that contains an obstacle is not."""
+    if abs(x) + radius > c.half_arena or abs(y) + radius > c.half_arena:
+        return False
+    return not obstacle_within(obstacles, c.num_obstacles, x, y, radius)
+
+
+@compiled
+def free_circles(
     c: Record,
     obstacles: Records,
     x: np.float32,
     y: np.float32,
     heading_cos: np.float32,
     heading_sin: np.float32,
-    side: np.float32,
-    allowance: np.float32 = ZERO,
-) -> bool:
-    """Return whether the turning circle on a side (+1 left, -1 right) is free, to an allowance."""
+    allowance: np.float32,
+) -> tuple[bool, bool]:
+    """Return whether the turning circles on the left and on the right are free, but for an allowance, m."""
     radius = c.target_speed / c.target_turn_rate
-    x, y = x - side * radius * heading_sin, y + side * radius * heading_cos
-    room = radius - allowance + c.safe_distance
-    if abs(x) + room > c.half_arena or abs(y) + room > c.half_arena:
-        return False
-    # A circle that contains an obstacle is not free, either.
-    return not obstacle_within(obstacles, c.num_obstacles, x, y, room)
+    aside_x, aside_y, room = radius * heading_sin, radius * heading_cos, radius - allowance + c.safe_distance
+    left = disc_is_free(c, obstacles, x - aside_x, y + aside_y, room)
+    return left, disc_is_free(c, obstacles, x + aside_x, y - aside_y, room)
 
 
 @compiled(out_of_line=True)
@@ -77,14 +81,11 @@ def safe_turn(c: Record, w: Record, obstacles: Records, turn: np.float32) -> np.
     for _ in range(c.physics_steps):
         dx, dy, hc, hs = arc(hc, hs, c.target_speed, turn, c.physics_step)
         x, y = x + dx, y + dy
-    if has_free_circle(c, obstacles, x, y, hc, hs, ONE):
-        return turn
-    if has_free_circle(c, obstacles, x, y, hc, hs, -ONE):
+    left, right = free_circles(c, obstacles, x, y, hc, hs, ZERO)
+    if left or right:
         return turn
     # Allow for rounding, so that the target does not change sides on a free circle.
-    x, y, hc, hs = w.x, w.y, w.heading_cos, w.heading_sin
-    left = has_free_circle(c, obstacles, x, y, hc, hs, ONE, _ROUNDING)
-    right = has_free_circle(c, obstacles, x, y, hc, hs, -ONE, _ROUNDING)
+    left, right = free_circles(c, obstacles, w.x, w.y, w.heading_cos, w.heading_sin, _ROUNDING)
     if left and (turn >= ZERO or not right):
         side = ONE
     elif right:
