@@ -114,7 +114,7 @@ class Robot:
         arrays = self._world.arrays
         self._me = arrays.tracker[0, self.number]
         arrays.heard["step"], arrays.heard_message[...] = -1, 0.0
-        self._me.fix_step, self._me.sees, self._me.fix_vx, self._me.fix_vy = -1, 0, 0.0, 0.0
+        self._me.fix_step, self._me.sees = -1, 0
         self.steps = -1
         self._said: tuple[float, ...] = (0.0,) * self.scenario.message_size
 
