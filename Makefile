@@ -118,7 +118,8 @@ $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 	grep -viE '^(gymnasium|tensordict|torchrl)==' constraints.txt > $(RECIPES)/constraints.txt
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) $(RECIPES)/constraints.txt \
 		--constraint constraints-recipes.txt 'ray[rllib]' benchmarl skrl
-	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps pufferlib gym gym-notices
+	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps \
+		pufferlib gym gym-notices robotarium-python-simulator
 	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours
 	@$(RECIPES)/bin/$(COMPILE) $(RECIPES)/lib || true
 	@touch $@

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from posse_baselines.deploy import Deployed, deploy
 from posse_baselines.fields import Tunable
 from posse_baselines.playing import (
     Match,
@@ -24,6 +25,7 @@ register()
 
 __all__ = [
     "BasePolicy",
+    "Deployed",
     "Match",
     "Memory",
     "Played",
@@ -37,6 +39,7 @@ __all__ = [
     "Tunable",
     "against",
     "begin",
+    "deploy",
     "from_function",
     "load",
     "load_target",

@@ -6,6 +6,7 @@ from typing import Any
 
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
+from posse.adapters.robot import Command, Heard, Robot, TargetFix
 from posse.engine.batch import Batch, Snapshot
 from posse.engine.opponent import PairedBatch, TargetPolicy, batch_with
 from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
@@ -77,17 +78,21 @@ __all__ = [
     "SENSORS",
     "TARGET_MOTIONS",
     "Batch",
+    "Command",
     "DeclarationError",
     "Field",
+    "Heard",
     "Memory",
     "Metric",
     "ObservationLayout",
     "PairedBatch",
     "RewardTerm",
+    "Robot",
     "Scenario",
     "ScenarioError",
     "Sensor",
     "Snapshot",
+    "TargetFix",
     "TargetMotion",
     "TargetPolicy",
     "batch",

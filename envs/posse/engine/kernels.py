@@ -39,7 +39,7 @@ from posse.numeric import (
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
 from posse.rules.faults import apply_faults
-from posse.rules.motion import motion
+from posse.rules.motion import drift, motion
 from posse.rules.score import occupy, settle
 from posse.rules.senses.radio import hear, send, share_fixes
 from posse.rules.senses.sensing import look
@@ -84,34 +84,32 @@ class Results(NamedTuple):
 def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Record) -> None:
     """Target sensors and radio of every tracker of world e."""
     w, trackers = worlds.world[e], worlds.tracker[e]
-    seeing = look(c, w, trackers, made.sees, made.measure, scratch)
+    seeing = look(c, w, trackers, worlds.odometry[e], made.sees, made.measure, scratch)
     if c.perfect_radio:
         if seeing < c.num_trackers:  # otherwise all have a fix of this step
             share_fixes(c, trackers)
     else:
         broadcast, message = worlds.broadcast[e], worlds.message[e]
-        send(c, w, trackers, broadcast)
+        send(c, w, trackers, worlds.odometry[e], broadcast)
         hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
 
 
 @compiled(out_of_line=True)
-def begin(
-    c: Record,
-    w: Record,
-    trackers: Records,
-    heard: Records,
-    broadcast: Records,
-    heard_message: FloatArray,
-    message: FloatArray,
-    made: Generated,
-) -> None:
-    """Initialise an episode of a world whose poses are set, except for sensing."""
-    rest(c, w, trackers)
+def begin(c: Record, worlds: WorldArrays, e: int, made: Generated) -> None:
+    """Initialise an episode of world e, whose poses are set, except for sensing."""
+    w = worlds.world[e]
+    rest(c, w, worlds.tracker[e])
     made.clear_sums(w)
-    heard["step"][:] = -1
-    heard_message[:] = ZERO
-    message[:] = ZERO
-    broadcast["sent"][:] = 0
+    worlds.heard[e]["step"][:] = -1
+    worlds.heard_message[e][:] = ZERO
+    worlds.message[e][:] = ZERO
+    worlds.broadcast[e]["sent"][:] = 0
+    worlds.command[e][:, :, 0] = -ONE
+    worlds.command[e][:, :, 1] = ZERO
+    if c.drifts != 0:
+        for i in range(c.num_trackers):
+            o = worlds.odometry[e, i]
+            o.x, o.y, o.heading, o.cos, o.sin = ZERO, ZERO, ZERO, ONE, ZERO
 
 
 @compiled
@@ -131,8 +129,10 @@ def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, made: Gener
     """Move all robots of world e by a control step, and store the messages."""
     w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
     apply_faults(c, w, trackers)
-    motion(c, w, trackers, worlds.obstacle[e], actions, made.set_goal, scratch)
+    motion(c, w, trackers, worlds.obstacle[e], actions, worlds.command[e], made.set_goal, scratch)
     w.step += 1
+    if c.drifts != 0:
+        drift(c, w, worlds.odometry[e])
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
         works = trackers[i].broken_at == NEVER
@@ -210,9 +210,7 @@ def advance_worlds(
         elif order != LOOK:
             if order == START:
                 draw_start(c, w, trackers, obstacles, made.draw_motion)
-            begin(
-                c, w, trackers, worlds.heard[e], worlds.broadcast[e], worlds.heard_message[e], worlds.message[e], made
-            )
+            begin(c, worlds, e, made)
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
         if order != LOOK:

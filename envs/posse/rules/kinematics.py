@@ -48,6 +48,12 @@ def arc(
 
 
 @compiled
+def turned(x: Lanes, y: Lanes, cosine: Lanes, sine: Lanes) -> tuple[Lanes, Lanes]:
+    """Return a vector turned to the left by an angle."""
+    return x * cosine - y * sine, x * sine + y * cosine
+
+
+@compiled
 def approach(value: Lanes, wanted: Lanes, most: np.float32) -> Lanes:
     """Return ``value`` moved towards ``wanted`` by at most ``most``; a number, or lanes."""
     return lesser(greater(wanted, value - most), value + most)

@@ -6,6 +6,7 @@ steps, target first, then trackers by number, with swept collision checks.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from posse.numeric import (
     Records,
     compiled,
     eight,
+    greater,
     lesser,
     load,
     store,
@@ -29,6 +31,7 @@ from posse.numeric import (
 from posse.rules.contact import free_of_robots, free_of_surroundings
 from posse.rules.discs import FAR, blocks, columns, nonnegative, store_rows
 from posse.rules.kinematics import approach, arc, follow_heading
+from posse.rules.randomness import DRIFT, normal_pair
 from posse.rules.state import NEVER, POSE, Pose
 from posse.rules.targets.steering import target_turn_rate
 
@@ -56,7 +59,7 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
 
 
 @compiled(out_of_line=True)
-def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, s: Record) -> None:
+def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Move the robots with something near in physics steps, the target first.
 
     The other robots cannot block them.
@@ -77,7 +80,7 @@ def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, a
             t = trackers[i]
             if t.broken_at == NEVER:
                 t.speed, t.turn_rate = command(
-                    c, t.speed, t.turn_rate, t.max_speed, t.max_turn_rate, actions[i, 0], actions[i, 1]
+                    c, t.speed, t.turn_rate, t.max_speed, t.max_turn_rate, s.wanted_speed[i], s.wanted_turn[i]
                 )
                 move_swept(c, t, k, near + 1, obstacles, s)
 
@@ -93,18 +96,31 @@ def command(
     wanted_turn: Lanes,
 ) -> tuple[Lanes, Lanes]:
     """Return speed and turn rate after an action, within the limits."""
-    return (
-        approach(speed, HALF * (wanted_speed + ONE) * max_speed, c.speed_change),
-        approach(turn_rate, wanted_turn * max_turn_rate, c.turn_change),
-    )
+    to_speed, to_turn = HALF * (wanted_speed + ONE) * max_speed, wanted_turn * max_turn_rate
+    if c.actuator_lag > ZERO:
+        to_speed, to_turn = speed + c.followed * (to_speed - speed), turn_rate + c.followed * (to_turn - turn_rate)
+    speed, turn_rate = approach(speed, to_speed, c.speed_change), approach(turn_rate, to_turn, c.turn_change)
+    if c.wheel_base > ZERO:
+        speed = lesser(speed, max_speed - HALF * c.wheel_base * greater(turn_rate, -turn_rate))
+    return speed, turn_rate
 
 
 @compiled
-def move_freely(c: Record, trackers: Records, actions: FloatArray, parts: int, time: np.float32, s: Record) -> bool:
+def take_commands(c: Record, w: Record, actions: FloatArray, command: FloatArray, s: Record) -> None:
+    """Write the motions to execute now: those of the actions, or the ones of ``command_delay`` steps ago."""
+    for i in range(nonnegative(c.num_trackers)):
+        s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
+    if c.command_delay > 0:
+        kept = command[w.step % c.command_delay]
+        for i in range(c.num_trackers):
+            s.wanted_speed[i], s.wanted_turn[i] = kept[i, 0], kept[i, 1]
+            kept[i, 0], kept[i, 1] = actions[i, 0], actions[i, 1]
+
+
+@compiled
+def move_freely(c: Record, trackers: Records, parts: int, time: np.float32, s: Record) -> bool:
     """Move the trackers with nothing near on their arcs; return whether there are others."""
     n = nonnegative(c.num_trackers)
-    for i in range(n):
-        s.wanted_speed[i], s.wanted_turn[i] = actions[i, 0], actions[i, 1]
     for block in range(blocks(n)):
         i = WIDTH * block
         pose = Pose(*columns(trackers, i, n, POSE))
@@ -140,9 +156,18 @@ def move_freely(c: Record, trackers: Records, actions: FloatArray, parts: int, t
 
 @compiled
 def motion(
-    c: Record, w: Record, trackers: Records, obstacles: Records, actions: FloatArray, set_goal: Any, s: Record
+    c: Record,
+    w: Record,
+    trackers: Records,
+    obstacles: Records,
+    actions: FloatArray,
+    command: FloatArray,
+    set_goal: Any,
+    s: Record,
 ) -> None:
     """Move the robots by actions (rows, 2 + m) for one control step; -1 is V = 0, 0 is ω = 0.
+
+    Actions of trackers wait in ``command`` for the delay.
 
     A robot with nothing near moves on one arc, or with limited acceleration on one per physics
     step; a robot with something near moves in swept physics steps.
@@ -163,8 +188,22 @@ def motion(
             dx, dy, w.heading_cos, w.heading_sin = arc(w.heading_cos, w.heading_sin, w.speed, w.turn_rate, time)
             w.x += dx
             w.y += dy
-    if move_freely(c, trackers, actions, parts, time, s) or w.near != 0:
-        move_in_parts(c, w, trackers, obstacles, actions, s)
+    take_commands(c, w, actions, command, s)
+    if move_freely(c, trackers, parts, time, s) or w.near != 0:
+        move_in_parts(c, w, trackers, obstacles, s)
     w.frame_cos, w.frame_sin = follow_heading(
         w.frame_cos, w.frame_sin, w.heading_cos, w.heading_sin, c.frame_c, c.frame_s
     )
+
+
+@compiled(out_of_line=True)
+def drift(c: Record, w: Record, odometry: Records) -> None:
+    """Let each tracker's own pose, as it knows it, take a step of its random walk."""
+    for i in range(c.num_trackers):
+        o = odometry[i]
+        along, across = normal_pair(w.key, w.step, DRIFT, 2 * i)
+        about, _ = normal_pair(w.key, w.step, DRIFT, 2 * i + 1)
+        o.x += c.position_step * along
+        o.y += c.position_step * across
+        o.heading += c.heading_step * about
+        o.cos, o.sin = np.float32(math.cos(o.heading)), np.float32(math.sin(o.heading))

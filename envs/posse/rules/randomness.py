@@ -21,6 +21,8 @@ TARGET: Final = np.uint64(3)
 FAULTS: Final = np.uint64(4)
 SENSOR_NOISE: Final = np.uint64(5)
 RADIO_LOSS: Final = np.uint64(6)
+DRIFT: Final = np.uint64(7)
+HEADING_NOISE: Final = np.uint64(8)
 
 _GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
 _MIX_A: Final = np.uint64(0xBF58476D1CE4E5B9)

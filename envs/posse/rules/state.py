@@ -40,7 +40,7 @@ _NUMERIC: Final = {"int": _I, "bool": _I, "float": _F}
 
 def perfect_radio(s: Scenario) -> bool:
     """Return whether working trackers always receive each other's messages without delay."""
-    reliable = s.radio_delay == 0 and s.radio_loss == 0 and s.radio_outages == 0 and s.breaks == 0
+    reliable = not s.drifts and s.radio_delay == 0 and s.radio_loss == 0 and s.radio_outages == 0 and s.breaks == 0
     return reliable and math.isinf(s.radio_range)
 
 
@@ -52,7 +52,13 @@ def _frame_turn(s: Scenario) -> float:
 def _whole_arcs(s: Scenario) -> bool:
     """Return whether a robot with nothing near moves on one arc for the whole control step."""
     turn = max(*s.tracker_turn_rates, s.target_turn_rate) * s.control_step
-    return turn <= 1.0 and math.isinf(s.tracker_acceleration) and math.isinf(s.tracker_turn_acceleration)
+    unlimited = math.isinf(s.tracker_acceleration) and math.isinf(s.tracker_turn_acceleration)
+    return turn <= 1.0 and unlimited and s.actuator_lag == 0
+
+
+def _followed(s: Scenario) -> float:
+    """Return the share of a command that speed and turn rate come nearer in a physics step."""
+    return 1 - math.exp(-s.physics_step / s.actuator_lag) if s.actuator_lag > 0 else 1.0
 
 
 def _measured(s: Scenario) -> bool:
@@ -86,6 +92,10 @@ DERIVED: Final[_Numbers] = {
     "perfect_radio": (_I, perfect_radio),
     "formation": (_I, lambda s: FORMATIONS.index(s.formation)),
     "whole_arcs": (_I, _whole_arcs),
+    "drifts": (_I, lambda s: s.drifts),
+    "position_step": (_F, lambda s: s.odometry_drift * math.sqrt(s.control_step)),
+    "heading_step": (_F, lambda s: s.heading_drift * math.sqrt(s.control_step)),
+    "followed": (_F, _followed),
     "fastest": (_F, lambda s: max(s.tracker_speeds)),
     "speed_change": (_F, lambda s: min(s.tracker_acceleration * np.float32(s.physics_step), FAR)),
     "turn_change": (_F, lambda s: min(s.tracker_turn_acceleration * np.float32(s.physics_step), FAR)),
@@ -241,6 +251,19 @@ class Heard(NamedTuple):
     unused: Lanes  # makes a block of eight
 
 
+class Odometry(NamedTuple):
+    """How far the own poses of eight trackers, as they know them, are from the true ones."""
+
+    x: Lanes  # m
+    y: Lanes
+    cos: Lanes  # of the heading's error
+    sin: Lanes
+    heading: Lanes  # rad
+    unused_1: Lanes  # make a block of eight
+    unused_2: Lanes
+    unused_3: Lanes
+
+
 FIX_RECORD: Final = _record(*((name, _F) for name in Fix._fields))
 """A fix of the target: a position or a bearing, depending on the sensor (:mod:`posse.rules.senses.declaration`)."""
 
@@ -271,10 +294,14 @@ SLOT: Final = _record(("x", _F), ("y", _F))
 HEARD: Final = _record(*((name, _I if name == "step" else _F) for name in Heard._fields))
 """The last message that a tracker received from a team-mate: (E, receiver, sender)."""
 
+ODOMETRY: Final = _record(*((name, _F) for name in Odometry._fields))
+"""The error of a tracker's own pose."""
+
 BROADCAST: Final = _record(
     ("sent", _I),  # 0: its radio was silent
     *((name, _F) for name in Pose._fields[:6]),
     ("fix_step", _I),
+    ("odometry", ODOMETRY),  # a receiver is told the pose with this error
     ("fix", FIX_RECORD),  # a receiver works out the velocity from its own previous fix
 )
 """A tracker's message, kept until it is received: (E, D + 1, N), by step modulo D + 1."""
@@ -309,6 +336,10 @@ class WorldArrays(NamedTuple):
     """Message parts written by policies, (E, N, N, m) float32, by receiver and sender."""
     message: FloatArray
     """The same of messages sent, (E, D + 1, N, m) float32, by step modulo D + 1."""
+    odometry: Records
+    """(E, N) :data:`ODOMETRY`; (E, 0) if nothing drifts."""
+    command: FloatArray
+    """Commanded motions not yet executed, (E, ``command_delay``, N, 2) float32, by step modulo ``command_delay``."""
 
     @classmethod
     def allocate(cls, scenario: Scenario, num_worlds: int) -> WorldArrays:
@@ -330,6 +361,8 @@ class WorldArrays(NamedTuple):
             broadcast=np.zeros((num_worlds, delay if kept else 0, kept), BROADCAST),
             heard_message=np.zeros((num_worlds, kept, kept, m), np.float32),
             message=np.zeros((num_worlds, delay, n, m), np.float32),
+            odometry=np.zeros((num_worlds, n if scenario.drifts else 0), ODOMETRY),
+            command=np.zeros((num_worlds, scenario.command_delay, n, 2), np.float32),
         )
 
     def copy(self) -> WorldArrays:

@@ -62,6 +62,17 @@ class Scenario:
     tracker_turn_acceleration: float = setting(
         math.inf, "greatest change of a tracker's turn rate; inf: no limit", "rad/s²", SMALL, FAR, infinite=True
     )
+    actuator_lag: float = setting(
+        0.0, "time constant with which a tracker's speed and turn rate follow the command; 0: at once", "s", 0, 100
+    )
+    command_delay: int = setting(0, "control steps after which a tracker executes a command", "steps", 0, 100)
+    wheel_base: float = setting(
+        0.0,
+        "distance b of a tracker's two wheels: V + |ω| b / 2 is at most its greatest speed; 0: no such limit",
+        "m",
+        0,
+        WIDE,
+    )
     robot_radius: float = setting(0.15, "radius of every robot's disc, trackers and target", "m", SMALL, WIDE)
 
     # The target
@@ -130,6 +141,13 @@ class Scenario:
     velocity_smoothing: float = setting(
         0.0, "time constant of the velocity estimated from successive fixes; 0: none", "s", 0, WIDE
     )
+    heading_noise: float = setting(
+        0.0, "standard deviation of the target's measured heading and ψ; truncated at three", "rad", 0, 0.5
+    )
+    odometry_drift: float = setting(
+        0.0, "random walk of a tracker's own position, which it observes and broadcasts", "m/√s", 0, 1
+    )
+    heading_drift: float = setting(0.0, "the same of its own heading", "rad/√s", 0, 1)
     sonar_beams: int = setting(8, "beams of the sonar ring, evenly spaced from straight ahead", "1", 0, 64)
     sonar_range: float = setting(2.0, "range of the sonar, from the robot's rim", "m", SMALL, WIDE)
 
@@ -273,6 +291,16 @@ class Scenario:
         return 2 * math.sqrt(2) * self.position_bound
 
     @property
+    def drifts(self) -> bool:
+        """Whether a tracker's own pose, as it knows it, drifts away from the true one."""
+        return self.odometry_drift > 0 or self.heading_drift > 0
+
+    @property
+    def drift_bound(self) -> float:
+        """Greatest error of a tracker's own position along an axis, m."""
+        return 3 * self.odometry_drift * math.sqrt(self.control_step) * self.horizon
+
+    @property
     def slot_offsets(self) -> list[tuple[float, float]]:
         """The (x, y) of each slot in the slot frame, m (:func:`posse.scenarios.formation.slot_offsets`)."""
         return slot_offsets(self.formation, self.num_trackers, self.formation_distance, self.formation_spacing)
@@ -326,6 +354,10 @@ def _in_team(s: Scenario) -> _Conflicts:
         yield "target_least_speed", f"it must be at most target_speed={s.target_speed:g}"
     if s.target_speed < SMALL and s.target_motion != "constant":
         yield "target_speed", f"only a target of constant motion may rest: choose at least {SMALL:g}"
+    for speed, rate in zip(s.tracker_speeds, s.tracker_turn_rates, strict=False):
+        if rate * s.wheel_base / 2 > speed:
+            why = f"wheels would turn at {rate * s.wheel_base / 2:.3g} m/s on the spot, tracker_speed is {speed:g}"
+            yield "wheel_base", f"{why}: lower it, or tracker_turn_rate"
     if s.breaks >= s.num_trackers:
         yield "breaks", f"at most num_trackers - 1 = {s.num_trackers - 1}"
     if s.break_choice == "given" and s.breaks > 1:

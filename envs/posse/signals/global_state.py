@@ -27,6 +27,9 @@ _FIX: Final = {"fix_x": "m", "fix_y": "m", "fix_cos": "1", "fix_sin": "1", "fix_
 _FRAME: Final = {"frame_cos": "1", "frame_sin": "1", "goal_cos": "1", "goal_sin": "1"}
 
 
+_ODOMETRY: Final = {"x": "m", "y": "m", "heading": "rad"}
+
+
 class StateEntry(NamedTuple):
     """One named part of the state vector."""
 
@@ -121,6 +124,13 @@ def _table(s: Scenario) -> list[tuple[str, str, str, _Read]]:
         ),
         ("tracker_radio_dead_from", "s", "start of its radio's outage; -1: none", when("tracker", "radio_dead_from")),
         ("tracker_sees", "1", "1 while it sees the target", of("tracker", "sees")),
+        *((f"odometry_{k}", u, "error of each own pose", of("odometry", k)) for k, u in _ODOMETRY.items()),
+        (
+            "command",
+            "1",
+            "actions not yet executed, newest first",
+            lambda arrays: _newest_first(arrays, arrays.command, 1),
+        ),
         *((f"obstacle_{k}", "m", f"each obstacle's {k}", of("obstacle", k)) for k in ("x", "y", "radius")),
         ("message", "1", "policies' messages, newest first", lambda arrays: _newest_first(arrays, arrays.message)),
         ("heard_message", "1", "last received: receiver, sender", lambda arrays: arrays.heard_message),
@@ -139,8 +149,8 @@ def _field(records: Records, name: str) -> _Values:
     return np.asarray(records["fix"][name.removeprefix("fix_")] if name.startswith("fix_") else records[name])
 
 
-def _newest_first(arrays: WorldArrays, ring: _Values) -> _Values:
-    """Return a ring buffer (E, D + 1, ...) in order of age."""
-    ages = np.arange(ring.shape[1])
+def _newest_first(arrays: WorldArrays, ring: _Values, least: int = 0) -> _Values:
+    """Return a ring buffer (E, D + 1, ...) in order of age, from the age ``least`` on."""
+    ages = least + np.arange(ring.shape[1])
     places = (arrays.world["step"][:, None] - ages) % max(1, len(ages))
     return np.asarray(ring[np.arange(len(ring))[:, None], places])

@@ -8,6 +8,8 @@ or in a module of your own (:mod:`posse.signals.fields`).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater
@@ -29,7 +31,7 @@ def _most_turn_of_mate(s: Scenario) -> float:
 
 
 def _place(s: Scenario) -> float:
-    return s.position_bound * SLACK
+    return (s.position_bound + s.drift_bound) * SLACK
 
 
 def _fast(s: Scenario) -> float:
@@ -165,8 +167,14 @@ def target_age(c: Record, v: View) -> Lanes:
     return choose(v.target_known, (v.step - v.target_step) * c.control_step, -ONE)
 
 
+def _farthest_mate(s: Scenario) -> float:
+    return s.range_bound + 2 * math.sqrt(2) * s.drift_bound
+
+
 def _farthest_fix(s: Scenario) -> float:
-    return s.range_bound * (1 + 3 * s.range_noise + 3 * s.bearing_noise) * SLACK
+    measured = s.range_bound * (1 + 3 * s.range_noise + 3 * s.bearing_noise)
+    # Under drift it may be another's fix, from where that tracker believed to be.
+    return (measured + s.drifts * _farthest_mate(s)) * SLACK
 
 
 @field("m", -1, _farthest_fix, unknown=-1)
@@ -220,7 +228,7 @@ def neighbour_age(c: Record, v: View, m: Mate) -> Lanes:
     return m.age
 
 
-@field("m", -1, lambda s: s.range_bound * SLACK, unknown=-1)
+@field("m", -1, lambda s: _farthest_mate(s) * SLACK, unknown=-1)
 def neighbour_range(c: Record, v: View, m: Mate) -> Lanes:
     """Distance from the robot to the team-mate's position."""
     return m.distance

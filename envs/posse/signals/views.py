@@ -31,8 +31,9 @@ from posse.numeric import (
 )
 from posse.rules.contact import touches_surroundings
 from posse.rules.discs import nonnegative
+from posse.rules.kinematics import turned
 from posse.rules.scratch import TEAM, Fields
-from posse.rules.state import CONDITION, FIX, NEVER, NO_BITS, POSE, Condition, Fix, Pose, WorldArrays
+from posse.rules.state import CONDITION, FIX, NEVER, NO_BITS, POSE, Condition, Fix, Odometry, Pose, WorldArrays
 
 OBSERVING: Final[Fields] = (
     # Eight numbers, one for each of eight worlds.
@@ -201,19 +202,24 @@ def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s:
 
 @compiled
 def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
-    """Return the view of a tracker of eight worlds; requires :func:`lay_out_observers`."""
+    """Return the view of a tracker of eight worlds, its pose as it knows it; requires :func:`lay_out_observers`."""
     own = Pose(*columns(worlds.tracker, observers, observers.i, POSE))
+    x, y, heading_cos, heading_sin = own.x, own.y, own.heading_cos, own.heading_sin
+    if c.drifts != 0:
+        error = Odometry(*columns(worlds.odometry, observers, observers.i, 0))
+        x, y = x + error.x, y + error.y
+        heading_cos, heading_sin = turned(heading_cos, heading_sin, error.cos, error.sin)
     fix = Fix(*columns(worlds.tracker, observers, observers.i, FIX))
     condition = Condition(*columns(worlds.tracker, observers, observers.i, CONDITION))
     dx, dy, fixed_at = fix.x, fix.y, counts(condition.fix_step)
     if c.fix_bearing == 0:
-        dx, dy = dx - own.x, dy - own.y
+        dx, dy = dx - x, dy - y
     return View(
         number=eight(np.float32(observers.i)),
-        x=own.x,
-        y=own.y,
-        heading_cos=own.heading_cos,
-        heading_sin=own.heading_sin,
+        x=x,
+        y=y,
+        heading_cos=heading_cos,
+        heading_sin=heading_sin,
         speed=own.speed,
         turn_rate=own.turn_rate,
         touching=counts(condition.touching),

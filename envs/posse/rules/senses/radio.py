@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from posse.numeric import ZERO, FloatArray, Record, Records, compiled
+from posse.rules.kinematics import turned
 from posse.rules.randomness import RADIO_LOSS, uniform
 from posse.rules.senses.sensing import take_fix
 from posse.rules.state import BIT, NEVER, NO_BITS
@@ -39,7 +40,7 @@ def share_fixes(c: Record, trackers: Records) -> None:
 
 
 @compiled(out_of_line=True)
-def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
+def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: Records) -> None:
     """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
     slot = w.step % (c.radio_delay + 1)
     for i in range(c.num_trackers):
@@ -48,6 +49,8 @@ def send(c: Record, w: Record, trackers: Records, broadcast: Records) -> None:
         b.x, b.y, b.heading_cos, b.heading_sin = t.x, t.y, t.heading_cos, t.heading_sin
         b.speed, b.turn_rate = t.speed, t.turn_rate
         b.fix_step, b.fix = t.fix_step, t.fix
+        if c.drifts != 0:
+            b.odometry = odometry[i]
 
 
 @compiled(out_of_line=True)
@@ -84,6 +87,9 @@ def hear(
             h = heard[i, j]
             h.step = sent_at
             h.x, h.y, h.heading_cos, h.heading_sin = b.x, b.y, b.heading_cos, b.heading_sin
+            if c.drifts != 0:
+                h.x, h.y = b.x + b.odometry.x, b.y + b.odometry.y
+                h.heading_cos, h.heading_sin = turned(b.heading_cos, b.heading_sin, b.odometry.cos, b.odometry.sin)
             h.speed, h.turn_rate = b.speed, b.turn_rate
             for k in range(c.message_size):
                 heard_message[i, j, k] = message[slot, j, k]

@@ -9,7 +9,8 @@ import numpy as np
 
 from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, bits, compiled, load, root
 from posse.rules.discs import blocks, nonnegative
-from posse.rules.randomness import SENSOR_NOISE, normal_pair
+from posse.rules.kinematics import turned
+from posse.rules.randomness import HEADING_NOISE, SENSOR_NOISE, normal_pair
 from posse.rules.senses.declaration import sensor
 from posse.rules.state import NEVER
 
@@ -79,7 +80,7 @@ def take_fix(c: Record, t: Record, sender: Record) -> None:
 
 
 @compiled
-def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Record) -> int:
+def look(c: Record, w: Record, trackers: Records, odometry: Records, sees: Any, measure: Any, s: Record) -> int:
     """Read the target sensors and store fixes; return the number of trackers that see the target.
 
     Positions of discs are read from ``s`` (:func:`posse.rules.discs.lay_out`).
@@ -94,15 +95,25 @@ def look(c: Record, w: Record, trackers: Records, sees: Any, measure: Any, s: Re
         seeing += 1
         if c.measured != 0:
             dx, dy = measure(c, w, i, dx, dy)
+        own_x, own_y, cosine, sine = t.x, t.y, ONE, ZERO
+        if c.drifts != 0:  # what it measures is placed by its own pose, as it knows that
+            own_x, own_y = t.x + odometry[i].x, t.y + odometry[i].y
+            cosine, sine = odometry[i].cos, odometry[i].sin
+            dx, dy = turned(dx, dy, cosine, sine)
         if c.fix_bearing != 0:
             per_metre = ONE / max(root(dx * dx + dy * dy), TINY)
             t.fix.x, t.fix.y = dx * per_metre, dy * per_metre
             t.fix.cos, t.fix.sin, t.fix.frame_cos, t.fix.frame_sin = ZERO, ZERO, ZERO, ZERO
         else:
-            x, y = t.x + dx, t.y + dy
+            x, y = own_x + dx, own_y + dy
             t.fix.vx, t.fix.vy = fix_velocity(c, t, w.step, x, y)
             t.fix.x, t.fix.y, t.fix.cos, t.fix.sin = x, y, w.heading_cos, w.heading_sin
             t.fix.frame_cos, t.fix.frame_sin = w.frame_cos, w.frame_sin
+            if c.drifts != 0 or c.heading_noise > ZERO:
+                noise = c.heading_noise * normal_pair(w.key, w.step, HEADING_NOISE, i)[0]
+                cosine, sine = turned(cosine, sine, np.float32(math.cos(noise)), np.float32(math.sin(noise)))
+                t.fix.cos, t.fix.sin = turned(t.fix.cos, t.fix.sin, cosine, sine)
+                t.fix.frame_cos, t.fix.frame_sin = turned(t.fix.frame_cos, t.fix.frame_sin, cosine, sine)
         t.fix_step = w.step
     if seeing > 0 and w.detected_at < 0:
         w.detected_at = w.step

@@ -1,0 +1,44 @@
+"""A policy on one real robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from posse import Command, Robot
+from posse_baselines.policy import Policy, PolicyError
+
+
+class Deployed:
+    """What :func:`deploy` returns: a policy that drives one robot, memory inside."""
+
+    def __init__(self, policy: Policy, robot: Robot) -> None:
+        if policy.reads_state:
+            raise PolicyError(f"policy {policy.name!r} reads the state of the worlds, which no robot measures")
+        self.policy, self.robot = policy, robot
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin an episode: robot and policy forget everything."""
+        self.robot.reset()
+        self._memory = self.policy.begin(self.robot.layout, 1)
+
+    def step(self, *measurements: Any, **more: Any) -> Command:
+        """Return the command for the measurements of a control step, which :meth:`posse.Robot.observe` describes."""
+        row = self.row = self.robot.observe(*measurements, **more)
+        # A policy's rows are independent of each other: this robot's is the only one whose action is read.
+        team = np.tile(row, (1, self.robot.scenario.num_trackers, 1))
+        actions, self._memory = self.policy.act(team, self._memory)
+        return self.robot.command(actions[0, self.robot.number])
+
+
+def deploy(policy: Policy, robot: Robot) -> Deployed:
+    """Return a policy that drives one robot.
+
+    The robot's scenario needs a ``message_size`` of at least the policy's.
+
+    Raises:
+        PolicyError: The policy reads the state, or does not fit the robot's scenario.
+    """
+    return Deployed(policy, robot)

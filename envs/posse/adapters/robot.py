@@ -1,0 +1,269 @@
+"""One real robot in the place of a tracker: its measurements become an observation, an action its command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.engine.batch import Batch
+from posse.numeric import FloatArray
+from posse.registry import SENSORS
+from posse.rules.kinematics import follow_heading
+from posse.rules.senses.sensing import take_fix
+from posse.rules.state import BROADCAST, config_record, perfect_radio
+from posse.scenarios import Scenario, ScenarioError, get_scenario
+from posse.signals.layout import ObservationLayout
+
+_BARELY_LOSSY: Final = 1e-9  # loss of a radio whose messages a world keeps with their ages
+
+
+class TargetFix(NamedTuple):
+    """A measurement of the target in the team's common frame."""
+
+    x: float
+    """m, in the robots' own metres, as everything here."""
+    y: float
+    heading: float
+    """rad."""
+    age: float = 0.0
+    """s since it was taken."""
+    frame: float | None = None
+    """Slot frame ψ then, rad; ``None``: unknown, and the robot estimates it from the headings."""
+
+
+class Heard(NamedTuple):
+    """What a robot broadcasts, and what its team-mates hear of it."""
+
+    number: int
+    """Its number in the team."""
+    x: float
+    """m, common frame."""
+    y: float
+    heading: float
+    """rad."""
+    speed: float
+    """m/s."""
+    turn_rate: float
+    """rad/s, positive to the left."""
+    message: tuple[float, ...] = ()
+    """``message_size`` numbers of its policy."""
+    fix: TargetFix | None = None
+    """Its best fix of the target."""
+    age: float = 0.0
+    """s since it was sent."""
+
+
+class Command(NamedTuple):
+    """What a robot does until its next observation."""
+
+    speed: float
+    """m/s."""
+    turn_rate: float
+    """rad/s, positive to the left."""
+    message: tuple[float, ...]
+    """For its next broadcast."""
+
+
+class Robot:
+    """One robot of a team, driven by a policy of posse in a world that is not posse's.
+
+    Call :meth:`observe` once a control step (``scenario.control_step``, s), give the row to a policy, and carry out
+    what :meth:`command` makes of its action. All robots share one common frame, whose origin is the middle of the
+    arena if there is one, and count ages in seconds; clocks need not agree.
+
+    Args:
+        scenario: The scenario, or its name, whose settings describe the team: sizes, speeds, ranges, formation.
+        number: The robot's number in the team, 0 to N - 1.
+        scale: Scenario metres per metre of the robot. A robot of 0.055 m radius plays one of 0.15 m with 2.73.
+        **overrides: Settings to change.
+
+    Attributes:
+        scenario: Its settings, in scenario metres.
+        layout: The layout of its observation.
+        steps: Observations since the start, less one.
+
+    Raises:
+        ScenarioError: An invalid setting, or a sensor that measures bearings alone.
+        ValueError: ``number`` or ``scale`` is out of its range.
+    """
+
+    def __init__(self, scenario: str | Scenario, number: int, *, scale: float = 1.0, **overrides: Any) -> None:
+        self.scenario = get_scenario(scenario, **overrides)
+        if SENSORS[self.scenario.sensor].fix == "bearing":
+            raise ScenarioError(f"sensor={self.scenario.sensor!r} gives bearings; a robot needs a sensor of positions")
+        if not 0 <= number < self.scenario.num_trackers:
+            raise ValueError(f"number={number!r} must be from 0 to {self.scenario.num_trackers - 1}, one of the team's")
+        if not (math.isfinite(scale) and scale > 0):
+            raise ValueError(f"scale={scale!r} must be a positive number: scenario metres per metre of the robot")
+        self.number, self.scale = number, scale
+        self.layout = ObservationLayout(self.scenario)
+        kept = self.scenario
+        if perfect_radio(kept):  # such a world stores no messages, since they would equal the state
+            kept = kept.replace(radio_loss=_BARELY_LOSSY)
+        self._world = Batch(kept, 1, num_threads=1)
+        self._config = config_record(kept).view(np.recarray)[0]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next observation is the first of an episode."""
+        self._world.reset(seed=0)
+        arrays = self._world.arrays
+        self._me = arrays.tracker[0, self.number]
+        arrays.heard["step"], arrays.heard_message[...] = -1, 0.0
+        self._me.fix_step, self._me.sees = -1, 0
+        self.steps = -1
+        self._said: tuple[float, ...] = (0.0,) * self.scenario.message_size
+
+    def observe(
+        self,
+        pose: npt.ArrayLike,
+        speed: float,
+        turn_rate: float,
+        target_fix: TargetFix | None = None,
+        sonar: npt.ArrayLike | None = None,
+        heard: Iterable[Heard] = (),
+        *,
+        touching: bool = False,
+    ) -> FloatArray:
+        """Return the observation (F,) of the next control step.
+
+        Args:
+            pose: Own x, y (m) and heading (rad) in the common frame, from odometry or a map.
+            speed: Own speed, m/s.
+            turn_rate: Own turn rate, rad/s, positive to the left.
+            target_fix: What its own sensor measured of the target; ``None``: it does not see it. Then the last fix
+                stays, and its age grows.
+            sonar: (``sonar_beams``,) distance from its rim to the nearest thing, m. Beam k is a cone about the
+                direction 2πk / S to the left of ahead, π / S to each side. A beam that contains the point of a body
+                nearest to the robot reads the distance of that point; another one, the distance along its axis.
+                Readings beyond ``sonar_range``, or ``None``: nothing is near.
+            heard: What arrived since the last observation. Of each team-mate the last stays, and its age grows.
+            touching: Whether it touches a robot, an obstacle or a wall.
+
+        Raises:
+            ValueError: A measurement of a wrong shape, not finite, or of a robot that is not in the team. Nothing is
+                changed.
+        """
+        x, y, heading = _finite("pose", pose, (3,))
+        speed, turn_rate = _finite("speed and turn_rate", (speed, turn_rate), (2,))
+        beams = self.scenario.sonar_beams
+        readings = None if sonar is None else np.asarray(sonar, np.float64)
+        if readings is not None and (readings.shape != (beams,) or not readings.min(initial=0.0) >= 0.0):
+            raise ValueError(f"sonar={sonar!r} must be {beams} distances of at least 0 m")
+        messages = [self._checked(message) for message in heard]
+        fix = None if target_fix is None else self._checked_fix(target_fix)
+
+        self.steps += 1
+        world, me = self._world.arrays.world[0], self._me
+        world.step = self.steps
+        self._pose = (x, y, heading)
+        _place(me, x * self.scale, y * self.scale, heading)
+        me.speed, me.turn_rate, me.touching, me.sees = speed * self.scale, turn_rate, touching, fix is not None
+        if fix is not None:
+            self._take(fix)
+        for message in messages:
+            self._hear(message)
+        row: FloatArray = self._world.observe()[0, self.number].copy()
+        if beams:
+            reach = self.scenario.sonar_range
+            row[self.layout.offsets["sonar"] :][:beams] = (
+                reach if readings is None else np.minimum(readings * self.scale, reach)
+            )
+        return row
+
+    def command(self, action: npt.ArrayLike) -> Command:
+        """Return what an action (2 + m,) in [-1, 1] commands, in the robot's own units.
+
+        Raises:
+            ValueError: An action of a wrong shape, not finite or outside [-1, 1].
+        """
+        numbers = _finite("action", action, (2 + self.scenario.message_size,))
+        if np.abs(numbers).max() > 1 + 1e-6:
+            raise ValueError(f"action={action!r} must lie in [-1, 1]")
+        forward, turn, *said = np.clip(numbers, -1.0, 1.0).tolist()
+        self._said = tuple(said)
+        top_speed = self.scenario.tracker_speeds[self.number] / self.scale
+        return Command((forward + 1) / 2 * top_speed, turn * self.scenario.tracker_turn_rates[self.number], self._said)
+
+    def broadcast(self) -> Heard:
+        """Return what team-mates should hear of it now: its last measurements and its policy's last message."""
+        if self.steps < 0:
+            raise ValueError("broadcast before the first observation: call observe() first")
+        me, fix = self._me, None
+        if me.fix_step >= 0:
+            fix = TargetFix(
+                float(me.fix.x) / self.scale,
+                float(me.fix.y) / self.scale,
+                math.atan2(me.fix.sin, me.fix.cos),
+                (self.steps - int(me.fix_step)) * self.scenario.control_step,
+                math.atan2(me.fix.frame_sin, me.fix.frame_cos),
+            )
+        return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._said, fix)
+
+    def _checked(self, message: Heard) -> Heard:
+        _finite("a message heard", (*message[1:6], message.age, *message.message), (6 + len(message.message),))
+        if not 0 <= message.number < self.scenario.num_trackers or message.number == self.number:
+            raise ValueError(f"heard number={message.number!r}, which is no team-mate of {self.number}")
+        if len(message.message) not in (0, self.scenario.message_size):
+            raise ValueError(f"heard a message of {len(message.message)}, wanted {self.scenario.message_size} numbers")
+        return message._replace(fix=message.fix and self._checked_fix(message.fix))
+
+    def _checked_fix(self, fix: TargetFix) -> TargetFix:
+        _finite("a fix", [value for value in fix if value is not None], (5 - (fix.frame is None),))
+        return fix
+
+    def _step_of(self, age: float) -> int:
+        return self.steps - round(age / self.scenario.control_step)
+
+    def _take(self, fix: TargetFix) -> None:
+        """Take a fix, if it is newer than the last one, as a tracker of a world does."""
+        me, step = self._me, self._step_of(fix.age)
+        if step <= me.fix_step:
+            return
+        new = np.zeros(1, BROADCAST).view(np.recarray)[0]
+        new.fix_step = step
+        _place(new.fix, fix.x * self.scale, fix.y * self.scale, fix.heading, "")
+        new.fix.frame_cos, new.fix.frame_sin = new.fix.cos, new.fix.sin
+        if fix.frame is not None:
+            new.fix.frame_cos, new.fix.frame_sin = math.cos(fix.frame), math.sin(fix.frame)
+        elif me.fix_step >= 0:
+            new.fix.frame_cos, new.fix.frame_sin = me.fix.frame_cos, me.fix.frame_sin
+            for _ in range(step - int(me.fix_step)):
+                new.fix.frame_cos, new.fix.frame_sin = follow_heading(
+                    new.fix.frame_cos,
+                    new.fix.frame_sin,
+                    new.fix.cos,
+                    new.fix.sin,
+                    self._config.frame_c,
+                    self._config.frame_s,
+                )
+        take_fix(self._config, me, new)
+
+    def _hear(self, message: Heard) -> None:
+        """Store a message, unless a later one of the same team-mate was heard, and take its fix."""
+        arrays, step = self._world.arrays, self._step_of(message.age)
+        heard = arrays.heard[0, self.number, message.number]
+        if step >= heard.step:
+            heard.step = step
+            _place(heard, message.x * self.scale, message.y * self.scale, message.heading)
+            heard.speed, heard.turn_rate = message.speed * self.scale, message.turn_rate
+            arrays.heard_message[0, self.number, message.number] = message.message or 0.0
+        if message.fix is not None:
+            self._take(message.fix._replace(age=message.fix.age + message.age))
+
+
+def _place(record: Any, x: float, y: float, heading: float, prefix: str = "heading_") -> None:
+    record.x, record.y = x, y
+    setattr(record, f"{prefix}cos", math.cos(heading))
+    setattr(record, f"{prefix}sin", math.sin(heading))
+
+
+def _finite(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    array = np.asarray(values, np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{name}={values!r} must be {shape[0]} finite numbers")
+    return array

@@ -1,0 +1,132 @@
+"""Robots that are given what the trackers of a world measure observe and do the same as those."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posse
+from posse import Batch, Heard, Robot, ScenarioError, TargetFix
+from posse.rules.state import perfect_radio
+from posse_baselines import PolicyError, begin, deploy, load
+
+SCALE = 2.0
+
+
+def fix_of(record: Any, age: float, frame: bool = True) -> TargetFix:
+    psi = math.atan2(record.frame_sin, record.frame_cos) if frame else None
+    return TargetFix(record.x / SCALE, record.y / SCALE, math.atan2(record.sin, record.cos), age, psi)
+
+
+def motion_of(record: Any) -> tuple[float, float, float, float, float]:
+    heading = math.atan2(record.heading_sin, record.heading_cos)
+    return record.x / SCALE, record.y / SCALE, heading, record.speed / SCALE, record.turn_rate
+
+
+def heard_by(batch: Batch, i: int) -> Iterator[Heard]:
+    """What tracker i of the only world received in this step, from the state."""
+    s, arrays, step = batch.scenario, batch.arrays, batch.worlds["step"][0]
+    delay = s.radio_delay
+    for j in range(s.num_trackers):
+        if j == i:
+            continue
+        t, said = arrays.tracker[0, j], arrays.message[0, 0, j]
+        if not perfect_radio(s):
+            if step < delay or arrays.heard[0, i, j]["step"] != step - delay:
+                continue
+            t, said = arrays.broadcast[0, (step - delay) % (delay + 1), j], arrays.heard_message[0, i, j]
+        fix = fix_of(t.fix, (step - delay - t.fix_step) * s.control_step) if t.fix_step >= 0 else None
+        yield Heard(j, *motion_of(t), tuple(said), fix, delay * s.control_step)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "policy", "frame"),
+    [
+        ("smart", "pngl-l-phi", False),  # it always sees the target, and estimates ψ itself
+        ("radio", "ddcs-tuned", True),
+        ("field", "learned-field", True),
+        ("search", "learned-search", True),
+    ],
+)
+def test_robots_observe_and_do_what_trackers_do(scenario: str, policy: str, frame: bool) -> None:
+    team = load(policy)
+    batch = posse.batch(scenario, message_size=team.message_size, seed=5, horizon=250)
+    s = batch.scenario
+    robots = [deploy(team, Robot(s, i, scale=SCALE)) for i in range(s.num_trackers)]
+    observations, memory = batch.reset(), begin(team, batch)
+    for _ in range(s.horizon):
+        actions, memory = team.act(observations, memory)
+        sonar = batch.layout.views(observations[0])["sonar"]
+        for i, robot in enumerate(robots):
+            t = batch.arrays.tracker[0, i]
+            if not batch.working[0, i]:
+                continue
+            x, y, heading, speed, turn_rate = motion_of(t)
+            seen = fix_of(t.fix, 0.0, frame) if t.sees else None
+            command = robot.step(
+                (x, y, heading), speed, turn_rate, seen, sonar[i] / SCALE, heard_by(batch, i), touching=bool(t.touching)
+            )
+            np.testing.assert_allclose(robot.row, observations[0, i], rtol=1e-4, atol=1e-4)
+            forward = 2 * command.speed * SCALE / s.tracker_speeds[i] - 1
+            told = forward, command.turn_rate / s.tracker_turn_rates[i], *command.message
+            np.testing.assert_allclose(told, actions[0, i], atol=1e-4)
+        observations = batch.step(actions)[0]
+
+
+def test_robots_that_hear_each_other_take_their_slots() -> None:
+    """A fleet integrated here, whose robots hear the broadcasts of the step before."""
+    team = load("ddcs-distributed")
+    s = posse.get_scenario("constant", message_size=team.message_size)
+    robots = [deploy(team, Robot(s, i)) for i in range(s.num_trackers)]
+    pose = np.array([(-4.0, 3.0 * i - 6.0, 0.0) for i in range(s.num_trackers)])
+    moving = np.zeros((s.num_trackers, 2))
+    broadcasts: list[Heard] = []
+    for step in range(400):
+        target = TargetFix(0.06 * step, 0.0, 0.0)
+        for i, robot in enumerate(robots):
+            others = [heard._replace(age=s.control_step) for heard in broadcasts if heard.number != i]
+            moving[i] = robot.step(pose[i], *moving[i], target, None, others)[:2]
+        broadcasts = [robot.robot.broadcast() for robot in robots]
+        middle = pose[:, 2] + moving[:, 1] * s.control_step / 2
+        pose[:, 0] += moving[:, 0] * s.control_step * np.cos(middle)
+        pose[:, 1] += moving[:, 0] * s.control_step * np.sin(middle)
+        pose[:, 2] += moving[:, 1] * s.control_step
+    slots = np.array(s.slot_offsets) + np.array((0.06 * 400, 0.0))
+    gaps = np.linalg.norm(pose[:, None, :2] - slots, axis=2)
+    assert sorted(gaps.argmin(axis=1)) == list(range(s.num_trackers))
+    assert gaps.min(axis=1).max() < 0.1
+
+
+def test_what_cannot_be_is_refused() -> None:
+    robot = Robot("field", 1)
+    beams = robot.scenario.sonar_beams
+    before = robot.observe((0.0, 0.0, 0.0), 0.1, 0.0)
+    for measured, words in (
+        (((0.0, math.nan, 0.0), 0.0, 0.0), "pose"),
+        (((0.0, 0.0, 0.0), math.inf, 0.0), "speed"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, math.nan)), "fix"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, [1.0]), f"{beams} distances"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(1, 0.0, 0.0, 0.0, 0.0, 0.0)]), "no team-mate"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, (1.0,))]), "wanted 0 numbers"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            robot.observe(*measured)
+    assert robot.steps == 0
+    robot.reset()
+    np.testing.assert_array_equal(robot.observe((0.0, 0.0, 0.0), 0.1, 0.0), before)
+    with pytest.raises(ValueError, match=r"\[-1, 1\]"):
+        robot.command((0.0, 1.5))
+    with pytest.raises(ValueError, match="number=9"):
+        Robot("field", 9)
+    with pytest.raises(ValueError, match="scale=0"):
+        Robot("field", 0, scale=0)
+    with pytest.raises(ScenarioError, match="unknown"):
+        Robot("fields", 0)
+    with pytest.raises(PolicyError, match="reads the state"):
+        deploy(load("planner"), robot)
+    with pytest.raises(PolicyError, match="message_size"):
+        deploy(load("ddcs-distributed"), robot)

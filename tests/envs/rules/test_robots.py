@@ -1,0 +1,139 @@
+"""What real robots have: lag, delay, wheels, drift of their own pose, noise of measured headings."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import posse
+from posse import Batch, ScenarioError
+
+ALL: dict[str, Any] = {
+    "actuator_lag": 0.3,
+    "command_delay": 2,
+    "wheel_base": 0.23,
+    "odometry_drift": 0.05,
+    "heading_drift": 0.02,
+    "heading_noise": 0.05,
+}
+
+
+def drive(batch: Batch, steps: int, seed: int = 0) -> npt.NDArray[np.float32]:
+    """Return the observations of random actions, (steps, E, N, F)."""
+    rng = np.random.default_rng(seed)
+    return np.stack([batch.step(rng.uniform(-1, 1, batch.action_shape))[0] for _ in range(steps)])
+
+
+def test_speed_and_turn_rate_follow_the_command_with_the_lag() -> None:
+    batch = posse.batch("constant", 3, actuator_lag=0.4)
+    batch.reset()
+    full = np.ones(batch.action_shape)
+    for step in range(1, 20):
+        batch.step(full)
+        followed = 1 - math.exp(-0.1 * step / 0.4)
+        np.testing.assert_allclose(batch.state["tracker_speed"], followed, rtol=1e-5)
+        np.testing.assert_allclose(batch.state["tracker_turn_rate"], 2 * followed, rtol=1e-5)
+
+
+def test_commands_are_executed_after_the_delay() -> None:
+    late, prompt = (posse.batch("smart", 4, seed=1, command_delay=delay) for delay in (3, 0))
+    late.reset(), prompt.reset()
+    rng, rest = np.random.default_rng(0), np.zeros(late.action_shape) - (1, 0)
+    actions = [rest] * 3 + [rng.uniform(-1, 1, late.action_shape) for _ in range(40)]
+    for step in range(40):
+        late.step(actions[step + 3])
+        prompt.step(actions[step])
+        for name in ("x", "y", "speed", "turn_rate"):
+            np.testing.assert_array_equal(late.arrays.tracker[name], prompt.arrays.tracker[name])
+
+
+@settings(max_examples=10)
+@given(st.integers(0, 2**32), st.sampled_from([0.0, 0.5]), st.sampled_from([math.inf, 2.0]))
+def test_no_wheel_turns_faster_than_the_greatest_speed(seed: int, lag: float, acceleration: float) -> None:
+    batch = posse.batch("field", 2, wheel_base=0.6, actuator_lag=lag, tracker_acceleration=acceleration)
+    batch.reset(seed=seed)
+    for _ in range(30):
+        drive(batch, 1, seed)
+        wheel = batch.arrays.tracker["speed"] + 0.3 * np.abs(batch.arrays.tracker["turn_rate"])
+        assert (wheel <= batch.arrays.tracker["max_speed"] * (1 + 1e-6)).all()
+
+
+def test_wheels_that_cannot_turn_on_the_spot_are_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"wheel_base=3.*lower it, or tracker_turn_rate"):
+        posse.get_scenario("smart", wheel_base=3.0)
+
+
+def test_own_poses_drift_as_random_walks() -> None:
+    batch = posse.batch("constant", 300, odometry_drift=0.1, heading_drift=0.03)
+    batch.reset()
+    v = batch.layout.views(drive(batch, 100))
+    heading = np.arctan2(batch.state["tracker_heading_sin"], batch.state["tracker_heading_cos"])
+    known = np.arctan2(*np.moveaxis(v["heading"][-1], -1, 0)[::-1])
+    turned = np.angle(np.exp(1j * (known - heading)))
+    for error, wanted in (
+        (v["position"][-1, ..., 0] - batch.state["tracker_x"], 0.1),
+        (v["position"][-1, ..., 1] - batch.state["tracker_y"], 0.1),
+        (turned, 0.03),
+    ):
+        assert np.std(error) == pytest.approx(wanted * math.sqrt(10.0), rel=0.1)
+        assert abs(np.mean(error)) < 4 * np.std(error) / math.sqrt(error.size)
+
+
+def test_all_that_a_robot_tells_and_measures_is_placed_by_its_own_pose() -> None:
+    batch = posse.batch("constant", 20, odometry_drift=0.2, heading_drift=0.1)
+    batch.reset()
+    v, t = batch.layout.views(drive(batch, 50)[-1]), batch.arrays.tracker
+
+    def common(ego: npt.NDArray[np.float32], heading: npt.NDArray[np.float32]) -> npt.NDArray[np.complex128]:
+        return (ego[..., 0] + 1j * ego[..., 1]) * (heading[..., 0] + 1j * heading[..., 1])
+
+    own = v["position"][..., 0] + 1j * v["position"][..., 1]
+    known, true = v["heading"][..., 0] + 1j * v["heading"][..., 1], t["heading_cos"] + 1j * t["heading_sin"]
+    # Team-mates are where they say that they are.
+    others = own[..., None] + v["neighbour_range"] * common(v["neighbour_bearing"], v["heading"][..., None, :])
+    number = v["neighbour_number"].astype(int)
+    told = np.take_along_axis(own[:, None], number.reshape(20, 1, -1), axis=2).reshape(number.shape)
+    np.testing.assert_allclose(others, told, atol=1e-4)
+    # Each sees the target truly from where it is; here all do.
+    w = batch.worlds
+    measured = v["target_range"] * (v["target_bearing"][..., 0] + 1j * v["target_bearing"][..., 1])
+    away = (w["x"] + 1j * w["y"])[:, None] - (t["x"] + 1j * t["y"])
+    np.testing.assert_allclose(measured, away / true, atol=1e-3)
+    ahead = (w["heading_cos"] + 1j * w["heading_sin"])[:, None] / true
+    np.testing.assert_allclose(v["target_heading"][..., 0] + 1j * v["target_heading"][..., 1], ahead, atol=1e-4)
+    assert np.abs(known - true).max() > 0.1
+
+
+def test_the_measured_heading_of_the_target_is_noisy_and_with_it_the_slot_frame() -> None:
+    batch = posse.batch("constant", 200, heading_noise=0.1)
+    v = batch.layout.views(batch.reset())
+    true = (batch.worlds["heading_cos"] + 1j * batch.worlds["heading_sin"])[:, None]
+    own = v["heading"][..., 0] + 1j * v["heading"][..., 1]
+    heading, frame = (v[name][..., 0] + 1j * v[name][..., 1] for name in ("target_heading", "target_frame"))
+    error = np.angle(heading * own / true)
+    # Trackers share the newest fix, and at the start each has its own.
+    assert np.std(error) == pytest.approx(0.1, rel=0.1)
+    np.testing.assert_allclose(frame, heading, atol=1e-6)  # ψ is the heading at the start
+
+
+def test_a_world_replays_alone_and_its_state_decides_how_it_goes_on() -> None:
+    many, one = (posse.batch("field", n, first_world=w, seed=3, **ALL) for n, w in ((12, 5), (1, 9)))
+    many.reset(), one.reset()
+    rng = np.random.default_rng(0)
+    low, high = many.layout.bounds()
+    for step in range(60):
+        actions = rng.uniform(-1, 1, many.action_shape).astype(np.float32)
+        observations = many.step(actions)[0]
+        np.testing.assert_array_equal(one.step(actions[4:5])[0], observations[4:5])
+        assert ((observations >= low) & (observations <= high)).all()
+        if step == 30:
+            saved, copy = many.save(), pickle.loads(pickle.dumps(many))  # noqa: S301 (our own)
+    many.restore(saved)
+    np.testing.assert_array_equal(drive(many, 10), drive(copy, 10))
