@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from posse import Scenario, ScenarioError, get_scenario
+from posse import Batch, Scenario, ScenarioError, get_scenario
 from posse.adapters.gymnasium_env import TeamEnv
 from posse.numeric import FloatArray, OwnArrays
 from posse_baselines.policy import Policy, begin
@@ -57,10 +57,6 @@ class TrackerEnv(OwnArrays, TeamEnv):
         self._team: FloatArray = np.zeros(0, np.float32)
         super().__init__(scenario, **settings)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
-        self._prepare()
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
@@ -70,24 +66,32 @@ class TrackerEnv(OwnArrays, TeamEnv):
         self._memory = begin(self.teammates, self.batch)
         return result
 
-    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
-        """Advance the world by one control step; see :class:`posse.adapters.gymnasium_env.TeamEnv`."""
-        result = super().step(action)
-        self._team = self._observations[None].copy()  # policies may keep observations
-        return result
+    def _advance(self, actions: FloatArray) -> Any:
+        results = super()._advance(actions)
+        self._team = results.observations.copy()  # policies may keep observations
+        return results
 
-    def _of_team(self, own: FloatArray) -> FloatArray:
-        actions, memory = self.teammates.act(self._team, self._memory)
-        team = self.batch.check_actions(actions).copy()
-        self._memory = memory
-        return insert(team, self.number, own[:, 0])
+    def _of_team(self, motions: FloatArray) -> FloatArray:
+        actions, self._memory = with_teammates(
+            self.teammates, self.batch, self._team, self._memory, motions[None], self.number
+        )
+        return actions
 
 
-def insert(team: FloatArray, number: int, own: FloatArray) -> FloatArray:
-    """Write a tracker's actions (E, 2 or 2 + m) into those of the teams (E, N, 2 + m), and return these."""
-    team[:, number] = 0
-    team[:, number, : own.shape[1]] = own
-    return team
+def with_teammates(
+    teammates: Policy, batch: Batch, team: FloatArray, memory: Any, own: FloatArray, number: int
+) -> tuple[FloatArray, Any]:
+    """Return the actions of the teams (E, N, 2 + m), given those of a tracker (E, 2 or 2 + m), and the memory.
+
+    Own actions are checked before the team-mates act.
+    """
+    actions = np.zeros(batch.action_shape, np.float32)
+    actions[:, number, : own.shape[1]] = own
+    mine = batch.check_actions(actions)[:, number]
+    others, memory = teammates.act(team, memory)
+    actions = batch.check_actions(others).copy()
+    actions[:, number] = mine
+    return actions, memory
 
 
 def fitting(teammates: Policy, number: int, scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:

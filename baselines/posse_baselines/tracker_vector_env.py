@@ -14,7 +14,7 @@ from posse.adapters.vector_env import TeamVectorEnv
 from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
-from posse_baselines.tracker_env import fitting, insert
+from posse_baselines.tracker_env import fitting, with_teammates
 
 
 class TrackerVectorEnv(TeamVectorEnv):
@@ -75,14 +75,12 @@ class TrackerVectorEnv(TeamVectorEnv):
             self._memory = self.teammates.restart(self._memory, begins)
         return result
 
-    def _of_teams(self, motions: FloatArray) -> npt.NDArray[Any]:
+    def _of_team(self, motions: FloatArray) -> FloatArray:
         self.batch.check_running()
-        team = insert(np.zeros(self.batch.action_shape, np.float32), self.number, motions)
-        own = self.batch.check_actions(team)[:, self.number]
-        others, memory = self.teammates.act(self._team, self._memory)
-        team = insert(self.batch.check_actions(others).copy(), self.number, own)
-        self._memory = memory
-        return team
+        actions, self._memory = with_teammates(
+            self.teammates, self.batch, self._team, self._memory, motions, self.number
+        )
+        return actions
 
     def _observed(self, observations: FloatArray) -> FloatArray:
         self._team = observations

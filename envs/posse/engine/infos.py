@@ -25,21 +25,18 @@ class Infos:
     """
 
     def __init__(self, scenario: Scenario, zero: Any) -> None:
-        parts = declarations_for(scenario)
-        self._rewards = tuple(f"reward/{name}" for name in parts.term_names)
-        self._template = {
-            "score": zero,
-            **dict.fromkeys(self._rewards, zero),
-            **{f"metrics/{metric.name}": zero for metric in parts.metrics},
-        }
+        declared = declarations_for(scenario)
+        self.rewards = tuple(f"reward/{name}" for name in declared.term_names)
+        names = ("score", *self.rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
+        self._template = dict.fromkeys(names, zero)
 
     def build(
-        self, score: Any, terms: Iterable[Any], working: Any, metrics: Mapping[str, Any] | None
+        self, score: Any, terms: Iterable[Any] = (), working: Any = None, metrics: Mapping[str, Any] | None = None
     ) -> dict[str, Any]:
         """Return an info; ``terms`` in the order of the names, ``metrics`` by name where the episode ends."""
         info = self._template.copy()
         info["score"] = score
-        info.update(zip(self._rewards, terms))  # noqa: B905 (of equal length; in the hot path)
+        info.update(zip(self.rewards, terms))  # noqa: B905 (of equal length; in the hot path)
         if metrics is not None:
             info.update((f"metrics/{name}", value) for name, value in metrics.items())
         if working is not None:
