@@ -68,7 +68,7 @@ class TrackerEnv(OwnArrays, TeamEnv):
 
     def _advance(self, actions: FloatArray) -> Any:
         results = super()._advance(actions)
-        self._team = results.observations.copy()  # policies may keep observations
+        self._team = results.observations[None].copy()  # policies may keep observations
         return results
 
     def _of_team(self, motions: FloatArray) -> FloatArray:

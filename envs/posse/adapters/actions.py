@@ -25,6 +25,8 @@ TURN_RATES: Final = (-1.0, -0.5, 0.0, 0.5, 1.0)
 MOTIONS: Final = np.array([(v, turn) for v in SPEEDS for turn in TURN_RATES], np.float32)
 """The discrete actions, (15, 2): number 5 i + j is speed i with turn rate j."""
 
+_FLOAT32: Final = np.dtype(np.float32)
+
 Rows = int | slice
 """The robots that an agent moves, as rows of a batch: one, or all."""
 
@@ -76,6 +78,8 @@ def spaces_of(
 
 def as_motions(name: str, action: object, shape: tuple[int, ...] | None, discrete: bool) -> FloatArray:
     """Return an action of a shape as numbers, (..., 2 + m) float32, whose range is not checked; or ValueError."""
+    if type(action) is np.ndarray and action.dtype is _FLOAT32 and action.shape == shape and not discrete:
+        return np.ascontiguousarray(action)  # the usual case, which the checks below would take as long as the rest
     array = real_numbers(name, action, "iu" if discrete else "fiu")
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}, wanted {shape}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -99,7 +99,7 @@ class WorldEnv(BatchEnv):
         super()._open(scenario, num_worlds, num_threads=1, autoreset="disabled", **settings)
         self._infos = Infos(self.scenario, 0.0)
         self._breakable = self.scenario.breaks > 0
-        self._results: Results | None = None
+        self._results: tuple[Results, Results] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "_results": None}
@@ -125,16 +125,22 @@ class WorldEnv(BatchEnv):
         return super()._start(seed, options)
 
     def _advance(self, actions: FloatArray) -> Results:
-        """Perform a control step by valid actions, and return its results, which the next step overwrites."""
-        results = self._results
-        if results is None:
-            results = self._results = self.batch._new_results()
-        self.batch._advance(actions, results)
-        self._show()
-        return results
+        """Perform a control step by valid actions; return its results, which the next step overwrites.
 
-    def _last_metrics(self) -> dict[str, float] | None:
-        """Return every metric by name at the end of the episode; before, None."""
+        Observations are (rows, F), rewards (rows,) and terms (rows, K), the others as of a batch.
+        """
+        if self._results is None:
+            results = self.batch._new_results()
+            observations, rewards, terms, *others = results
+            self._results = results, Results(observations[0], rewards[0], terms[0], *others)
+        results, own = self._results
+        self.batch._advance(actions, results)
+        if self.render_mode == "human":
+            self._draw(0)
+        return own
+
+    def _info(self, score: float, terms: Sequence[Any] | None = None) -> dict[str, Any]:
+        """Return an info, with every metric at the end of the episode."""
         if not self.batch._over:
-            return None
-        return {name: float(value[0]) for name, value in self.batch.metrics().items()}
+            return self._infos.build(score, terms)
+        return self._infos.build(score, terms, {name: float(v[0]) for name, v in self.batch.metrics().items()})

@@ -118,7 +118,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         observations = self._start(seed, options)
         gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
         rows, terms = observations.shape[1], len(self.batch.term_names)
-        return observations[0, self._rows], self._info(0.0, np.zeros((rows, terms), np.float32))
+        return observations[0, self._rows], self._own_info(0.0, np.zeros((rows, terms), np.float32))
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -130,22 +130,23 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         self.batch.check_running()
         motions = as_motions("action", action, self.action_space.shape, self._discrete)
         results = self._advance(in_box(self._of_team(motions), self.batch.clip_actions))
-        rewards = results.rewards[0, self._rows].tolist()
+        rewards = results.rewards[self._rows].tolist()
         reward = sum(rewards) / len(rewards) if isinstance(rewards, list) else rewards
-        info = self._info(results.scores.item(), results.terms[0])
+        info = self._own_info(results.scores.item(), results.terms)
         ends = results.terminated.item(), results.truncated.item()
-        return results.observations[0, self._rows].copy(), reward, *ends, info
+        return results.observations[self._rows].copy(), reward, *ends, info
 
     def _of_team(self, motions: FloatArray) -> FloatArray:
         """Return the actions of all trackers (1, N, 2 + m), given the agent's."""
         return motions.reshape(self.batch.action_shape)
 
-    def _info(self, score: float, terms: FloatArray) -> dict[str, Any]:
-        own, working = terms[self._rows].T.copy(), None
+    def _own_info(self, score: float, terms: FloatArray) -> dict[str, Any]:
+        own = terms[self._rows].T
+        info = self._info(score, own.copy() if own.ndim == 2 else own.tolist())
         if self._breakable:
-            mine = self.batch.working[0, self._rows]
-            working = mine if mine.ndim else bool(mine)
-        return self._infos.build(score, own if own.ndim == 2 else own.tolist(), working, self._last_metrics())
+            working = self.batch.working[0, self._rows]
+            info["working"] = working if working.ndim else bool(working)
+        return info
 
 
 class SoloEnv(TeamEnv):

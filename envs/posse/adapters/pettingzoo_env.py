@@ -99,6 +99,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
         }
         self._reader = _Reader(self.possible_agents, self.batch.action_shape[2], discrete_actions, clip_actions)
+        self._none_ended = dict.fromkeys(self.possible_agents, False)
         self._wrapper_seed = seed
         self._np_random: np.random.Generator | None = None
 
@@ -133,7 +134,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.agents = self.possible_agents.copy()
         if seed is not None:
             self._wrapper_seed, self._np_random = int(seed), None
-        infos = self._infos_of(self.agents, 0.0, [()] * len(self.agents))
+        infos = self._infos_of(self.agents, 0.0, [[0.0] * len(self.batch.term_names)] * len(self.agents))
         return dict(zip(self.agents, observations, strict=True)), infos
 
     def step(
@@ -148,24 +149,26 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         agents = self.agents
         self.batch.check_running()
         results = self._advance(self._reader.read(actions))
-        terminated, truncated = results.terminated.item(), results.truncated.item()
-        if terminated or truncated:
+        terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
+        if self.batch._over:
+            (terminations if results.terminated[0] else truncations).update(dict.fromkeys(agents, True))
             self.agents = []
         # No strict=True below: equal lengths, in the hot path.
         return (
-            dict(zip(agents, results.observations[0].copy())),  # noqa: B905
-            dict(zip(agents, results.rewards[0].tolist())),  # noqa: B905
-            dict.fromkeys(agents, terminated),
-            dict.fromkeys(agents, truncated),
-            self._infos_of(agents, results.scores.item(), results.terms[0].tolist()),
+            dict(zip(agents, results.observations.copy())),  # noqa: B905
+            dict(zip(agents, results.rewards.tolist())),  # noqa: B905
+            terminations,
+            truncations,
+            self._infos_of(agents, results.scores.item(), results.terms.tolist()),
         )
 
-    def _infos_of(self, agents: list[str], score: float, terms: Iterable[Sequence[float]]) -> _Infos:
-        """Return the infos, which differ in the agents' own terms only."""
-        common, names, infos = self._infos.build(score, metrics=self._last_metrics()), self._infos.rewards, {}
+    def _infos_of(self, agents: list[str], score: float, terms: list[list[float]]) -> _Infos:
+        """Return the infos, which differ in the agents' own reward terms (rows, K) only."""
+        common, rewards, infos = self._info(score), self._infos.rewards, {}
         for agent, own in zip(agents, terms):  # noqa: B905
             infos[agent] = info = common.copy()
-            info.update(zip(names, own))  # noqa: B905
+            for key, k in rewards:
+                info[key] = own[k]
         if self._breakable:
             for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
                 infos[agent]["working"] = works  # a target never breaks

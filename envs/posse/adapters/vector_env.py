@@ -147,9 +147,11 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
 
     def _at_start(self) -> _Info:
         """Return the infos of worlds whose episodes have just started."""
-        zeros, rows = np.zeros(self.num_envs), np.zeros(self.batch.observation_shape[:2], np.float32)
-        working = self.batch.working if self.scenario.breaks > 0 else None
-        return self._own(self.batch._infos.build(zeros, [rows] * len(self.batch.term_names), working))
+        rows = np.zeros(self.batch.observation_shape[:2], np.float32)
+        infos = self.batch._infos.build(np.zeros(self.num_envs), [rows] * len(self.batch.term_names))
+        if self.scenario.breaks > 0:
+            infos["working"] = self.batch.working
+        return self._own(infos)
 
     def _own(self, infos: _Info) -> _Info:
         """Return the agents' part of a batch's infos, in the types of Gymnasium's own vector environments."""

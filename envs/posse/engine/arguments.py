@@ -59,9 +59,7 @@ def as_float32(array: npt.NDArray[Any]) -> FloatArray:
         return array.astype(np.float32, order="C")
 
 
-def in_box(
-    actions: FloatArray, clip: bool, place: Callable[..., str] = "actions[{}, {}, {}]".format
-) -> FloatArray:
+def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions[{}, {}, {}]".format) -> FloatArray:
     """Return actions (E, rows, 2 + m) in [-1, 1]; others raise ValueError, or are clipped if they are finite.
 
     Numbers outside by rounding are always clipped. ``place(e, i, k)`` names an element in the message.

@@ -395,12 +395,13 @@ class Batch:
         begun = self._over > 0 and self.autoreset == "next_step"
         over = self._advance(actions, results) > 0
         observations, rewards, terms, scores, terminated, truncated = results
-        working = self.working if self.scenario.breaks > 0 else None
         metrics = None
         if over:
             ended = terminated | truncated
             metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        infos = self._infos.build(scores, terms.transpose(2, 0, 1), working, metrics)
+        infos = self._infos.build(scores, terms.transpose(2, 0, 1), metrics)
+        if self.scenario.breaks > 0:
+            infos["working"] = self.working
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
@@ -428,18 +429,22 @@ class Batch:
 
         Several threads share the worlds. Episodes that end are not started anew.
         """
-        arguments = (self._tables, self._arrays, actions, results, self._orders if orders is None else orders)
+        if orders is None:
+            orders = self._orders
         if len(self._scratch) == 1:
-            self._over = self._kernel(*arguments, self._scratch[0], 0, self.num_worlds)
+            self._over = self._work(actions, results, orders, 0, 0, self.num_worlds)
         else:
-
-            def work(thread: int, first: int, end: int) -> int:
-                return self._kernel(*arguments, self._scratch[thread], first, end)
-
-            self._over = sum(over_worlds(work, (), self.num_worlds, self.scenario.num_agents, len(self._scratch)))
+            arguments, threads = (actions, results, orders), len(self._scratch)
+            self._over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, threads))
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
         return self._over
+
+    def _work(
+        self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8], thread: int, first: int, end: int
+    ) -> int:
+        """Execute the orders of worlds ``first`` to ``end``; return how many of their episodes are over."""
+        return self._kernel(self._tables, self._arrays, actions, results, orders, self._scratch[thread], first, end)
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds, uninitialised."""
@@ -459,7 +464,8 @@ class Batch:
 
     def check_running(self) -> None:
         """Raise ResetNeeded if a step is not possible now."""
-        self.check_started("step")
+        if not self._started:
+            self.check_started("step")
         if self._over and self.autoreset == "disabled":
             over = np.flatnonzero(self._arrays.world["over"])
             more = f" and {len(over) - 1} more" if len(over) > 1 else ""
