@@ -118,7 +118,8 @@ class Subject:
     def held(self) -> list[Any]:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""
         batch, env = self.batch, self.env
-        kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}, [batch.seed, batch._started, batch._over]]
+        kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}]
+        kept.append([batch.seed, batch._started, batch._over])
         if self.kind in ("parallel", "team", "solo"):
             world = env.unwrapped
             kept.append(world._seeded)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -102,7 +102,9 @@ class WorldEnv(BatchEnv):
         self._results: tuple[Results, Results] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**super().__getstate__(), "_results": None}
+        state = {**super().__getstate__(), "_results": None}
+        state.pop("state_layout", None)
+        return state
 
     @functools.cached_property
     def state_layout(self) -> StateLayout:
@@ -130,16 +132,16 @@ class WorldEnv(BatchEnv):
         Observations are (rows, F), rewards (rows,) and terms (rows, K), the others as of a batch.
         """
         if self._results is None:
-            results = self.batch._new_results()
-            observations, rewards, terms, *others = results
-            self._results = results, Results(observations[0], rewards[0], terms[0], *others)
+            new = self.batch._new_results()
+            first = new.observations[0], new.rewards[0], new.terms[0]
+            self._results = new, Results(*first, new.scores, new.terminated, new.truncated)
         results, own = self._results
         self.batch._advance(actions, results)
         if self.render_mode == "human":
             self._draw(0)
         return own
 
-    def _info(self, score: float, terms: Sequence[Any] | None = None) -> dict[str, Any]:
+    def _info(self, score: float, terms: Any = None) -> dict[str, Any]:
         """Return an info, with every metric at the end of the episode."""
         if not self.batch._over:
             return self._infos.build(score, terms)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from posse.scenarios import Scenario
@@ -34,9 +34,7 @@ class Infos:
         names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
         self._template = dict.fromkeys(names, zero)
 
-    def build(
-        self, score: Any, terms: Sequence[Any] | None = None, metrics: Mapping[str, Any] | None = None
-    ) -> dict[str, Any]:
+    def build(self, score: Any, terms: Any = None, metrics: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Return an info; ``terms`` (K, ...) in the order of the names, ``metrics`` by name where the episode ends."""
         info = self._template.copy()
         info["score"] = score
