@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
+from gymnasium.vector.utils import batch_space
 
 from posse.engine.arguments import as_float32, real_numbers
 from posse.numeric import FloatArray
@@ -63,17 +64,13 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
 
 def spaces_of(
     scenario: Scenario, rows: Rows, discrete: bool, silent: bool = False
-) -> tuple[spaces.Box, spaces.Space[Any]]:
+) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
     """Return the spaces of an agent that moves some rows; ``silent``: without the message."""
-    low, high = ObservationLayout(scenario).bounds()
-    single = single_action_space(scenario.replace(message_size=0) if silent else scenario, discrete)
+    observation = box(*ObservationLayout(scenario).bounds())
+    action = single_action_space(scenario.replace(message_size=0) if silent else scenario, discrete)
     if isinstance(rows, int):
-        return box(low, high), single
-    n = scenario.num_trackers
-    team: spaces.Space[Any] = spaces.MultiDiscrete([len(MOTIONS)] * n)
-    if not discrete:
-        team = spaces.Box(-1.0, 1.0, (n, 2 + scenario.message_size), np.float32)
-    return box(np.tile(low, (n, 1)), np.tile(high, (n, 1))), team
+        return observation, action
+    return batch_space(observation, scenario.num_trackers), batch_space(action, scenario.num_trackers)
 
 
 def as_motions(name: str, action: object, shape: tuple[int, ...] | None, discrete: bool) -> FloatArray:

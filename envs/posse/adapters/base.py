@@ -69,6 +69,10 @@ class BatchEnv:
         self._show()
         return observations
 
+    def _of_team(self, motions: FloatArray) -> FloatArray:
+        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
+        return motions.reshape(self.batch.action_shape)
+
     def _show(self) -> None:
         """Draw the first world in the window, in the mode "human"."""
         if self.render_mode == "human":

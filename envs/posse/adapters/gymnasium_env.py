@@ -136,10 +136,6 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         ends = results.terminated.item(), results.truncated.item()
         return results.observations[self._rows].copy(), reward, *ends, info
 
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        """Return the actions of all trackers (1, N, 2 + m), given the agent's."""
-        return motions.reshape(self.batch.action_shape)
-
     def _own_info(self, score: float, terms: FloatArray) -> dict[str, Any]:
         own = terms[self._rows].T
         info = self._info(score, own.copy() if own.ndim == 2 else own.tolist())

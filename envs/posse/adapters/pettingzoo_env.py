@@ -100,15 +100,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         }
         self._reader = _Reader(self.possible_agents, self.batch.action_shape[2], discrete_actions, clip_actions)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self._wrapper_seed = seed
-        self._np_random: np.random.Generator | None = None
-
-    @property
-    def np_random(self) -> np.random.Generator:
-        """Random numbers for wrappers that look for them here; no world draws from it."""
-        if self._np_random is None:
-            self._np_random = np.random.default_rng(self._wrapper_seed)
-        return self._np_random
+        self.np_random = np.random.default_rng(seed)  # for wrappers; no world draws from it
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""
@@ -133,7 +125,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         observations = self._start(seed, options)[0]
         self.agents = self.possible_agents.copy()
         if seed is not None:
-            self._wrapper_seed, self._np_random = int(seed), None
+            self.np_random = np.random.default_rng(seed)
         infos = self._infos_of(self.agents, 0.0, [[0.0] * len(self.batch.term_names)] * len(self.agents))
         return dict(zip(self.agents, observations, strict=True)), infos
 

@@ -98,11 +98,6 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, _Info]:
         """Start episodes as :meth:`posse.Batch.reset` does, and return the observations and infos of all worlds."""
-        if isinstance(seed, (list, tuple)):
-            raise ValueError(
-                "seed must be one number, from which the seeds of all worlds are derived; got a "
-                f"{type(seed).__name__} of {len(seed)}"
-            )
         observations = self._start(seed, options)
         super().reset(seed=None if seed is None else int(seed))
         mask = options_of(options).get("reset_mask")
@@ -137,10 +132,6 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         own = rewards[:, self._rows]
         mean: _Rewards = own.mean(axis=1, dtype=np.float64) if own.ndim == 2 else own.astype(np.float64)
         return self._observed(observations), mean, terminated, truncated, infos
-
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
-        return motions.reshape(self.batch.action_shape)
 
     def _observed(self, observations: FloatArray) -> FloatArray:
         return np.ascontiguousarray(observations[:, self._rows])
@@ -181,8 +172,6 @@ class SoloVectorEnv(TeamVectorEnv):
 
 def _zeroed(infos: _Info, mask: BoolArray) -> _Info:
     """Return infos with zeros where a mask is false."""
-    if mask.all():
-        return infos
     return {
         name: np.where(mask if values.ndim == 1 else mask[:, None], values, np.zeros((), values.dtype))
         for name, values in infos.items()
