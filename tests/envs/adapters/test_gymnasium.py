@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, RecordVideo
+from gymnasium.wrappers import FlattenObservation
 from tests.support.adapters import SOLO_SCENARIOS, f32, part
 
 import posse
@@ -128,18 +127,3 @@ def test_info_says_who_is_broken() -> None:
     env.reset(seed=0)
     working = [int(info["working"].sum()) for *_, info in play(env, 10)]
     assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
-
-
-def test_episodes_are_counted_and_filmed(tmp_path: Path) -> None:
-    pytest.importorskip("moviepy")
-    inner = gymnasium.make(TEAM, render_mode="rgb_array", horizon=8, settle_time=0.5)
-    env = RecordEpisodeStatistics(
-        RecordVideo(inner, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True)
-    )
-    env.reset(seed=0)
-    steps = play(env, 8)
-    episode = steps[-1][-1]["episode"]
-    assert episode["l"] == 8
-    assert episode["r"] == pytest.approx(sum(step[1] for step in steps), rel=1e-5, abs=1e-5)
-    env.close()
-    assert [path.suffix for path in (tmp_path / "films").iterdir()] == [".mp4"]
