@@ -84,10 +84,6 @@ class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
         self._join(number, teammates, silent)
         super().__init__(scenario, **settings)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        super().__setstate__(state)
-        self._prepare()
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
@@ -97,14 +93,13 @@ class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
         self._memory = begin(self.teammates, self.batch)
         return result
 
-    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
-        """Advance the world by one control step; see :class:`posse.adapters.gymnasium_env.TeamEnv`."""
-        result = super().step(action)
-        self._team = self._observations[None].copy()
-        return result
+    def _advance(self, actions: FloatArray) -> Any:
+        results = super()._advance(actions)
+        self._team = results.observations[None].copy()
+        return results
 
-    def _of_team(self, own: FloatArray) -> FloatArray:
-        return self._with_teammates(own[:, 0])
+    def _of_team(self, motions: FloatArray) -> FloatArray:
+        return self._with_teammates(motions[None])
 
 
 class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
@@ -146,7 +141,7 @@ class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
             self._memory = self.teammates.restart(self._memory, begins)
         return result
 
-    def _of_teams(self, motions: FloatArray) -> npt.NDArray[Any]:
+    def _of_team(self, motions: FloatArray) -> FloatArray:
         return self._with_teammates(motions)
 
     def _observed(self, observations: FloatArray) -> FloatArray:

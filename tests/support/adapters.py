@@ -13,17 +13,6 @@ import posse
 SOLO_SCENARIOS = tuple(name for name in posse.scenario_names() if posse.get_scenario(name).breaks == 0)
 """Scenarios possible with a single tracker: without breaks."""
 
-# Short, with every feature of an episode.
-EVERYTHING: dict[str, Any] = {
-    "scenario": "field",
-    "horizon": 12,
-    "settle_time": 0.5,
-    "break_window": (0.2, 0.6),
-    "sensor_outages": 1.0,
-    "radio_outages": 1.0,
-    "outage_time": 0.4,
-}
-
 
 def part(info: Any, prefix: str) -> dict[str, Any]:
     """Return the entries of an info whose names begin with a prefix, under the rest of their names."""

@@ -118,10 +118,11 @@ class Subject:
     def held(self) -> list[Any]:
         """Return copies of the environment's whole state, for comparison by :func:`same`."""
         batch, env = self.batch, self.env
-        kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}, [batch.seed, batch._started]]
+        kept: list[Any] = [{name: array.copy() for name, array in batch.state.items()}]
+        kept.append([batch.seed, batch._started, batch._over])
         if self.kind in ("parallel", "team", "solo"):
             world = env.unwrapped
-            kept.append([world._running, world._started, world._seeded])
+            kept.append(world._seeded)
         if self.kind in ("team vector", "solo vector"):
             kept.append([env._seeded, repr(env.np_random.bit_generator.state)])
         if self.kind in ("team", "solo"):

@@ -7,8 +7,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from posse.adapters.actions import ActionReader, Rows, agent_names, spaces_of
-from posse.adapters.world import WorldEnv
+from posse.adapters.actions import Rows, as_motions, spaces_of
+from posse.adapters.base import WorldEnv
+from posse.engine.arguments import in_box
 from posse.engine.opponent import TargetPolicy
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError, get_scenario
@@ -100,6 +101,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
     ) -> None:
         self._open(
             self._fit(scenario, overrides),
+            clip_actions=clip_actions,
             render_mode=render_mode,
             seed=seed,
             split=split,
@@ -107,8 +109,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
             target_policy=target_policy,
         )
         self.observation_space, self.action_space = spaces_of(self.scenario, self._rows, discrete_actions, self._silent)
-        moved = np.atleast_1d(agent_names(self.scenario)[: self.scenario.num_trackers][self._rows])
-        self._reader = ActionReader(moved.tolist(), self.action_space, clip_actions)
+        self._discrete = discrete_actions
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -116,8 +117,8 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         observations = self._start(seed, options)
         gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
-        self._terms[...] = 0
-        return observations[self._rows].copy(), self._own_info()
+        rows, terms = observations.shape[1], len(self.batch.term_names)
+        return observations[0, self._rows], self._own_info(0.0, np.zeros((rows, terms), np.float32))
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -126,25 +127,22 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An action out of its space; nothing is changed.
         """
-        self._check_running()
-        self._reader.of_all(action)
-        terminated, truncated = self._advance(self._of_team(self._reader.read))
-        rewards = self._rewards[self._rows].tolist()
+        self.batch.check_running()
+        motions = as_motions("action", action, self.action_space.shape, self._discrete)
+        results = self._advance(in_box(self._of_team(motions), self.batch.clip_actions))
+        rewards = results.rewards[self._rows].tolist()
         reward = sum(rewards) / len(rewards) if isinstance(rewards, list) else rewards
-        return self._observations[self._rows].copy(), reward, terminated, truncated, self._own_info()
+        info = self._own_info(results.scores.item(), results.terms)
+        ends = results.terminated.item(), results.truncated.item()
+        return results.observations[self._rows].copy(), reward, *ends, info
 
-    def _of_team(self, own: FloatArray) -> FloatArray:
-        """Return the actions of all trackers (1, N, 2 + m), given the agent's."""
-        return own
-
-    def _own_info(self) -> dict[str, Any]:
-        terms = self._terms[self._rows].T
-        working: Any = None
+    def _own_info(self, score: float, terms: FloatArray) -> dict[str, Any]:
+        own = terms[self._rows].T
+        info = self._info(score, own.copy() if own.ndim == 2 else own.tolist())
         if self._breakable:
             working = self.batch.working[0, self._rows]
-            working = working if working.ndim else bool(working)
-        told = terms.copy() if terms.ndim == 2 else terms.tolist()
-        return self._infos.build(self._score(), told, working, self._last_metrics())
+            info["working"] = working if working.ndim else bool(working)
+        return info
 
 
 class SoloEnv(TeamEnv):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import reprlib
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -11,9 +12,9 @@ from gymnasium import spaces
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from posse.adapters.actions import ActionReader, agent_names, box, single_action_space
-from posse.adapters.world import WorldEnv, with_horizon
-from posse.engine.arguments import options_of
+from posse.adapters.actions import agent_names, as_motions, box, single_action_space
+from posse.adapters.base import WorldEnv
+from posse.engine.arguments import in_box, options_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, get_scenario
 
@@ -82,8 +83,10 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         first_world: int = 0,
         **overrides: Any,
     ) -> None:
+        length = {} if max_cycles is None else {"horizon": max_cycles}
         self._open(
-            get_scenario(scenario, target=target, **with_horizon(overrides, max_cycles=max_cycles)),
+            get_scenario(scenario, target=target, **overrides, **length),
+            clip_actions=clip_actions,
             render_mode=render_mode,
             seed=seed,
             split=split,
@@ -95,18 +98,9 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.action_spaces = {
             agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
         }
-        single = self.action_spaces[self.possible_agents[0]]
-        self._reader = ActionReader(self.possible_agents, single, clip_actions)
+        self._reader = _Reader(self.possible_agents, self.batch.action_shape[2], discrete_actions, clip_actions)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self._wrapper_seed = seed
-        self._np_random: np.random.Generator | None = None
-
-    @property
-    def np_random(self) -> np.random.Generator:
-        """Random numbers for wrappers that look for them here; no world draws from it."""
-        if self._np_random is None:
-            self._np_random = np.random.default_rng(self._wrapper_seed)
-        return self._np_random
+        self.np_random = np.random.default_rng(seed)  # for wrappers; no world draws from it
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""
@@ -128,12 +122,12 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         if options is not None:
             # PettingZoo's own tests send {"options": 1}, to see that options are taken.
             options = {key: value for key, value in options_of(options).items() if key != "options"}
-        observations = self._start(seed, options)
+        observations = self._start(seed, options)[0]
         self.agents = self.possible_agents.copy()
         if seed is not None:
-            self._wrapper_seed, self._np_random = int(seed), None
-        self._terms[...] = 0
-        return dict(zip(self.agents, observations, strict=True)), self._infos_of(self.agents)
+            self.np_random = np.random.default_rng(seed)
+        infos = self._infos_of(self.agents, 0.0, [[0.0] * len(self.batch.term_names)] * len(self.agents))
+        return dict(zip(self.agents, observations, strict=True)), infos
 
     def step(
         self, actions: Mapping[str, Any]
@@ -145,29 +139,75 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
             ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
         agents = self.agents
-        self._check_running()
-        self._reader.by_agent(actions)
-        terminated, truncated = self._advance(self._reader.read)
+        self.batch.check_running()
+        results = self._advance(self._reader.read(actions))
         terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
-        if terminated or truncated:
-            (terminations if terminated else truncations).update(dict.fromkeys(agents, True))
+        if self.batch._over:
+            (terminations if results.terminated[0] else truncations).update(dict.fromkeys(agents, True))
             self.agents = []
         # No strict=True below: equal lengths, in the hot path.
         return (
-            dict(zip(agents, self._observations.copy())),  # noqa: B905
-            dict(zip(agents, self._rewards.tolist())),  # noqa: B905
+            dict(zip(agents, results.observations.copy())),  # noqa: B905
+            dict(zip(agents, results.rewards.tolist())),  # noqa: B905
             terminations,
             truncations,
-            self._infos_of(agents),
+            self._infos_of(agents, results.scores.item(), results.terms.tolist()),
         )
 
-    def _infos_of(self, agents: list[str]) -> _Infos:
-        terms = self._terms.tolist()
-        working = [None] * len(agents)
+    def _infos_of(self, agents: list[str], score: float, terms: list[list[float]]) -> _Infos:
+        """Return the infos, which differ in the agents' own reward terms (rows, K) only."""
+        common, rewards, infos = self._info(score), self._infos.rewards, {}
+        for agent, own in zip(agents, terms):  # noqa: B905
+            infos[agent] = info = common.copy()
+            for key, k in rewards:
+                info[key] = own[k]
         if self._breakable:
-            working = [*self.batch.working[0].tolist(), True][: len(agents)]  # a target never breaks
-        score, metrics, build = self._score(), self._last_metrics(), self._infos.build
-        return {a: build(score, t, works, metrics) for a, t, works in zip(agents, terms, working)}  # noqa: B905
+            for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
+                infos[agent]["working"] = works  # a target never breaks
+        return infos
+
+
+class _Reader:
+    """Reads the actions of a dictionary by agent into an array for the kernel, always the same."""
+
+    def __init__(self, agents: list[str], length: int, discrete: bool, clip: bool) -> None:
+        self._arguments = agents, length, discrete, clip
+        self._array = np.zeros((1, len(agents), length), np.float32)
+        self._rows = [(agent, memoryview(row)) for agent, row in zip(agents, self._array[0], strict=True)]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Reader, self._arguments  # so that the rows are views of the new array
+
+    def read(self, actions: Mapping[str, Any]) -> FloatArray:
+        """Return the actions, (1, rows, 2 + m); ValueError if one is missing, unknown or out of its space."""
+        agents, _, discrete, clip = self._arguments
+        # Assignment to a memoryview checks type and shape faster than explicit tests.
+        try:
+            if discrete or type(actions) is not dict or len(actions) != len(agents):
+                raise TypeError
+            for agent, row in self._rows:
+                row[:] = actions[agent]
+        except (KeyError, TypeError, ValueError, BufferError):
+            self._read_any(actions)
+        return in_box(self._array, clip, self._place)
+
+    def _read_any(self, actions: Mapping[str, Any]) -> None:
+        """Read actions of any type, and report which one is invalid."""
+        agents, length, discrete, _ = self._arguments
+        if not isinstance(actions, Mapping):
+            raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
+        known = f"agents are: {', '.join(agents)}"
+        for agent in actions:
+            if agent not in agents:
+                raise ValueError(f"action for unknown agent {reprlib.repr(agent)}; {known}")
+        for agent, row in zip(agents, self._array[0], strict=True):
+            if agent not in actions:
+                raise ValueError(f"no action for {agent}: every agent needs one; {known}")
+            row[...] = as_motions(f"action of {agent}", actions[agent], () if discrete else (length,), discrete)
+
+    def _place(self, _: int, row: int, k: int) -> str:
+        parts = ("speed", "turn rate")
+        return f"action of {self._arguments[0][row]}: {parts[k] if k < 2 else f'message[{k - 2}]'}"
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:

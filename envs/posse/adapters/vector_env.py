@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,20 +11,18 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import Rows, as_motions, spaces_of
+from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
-from posse.adapters.world import RENDER_MODES, check_render_mode, new_renderer, with_horizon
 from posse.engine.arguments import options_of
-from posse.engine.infos import Infos
-from posse.engine.opponent import TargetPolicy, batch_with
+from posse.engine.opponent import TargetPolicy
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
-from posse.signals.layout import ObservationLayout
 
 _Info = dict[str, Any]
 _Rewards = npt.NDArray[np.float64]
 
 
-class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
+class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     """``posse/Team-v0`` as a vector environment: E worlds, one agent controls the team in each.
 
     As :class:`posse.adapters.gymnasium_env.TeamEnv`, with a leading axis E.
@@ -52,8 +49,7 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(RENDER_MODES),
-        "render_fps": 10,
+        **BatchEnv.metadata,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
     _rows: Rows = slice(None)
@@ -77,53 +73,33 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         target_policy: TargetPolicy | None = None,
         **overrides: Any,
     ) -> None:
-        check_render_mode(render_mode)
-        self.batch = batch_with(
-            self._fit(scenario, with_horizon(overrides, max_episode_steps=max_episode_steps)),
+        length = {} if max_episode_steps is None else {"horizon": max_episode_steps}
+        self._open(
+            self._fit(scenario, {**overrides, **length}),
             num_envs,
-            target_policy,
-            seed=0 if seed is None else seed,
+            clip_actions=clip_actions,
+            render_mode=render_mode,
+            seed=seed,
             split=split,
             first_world=first_world,
+            target_policy=target_policy,
             autoreset=autoreset.name.lower() if isinstance(autoreset, AutoresetMode) else autoreset,
             num_threads=num_threads,
-            clip_actions=clip_actions,
         )
-        self.scenario: Scenario = self.batch.scenario
-        self.layout: ObservationLayout = self.batch.layout
         self.num_envs = self.batch.num_worlds
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
+        self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_observation_space, self.single_action_space = spaces_of(
             self.scenario, self._rows, discrete_actions, self._silent
         )
         self.observation_space: spaces.Space[Any] = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.render_mode = render_mode
-        self.metadata = {  # type: ignore[misc]
-            **type(self).metadata,
-            "render_fps": max(1, round(1 / self.scenario.control_step)),
-            "autoreset_mode": self.autoreset_mode,
-        }
         self._discrete = discrete_actions
-        self._seeded = seed is not None
-        self._renderer: Any = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, _Info]:
         """Start episodes as :meth:`posse.Batch.reset` does, and return the observations and infos of all worlds."""
-        if isinstance(seed, (list, tuple)):
-            raise ValueError(
-                "seed must be one number, from which the seeds of all worlds are derived; got a "
-                f"{type(seed).__name__} of {len(seed)}"
-            )
-        fresh = secrets.randbits(32) if seed is None and not self._seeded else seed
-        observations = self.batch.reset(seed=fresh, options=options)
-        self._seeded = True
+        observations = self._start(seed, options)
         super().reset(seed=None if seed is None else int(seed))
-        if self.render_mode == "human":
-            self.render()
         mask = options_of(options).get("reset_mask")
         mask = np.ones(self.num_envs, np.bool_) if mask is None else np.array(mask)
         return self._observed(observations), _masked(_zeroed(self._at_start(), mask), mask)
@@ -136,9 +112,8 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
             ValueError: Actions out of their space; nothing is changed.
         """
         motions = as_motions("actions", actions, self.action_space.shape, self._discrete)
-        observations, rewards, terminated, truncated, found = self.batch.step(self._of_teams(motions))
-        if self.render_mode == "human":
-            self.render()
+        observations, rewards, terminated, truncated, found = self.batch.step(self._of_team(motions))
+        self._show()
         ended, everywhere = terminated | truncated, np.ones(self.num_envs, np.bool_)
         last = found.pop("final_obs", None)
         infos = self._own(found)
@@ -158,18 +133,15 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         mean: _Rewards = own.mean(axis=1, dtype=np.float64) if own.ndim == 2 else own.astype(np.float64)
         return self._observed(observations), mean, terminated, truncated, infos
 
-    def _of_teams(self, motions: FloatArray) -> npt.NDArray[Any]:
-        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
-        return motions.reshape(self.batch.action_shape)
-
     def _observed(self, observations: FloatArray) -> FloatArray:
         return np.ascontiguousarray(observations[:, self._rows])
 
     def _at_start(self) -> _Info:
         """Return the infos of worlds whose episodes have just started."""
-        zeros, rows = np.zeros(self.num_envs), np.zeros(self.batch.observation_shape[:2], np.float32)
-        working = self.batch.working if self.scenario.breaks > 0 else None
-        infos = Infos(self.scenario, zeros).build(zeros, [rows] * len(self.batch.term_names), working, None)
+        rows = np.zeros(self.batch.observation_shape[:2], np.float32)
+        infos = self.batch._infos.build(np.zeros(self.num_envs), [rows] * len(self.batch.term_names))
+        if self.scenario.breaks > 0:
+            infos["working"] = self.batch.working
         return self._own(infos)
 
     def _own(self, infos: _Info) -> _Info:
@@ -183,20 +155,12 @@ class TeamVectorEnv(VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Draw every world, (H, W, 3) uint8 each; in the mode "human", world 0 in a window."""
-        if self.render_mode is None:
-            return None
-        if self._renderer is None:
-            self._renderer = new_renderer(self.scenario, self.render_mode)
-        if self.render_mode == "human":
-            self._renderer.draw(self.batch)
-            return None
-        return tuple(self._renderer.draw(self.batch, world=e) for e in range(self.num_envs))
+        drawn = tuple(self._draw(e) for e in range(1 if self.render_mode == "human" else self.num_envs))
+        return tuple(frame for frame in drawn if frame is not None) or None
 
-    def close_extras(self, **kwargs: Any) -> None:
-        """Close the window, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+    def close(self, **kwargs: Any) -> None:
+        """Close the window, if there is one; may be called again."""
+        BatchEnv.close(self)
 
 
 class SoloVectorEnv(TeamVectorEnv):
@@ -208,8 +172,6 @@ class SoloVectorEnv(TeamVectorEnv):
 
 def _zeroed(infos: _Info, mask: BoolArray) -> _Info:
     """Return infos with zeros where a mask is false."""
-    if mask.all():
-        return infos
     return {
         name: np.where(mask if values.ndim == 1 else mask[:, None], values, np.zeros((), values.dtype))
         for name, values in infos.items()

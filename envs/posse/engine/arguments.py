@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from posse.engine.kernels import IN_BOX, bad_action
 from posse.numeric import FloatArray
-from posse.scenarios import ScenarioError
+from posse.scenarios import Scenario, ScenarioError
 
 MOST: Final = 2**63
 """Seeds and numbers of worlds are below."""
+_FLOAT32: Final = np.dtype(np.float32)
 
 
 def check_count(name: str, value: object, least: int) -> int:
@@ -52,13 +53,13 @@ def real_numbers(name: str, value: object, kinds: str = "fiu") -> npt.NDArray[An
 
 def as_float32(array: npt.NDArray[Any]) -> FloatArray:
     """Return real numbers as contiguous float32; numbers out of its range become infinite."""
-    if array.dtype == np.float32:
-        return np.asarray(array, np.float32, order="C")
+    if array.dtype == _FLOAT32:
+        return np.ascontiguousarray(array)
     with np.errstate(over="ignore"):
         return array.astype(np.float32, order="C")
 
 
-def in_box(actions: FloatArray, clip: bool, place: Callable[..., str]) -> FloatArray:
+def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions[{}, {}, {}]".format) -> FloatArray:
     """Return actions (E, rows, 2 + m) in [-1, 1]; others raise ValueError, or are clipped if they are finite.
 
     Numbers outside by rounding are always clipped. ``place(e, i, k)`` names an element in the message.
@@ -77,9 +78,19 @@ def in_box(actions: FloatArray, clip: bool, place: Callable[..., str]) -> FloatA
     return actions.clip(-1, 1)
 
 
-def checked_actions(actions: object, shape: tuple[int, ...], clip: bool) -> FloatArray:
-    """Return the actions of a batch, of the given shape, as the kernel takes them, or raise ValueError."""
-    array = real_numbers("actions", actions)
-    if array.shape != shape:
-        raise ValueError(f"actions have shape {array.shape}, wanted {shape}: (worlds, agents, 2 + message_size)")
-    return in_box(as_float32(array), clip, "actions[{}, {}, {}]".format)
+def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) -> dict[str, npt.NDArray[np.float64]]:
+    """Return the start poses among the options of a reset, (E, N, 3) and (E, 3), or raise ValueError."""
+    poses, most = {}, scenario.start_extent
+    for name, shape in (("tracker_pose", (scenario.num_trackers, 3)), ("target_pose", (3,))):
+        if options.get(name) is None:
+            continue
+        array, full = real_numbers(name, options[name]).astype(np.float64), (num_worlds, *shape)
+        if array.shape not in (shape, full, (3,) if scenario.num_trackers == 1 else full):
+            raise ValueError(f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each")
+        if not (np.isfinite(array).all() and np.abs(array[..., :2]).max() <= most):
+            raise ValueError(
+                f"{name}={reprlib.repr(options[name])} must be finite, with x and y of {scenario.name!r} "
+                f"at most {most:g} m from the origin"
+            )
+        poses[name] = np.broadcast_to(array, full)
+    return poses

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import reprlib
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -15,13 +16,20 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from posse.engine.arguments import check_choice, check_count, checked_actions, options_of
-from posse.engine.copies import write_copies
+from posse.engine.arguments import as_float32, check_choice, check_count, in_box, options_of, poses_of, real_numbers
 from posse.engine.infos import Infos
-from posse.engine.kernels import LOOK, START, START_FROM_POSES, STEP, Results, first_over, kernel_of, tables_of
-from posse.engine.recycler import Recycler
-from posse.engine.scratch import SCRATCH
-from posse.engine.start_poses import check_poses, poses_of, write_poses
+from posse.engine.kernels import (
+    LOOK,
+    SCRATCH,
+    START,
+    START_FROM_POSES,
+    STEP,
+    Results,
+    draw_anew,
+    first_bad_start,
+    kernel_of,
+    tables_of,
+)
 from posse.numeric import BoolArray, FloatArray, Records, direct, over_worlds, threads_for
 from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
@@ -33,18 +41,9 @@ from posse.signals.reward import check_terms
 
 AUTORESET_MODES: Final = ("next_step", "same_step", "disabled")
 _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
-_DERIVED: Final = (
-    "_declared",
-    "_tables",
-    "_kernel",
-    "_untyped",
-    "_scratch",
-    "_orders",
-    "_score",
-    "_recyclers",
-    "_infos",
-)
-"""Attributes that are not pickled but prepared again."""
+_RECYCLED_FROM: Final = 1 << 14
+"""Numbers in the observations from which the memory of returned arrays is used again."""
+_FLOAT32: Final = np.dtype(np.float32)
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -121,28 +120,28 @@ class Batch:
                 f"num_worlds={num_worlds} of {each} bytes each are more than there is memory for: lower it"
             ) from None
         self._started = False
-        self._restarts = True  # whether the next step may start episodes
+        self._over = 0  # episodes that are over
         self._prepare()
 
     def _prepare(self) -> None:
         """Set the attributes that are not pickled."""
-        worlds, rows, size = self.observation_shape
+        kept = set(self.__dict__)
         self._declared = declarations_for(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
         self._tables = tables_of(self.scenario)
-        self._untyped: Callable[..., int] = kernel_of(self._declared)
-        self._kernel: Callable[..., int] = direct(self._untyped)
-        self._orders = np.full(worlds, STEP, np.uint8)
-        self._scratch = [new_scratch(SCRATCH) for _ in range(threads_for(worlds, rows, self.num_threads))]
-        self._score: FloatArray = self._arrays.world["score"]  # a view, created only once
-        shapes = (worlds, rows, size), (worlds, rows), (worlds, rows, len(self.term_names))
-        self._recyclers = tuple(Recycler(shape) for shape in shapes)
-        zeros = np.zeros(worlds)
+        self._dispatcher: Callable[..., int] = kernel_of(self._declared)
+        self._kernel: Callable[..., int] = direct(self._dispatcher)
+        self._orders = np.full(self.num_worlds, STEP, np.uint8)
+        threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
+        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
+        self._returned: tuple[list[FloatArray], ...] = ([], [], [])
+        zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
         self._infos = Infos(self.scenario, zeros)
+        self._not_pickled = {"_not_pickled", *self.__dict__} - kept
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
+        state = {name: value for name, value in self.__dict__.items() if name not in self._not_pickled}
         return {**state, "fingerprints": self._declared.fingerprints()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -175,14 +174,9 @@ class Batch:
         return self._arrays
 
     @property
-    def bytes_per_world(self) -> int:
-        """Size of the state of one world, bytes."""
-        return self._arrays.bytes_per_world
-
-    @property
     def score(self) -> FloatArray:
         """(E,) the score of the current step; 0 at the start."""
-        return self._score.copy()
+        return np.array(self._arrays.world["score"])
 
     @property
     def terminated(self) -> BoolArray:
@@ -209,7 +203,7 @@ class Batch:
         Raises:
             ResetNeeded: Before the first :meth:`reset`.
         """
-        self._check_started("save")
+        self.check_started("save")
         return Snapshot(self.scenario, self._arrays.copy(), self._declared.fingerprints())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
@@ -225,7 +219,7 @@ class Batch:
         self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
         self._declared.check_fingerprints(snapshot.fingerprints)
         self._arrays.write(snapshot.arrays)
-        self._started = self._restarts = True
+        self._started = True
         return self.observe()
 
     def observe(self) -> FloatArray:
@@ -234,7 +228,7 @@ class Batch:
         Raises:
             ResetNeeded: Before the first :meth:`reset`.
         """
-        self._check_started("observe")
+        self.check_started("observe")
         return self._start(np.zeros(self.num_worlds, np.bool_), LOOK)
 
     def copies(self, count: int, *, seed: int = 0, alike: bool = False, into: Batch | None = None) -> Batch:
@@ -258,7 +252,7 @@ class Batch:
             ValueError: ``into`` is this batch, or one of another scenario or number of worlds.
         """
         count, seed = check_count("count", count, 1), check_count("seed", seed, 0)
-        self._check_started("copies")
+        self.check_started("copies")
         if into is None:
             into = Batch(
                 self.scenario, self.num_worlds * count, seed=self.seed, split=self.split, num_threads=self.num_threads
@@ -267,8 +261,12 @@ class Batch:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
         into._declared.check_fingerprints(self._declared.fingerprints())
-        write_copies(self._tables.config, self.arrays, into.arrays, count, seed, alike)
-        into._started = True
+        for mine, theirs in zip(self._arrays, into._arrays, strict=True):
+            if mine.size:  # as plain bytes, which are copied fastest
+                by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
+                theirs.view(np.uint8).reshape(self.num_worlds, count, -1)[...] = by_world
+        draw_anew(self._tables.config, into.worlds, into.arrays.tracker, count, seed, alike)
+        into._started, into._over = True, count * self._over
         return into
 
     def _check_fit(self, what: str, worlds: int, scenario: Scenario, wanted: int) -> None:
@@ -303,7 +301,7 @@ class Batch:
         new_seed = self.seed if seed is None else check_count("seed", seed, 0)
         chosen = self._chosen(given.get("reset_mask"))
         poses = poses_of(given, self.scenario, self.num_worlds)
-        before, world = self._arrays.copy(), self._arrays.world
+        before, over, world = self._arrays.copy(), self._over, self._arrays.world
         if seed is not None or not self._started:
             world["seed"][chosen] = new_seed
             world["split"] = SPLITS.index(self.split)
@@ -314,13 +312,12 @@ class Batch:
         try:
             observations = self._start(chosen, START)
             check_drawn(self.scenario, world, chosen, poses)
-            for name, pose in poses.items():
-                write_poses(self._arrays.tracker if name == "tracker_pose" else world, pose, chosen)
             if poses:
-                check_poses(self._tables.config, self._arrays, chosen, "target_pose" in poses)
+                self._place(poses, chosen)
                 observations = self._start(chosen, START_FROM_POSES)
         except BaseException:
             self._arrays.write(before)
+            self._over = over
             raise
         self.seed, self._started = new_seed, True
         return observations
@@ -339,13 +336,34 @@ class Batch:
             raise ResetNeeded("the first reset starts every world: call it without reset_mask")
         return chosen
 
+    def _place(self, poses: Mapping[str, npt.NDArray[np.float64]], chosen: BoolArray) -> None:
+        """Set poses in the chosen worlds, and check them by the rules of a drawn start."""
+        arrays = self._arrays
+        for name, pose in poses.items():
+            records = arrays.tracker if name == "tracker_pose" else arrays.world
+            x, y, heading = np.moveaxis(pose[chosen], -1, 0)
+            records["x"][chosen], records["y"][chosen] = x, y
+            records["heading_cos"][chosen], records["heading_sin"][chosen] = np.cos(heading), np.sin(heading)
+        config, n = self._tables.config, self.scenario.num_trackers
+        e, i = divmod(first_bad_start(config, arrays.world, arrays.tracker, arrays.obstacle, chosen), n + 2)
+        if e < 0:
+            return
+        if i <= n:
+            robot = f"tracker_{i}" if i < n else "the target"
+            raise ValueError(f"{robot} of world {e} would start in a wall, an obstacle or another robot: move it")
+        at = ", ".join(f"{value:.4g}" for value in poses["target_pose"][e])
+        radius = config["target_speed"][0] / config["target_turn_rate"][0] + config["safe_distance"][0]
+        raise ValueError(
+            f"target_pose ({at}) leaves the target no room to turn: a disc of {radius:.3g} m about the centre of its "
+            "left or right turning circle must be clear of obstacles and walls: move it or turn it"
+        )
+
     def _start(self, chosen: BoolArray, order: int) -> FloatArray:
-        """Start an episode in the chosen worlds; return every world's observations."""
+        """Execute an order in the chosen worlds; return every world's observations."""
         results = self._new_results()
-        orders = np.where(chosen, order, LOOK).astype(np.uint8)
-        actions = np.empty((self.num_worlds, *self.action_shape[1:]), np.float32)  # not read
-        self._run(orders, actions, results)
-        self._kernel = direct(self._untyped)  # now compiled
+        actions = np.zeros(self.action_shape, np.float32)  # not read
+        self._advance(actions, results, np.where(chosen, order, LOOK).astype(np.uint8))
+        self._kernel = direct(self._dispatcher)  # now compiled
         if not self._started:
             self.layout.check_added(results.observations)
         return results.observations
@@ -373,77 +391,100 @@ class Batch:
                 changed.
         """
         self.check_running()
-        return self._step(self.check_actions(actions))
-
-    def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
-        """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
-        return checked_actions(actions, self.action_shape, self.clip_actions)
-
-    def _step(self, actions: FloatArray) -> Step:
-        """Advance every world by valid actions."""
-        results = self._new_results()
-        over = self._advance(actions, results)
-        if self._restarts:
-            self._check_started_worlds(self._arrays.world["step"] == 0)
-        self._restarts = over > 0 and self.autoreset == "next_step"
-        observations, rewards, terms, (terminated, truncated) = results
-        working = self.working if self.scenario.breaks > 0 else None
+        actions, results = self.check_actions(actions), self._new_results()
+        begun = self._over > 0 and self.autoreset == "next_step"
+        over = self._advance(actions, results) > 0
+        observations, rewards, terms, scores, terminated, truncated = results
         metrics = None
         if over:
             ended = terminated | truncated
             metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        infos = self._infos.build(self._score.copy(), terms.transpose(2, 0, 1), working, metrics)
+        infos = self._infos.build(scores, terms.transpose(2, 0, 1), metrics)
+        if self.scenario.breaks > 0:
+            infos["working"] = self.working
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
                 self._arrays.world["episode"][ended] += 1
-                observations = self._start(ended, START)
-                self._check_started_worlds(ended)
+                observations, begun = self._start(ended, START), True
+        if begun:
+            try:
+                check_drawn(self.scenario, self._arrays.world, self._arrays.world["step"] == 0)
+            except ScenarioError:
+                self._started = False  # only a reset helps
+                raise
         return observations, rewards, terminated, truncated, infos
 
-    def _advance(self, actions: FloatArray, results: Results) -> int:
-        """Advance every world by valid actions; return how many episodes are over, none of which starts anew."""
-        over = self._run(self._orders, actions, results)
+    def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
+        """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
+        array = real_numbers("actions", actions)
+        if array.shape != self.action_shape:
+            raise ValueError(
+                f"actions have shape {array.shape}, wanted {self.action_shape}: (worlds, agents, 2 + message_size)"
+            )
+        return in_box(as_float32(array), self.clip_actions)
+
+    def _advance(self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8] | None = None) -> int:
+        """Advance every world by valid actions, or execute its order; return how many episodes are over.
+
+        Several threads share the worlds. Episodes that end are not started anew.
+        """
+        if orders is None:
+            orders = self._orders
+        if len(self._scratch) == 1:
+            self._over = self._work(actions, results, orders, 0, 0, self.num_worlds)
+        else:
+            arguments, threads = (actions, results, orders), len(self._scratch)
+            self._over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, threads))
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
-        return over
+        return self._over
 
-    def _run(self, orders: npt.NDArray[np.uint8], actions: FloatArray, results: Results) -> int:
-        """Execute the order of each world in several threads; return how many episodes are over."""
-        kernel, scratch = self._kernel, self._scratch
-        if len(scratch) == 1:
-            return kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self.num_worlds)
-        arguments = (self._tables, self._arrays, actions, results, orders)
-
-        def work(thread: int, first: int, end: int) -> int:
-            return kernel(*arguments, scratch[thread], first, end)
-
-        return sum(over_worlds(work, (), self.num_worlds, self.scenario.num_agents, len(scratch)))
+    def _work(
+        self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8], thread: int, first: int, end: int
+    ) -> int:
+        """Execute the orders of worlds ``first`` to ``end``; return how many of their episodes are over."""
+        return self._kernel(self._tables, self._arrays, actions, results, orders, self._scratch[thread], first, end)
 
     def _new_results(self) -> Results:
-        """Return output arrays for a pass over the worlds."""
-        observations, rewards, terms = (recycler.take() for recycler in self._recyclers)
-        return Results(observations, rewards, terms, np.empty((2, self.num_worlds), np.bool_))
+        """Return output arrays for a pass over the worlds, uninitialised."""
+        worlds, rows, size = whole = self.observation_shape
+        each, terms = (worlds, rows), (worlds, rows, len(self.term_names))
+        if worlds * rows * size < _RECYCLED_FROM:
+            arrays = np.empty(whole, _FLOAT32), np.empty(each, _FLOAT32), np.empty(terms, _FLOAT32)
+        else:
+            returned = self._returned
+            arrays = _reused(returned[0], whole), _reused(returned[1], each), _reused(returned[2], terms)
+        return Results(*arrays, np.empty(worlds, _FLOAT32), np.empty(worlds, np.bool_), np.empty(worlds, np.bool_))
 
-    def _check_started_worlds(self, started: BoolArray) -> None:
-        """Raise ScenarioError if the start of a world could not be drawn; then only a reset helps."""
-        try:
-            check_drawn(self.scenario, self._arrays.world, started)
-        except ScenarioError:
-            self._started = False
-            raise
-
-    def _check_started(self, what: str) -> None:
+    def check_started(self, what: str) -> None:
+        """Raise ResetNeeded before the first :meth:`reset`."""
         if not self._started:
             raise ResetNeeded(f"{what} before reset: call reset() first")
 
     def check_running(self) -> None:
         """Raise ResetNeeded if a step is not possible now."""
-        self._check_started("step")
-        if self.autoreset == "disabled" and first_over(self._arrays.world) >= 0:
+        if not self._started:
+            self.check_started("step")
+        if self._over and self.autoreset == "disabled":
             over = np.flatnonzero(self._arrays.world["over"])
+            more = f" and {len(over) - 1} more" if len(over) > 1 else ""
             raise ResetNeeded(
-                f"step after the end of world {over[0]}"
-                + (f" and {len(over) - 1} more" if len(over) > 1 else "")
-                + ': call reset(options={"reset_mask": mask}) first'
+                f"step after the end of the episode of world {over[0]}{more}: call reset() first, "
+                'or reset(options={"reset_mask": mask}) for these worlds alone'
             )
+
+
+def _reused(returned: list[FloatArray], shape: tuple[int, ...]) -> FloatArray:
+    """Return an array of a shape to which there is no other reference, one returned before or a new one.
+
+    A view or a tensor refers to the array that owns its memory, so what a caller keeps is never overwritten.
+    Allocating large arrays in every step would take as long as the step, since the system maps memory page by page.
+    """
+    for k in range(len(returned)):
+        if sys.getrefcount(returned[k]) == 2:  # of the list, and of the call's argument
+            return returned[k]
+    array = np.empty(shape, np.float32)
+    if len(returned) < 4:
+        returned.append(array)
+    return array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from posse.scenarios import Scenario
@@ -22,26 +22,25 @@ class Infos:
     Args:
         scenario: Names the terms and metrics.
         zero: A metric before the end of the episode.
+
+    Attributes:
+        rewards: Keys of the reward terms, each with its number.
     """
 
     def __init__(self, scenario: Scenario, zero: Any) -> None:
-        parts = declarations_for(scenario)
-        self._rewards = tuple(f"reward/{name}" for name in parts.term_names)
-        self._template = {
-            "score": zero,
-            **dict.fromkeys(self._rewards, zero),
-            **{f"metrics/{metric.name}": zero for metric in parts.metrics},
-        }
+        declared = declarations_for(scenario)
+        rewards = [f"reward/{name}" for name in declared.term_names]
+        self.rewards = tuple(zip(rewards, range(len(rewards)), strict=True))
+        names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
+        self._template = dict.fromkeys(names, zero)
 
-    def build(
-        self, score: Any, terms: Iterable[Any], working: Any, metrics: Mapping[str, Any] | None
-    ) -> dict[str, Any]:
-        """Return an info; ``terms`` in the order of the names, ``metrics`` by name where the episode ends."""
+    def build(self, score: Any, terms: Any = None, metrics: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Return an info; ``terms`` (K, ...) in the order of the names, ``metrics`` by name where the episode ends."""
         info = self._template.copy()
         info["score"] = score
-        info.update(zip(self._rewards, terms))  # noqa: B905 (of equal length; in the hot path)
+        if terms is not None:
+            for key, k in self.rewards:  # faster than dict.update(zip(...)), which creates tuples
+                info[key] = terms[k]
         if metrics is not None:
             info.update((f"metrics/{name}", value) for name, value in metrics.items())
-        if working is not None:
-            info["working"] = working
         return info

@@ -11,45 +11,32 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.engine.scratch import SCRATCH
-from posse.numeric import (
-    ONE,
-    WIDTH,
-    ZERO,
-    BoolArray,
-    FloatArray,
-    Lanes,
-    Record,
-    Records,
-    choose,
-    compiled,
-    eight,
-    fetch,
-    kernel,
-    least,
-    lesser,
-    load,
-    stamp,
-)
+from posse.numeric import ONE, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel, stamp
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
-from posse.rules.faults import apply_faults
+from posse.rules.faults import apply_faults, draw_coming_faults
 from posse.rules.motion import drift, motion
+from posse.rules.randomness import mix
 from posse.rules.score import occupy, settle
+from posse.rules.scratch import RULES, scratch_record
 from posse.rules.senses.radio import hear, send, share_fixes
 from posse.rules.senses.sensing import look
-from posse.rules.start import draw_start, rest
+from posse.rules.start import draw_start, is_clear, rest, target_can_turn
 from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, Generated, generated_for
 from posse.signals.reward import weights_for
 from posse.signals.rows import TOGETHER, observe_sonar, observe_together
 from posse.signals.user_functions import check_functions
+from posse.signals.views import OBSERVING
+
+SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
+"""Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
 
 
 class Tables(NamedTuple):
@@ -76,8 +63,12 @@ class Results(NamedTuple):
     """(E, rows)."""
     terms: FloatArray
     """(E, rows, K)."""
-    flags: BoolArray
-    """(2, E): terminated, truncated."""
+    scores: FloatArray
+    """(E,)."""
+    terminated: BoolArray
+    """(E,)."""
+    truncated: BoolArray
+    """(E,)."""
 
 
 @compiled
@@ -152,22 +143,10 @@ def end_step(c: Record, w: Record, trackers: Records, slots: Records, made: Gene
     w.over = w.terminated != 0 or w.step >= c.horizon
 
 
-@compiled
-def fetch_all(array: npt.NDArray[Any]) -> None:
-    """Prefetch an array that is written soon."""
-    for offset in range(0, array.size * array.itemsize, LINE):
-        fetch(array, offset)
-
-
 STEP: Final = 0
 START: Final = 1
 START_FROM_POSES: Final = 2
 LOOK: Final = 3
-
-LINE: Final = 64
-"""Bytes of a cache line."""
-FETCHED: Final = 16
-"""Greatest team size whose prefetched data fit in the first-level cache."""
 
 
 @compiled
@@ -197,10 +176,7 @@ def advance_worlds(
     c, over = tables.config[0], 0
     for e in range(first, first + count):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
-        observations, flags = results.observations[e], results.flags
-        rewards, terms = results.rewards[e], results.terms[e]
-        if count > 1 and trackers.shape[0] <= FETCHED:
-            fetch_all(observations)  # written below, after the loop
+        observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
@@ -225,8 +201,9 @@ def advance_worlds(
                 w.held, w.score = 0, ZERO
             rewards[:] = ZERO
             terms[:, :] = ZERO
-        flags[0, e] = w.terminated != 0
-        flags[1, e] = w.over != 0 and w.terminated == 0
+        results.scores[e] = w.score
+        results.terminated[e] = w.terminated != 0
+        results.truncated[e] = w.over != 0 and w.terminated == 0
         over += w.over != 0
         observe_sonar(c, w, trackers, scratch, observations, made.width)
     observe_together(c, worlds, first, count, made, scratch, results.observations)
@@ -285,12 +262,39 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
     return advance
 
 
+_COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes
+_SEED: Final = np.uint64(1)
+_POSITIVE: Final = np.uint64(2**63 - 1)
+
+
 @kernel
-def first_over(world: Records) -> int:
-    """Return the first world whose episode is over, or -1."""
+def draw_anew(config: Records, world: Records, tracker: Records, count: int, seed: int, alike: bool) -> None:
+    """Give copies, ``count`` consecutive ones per world, new keys, and redraw their faults."""
+    c = config[0]
+    for i in range(len(world)):
+        w = world[i]
+        number = np.uint64(0) if alike else np.uint64(i % count + 1)
+        key = mix(mix(mix(w.key, _COPIES), np.uint64(seed)), np.uint64(w.step))
+        w.key = mix(key, number)
+        w.seed = mix(w.key, _SEED) & _POSITIVE
+        draw_coming_faults(c, w, tracker[i], w.step + 1, w.step)
+
+
+@kernel
+def first_bad_start(config: Records, world: Records, tracker: Records, obstacle: Records, chosen: BoolArray) -> int:
+    """Return ``e * (N + 2) + i`` of the first chosen world e whose robot i starts in another, an obstacle or a wall.
+
+    -1: none. The target is robot N; i = N + 1 if a scripted target has no room to turn.
+    """
+    c, n, zero = config[0], tracker.shape[1], np.float32(0)
     for e in range(len(world)):
-        if world[e].over != 0:
-            return e
+        w, trackers, obstacles = world[e], tracker[e], obstacle[e]
+        for i in range(n + 1 if chosen[e] else 0):
+            x, y = (trackers[i].x, trackers[i].y) if i < n else (w.x, w.y)
+            if not is_clear(c, trackers, i, obstacles, x, y, zero):
+                return int(e * (n + 2) + i)
+        if chosen[e] and c.target_speed > 0 and not target_can_turn(c, w, obstacles):
+            return int(e * (n + 2) + n + 1)
     return -1
 
 
@@ -298,12 +302,6 @@ MOST_ACTION: Final = np.float32(1 + 1e-6)
 """Actions up to this are clipped to 1, since rounding may exceed it."""
 IN_BOX: Final = -1
 TO_CLIP: Final = -2
-_AT_ONCE: Final = 4 * WIDTH
-
-
-@compiled
-def _in_box(action: Lanes) -> Lanes:
-    return (action >= -ONE) & (action <= ONE)
 
 
 @kernel
@@ -312,17 +310,10 @@ def bad_action(actions: FloatArray) -> int:
 
     :data:`IN_BOX` if there is none; :data:`TO_CLIP` if some lie outside by rounding.
     """
-    flat = actions.reshape(-1)
-    whole, worst = len(flat) // _AT_ONCE * _AT_ONCE, eight(ZERO)
-    for at in range(0, whole, _AT_ONCE):
-        k = nonnegative(at)
-        first = _in_box(load(flat, k)) & _in_box(load(flat, k + WIDTH))
-        last = _in_box(load(flat, k + 2 * WIDTH)) & _in_box(load(flat, k + 3 * WIDTH))
-        worst = lesser(worst, choose(first & last, ZERO, -ONE))
-    outside = least(worst) < ZERO
-    for k in range(whole, len(flat)):
-        outside |= not _in_box(flat[k])
-    if not outside:
+    flat, inside = actions.reshape(-1), True
+    for k in range(len(flat)):
+        inside &= flat[k] >= -ONE and flat[k] <= ONE
+    if inside:
         return IN_BOX
     for k in range(len(flat)):
         if not (flat[k] >= -MOST_ACTION and flat[k] <= MOST_ACTION):

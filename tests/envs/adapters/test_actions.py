@@ -89,19 +89,3 @@ def test_numbers_outside_are_clipped_where_that_is_asked_for_and_by_rounding(kin
         for env in (rounded, clipping):
             with pytest.raises(ValueError, match=r"(nan|inf) is not a number in \[-1, 1\]"):
                 env.step(actions(np.where(bounds > 0, bad, np.float32(0.5))))
-
-
-@kinds
-@pytest.mark.parametrize(
-    "strange", [None, "left", "0.5", 1j, True, b"\0", object(), [[0], [0, 1]]], ids=lambda value: type(value).__name__
-)
-def test_what_is_no_number_is_refused_and_changes_nothing(kind: str, strange: Any) -> None:
-    env, actions = started(kind)
-    twin, _ = started(kind)
-    whole = actions(VALUES)
-    given = strange
-    if not isinstance(strange, list) and strange is not None:
-        given = np.full(np.shape(whole), strange) if kind != "parallel" else {**whole, "tracker_1": np.full(2, strange)}
-    with pytest.raises(ValueError, match=r"must be real numbers|is not an array|dictionary by agent"):
-        env.step(given)
-    assert same(env.step(whole)[:4], twin.step(whole)[:4])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from gymnasium.error import ResetNeeded
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
+from tests.support.adapters import out_of_band, same
 from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject, unchanged
 
 SEEDS = st.integers(0, 2**63 - 1)
@@ -84,3 +87,45 @@ def test_what_is_refused_changes_nothing_whatever_was_called_before(kind: str) -
             suppress_health_check=list(HealthCheck),
         ),
     )
+
+
+def played(subject: Subject, steps: int, seed: int = 0) -> list[Any]:
+    """Step with drawn actions, and reset where the episode is over; return all that was returned."""
+    rng, returned = np.random.default_rng(seed), []
+    for _ in range(steps):
+        try:
+            returned.append(subject.step(subject.good_action(rng)))
+        except ResetNeeded:
+            returned.append(subject.reset())
+    return returned
+
+
+one_by_one = pytest.mark.parametrize("kind", [kind for kind in MAKERS if kind != "torchrl"])
+
+
+@one_by_one
+@pytest.mark.parametrize(
+    "replica",
+    [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), out_of_band],  # noqa: S301
+    ids=["deepcopy", "pickle", "out of band"],
+)
+def test_a_copy_made_in_mid_episode_goes_on_alike(kind: str, replica: Any) -> None:
+    one, twin = Subject(kind), Subject(kind)
+    one.reset(seed=3)
+    played(one, 2)
+    if kind in ("parallel", "team", "solo"):
+        one.env.state()
+    twin.env = replica(one.env)
+    assert same(played(one, 20), played(twin, 20))
+    assert same(one.reset(seed=1), twin.reset(seed=1))
+
+
+@one_by_one
+def test_what_is_returned_is_never_overwritten(kind: str) -> None:
+    subject = Subject(kind)
+    returned = [subject.reset(seed=0)]
+    kept = copy.deepcopy(returned)
+    for step in range(15):
+        returned += played(subject, 1, step)
+        kept.append(copy.deepcopy(returned[-1]))
+    assert same(returned, kept)

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import copy
-import json
-import pickle
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, RecordVideo
-from tests.support.adapters import EVERYTHING, SOLO_SCENARIOS, f32, out_of_band, part, same
+from gymnasium.wrappers import FlattenObservation
+from tests.support.adapters import SOLO_SCENARIOS, f32, part
 
 import posse
-from posse.adapters.gymnasium_env import SoloEnv, TeamEnv
 
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
@@ -107,16 +102,6 @@ def test_without_a_seed_environments_differ() -> None:
     assert np.array_equal(gymnasium.make(TEAM, seed=4).reset()[0], second.reset(seed=4)[0])
 
 
-def test_it_starts_from_given_poses() -> None:
-    env = gymnasium.make(SOLO)
-    layout = env.unwrapped.layout  # type: ignore[attr-defined]
-    options = {"tracker_pose": [1.0, 2.0, 0.0], "target_pose": [4.0, 2.0, 0.5]}
-    views = layout.views(env.reset(seed=0, options=options)[0])
-    assert views["position"] == pytest.approx([1, 2])
-    assert views["target_range"] == pytest.approx(3)
-    assert views["target_heading"] == pytest.approx([np.cos(0.5), np.sin(0.5)])
-
-
 def test_the_end_is_told_with_every_metric() -> None:
     for name in (TEAM, SOLO):
         env = gymnasium.make(name, horizon=5, settle_time=0.3)
@@ -142,60 +127,3 @@ def test_info_says_who_is_broken() -> None:
     env.reset(seed=0)
     working = [int(info["working"].sum()) for *_, info in play(env, 10)]
     assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
-
-
-@pytest.mark.parametrize(
-    "replica",
-    [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), out_of_band],  # noqa: S301
-)
-@pytest.mark.parametrize("name", [TEAM, SOLO])
-def test_a_copy_made_in_mid_episode_goes_on_alike(name: str, replica: Any) -> None:
-    settings = dict(EVERYTHING)
-    if name == SOLO:
-        settings.update(breaks=0)
-    env = gymnasium.make(name, **settings).unwrapped
-    env.reset(seed=3)
-    play(env, 5)
-    twin = replica(env)
-    assert same(play(env, 20), play(twin, 20))
-
-
-@pytest.mark.parametrize("name", [TEAM, SOLO])
-def test_what_is_returned_is_never_overwritten(name: str) -> None:
-    env = gymnasium.make(name, horizon=10, settle_time=0.5).unwrapped
-    returned: list[Any] = [env.reset(seed=0)]
-    kept = copy.deepcopy(returned)
-    over = False
-    for _ in range(25):
-        if over:
-            returned.append(env.reset())
-            kept.append(copy.deepcopy(returned[-1]))
-        step = env.step(env.action_space.sample())
-        returned.append(step)
-        kept.append(copy.deepcopy(step))
-        over = step[2] or step[3]
-    assert same(returned, kept)
-
-
-def test_episodes_are_counted_and_filmed(tmp_path: Path) -> None:
-    pytest.importorskip("moviepy")
-    inner = gymnasium.make(TEAM, render_mode="rgb_array", horizon=8, settle_time=0.5)
-    env = RecordEpisodeStatistics(
-        RecordVideo(inner, str(tmp_path / "films"), episode_trigger=lambda _: True, disable_logger=True)
-    )
-    env.reset(seed=0)
-    steps = play(env, 8)
-    episode = steps[-1][-1]["episode"]
-    assert episode["l"] == 8
-    assert episode["r"] == pytest.approx(sum(step[1] for step in steps), rel=1e-5, abs=1e-5)
-    env.close()
-    assert [path.suffix for path in (tmp_path / "films").iterdir()] == [".mp4"]
-
-
-def test_the_ids_can_be_written_down() -> None:
-    for name, cls in ((TEAM, TeamEnv), (SOLO, SoloEnv)):
-        env = gymnasium.make(name, scenario="smart", num_trackers=1)
-        assert type(env.unwrapped) is cls
-        assert env.spec is not None
-        assert json.loads(env.spec.to_json())["kwargs"] == {"scenario": "smart", "num_trackers": 1}
-        assert gymnasium.make(env.spec).reset(seed=0)[0].shape == env.reset(seed=0)[0].shape

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
 from typing import Any
 
 import numpy as np
@@ -18,7 +16,7 @@ from pettingzoo.test import (
     seed_test,
     state_test,
 )
-from tests.support.adapters import EVERYTHING, f32, out_of_band, part, same
+from tests.support.adapters import f32, part
 
 import posse
 from posse.adapters.actions import MOTIONS
@@ -100,15 +98,6 @@ def test_a_target_that_is_an_agent_goes_where_it_wants() -> None:
     assert places[1] == pytest.approx(2 * 0.6 * abs(np.sin(2.5)), rel=1e-3)
 
 
-def test_observations_lie_in_their_spaces_to_the_end() -> None:
-    for name in posse.scenario_names():
-        env = posse.parallel_env(name, horizon=60)
-        env.reset(seed=5)
-        for observations, *_ in play(env, 130):
-            for agent, observation in observations.items():
-                assert env.observation_space(agent).contains(observation), (name, agent)
-
-
 def test_an_environment_is_the_first_world_of_a_batch() -> None:
     for first_world in (0, 3):
         env = posse.parallel_env("field", split="test", first_world=first_world)
@@ -160,48 +149,6 @@ def test_a_discrete_action_is_one_of_the_motions() -> None:
         assert np.array_equal(plain.state(), discrete.state())
     for number, motion in enumerate(MOTIONS):
         assert tuple(motion) == (number // 5 - 1, (number % 5 - 2) / 2)
-
-
-@pytest.mark.parametrize(
-    "replica",
-    [copy.deepcopy, lambda e: pickle.loads(pickle.dumps(e)), out_of_band],  # noqa: S301
-)
-def test_a_copy_made_in_mid_episode_goes_on_alike(replica: Any) -> None:
-    env = posse.parallel_env(**EVERYTHING)
-    env.reset(seed=3)
-    play(env, 5)
-    env.state()
-    twin = replica(env)
-    assert same(play(env, 20), play(twin, 20))
-    turns = posse.env(**EVERYTHING)
-    turns.reset(seed=3)
-    turns.step(np.zeros(2, np.float32))
-    twin_turns = replica(turns)
-    for each in (turns, twin_turns):
-        each.step(np.ones(2, np.float32))
-    assert turns.agent_selection == twin_turns.agent_selection == "tracker_2"
-
-
-def test_the_state_holds_what_decides_how_a_world_goes_on() -> None:
-    env = posse.parallel_env("field", message_size=1)
-    env.reset(seed=0)
-    play(env, 30)
-    views = env.state_layout.views(env.state())
-    arrays = env.batch.arrays
-    for name in ("x", "y", "heading_cos", "speed", "turn_rate"):
-        assert np.array_equal(views[f"tracker_{name}"], arrays.tracker[name][0])
-    assert np.array_equal(views["tracker_fix_x"], arrays.tracker["fix"]["x"][0])
-    assert np.array_equal(views["obstacle_radius"], arrays.obstacle["radius"][0])
-    assert views["target_frame_cos"] == arrays.world["frame_cos"][0]
-    assert views["time"] == pytest.approx(3.0)
-    assert (views["tracker_breaks_at"] >= 0).sum() == 1
-    # Two steps of delay: messages sent now, one and two steps ago, newest first.
-    assert np.array_equal(views["sent_x"][0], arrays.tracker["x"][0])
-    now = views["sent_x"][0].copy(), views["message"][0].copy()
-    play(env, 1)
-    views = env.state_layout.views(env.state())
-    assert np.array_equal(views["sent_x"][1], now[0])
-    assert np.array_equal(views["message"][1], now[1])
 
 
 @pytest.mark.skipif(not hasattr(pettingzoo, "parallel_registry"), reason="PettingZoo has a registry since 1.27")

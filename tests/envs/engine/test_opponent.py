@@ -164,8 +164,6 @@ def test_clipping_is_for_both_sides() -> None:
 def test_what_is_no_target_policy_is_refused() -> None:
     with pytest.raises(TypeError, match="begin, act, restart"):
         posse.batch(SHORT, 1, target_policy=3)  # type: ignore[arg-type]
-    with pytest.raises(AttributeError, match=r"policy inside has no 'copies'; its worlds are .batch"):
-        posse.batch(SHORT, 1, target_policy=Weaver()).copies(2)
     with pytest.raises(posse.ScenarioError, match="target_policy="):
         gym.make("posse/Team-v0", scenario=SHORT, target="agent")
 
