@@ -14,7 +14,7 @@ from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eigh
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.signals.fields import SLACK, field, settings
+from posse.signals.fields import SLACK, field, setting
 from posse.signals.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]
@@ -96,7 +96,8 @@ def team_size(c: Record) -> np.float32:
     return np.float32(c.num_trackers)
 
 
-settings("formation_distance", "formation_spacing")
+setting("formation_distance")
+setting("formation_spacing")
 
 
 @field("m/s", 0, _fast)
@@ -123,7 +124,12 @@ def turn_acceleration_time(c: Record, v: View) -> Lanes:
     return v.turn_acceleration_time
 
 
-settings("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range", "arena")
+setting("tolerance")
+setting("robot_radius")
+setting("control_step")
+setting("sensing_range")
+setting("sonar_range")
+setting("arena")
 
 
 @field("s", 0, lambda s: s.duration * SLACK)

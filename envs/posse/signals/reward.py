@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, FloatArray, Record, compiled
+from posse.numeric import ONE, ZERO, FloatArray, Record
 from posse.registry import REWARD_TERMS as TERMS
-from posse.registry import Declaration, Function, plain
+from posse.registry import Declaration, Function
 from posse.scenarios import Scenario
 
 
@@ -25,16 +25,16 @@ class RewardTerm(Declaration):
     Its function gives the value for a tracker, ``(c, w, t)``, or one of the world, ``(c, w)``.
 
     Attributes:
-        of_target: The value for a target that is an agent, ``(c, w)``; ``None``: it has none.
+        target: The value for a target that is an agent, ``(c, w)``, if it differs.
     """
 
-    of_target: Function | None = None
+    target: Function | None = None
+    further: ClassVar = {"target": (("c", "w"), "a number")}
 
     @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions of the term, and what each returns."""
-        both = (self.function, self.of_target)
-        return tuple((function, "a number") for function in dict.fromkeys(both) if function)
+    def of_target(self) -> Function | None:
+        """The function for a target that is an agent; ``None``: it has none."""
+        return self.function if self.target is None and "t" not in self.parameters else self.target
 
 
 def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Function], Function]:
@@ -53,17 +53,7 @@ def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Funct
         DeclarationError: The name is taken, the docstring is missing, or the parameters differ.
     """
     TERMS.check_argument(unit, '@posse.reward_term("1")')
-
-    def declare(function: Function) -> Function:
-        of_target = None
-        if target is not None:
-            TERMS.check_function(target, ("c", "w"))
-            of_target = compiled(plain(target))
-        elif TERMS.check_function(function, *TERMS.allowed) == ("c", "w"):
-            of_target = compiled(plain(function))
-        return TERMS.declare(RewardTerm, function, unit=unit, of_target=of_target)
-
-    return declare
+    return lambda function: TERMS.declare(RewardTerm, function, unit=unit, target=target)
 
 
 @reward_term("1")
@@ -133,11 +123,7 @@ def weights_for(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
 
 
 def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatArray) -> None:
-    """Check the rewards of a step and the values of its terms (..., K).
-
-    Raises:
-        DeclarationError: A term returned a value that is not finite.
-    """
+    """Raise DeclarationError if a reward is not finite, for the term whose value (..., K) is not."""
     if np.isfinite(rewards).all():
         return
     for k, term in enumerate(terms):

@@ -51,7 +51,7 @@ def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
         "dy": types.float32,
     }
     for registry, declaration in added:
-        for function, returns in declaration.functions:
+        for function, returns in declaration.functions.items():
             line, reason = _why_not(function, [known[name] for name in parameters_of(function)], returns)
             if reason:
                 raise registry.error(function, f"line {line}: {reason}") from None
