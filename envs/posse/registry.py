@@ -175,12 +175,6 @@ class Registry(dict[str, D]):
         if callable(argument):
             raise self.error(argument, f"the decorator needs arguments: {usage}")
 
-    def check_bounds(self, function: Function, low: object, high: object, of: str = "") -> None:
-        """Raise unless the bounds ``of`` a value are numbers, or functions of the scenario."""
-        for name, bound in (("low", low), ("high", high)):
-            if not callable(bound) and not is_number(bound):
-                raise self.error(function, f"{name}={bound!r}{of} is neither a finite number nor a function")
-
     def bounds_of(self, function: Function, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
         """Return the bounds ``of`` a value in a scenario; raise unless they are finite and in order."""
         values = []

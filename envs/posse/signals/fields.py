@@ -70,18 +70,12 @@ class FieldDeclaration(Declaration):
         return {self.function: f"{self.size} numbers" if self.size > 1 else "a number"}
 
     def of(self, scenario: Scenario) -> Field:
-        """Return the field in a scenario.
-
-        Raises:
-            DeclarationError: Its bounds are not finite, low is above high, or the value for
-                "unknown" is not between them.
-        """
+        """Return the field in a scenario; raise DeclarationError if its bounds or its value for "unknown" are wrong."""
         low, high = FIELDS.bounds_of(self.function, self.low, self.high, scenario)
         empty = 0.0 if self.unknown is None and self.of_mate else self.unknown
-        if empty is not None and not low <= empty <= high:
-            raise FIELDS.error(
-                self.function, f"unknown={empty:g} is not between low={low:g} and high={high:g} in {scenario.name!r}"
-            )
+        if empty is not None and not (is_number(empty) and low <= empty <= high):
+            where = f"between low={low:g} and high={high:g} in {scenario.name!r}"
+            raise FIELDS.error(self.function, f"unknown={empty!r} is not a number {where}")
         return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
 
 
@@ -96,28 +90,20 @@ def field(
         high: The greatest, likewise.
         unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
         size: Number of values that the function returns, at most 256; as a tuple if more than one.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, an argument is wrong, or the
-            parameters are not (c), (c, v) or (c, v, m).
     """
 
     def declare(function: Function) -> Function:
         if type(size) is not int or not 1 <= size <= MOST_NUMBERS:
             raise FIELDS.error(function, f"size={size!r} must be a whole number from 1 to {MOST_NUMBERS}")
-        if unknown is not None and not is_number(unknown):
-            raise FIELDS.error(function, f"unknown={unknown!r} is not a finite number")
-        FIELDS.check_bounds(function, low, high)
         return FIELDS.declare(FieldDeclaration, function, unit=unit, low=low, high=high, unknown=unknown, size=size)
 
     return declare
 
 
 def setting(name: str) -> None:
-    """Declare a number of the scenario as a field of its name, with its unit and meaning.
+    """Declare a number of the scenario as a field of its name, with its unit and meaning; -1 for an unlimited one.
 
-    -1 stands for an unlimited one. The range holds the value, 0 and 1: wrappers of other libraries
-    pad observations with 0 and 1.
+    The range holds the value, 0 and 1: wrappers of other libraries pad observations with 0 and 1.
     """
     declared = Scenario.settings()[name]
 

@@ -70,11 +70,7 @@ class Declarations(NamedTuple):
 
 
 def declarations_for(scenario: Scenario) -> Declarations:
-    """Return the declarations of a scenario: the built-in ones, and those that it names.
-
-    Raises:
-        DeclarationError: The bounds of a motion's memory are invalid in this scenario.
-    """
+    """Return the declarations of a scenario: the built-in ones, and those that it names."""
     TARGET_MOTIONS[scenario.target_motion].check(scenario)
     return Declarations(
         FIELDS.with_added(*scenario.extra_fields),
@@ -157,30 +153,40 @@ class _Module:
         own = [field for field in declarations.fields if not field.of_mate]
         of_mate = [field for field in declarations.fields if field.of_mate]
         summed = [metric for metric in metrics if metric.per]
+        functions = {
+            "write_own(c, v, rows)": self._columns(own),
+            "write_mate(c, v, m, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],
+            "reward(c, w, t, weights, values)": self._reward({f"term_{t.name}": t.function for t in terms}),
+            "target_reward(c, w, weights, values)": self._reward({f"target_term_{t.name}": t.of_target for t in terms}),
+            "draw_motion(c, w)": [
+                *(f"w.{memory.name} = ZERO" for motion in motions for memory in motion.memory),
+                *self._chosen("motion", "{}", {f"draw_{each.name}": each.draw for each in motions}),
+            ],
+            "set_goal(c, w, trackers, obstacles, s)": self._chosen(
+                "motion", "{}", {f"goal_{each.name}": each.function for each in motions}
+            ),
+            "sees(c, w, t, dx, dy, s)": [
+                *self._chosen("sensor", "return bool({})", {f"sight_{each.name}": each.function for each in sensors}),
+                "return False",
+            ],
+            "measure(c, w, number, dx, dy)": [
+                *self._chosen(
+                    "sensor",
+                    "x, y = {}\n        return float32(x), float32(y)",
+                    {f"measure_{each.name}": each.measure for each in sensors},
+                ),
+                "return add_noise(c, w, number, dx, dy)",
+            ],
+            "clear_sums(w)": [*(f"w.{metric.sum_name} = ZERO" for metric in summed), "w.tracker_steps = ZERO"],
+            "add_to_sums(c, w, trackers, slots)": self._sums(summed),
+        }
         body = [
-            "",
-            f"width = {sum(field.size for field in own)}",
-            f"mate_width = {sum(field.size for field in of_mate)}",
-            *_function("write_own(c, v, rows)", self._columns(own)),
-            *_function("write_mate(c, v, m, rows)", ["there = m.number >= ZERO", *self._columns(of_mate)]),
-            *_function("reward(c, w, t, weights, values)", self._reward("term", {t.name: t.function for t in terms})),
-            *_function(
-                "target_reward(c, w, weights, values)",
-                self._reward("target_term", {t.name: t.of_target for t in terms}),
-            ),
-            *_function("draw_motion(c, w)", self._draw(motions)),
-            *_function("set_goal(c, w, trackers, obstacles, s)", self._goal(motions)),
-            *_function("sees(c, w, t, dx, dy, s)", self._sight(sensors)),
-            *_function("measure(c, w, number, dx, dy)", self._measure(sensors)),
-            *_function(
-                "clear_sums(w)", [*(f"w.{metric.sum_name} = ZERO" for metric in summed), "w.tracker_steps = ZERO"]
-            ),
-            *_function("add_to_sums(c, w, trackers, slots)", self._sums(summed)),
+            f"width = {_size(own)}",
+            f"mate_width = {_size(of_mate)}",
+            *("\n    ".join([f"\n\n@compiled\ndef {head}:", *lines]) for head, lines in functions.items()),
         ]
-        declared = (
-            f"# {name}: {function.__module__}.{place_of(function)}" for name, function in self.functions.items()
-        )
-        self.text = "\n".join([_HEAD, *declared, *body]) + "\n"
+        declared = (f"# {name}: {place_of(function)}" for name, function in self.functions.items())
+        self.text = "\n".join([_HEAD, *declared, "", *body, ""])
 
     def _call(self, alias: str, function: Function) -> str:
         """Return the call of a declared function with its parameters as arguments."""
@@ -191,7 +197,7 @@ class _Module:
 
     def _columns(self, fields: Iterable[FieldDeclaration]) -> Iterator[str]:
         columns: list[str] = []
-        width = sum(field.size for field in fields)
+        width = _size(fields)
         # The last block may repeat columns of the one before.
         blocks = [*range(0, width - WIDTH, WIDTH), width - WIDTH]
         for field in fields:
@@ -207,36 +213,19 @@ class _Module:
                 first = blocks.pop(0)
                 yield f"write_block({', '.join(columns[first : first + WIDTH])}, {first}, rows)"
 
-    def _reward(self, prefix: str, terms: Mapping[str, Function | None]) -> Iterator[str]:
+    def _reward(self, terms: Mapping[str, Function | None]) -> Iterator[str]:
         for k, (name, function) in enumerate(terms.items()):
-            yield f"values[{k}] = " + ("ZERO" if function is None else self._call(f"{prefix}_{name}", function))
+            yield f"values[{k}] = " + ("ZERO" if function is None else self._call(name, function))
         yield "reward = ZERO"
         # From last to first: another order would round differently and change results.
         yield from (f"reward = float32(weights[{k}] * values[{k}] + reward)" for k in reversed(range(len(terms))))
         yield "return reward"
 
-    def _draw(self, motions: Iterable[TargetMotion]) -> Iterator[str]:
-        yield from (f"w.{memory.name} = ZERO" for motion in motions for memory in motion.memory)
-        for k, motion in enumerate(motions):
-            if motion.draw is not None:
-                yield from (f"if c.motion == {k}:", f"    {self._call(f'draw_{motion.name}', motion.draw)}")
-
-    def _goal(self, motions: Iterable[TargetMotion]) -> Iterator[str]:
-        for k, motion in enumerate(motions):
-            yield from (f"if c.motion == {k}:", f"    {self._call(f'goal_{motion.name}', motion.function)}")
-
-    def _sight(self, sensors: Iterable[Sensor]) -> Iterator[str]:
-        for k, sensor in enumerate(sensors):
-            call = self._call(f"sight_{sensor.name}", sensor.function)
-            yield from (f"if c.sensor == {k}:", f"    return bool({call})")
-        yield "return False"
-
-    def _measure(self, sensors: Iterable[Sensor]) -> Iterator[str]:
-        for k, sensor in enumerate(sensors):
-            if sensor.measure is not None:
-                call = self._call(f"measure_{sensor.name}", sensor.measure)
-                yield from (f"if c.sensor == {k}:", f"    x, y = {call}", "    return float32(x), float32(y)")
-        yield "return add_noise(c, w, number, dx, dy)"
+    def _chosen(self, setting: str, statement: str, functions: Mapping[str, Function | None]) -> Iterator[str]:
+        """Yield a statement with the call of one of several functions, by a number of the scenario."""
+        for k, (name, function) in enumerate(functions.items()):
+            if function is not None:
+                yield from (f"if c.{setting} == {k}:", f"    {statement.format(self._call(name, function))}")
 
     def _sums(self, metrics: Iterable[Metric]) -> Iterator[str]:
         loop, after = ["t = trackers[i]", "if t.broken_at == NEVER:"], ["w.tracker_steps += float32(w.working)"]
@@ -250,6 +239,5 @@ class _Module:
         yield from ("for i in range(c.num_trackers):", *(f"    {line}" for line in loop), *after)
 
 
-def _function(head: str, lines: Iterable[str]) -> list[str]:
-    """Return the lines of a compiled function."""
-    return ["", "", "@compiled", f"def {head}:", *(f"    {line}" for line in lines)]
+def _size(fields: Iterable[FieldDeclaration]) -> int:
+    return sum(field.size for field in fields)

@@ -26,9 +26,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse import registry
 from posse.numeric import ONE, ZERO, Record, Records
-from posse.registry import Declaration, Function
+from posse.registry import METRICS, Declaration, Function
 from posse.rules.score import could_arrive
 from posse.rules.senses.radio import connected
 from posse.rules.state import NEVER
@@ -80,18 +79,14 @@ def metric(unit: str, *, per: str = "step") -> Callable[[Function], Function]:
         unit: Unit of the metric.
         per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
             control steps of all working trackers; ``"episode"``: 1.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, the parameters are not among
-            those above, or ``per`` is unknown.
     """
-    registry.METRICS.check_argument(unit, '@posse.metric("1")')
+    METRICS.check_argument(unit, '@posse.metric("1")')
 
     def declare(function: Function) -> Function:
         if per not in tuple(_STEPS):
-            raise registry.METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
-        summed = registry.METRICS.check_function(function, *registry.METRICS.allowed)[0] == "c"
-        return registry.METRICS.declare(Metric, function, unit=unit, per=per if summed else None)
+            raise METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
+        summed = METRICS.check_function(function, *METRICS.allowed)[0] == "c"
+        return METRICS.declare(Metric, function, unit=unit, per=per if summed else None)
 
     return declare
 
@@ -178,7 +173,7 @@ def target_contacts(s: Scenario, w: Records) -> Column:
 def contact_free(s: Scenario, w: Records) -> Column:
     """1 if no tracker touched anything, else 0; the mean is the share of contact-free episodes."""
     contacts = w["contacts_tracker"] + w["contacts_obstacle"] + w["contacts_target"]
-    return contacts == 0
+    return np.asarray(contacts == 0, np.float64)
 
 
 @metric("m")
@@ -204,7 +199,3 @@ def time_connected(c: Record, w: Record, trackers: Records) -> np.float32:
 def duration(s: Scenario, w: Records) -> Column:
     """Length of the episode."""
     return _time(w["step"], s)
-
-
-METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
-"""Every built-in metric, in the order in which they are reported."""

@@ -96,8 +96,8 @@ def team_size(c: Record) -> np.float32:
     return np.float32(c.num_trackers)
 
 
-setting("formation_distance")
-setting("formation_spacing")
+for _name in ("formation_distance", "formation_spacing"):
+    setting(_name)
 
 
 @field("m/s", 0, _fast)
@@ -124,12 +124,8 @@ def turn_acceleration_time(c: Record, v: View) -> Lanes:
     return v.turn_acceleration_time
 
 
-setting("tolerance")
-setting("robot_radius")
-setting("control_step")
-setting("sensing_range")
-setting("sonar_range")
-setting("arena")
+for _name in ("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range", "arena"):
+    setting(_name)
 
 
 @field("s", 0, lambda s: s.duration * SLACK)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 
 from posse.numeric import ONE, ZERO, FloatArray, Record
-from posse.registry import REWARD_TERMS as TERMS
-from posse.registry import Declaration, Function
+from posse.registry import REWARD_TERMS, Declaration, Function
 from posse.scenarios import Scenario
 
 
@@ -48,12 +47,9 @@ def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Funct
         unit: Unit of the term.
         target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
             ``(c, w, t)`` is for trackers only.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, or the parameters differ.
     """
-    TERMS.check_argument(unit, '@posse.reward_term("1")')
-    return lambda function: TERMS.declare(RewardTerm, function, unit=unit, target=target)
+    REWARD_TERMS.check_argument(unit, '@posse.reward_term("1")')
+    return lambda function: REWARD_TERMS.declare(RewardTerm, function, unit=unit, target=target)
 
 
 @reward_term("1")
@@ -108,13 +104,9 @@ def team(c: Record, w: Record) -> np.float32:
     return np.float32(w.score)
 
 
-REWARD_TERMS: Final[tuple[RewardTerm, ...]] = TERMS.built_in()
-"""The built-in terms, in the order in which they are reported."""
-
-
 def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
     """Return the terms of a scenario: the built-in ones, then others with a weight."""
-    return TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
+    return REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
 
 
 def weights_for(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
@@ -129,4 +121,4 @@ def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatA
     for k, term in enumerate(terms):
         wrong = values[..., k][~np.isfinite(values[..., k])]
         if wrong.size:
-            raise TERMS.error(term.function, f"it returned {wrong[0]:g}, and a reward must be finite")
+            raise REWARD_TERMS.error(term.function, f"it returned {wrong[0]:g}, and a reward must be finite")

@@ -95,5 +95,4 @@ def _check_memory(function: Function, memory: Any) -> None:
             )
         if each.name in taken:
             raise TARGET_MOTIONS.error(function, f"a world has a field {each.name!r}: choose another name")
-        TARGET_MOTIONS.check_bounds(function, each.low, each.high, f" of memory {each.name!r}")
         taken.add(each.name)
