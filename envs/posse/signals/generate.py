@@ -126,6 +126,9 @@ def source_of(declarations: Declarations) -> str:
     return _Module(declarations).text
 
 
+_FEW: Final = 2
+"""Number of columns left over up to which writing each is faster than another transposition."""
+
 _HEAD: Final = '''"""Functions that posse compiles for the declarations of a scenario."""
 
 from numpy import float32
@@ -133,7 +136,7 @@ from numpy import float32
 from posse.numeric import ZERO, choose, compiled, eight
 from posse.rules.senses import add_noise
 from posse.rules.state import NEVER
-from posse.signals.rows import write_block
+from posse.signals.rows import write_block, write_column
 
 # The declared functions:'''
 
@@ -154,8 +157,8 @@ class _Module:
         of_mate = [field for field in declarations.fields if field.of_mate]
         summed = [metric for metric in metrics if metric.per]
         functions = {
-            "write_own(c, v, rows)": self._columns(own),
-            "write_mate(c, v, m, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],
+            "write_own(c, v, s, rows)": self._columns(own),
+            "write_mate(c, v, m, s, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],
             "reward(c, w, t, weights, values)": self._reward({f"term_{t.name}": t.function for t in terms}),
             "target_reward(c, w, weights, values)": self._reward({f"target_term_{t.name}": t.of_target for t in terms}),
             "draw_motion(c, w)": [
@@ -198,8 +201,10 @@ class _Module:
     def _columns(self, fields: Iterable[FieldDeclaration]) -> Iterator[str]:
         columns: list[str] = []
         width = _size(fields)
-        # The last block may repeat columns of the one before.
-        blocks = [*range(0, width - WIDTH, WIDTH), width - WIDTH]
+        blocks = [*range(0, width - WIDTH + 1, WIDTH)]
+        if width % WIDTH > _FEW:
+            blocks.append(width - WIDTH)  # repeats columns of the one before
+        single = range(blocks[-1] + WIDTH, width)
         for field in fields:
             mine = [f"{field.name}_{q}" for q in range(field.size)]
             yield f"{', '.join(mine)} = {self._call(f'field_{field.name}', field.function)}"
@@ -212,6 +217,7 @@ class _Module:
             while blocks and len(columns) >= blocks[0] + WIDTH:
                 first = blocks.pop(0)
                 yield f"write_block({', '.join(columns[first : first + WIDTH])}, {first}, rows)"
+        yield from (f"write_column({columns[q]}, {q}, s, rows)" for q in single)
 
     def _reward(self, terms: Mapping[str, Function | None]) -> Iterator[str]:
         for k, (name, function) in enumerate(terms.items()):

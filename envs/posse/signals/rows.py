@@ -1,7 +1,8 @@
 """Writes the observations, for one robot of eight worlds at once, one world per lane.
 
 The generated functions (:mod:`posse.signals.generate`) compute the fields of a view (:mod:`.views`). Each gives a
-*column* of eight numbers, one for each world; eight columns are transposed and written to the worlds' rows.
+*column* of eight numbers, one for each world; eight columns are transposed and
+written to the worlds' rows, those left over one by one.
 
 Team-mates follow, nearest first. With a perfect radio, and for a target agent, they are as they are now, otherwise as
 last heard.
@@ -56,13 +57,13 @@ def observe_together(
     for i in range(n + 1 if c.target_agent != 0 else n):
         observers = Observers(first, i, count)
         view = view_of(c, worlds, observers, s)
-        made.write_own(c, view, Rows(observers, observations, 0))
+        made.write_own(c, view, s, Rows(observers, observations, 0))
         now = c.perfect_radio != 0 or i == n
         _list_nearest(c, worlds, observers, view, now, s)
         start, size = natural(made.width + c.sonar_beams), natural(made.mate_width + c.message_size)
         for p in range(natural(c.neighbours)):
             mate = _mate_in_place(c, worlds, observers, view, p, now, s)
-            made.write_mate(c, view, mate, Rows(observers, observations, natural(start + p * size)))
+            made.write_mate(c, view, mate, s, Rows(observers, observations, natural(start + p * size)))
         if c.message_size > 0:
             _write_messages(c, worlds, observers, made, s, observations)
 
@@ -207,3 +208,12 @@ def _write_row(row: Lanes, lane: int, first: int, rows: Rows) -> None:
     if lane < rows.observers.number:
         o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
         store(o, natural(rows.start) + first, row)
+
+
+@compiled
+def write_column(column: Lanes, number: int, s: Record, rows: Rows) -> None:
+    """Write one column."""
+    store(s.column, 0, column)
+    for lane in range(rows.observers.number):
+        o = rows.observations[natural(rows.observers.e + lane), natural(rows.observers.i)]
+        o[natural(rows.start) + number] = s.column[lane]

@@ -36,6 +36,7 @@ from posse.rules.state import CONDITION, FIX, NEVER, NO_BITS, POSE, TARGET_POSE,
 
 OBSERVING: Final[Fields] = (
     # Eight numbers, one for each of eight worlds.
+    ("column", WIDTH),  # of observations
     ("steps", WIDTH),  # control steps
     ("target_touching", WIDTH),  # 1: the target touches anything
     # Eight numbers for each tracker.
