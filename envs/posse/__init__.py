@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
+from posse import registry
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.adapters.robot import Command, Heard, Robot, TargetFix
@@ -16,10 +17,15 @@ from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_name
 from posse.signals.fields import Field, field
 from posse.signals.generate import declarations_for, source_of
 from posse.signals.layout import ObservationLayout
-from posse.signals.metrics import METRICS, Metric, metric
-from posse.signals.reward import REWARD_TERMS, RewardTerm, reward_term
+from posse.signals.metrics import Metric, metric
+from posse.signals.reward import RewardTerm, reward_term
 
 __version__ = "0.1.0"
+
+METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
+"""Every built-in metric, in the order in which they are reported."""
+REWARD_TERMS: Final[tuple[RewardTerm, ...]] = registry.REWARD_TERMS.built_in()
+"""The built-in reward terms, in the order in which they are reported."""
 
 _register()
 
@@ -66,8 +72,8 @@ def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) 
 def kernel_source(scenario: str | Scenario = "constant", **overrides: Any) -> str:
     """Return the source text of what the kernel of a scenario calls for its declarations.
 
-    It is a Python module: one function each for the own observation fields, those of a team-mate, an
-    empty place, the rewards, the target's motion, the sensor and the sums of the metrics.
+    It has one function each for the own observation fields, those of a team-mate, the rewards, the target's motion,
+    the sensor and the sums of the metrics.
     """
     return source_of(declarations_for(get_scenario(scenario, **overrides)))
 

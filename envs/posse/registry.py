@@ -10,14 +10,13 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import inspect
-import keyword
 import math
 import os
 import reprlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import FunctionType
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, ClassVar, Final, TypeVar
 
 import numpy as np
 
@@ -75,17 +74,22 @@ class Declaration:
         unit: Unit of its value; empty for rules, which have none.
         meaning: Its docstring.
         function: The function, compiled.
+        returns: What it returns.
+        further: Names of further functions, each with its parameters and what it returns; ``None`` if it is not given.
     """
 
     name: str
     unit: str = ""
     meaning: str
     function: Function
+    returns: ClassVar[str] = "a number"
+    further: ClassVar[Mapping[str, tuple[Parameters, str]]] = {}
 
     @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
+    def functions(self) -> dict[Function, str]:
         """The functions for compiled code, and what each returns."""
-        return ((self.function, "a number"),)
+        further = {getattr(self, name): returns for name, (_, returns) in self.further.items() if getattr(self, name)}
+        return {self.function: self.returns, **further}
 
     @property
     def built_in(self) -> bool:
@@ -105,7 +109,7 @@ class Declaration:
 D = TypeVar("D", bound=Declaration)
 
 
-class Registry(Mapping[str, D], Generic[D]):
+class Registry(dict[str, D]):
     """Declarations of one kind by name, in order.
 
     Args:
@@ -114,20 +118,11 @@ class Registry(Mapping[str, D], Generic[D]):
     """
 
     def __init__(self, kind: str, *allowed: Parameters) -> None:
+        super().__init__()
         self.kind = kind
         self.allowed = allowed
-        self._declared: dict[str, D] = {}
 
-    def declare(
-        self,
-        make: type[D],
-        function: Any,
-        *,
-        name: Any = None,
-        meaning: str | None = None,
-        parameters: Parameters | None = None,
-        **options: Any,
-    ) -> Function:
+    def declare(self, make: type[D], function: Any, *, name: Any = None, **options: Any) -> Function:
         """Add the declaration that is made on a function, and return the function, compiled.
 
         It replaces one that was made on a function of the same module and qualified name.
@@ -136,58 +131,49 @@ class Registry(Mapping[str, D], Generic[D]):
             make: The class of the declaration.
             function: The function.
             name: The declaration's name; default: that of the function.
-            meaning: Its meaning; default: the function's docstring.
-            parameters: Those of a function that is returned as it is, and not compiled here.
             **options: Further attributes of the declaration.
 
         Raises:
-            DeclarationError: The name is invalid or taken, the function has no docstring or other
+            DeclarationError: The name is invalid or taken, a function has no docstring or other
                 parameters, or its unit is none.
         """
-        self.check_function(function, *(self.allowed if parameters is None else (parameters,)))
+        parameters = self.check_function(function, *self.allowed)
+        for further, (wanted, _) in make.further.items():
+            if options.get(further) is not None:
+                self.check_function(options[further], wanted)
+                options[further] = compiled(plain(options[further]))
         name = plain(function).__name__ if name is None else name
         if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
             raise self.error(function, f"invalid name {name!r}: use letters, digits, _ and -")
-        taken = self._declared.get(name)
+        taken = self.get(name)
         if taken is not None and _home(taken.function) != _home(function):
             raise self.error(function, f"the name {name!r} is taken by {place_of(taken.function)}")
-        meaning = meaning or inspect.getdoc(plain(function)) or ""
+        meaning = inspect.getdoc(plain(function)) or ""
         if not meaning.strip():
             raise self.error(function, "its docstring, which must state its meaning, is missing")
         unit = options.get("unit", "-")
         if not isinstance(unit, str) or not unit:
             raise self.error(function, f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
-        working: Function = compiled(plain(function)) if parameters is None else function
-        self._declared[name] = make(name=name, meaning=meaning, function=working, **options)
+        working: Function = compiled(plain(function)) if parameters[0] == "c" else function
+        self[name] = make(name=name, meaning=meaning, function=working, **options)
         return working
 
     def check_function(self, function: Any, *allowed: Parameters) -> Parameters:
-        """Return the parameters of a function; raise unless it is one, and they are among those allowed.
-
-        Raises:
-            DeclarationError: It is not.
-        """
+        """Return the parameters of a function; raise DeclarationError unless it is one with parameters allowed."""
         if not isinstance(plain(function), FunctionType):
             raise self.error(function, f"declare a function, made by def, not a {type(function).__name__}")
-        names = parameters_of(function)
         signature = inspect.signature(plain(function))
         bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
         given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
         wanted = [f"({', '.join(each)})" for each in allowed]
         if given not in wanted:
             raise self.error(function, f"its parameters are {given}, not {' or '.join(wanted)}")
-        return names
+        return parameters_of(function)
 
     def check_argument(self, argument: object, usage: str) -> None:
         """Raise if a decorator was used without its arguments, on the function itself."""
         if callable(argument):
             raise self.error(argument, f"the decorator needs arguments: {usage}")
-
-    def check_bounds(self, function: Function, low: object, high: object, of: str = "") -> None:
-        """Raise unless the bounds ``of`` a value are numbers, or functions of the scenario."""
-        for name, bound in (("low", low), ("high", high)):
-            if not callable(bound) and not is_number(bound):
-                raise self.error(function, f"{name}={bound!r}{of} is neither a finite number nor a function")
 
     def bounds_of(self, function: Function, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
         """Return the bounds ``of`` a value in a scenario; raise unless they are finite and in order."""
@@ -210,11 +196,11 @@ class Registry(Mapping[str, D], Generic[D]):
 
     def is_built_in(self, name: str) -> bool:
         """Return whether posse itself declares this name."""
-        return self._declared[name].built_in
+        return self[name].built_in
 
     def built_in(self) -> tuple[D, ...]:
         """Return the built-in declarations, in order."""
-        return tuple(each for each in self._declared.values() if each.built_in)
+        return tuple(each for each in self.values() if each.built_in)
 
     def with_added(self, *names: str) -> tuple[D, ...]:
         """Return the built-in declarations, then the named ones, each once.
@@ -229,28 +215,8 @@ class Registry(Mapping[str, D], Generic[D]):
         """Return the message for an unknown name."""
         return f"{unknown(self.kind, name, self)}. To use a declaration of your own, import its module first"
 
-    def __getitem__(self, name: str) -> D:
-        if name not in self._declared:
-            raise KeyError(self.unknown(name))
-        return self._declared[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._declared)
-
-    def __len__(self) -> int:
-        return len(self._declared)
-
-
-def check_memory_name(registry: Registry[Any], function: Function, name: object, taken: Iterable[str]) -> None:
-    """Raise unless a name is free for a field of a world's record.
-
-    Raises:
-        DeclarationError: It is taken, or no name in Python.
-    """
-    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-        raise registry.error(function, f"invalid name {name!r} of a memory: use a name that Python allows")
-    if name in taken:
-        raise registry.error(function, f"a world has a field {name!r}: choose another name")
+    def __missing__(self, name: str) -> D:
+        raise KeyError(self.unknown(name))
 
 
 def _home(function: Function) -> tuple[str, str]:
@@ -259,7 +225,7 @@ def _home(function: Function) -> tuple[str, str]:
 
 FIELDS: Final[Registry[Any]] = Registry("observation field", ("c",), ("c", "v"), ("c", "v", "m"))
 METRICS: Final[Registry[Any]] = Registry(
-    "metric", ("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots")
+    "metric", ("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots"), ("s", "w")
 )
 REWARD_TERMS: Final[Registry[Any]] = Registry("reward term", ("c", "w", "t"), ("c", "w"))
 SENSORS: Final[Registry[Any]] = Registry("sensor", ("c", "w", "t", "dx", "dy"), ("c", "w", "t", "dx", "dy", "s"))

@@ -1,4 +1,4 @@
-"""Observation fields and reward terms of a user's module: the examples of the manual."""
+"""The examples of the manual's chapter *Extend posse*, as modules of a user."""
 
 from __future__ import annotations
 
@@ -7,13 +7,19 @@ from pathlib import Path
 import pytest
 from tests.support.user_modules import examples, lines_of, run, snippets
 
-CHAPTER = "extend.md"
-MOST_LINES = {"walls": 8, "closing": 10, "steady": 6}
+EXAMPLES = {**examples("extend.md"), **examples("extend_targets.md")}
+MOST_LINES = {"walls": 8, "closing": 10, "steady": 6, "spiral": 15, "bearing": 25, "distance": 8}
 
 
 @pytest.mark.parametrize("name", MOST_LINES)
 def test_an_example_is_short(name: str) -> None:
-    assert lines_of(examples(CHAPTER)[name]) <= MOST_LINES[name]
+    assert lines_of(EXAMPLES[name]) <= MOST_LINES[name]
+
+
+def test_the_other_pieces_of_code_run(tmp_path: Path) -> None:
+    for code in snippets("extend.md"):
+        done = run(tmp_path, code, **EXAMPLES)
+        assert done.returncode == 0, done.stderr
 
 
 TWICE = """
@@ -35,7 +41,7 @@ def told(c):
         11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, c.num_trackers, 20.0,
     )
 """
-PLAY = """
+FIELDS_AND_TERMS = """
 import pickle
 
 import gymnasium
@@ -50,11 +56,10 @@ settings = dict(
     extra_fields=("closing_speed", "wall_distance", "twice", "told"),
     target_motion="agent",
     reward_weights={"slot": 1.0, "steady": 0.5}, message_size=1, num_neighbours=4,
-    breaks=BREAKS, num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
+    num_trackers=4, tracker_speed=(1.0, 1.1, 1.2, 1.3),
 )
 
 batch = posse.batch("obstacles", 11, **settings)
-alone = [posse.batch("obstacles", 1, first_world=e, **settings) for e in (0, 9)]
 s, layout = batch.scenario, batch.layout
 plain = posse.batch("obstacles", 11, **{**settings, "extra_fields": (), "reward_weights": {}})
 names = [field.name for field in layout.fields]
@@ -66,104 +71,144 @@ assert names.index("closing_speed") + 1 == names.index("neighbour_message")
 low, high = layout.bounds()
 rng = np.random.default_rng(0)
 observed, expected = batch.reset(seed=1), plain.reset(seed=1)
-singles = [single.reset(seed=1) for single in alone]
 for step in range(60):
     o, other = layout.views(observed), plain.layout.views(expected)
     for name, view in other.items():
         np.testing.assert_array_equal(o[name], view, err_msg=name)
     assert (o["told"] == [*range(1, 19), 4, 20]).all()
-    for single, e in zip(singles, (0, 9)):
-        np.testing.assert_array_equal(single[0], observed[e])
     assert ((observed >= low) & (observed <= high)).all()
     state = batch.state
-    x, y, heading, speed = (
+    x, y, heading, side, speed = (
         np.concatenate([state[f"tracker_{k}"], state[f"world_{k}"][:, None]], axis=1)
-        for k in ("x", "y", "heading_cos", "speed")
+        for k in ("x", "y", "heading_cos", "heading_sin", "speed")
     )
     rim = s.arena / 2 - s.robot_radius
-    np.testing.assert_allclose(
-        o["wall_distance"], rim - np.maximum(abs(x), abs(y)), rtol=1e-5, atol=1e-5
-    )
+    np.testing.assert_allclose(o["wall_distance"], rim - np.maximum(abs(x), abs(y)), rtol=1e-5, atol=1e-5)
     np.testing.assert_array_equal(o["twice"][..., 0], np.where(speed > 0, 1, -1))
     np.testing.assert_array_equal(o["twice"][..., 1], 4)
-    if not s.breaks:
-        velocity = speed * (heading + 1j * np.concatenate(
-            [state["tracker_heading_sin"], state["world_heading_sin"][:, None]], axis=1
-        ))
-        for i in range(5):
-            number = o["neighbour_number"][:, i].astype(int)
-            apart = np.take_along_axis(x + 1j * y, number, 1) - (x + 1j * y)[:, i : i + 1]
-            moving = np.take_along_axis(velocity, number, 1) - velocity[:, i : i + 1]
-            closing_speed = -(apart.conj() * moving).real / abs(apart)
-            there = number >= 0
-            np.testing.assert_allclose(
-                o["closing_speed"][:, i][there], closing_speed[there], rtol=1e-4, atol=2e-3
-            )
-            assert (o["closing_speed"][:, i][~there] == 0).all()
+    velocity = speed * (heading + 1j * side)
+    for i in range(5):
+        number = o["neighbour_number"][:, i].astype(int)
+        apart = np.take_along_axis(x + 1j * y, number, 1) - (x + 1j * y)[:, i : i + 1]
+        moving = np.take_along_axis(velocity, number, 1) - velocity[:, i : i + 1]
+        closing_speed = -(apart.conj() * moving).real / abs(apart)
+        there = number >= 0
+        np.testing.assert_allclose(o["closing_speed"][:, i][there], closing_speed[there], rtol=1e-4, atol=2e-3)
+        assert (o["closing_speed"][:, i][~there] == 0).all()
     actions = rng.uniform(-1, 1, batch.action_shape).astype(np.float32)
     observed, rewards, *_, infos = batch.step(actions)
     expected = plain.step(actions)[0]
-    singles = [single.step(actions[e : e + 1])[0] for single, e in zip(alone, (0, 9))]
     terms = {name: infos[f"reward/{name}"] for name in ("slot", "steady")}
     turn = abs(batch.state["tracker_turn_rate"]) / s.tracker_turn_rate
     np.testing.assert_allclose(terms["steady"][:, :4], 1 - turn, rtol=1e-5, atol=1e-5)
-    np.testing.assert_allclose(
-        rewards[:, :4], (terms["slot"] + 0.5 * terms["steady"])[:, :4], rtol=1e-5, atol=1e-5
-    )
+    np.testing.assert_allclose(rewards[:, :4], (terms["slot"] + 0.5 * terms["steady"])[:, :4], rtol=1e-5, atol=1e-5)
 copy = pickle.loads(pickle.dumps(batch))
 np.testing.assert_array_equal(copy.step(actions)[0], batch.step(actions)[0])
-assert "steady" not in plain.__class__(posse.get_scenario("smart"), 1).term_names
+assert "steady" not in posse.batch("smart").term_names
 
 own = {name: settings[name] for name in ("extra_fields", "reward_weights")}  # the same kernel
 team = gymnasium.make("posse/Team-v0", scenario="obstacles", **own)
-parallel = posse.parallel_env("obstacles", **own)
 team.reset(seed=0)
-parallel.reset(seed=0)
-info = team.step(team.action_space.sample())[4]
-assert info["reward/steady"].shape == (5,)
-rewards, infos = parallel.step({agent: [0.0, 0.5] for agent in parallel.agents})[1::3]
-for agent, info in infos.items():
-    terms = {name: info[f"reward/{name}"] for name in ("slot", "steady")}
-    assert abs(terms["steady"] - 0.5) < 1e-5
-    assert abs(rewards[agent] - terms["slot"] - 0.5 * terms["steady"]) < 1e-5
+assert team.step(team.action_space.sample())[4]["reward/steady"].shape == (5,)
 print("hits", sum(batch._untyped.stats.cache_hits.values()))
 """
 
 
-def play(folder: Path, breaks: int, **changed: str) -> tuple[str, str]:
-    """Return the output and the errors of a game with the examples."""
-    code = PLAY.replace("BREAKS", str(breaks))
-    done = run(folder, code, **{**examples(CHAPTER), "twice": TWICE, **changed})
-    return done.stdout, done.stderr
+@pytest.mark.long
+def test_fields_and_terms_are_part_of_the_kernel(tmp_path: Path) -> None:
+    """Of that of any scenario, which is kept on disk until a term is edited."""
+    modules = {**EXAMPLES, "twice": TWICE}
+    for _ in range(2):
+        done = run(tmp_path, FIELDS_AND_TERMS, **modules)
+        assert done.stdout.startswith("hits"), done.stderr
+    assert done.stdout == "hits 1\n"
+    steady = EXAMPLES["steady"].replace("return 1 -", "return 2 -")
+    assert "Not equal to tolerance" in run(tmp_path, FIELDS_AND_TERMS, **{**modules, "steady": steady}).stderr
+
+
+MOTION_SENSOR_AND_METRIC = """
+import numpy as np
+import posse
+import bearing
+import distance
+import spiral
+from posse.signals.global_state import StateLayout
+
+@posse.metric("1")
+def last_heading(s, w):
+    '''Cosine of the target's heading at the end.'''
+    return w["heading_cos"]
+
+batch = posse.batch(
+    "constant", 40, target_motion="spiral", sensor="bearing-only", sensing_range=6.0,
+    num_trackers=3, radio_loss=0.1, metrics=["target_distance", "last_heading"], horizon=101,
+)
+s, layout = batch.scenario, StateLayout(batch.scenario)
+low, high = batch.layout.bounds()
+observations = batch.reset(seed=0)
+heading, ever, bearings, losses, distances = [], 0, np.nan, 0, []
+for step in range(100):
+    state, o = batch.state, batch.layout.views(observations)
+    heading.append(np.arctan2(state["world_heading_sin"], state["world_heading_cos"]))
+    offset = state["world_x"][:, None] - state["tracker_x"]
+    offset = offset + 1j * (state["world_y"][:, None] - state["tracker_y"])
+    own = state["tracker_heading_cos"] + 1j * state["tracker_heading_sin"]
+    told = (o["target_bearing"][..., 0] + 1j * o["target_bearing"][..., 1]) * own
+    seen, known = o["target_seen"] > 0, o["target_known"] > 0
+    np.testing.assert_array_equal(seen, abs(offset) <= s.sensing_range)
+    ever = ever | seen
+    np.testing.assert_array_equal(known, ever)  # a bearing is not sent
+    error = np.angle(told / offset)[seen]
+    assert np.abs(error).max() <= 0.0601
+    assert error.std() > 0.01
+    kept = known & ~seen  # the direction stands, whoever moves
+    np.testing.assert_allclose(told[kept], np.broadcast_to(bearings, told.shape)[kept], rtol=1e-4, atol=1e-4)
+    bearings, losses = told.copy(), losses + kept.sum()
+    assert (o["target_range"] == -1).all()
+    assert (abs(told[~known]) == 0).all()
+    for name in ("target_heading", "target_frame", "target_velocity"):
+        assert (o[name] == 0).all()
+    assert ((observations >= low) & (observations <= high)).all()
+    distances += [abs(offset)] * (step > 0)
+    observations, *_, infos = batch.step(np.ones(batch.action_shape))
+assert losses > 0
+state = batch.state
+turned = np.unwrap(heading, axis=0)
+turned -= turned[0]
+side = batch.state["world_spiral_side"]
+assert set(side) == {-1.0, 1.0}
+rates = s.target_turn_rate / (1 + 0.1 * s.control_step * np.arange(100))
+expected = np.append(0, np.cumsum(rates[:-1] * s.control_step))
+np.testing.assert_allclose(turned, side * expected[:, None], rtol=1e-4, atol=1e-3)
+np.testing.assert_array_equal(layout.views(layout.vector(batch.arrays))["spiral_side"], side)
+assert "spiral_side" not in StateLayout(posse.get_scenario("smart")).offsets
+
+# The metric, at any time and at the end of the episode; beside the built-in ones, which it leaves.
+metrics = batch.metrics()
+assert list(metrics) == [metric.name for metric in posse.METRICS] + ["target_distance", "last_heading"]
+np.testing.assert_array_equal(metrics["last_heading"], state["world_heading_cos"])
+x, y = state["world_x"][:, None], state["world_y"][:, None]
+distances.append(np.hypot(x - state["tracker_x"], y - state["tracker_y"]))
+np.testing.assert_allclose(metrics["target_distance"], np.mean(distances, (0, 2)), rtol=1e-5)
+assert (infos["metrics/target_distance"] == 0).all()
+infos = batch.step(np.ones(batch.action_shape))[-1]
+assert infos["metrics/target_distance"].shape == (40,)
+batch.step(np.ones(batch.action_shape))  # the next episode's start: sums begin anew
+assert (batch.state["world_target_distance_sum"] == 0).all()
+print("done")
+"""
 
 
 @pytest.mark.long
-def test_the_examples_are_part_of_the_kernel(tmp_path: Path) -> None:
-    """Of that of any scenario, which is also that of the environments and kept on disk."""
-    for breaks in (0, 1):
-        said, errors = play(tmp_path, breaks)
-        assert said.startswith("hits"), errors
-    assert said == "hits 1\n"
-
-
-@pytest.mark.long
-def test_an_edited_term_is_compiled_anew(tmp_path: Path) -> None:
-    said, errors = play(tmp_path, 0)
-    assert said.startswith("hits"), errors
-    steady = examples(CHAPTER)["steady"].replace("return 1 -", "return 2 -")
-    _, errors = play(tmp_path, 0, steady=steady)
-    assert "Not equal to tolerance" in errors
-
-
-def test_the_other_pieces_of_code_run(tmp_path: Path) -> None:
-    for code in snippets(CHAPTER):
-        done = run(tmp_path, code, **examples(CHAPTER))
-        assert done.returncode == 0, done.stderr
+def test_a_motion_a_sensor_and_a_metric_are_part_of_the_kernel(tmp_path: Path) -> None:
+    done = run(tmp_path, MOTION_SENSOR_AND_METRIC, **EXAMPLES)
+    assert done.stdout.endswith("done\n"), done.stderr
 
 
 UNKNOWN = {
     "extra_fields=['wall_distnce']": "unknown observation field 'wall_distnce' (did you mean 'wall_distance'",
     "reward_weights={'stedy': 1}": "unknown reward term 'stedy' (did you mean 'steady'?)",
+    "target_motion='spirall'": "unknown target_motion 'spirall' (did you mean 'spiral'?)",
     "extra_fields=['speed']": "'speed' is in every observation: leave it out",
     "extra_fields=['wall_distance'] * 2": "it must be a tuple of names, each once",
     "extra_fields=[1]": "extra_fields=[1] is refused: it must be a tuple of names",
@@ -172,5 +217,5 @@ UNKNOWN = {
 
 @pytest.mark.parametrize("settings", UNKNOWN)
 def test_a_setting_that_names_nothing_is_refused(settings: str, tmp_path: Path) -> None:
-    code = f"import posse, steady, walls\nposse.batch('obstacles', {settings})"
-    assert UNKNOWN[settings] in run(tmp_path, code, **examples(CHAPTER)).stderr
+    code = f"import posse, spiral, steady, walls\nposse.batch('obstacles', {settings})"
+    assert UNKNOWN[settings] in run(tmp_path, code, **EXAMPLES).stderr

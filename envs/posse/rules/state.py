@@ -115,7 +115,7 @@ DERIVED: Final[_Numbers] = {
 
 
 def _of_pair(name: str, place: int) -> Callable[[Scenario], float]:
-    return lambda s: getattr(s, name)[place]  # type: ignore[no-any-return]
+    return lambda s: getattr(s, name)[place]
 
 
 def _numbers() -> _Numbers:
@@ -142,7 +142,7 @@ _WORLD: Final = (
     ("step", _I),  # control steps since the start
     ("over", _I),  # 1: the episode has ended, the world must be reset
     ("terminated", _I),
-    # the target
+    # the target; kernels also read its pose to the slot frame at once (TARGET_POSE)
     ("x", _F),
     ("y", _F),
     ("heading_cos", _F),
@@ -313,6 +313,7 @@ def _begin(record: np.dtype[Any], name: str) -> int:
     return int(fields[name][1])
 
 
+TARGET_POSE: Final = _begin(_record(*_WORLD), "x")
 POSE: Final = _begin(TRACKER, Pose._fields[0])
 CONDITION: Final = _begin(TRACKER, Condition._fields[0])
 FIX: Final = _begin(TRACKER, "fix")

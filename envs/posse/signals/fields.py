@@ -18,12 +18,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
 
-from posse.numeric import compiled
+from posse.numeric import Record
 from posse.registry import FIELDS, Bound, Declaration, Function, is_number
 from posse.scenarios import Scenario
 from posse.scenarios.limits import FAR
@@ -66,23 +65,17 @@ class FieldDeclaration(Declaration):
         return "m" in self.parameters
 
     @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
+    def functions(self) -> dict[Function, str]:
         """Its function, and what it returns."""
-        return ((self.function, f"{self.size} numbers" if self.size > 1 else "a number"),)
+        return {self.function: f"{self.size} numbers" if self.size > 1 else "a number"}
 
     def of(self, scenario: Scenario) -> Field:
-        """Return the field in a scenario.
-
-        Raises:
-            DeclarationError: Its bounds are not finite, low is above high, or the value for
-                "unknown" is not between them.
-        """
+        """Return the field in a scenario; raise DeclarationError if its bounds or its value for "unknown" are wrong."""
         low, high = FIELDS.bounds_of(self.function, self.low, self.high, scenario)
         empty = 0.0 if self.unknown is None and self.of_mate else self.unknown
-        if empty is not None and not low <= empty <= high:
-            raise FIELDS.error(
-                self.function, f"unknown={empty:g} is not between low={low:g} and high={high:g} in {scenario.name!r}"
-            )
+        if empty is not None and not (is_number(empty) and low <= empty <= high):
+            where = f"between low={low:g} and high={high:g} in {scenario.name!r}"
+            raise FIELDS.error(self.function, f"unknown={empty!r} is not a number {where}")
         return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
 
 
@@ -97,55 +90,33 @@ def field(
         high: The greatest, likewise.
         unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
         size: Number of values that the function returns, at most 256; as a tuple if more than one.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, an argument is wrong, or the
-            parameters are not (c), (c, v) or (c, v, m).
     """
 
     def declare(function: Function) -> Function:
         if type(size) is not int or not 1 <= size <= MOST_NUMBERS:
             raise FIELDS.error(function, f"size={size!r} must be a whole number from 1 to {MOST_NUMBERS}")
-        if unknown is not None and not is_number(unknown):
-            raise FIELDS.error(function, f"unknown={unknown!r} is not a finite number")
-        FIELDS.check_bounds(function, low, high)
         return FIELDS.declare(FieldDeclaration, function, unit=unit, low=low, high=high, unknown=unknown, size=size)
 
     return declare
 
 
-def settings(*names: str) -> None:
-    """Declare settings of the scenario as fields of their names, with its units and meanings.
+def setting(name: str) -> None:
+    """Declare a number of the scenario as a field of its name, with its unit and meaning; -1 for an unlimited one.
 
-    -1 stands for an unlimited one. The range holds the value, 0 and 1: wrappers of other libraries
-    pad observations with 0 and 1.
+    The range holds the value, 0 and 1: wrappers of other libraries pad observations with 0 and 1.
     """
-    for name in names:
-        declared = Scenario.settings()[name]
-        FIELDS.declare(
-            FieldDeclaration,
-            limited,
-            name=name,
-            meaning=f"{declared.meaning[0].upper()}{declared.meaning[1:]}.".replace("inf:", "-1:"),
-            parameters=("value",),
-            unit=declared.unit,
-            low=partial(_least, name),
-            high=partial(_greatest, name),
-            unknown=None,
-            size=1,
-        )
+    declared = Scenario.settings()[name]
 
+    def limited(c: Record) -> np.float32:
+        return np.float32(c[name] if c[name] < FAR else -1.0)
 
-@compiled
-def limited(value: float) -> np.float32:
-    """Return a setting as it is observed: -1 for an unlimited one."""
-    return np.float32(value if value < FAR else -1.0)
+    def low(s: Scenario) -> float:
+        return -1.0 if math.isinf(getattr(s, name)) else 0.0
 
+    def high(s: Scenario) -> float:
+        value: float = getattr(s, name)
+        return 1.0 if math.isinf(value) else max(1.0, value * SLACK)
 
-def _least(name: str, s: Scenario) -> float:
-    return -1.0 if math.isinf(getattr(s, name)) else 0.0
-
-
-def _greatest(name: str, s: Scenario) -> float:
-    value: float = getattr(s, name)
-    return 1.0 if math.isinf(value) else max(1.0, value * SLACK)
+    limited.__name__ = name
+    limited.__doc__ = f"{declared.meaning[0].upper()}{declared.meaning[1:]}.".replace("inf:", "-1:")
+    field(declared.unit, low, high)(limited)

@@ -8,7 +8,6 @@ Unknown quantities hold the field's ``unknown`` value.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -62,16 +61,13 @@ class ObservationLayout:
         return low, high
 
     def check_added(self, observations: FloatArray) -> None:
-        """Check the fields that the scenario adds in observations (..., F).
-
-        Raises:
-            DeclarationError: One has a value that is not finite or not between its bounds.
-        """
-        views = self.views(observations) if self.scenario.extra_fields else {}
+        """Raise DeclarationError if a field that the scenario adds leaves its bounds in observations (..., F)."""
+        views = self.views(observations)
         for field in self.fields:
-            if field.name in self.scenario.extra_fields:
-                values = views[field.name]
-                wrong = values[~((values >= np.float32(field.low)) & (values <= np.float32(field.high)))]
+            values = views[field.name]
+            if field.name in self.scenario.extra_fields and values.size:
+                low, high = np.float32(field.low), np.float32(field.high)
+                wrong = values[~((values >= low) & (values <= high))]
                 if wrong.size:
                     raise FIELDS.error(
                         FIELDS[field.name].function,
@@ -83,9 +79,6 @@ class ObservationLayout:
 
         A field of size 1 has shape (...), one of size k (..., k); a field of team-mates has an
         axis of places before that, (..., places) or (..., places, k).
-
-        Raises:
-            ValueError: The last axis is not F long.
         """
         if observations.shape[-1] != self.size:
             raise ValueError(
@@ -102,20 +95,3 @@ class ObservationLayout:
             part = source[..., start : start + field.size]
             views[field.name] = part[..., 0] if field.size == 1 else part
         return views
-
-    def flatten(self, views: Mapping[str, npt.ArrayLike]) -> FloatArray:
-        """Return the flat observations (..., F) of named values; the inverse of :meth:`views`.
-
-        Raises:
-            ValueError: A missing or unknown field, or a wrong shape.
-        """
-        odd = set(views) ^ set(self.offsets)
-        if odd:
-            raise ValueError(f"fields missing or unknown: {', '.join(sorted(odd))}")
-        flat = np.empty((*np.shape(views["speed"]), self.size), np.float32)
-        for name, part in self.views(flat).items():
-            value = np.asarray(views[name], np.float32)
-            if value.shape != part.shape:
-                raise ValueError(f"{name} has shape {value.shape}, wanted {part.shape}")
-            part[...] = value
-        return flat

@@ -9,11 +9,12 @@ divided at the end of the episode. The parameters of the function determine what
 (c, w, t)                 a value of each working tracker
 (c, w, trackers)          a value of the team
 (c, w, trackers, slots)   a value of the team, with the slots
+(s, w)                    nothing: called from Python with the scenario and the records of all
+                          worlds, it returns the metric of each, (E,)
 ========================= ========================================================================
 
-A metric without a sum is a *figure*, declared on a function of the worlds' records. ``info``
-reports the built-in metrics at the end of every episode, and others if the scenario names them.
-``nan`` stands for "never happened".
+``info`` reports the built-in metrics at the end of every episode, and others if the scenario names
+them. ``nan`` stands for "never happened".
 """
 
 from __future__ import annotations
@@ -25,16 +26,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse import registry
 from posse.numeric import ONE, ZERO, Record, Records
-from posse.registry import TARGET_MOTIONS, Declaration, Function, check_memory_name, plain
+from posse.registry import METRICS, Declaration, Function
 from posse.rules.score import could_arrive
 from posse.rules.senses.radio import connected
-from posse.rules.state import NEVER, WORLD_NAMES
+from posse.rules.state import NEVER
 from posse.scenarios import Scenario
 
 Column = npt.NDArray[np.float64]
-Figure = Callable[[Scenario, Records], Column]
 
 _STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
 
@@ -43,11 +42,8 @@ _STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker
 class Metric(Declaration):
     """One metric of an episode.
 
-    Its function returns what a control step adds to the sum; that of a figure, which has no sum,
-    takes the scenario and the worlds' records and returns (E,).
-
     Attributes:
-        per: Divisor of the sum: ``"step"``, ``"tracker_step"`` or ``"episode"``; ``None``: a figure.
+        per: Divisor of the sum: ``"step"``, ``"tracker_step"`` or ``"episode"``; ``None``: it has no sum.
     """
 
     per: str | None
@@ -63,15 +59,14 @@ class Metric(Declaration):
         return () if self.per is None else ((self.sum_name, np.float64),)
 
     @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
-        """Its function, unless it is a figure, and what it returns."""
-        return () if self.per is None else ((self.function, "a number"),)
+    def functions(self) -> dict[Function, str]:
+        """Its function, if that is compiled, and what it returns."""
+        return {} if self.per is None else super().functions
 
     def of(self, scenario: Scenario, worlds: Records) -> Column:
         """Return the metric of the current episodes, (E,)."""
         if self.per is None:
-            column: Column = self.function(scenario, worlds)
-            return column
+            return np.asarray(self.function(scenario, worlds), np.float64)
         total: Column = np.asarray(worlds[self.sum_name], np.float64)
         steps = _STEPS[self.per]
         return total if steps is None else total / np.maximum(worlds[steps], 1)
@@ -84,29 +79,14 @@ def metric(unit: str, *, per: str = "step") -> Callable[[Function], Function]:
         unit: Unit of the metric.
         per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
             control steps of all working trackers; ``"episode"``: 1.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, the parameters are not among
-            those above, or ``per`` is unknown.
     """
-    registry.METRICS.check_argument(unit, '@posse.metric("1")')
+    METRICS.check_argument(unit, '@posse.metric("1")')
 
     def declare(function: Function) -> Function:
         if per not in tuple(_STEPS):
-            raise registry.METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
-        registry.METRICS.check_function(function, *registry.METRICS.allowed)
-        memories = [each.name for motion in TARGET_MOTIONS.values() for each in motion.memory]
-        check_memory_name(registry.METRICS, function, f"{plain(function).__name__}_sum", (*WORLD_NAMES, *memories))
-        return registry.METRICS.declare(Metric, function, unit=unit, per=per)
-
-    return declare
-
-
-def figure(unit: str) -> Callable[[Figure], Figure]:
-    """Declare a function (s, w), the scenario and the worlds (E,), -> (E,) as a metric."""
-
-    def declare(function: Figure) -> Figure:
-        return registry.METRICS.declare(Metric, function, unit=unit, per=None, parameters=("s", "w"))
+            raise METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
+        summed = METRICS.check_function(function, *METRICS.allowed)[0] == "c"
+        return METRICS.declare(Metric, function, unit=unit, per=per if summed else None)
 
     return declare
 
@@ -141,19 +121,19 @@ def bound(c: Record, w: Record, trackers: Records, slots: Records) -> np.float32
     return np.float32(count) / np.float32(w.working) if w.working > 0 else ZERO
 
 
-@figure("s")
+@metric("s")
 def detection_time(s: Scenario, w: Records) -> Column:
     """Time at which a tracker first had the target in sight; nan: never."""
     return _time(w["detected_at"], s)
 
 
-@figure("s")
+@metric("s")
 def settling_time(s: Scenario, w: Records) -> Column:
     """Start of the first settle_time with each working tracker in its own slot; nan: never."""
     return _time(w["settled_at"], s)
 
 
-@figure("s")
+@metric("s")
 def recovery_time(s: Scenario, w: Records) -> Column:
     """Time from a tracker's first break until the others settled again; nan: never."""
     return np.where(w["recovered_at"] >= 0, _time(w["recovered_at"] - w["lost_at"], s), np.nan)
@@ -171,35 +151,35 @@ def time_in_sight(c: Record, w: Record, t: Record) -> np.float32:
     return np.float32(t.sees)
 
 
-@figure("count")
+@metric("count")
 def tracker_contacts(s: Scenario, w: Records) -> Column:
     """Contacts between two trackers, each counted once at its beginning."""
-    return np.asarray(w["contacts_tracker"], np.float64)
+    return w["contacts_tracker"]
 
 
-@figure("count")
+@metric("count")
 def obstacle_contacts(s: Scenario, w: Records) -> Column:
     """Contacts of a tracker with an obstacle or a wall."""
-    return np.asarray(w["contacts_obstacle"], np.float64)
+    return w["contacts_obstacle"]
 
 
-@figure("count")
+@metric("count")
 def target_contacts(s: Scenario, w: Records) -> Column:
     """Contacts of a tracker with the target."""
-    return np.asarray(w["contacts_target"], np.float64)
+    return w["contacts_target"]
 
 
-@figure("1")
+@metric("1")
 def contact_free(s: Scenario, w: Records) -> Column:
     """1 if no tracker touched anything, else 0; the mean is the share of contact-free episodes."""
     contacts = w["contacts_tracker"] + w["contacts_obstacle"] + w["contacts_target"]
     return np.asarray(contacts == 0, np.float64)
 
 
-@figure("m")
+@metric("m")
 def least_gap(s: Scenario, w: Records) -> Column:
     """Least clearance of a tracker from anything else, over all control steps."""
-    return np.asarray(w["least_gap"], np.float64)
+    return w["least_gap"]
 
 
 @metric("1", per="tracker_step")
@@ -215,11 +195,7 @@ def time_connected(c: Record, w: Record, trackers: Records) -> np.float32:
     return ONE if c.perfect_radio or connected(c, w, trackers) else ZERO
 
 
-@figure("s")
+@metric("s")
 def duration(s: Scenario, w: Records) -> Column:
     """Length of the episode."""
     return _time(w["step"], s)
-
-
-METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
-"""Every built-in metric, in the order in which they are reported."""

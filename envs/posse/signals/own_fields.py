@@ -16,7 +16,7 @@ from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eigh
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.signals.fields import SLACK, field, settings
+from posse.signals.fields import SLACK, field, setting
 from posse.signals.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]
@@ -98,7 +98,8 @@ def team_size(c: Record) -> np.float32:
     return np.float32(c.num_trackers)
 
 
-settings("formation_distance", "formation_spacing")
+for _name in ("formation_distance", "formation_spacing"):
+    setting(_name)
 
 
 @field("m/s", 0, _fast)
@@ -125,7 +126,8 @@ def turn_acceleration_time(c: Record, v: View) -> Lanes:
     return v.turn_acceleration_time
 
 
-settings("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range", "arena")
+for _name in ("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range", "arena"):
+    setting(_name)
 
 
 @field("s", 0, lambda s: s.duration * SLACK)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, FloatArray, Record, compiled
-from posse.registry import REWARD_TERMS as TERMS
-from posse.registry import Declaration, Function, plain
+from posse.numeric import ONE, ZERO, FloatArray, Record
+from posse.registry import REWARD_TERMS, Declaration, Function
 from posse.scenarios import Scenario
 
 
@@ -25,16 +24,16 @@ class RewardTerm(Declaration):
     Its function gives the value for a tracker, ``(c, w, t)``, or one of the world, ``(c, w)``.
 
     Attributes:
-        of_target: The value for a target that is an agent, ``(c, w)``; ``None``: it has none.
+        target: The value for a target that is an agent, ``(c, w)``, if it differs.
     """
 
-    of_target: Function | None = None
+    target: Function | None = None
+    further: ClassVar = {"target": (("c", "w"), "a number")}
 
     @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
-        """The functions of the term, and what each returns."""
-        both = (self.function, self.of_target)
-        return tuple((function, "a number") for function in dict.fromkeys(both) if function)
+    def of_target(self) -> Function | None:
+        """The function for a target that is an agent; ``None``: it has none."""
+        return self.function if self.target is None and "t" not in self.parameters else self.target
 
 
 def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Function], Function]:
@@ -48,22 +47,9 @@ def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Funct
         unit: Unit of the term.
         target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
             ``(c, w, t)`` is for trackers only.
-
-    Raises:
-        DeclarationError: The name is taken, the docstring is missing, or the parameters differ.
     """
-    TERMS.check_argument(unit, '@posse.reward_term("1")')
-
-    def declare(function: Function) -> Function:
-        of_target = None
-        if target is not None:
-            TERMS.check_function(target, ("c", "w"))
-            of_target = compiled(plain(target))
-        elif TERMS.check_function(function, *TERMS.allowed) == ("c", "w"):
-            of_target = compiled(plain(function))
-        return TERMS.declare(RewardTerm, function, unit=unit, of_target=of_target)
-
-    return declare
+    REWARD_TERMS.check_argument(unit, '@posse.reward_term("1")')
+    return lambda function: REWARD_TERMS.declare(RewardTerm, function, unit=unit, target=target)
 
 
 @reward_term("1")
@@ -118,13 +104,9 @@ def team(c: Record, w: Record) -> np.float32:
     return np.float32(w.score)
 
 
-REWARD_TERMS: Final[tuple[RewardTerm, ...]] = TERMS.built_in()
-"""The built-in terms, in the order in which they are reported."""
-
-
 def terms_for(scenario: Scenario) -> tuple[RewardTerm, ...]:
     """Return the terms of a scenario: the built-in ones, then others with a weight."""
-    return TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
+    return REWARD_TERMS.with_added(*dict(scenario.reward_weights), *dict(scenario.target_reward_weights))
 
 
 def weights_for(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
@@ -133,14 +115,10 @@ def weights_for(scenario: Scenario, weights: Mapping[str, float]) -> FloatArray:
 
 
 def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatArray) -> None:
-    """Check the rewards of a step and the values of its terms (..., K).
-
-    Raises:
-        DeclarationError: A term returned a value that is not finite.
-    """
+    """Raise DeclarationError if a reward is not finite, for the term whose value (..., K) is not."""
     if np.isfinite(rewards).all():
         return
     for k, term in enumerate(terms):
         wrong = values[..., k][~np.isfinite(values[..., k])]
         if wrong.size:
-            raise TERMS.error(term.function, f"it returned {wrong[0]:g}, and a reward must be finite")
+            raise REWARD_TERMS.error(term.function, f"it returned {wrong[0]:g}, and a reward must be finite")

@@ -30,11 +30,7 @@ _LONGEST: Final = 200
 
 
 def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
-    """Raise if a user's function cannot be compiled. Takes some tenths of a second for each.
-
-    Raises:
-        DeclarationError: Names the function, the line and the reason.
-    """
+    """Raise DeclarationError for a user's function that cannot be compiled. Takes some tenths of a second for each."""
     added = list(declarations.added())
     if UNCOMPILED or not added:
         return
@@ -51,7 +47,7 @@ def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
         "dy": types.float32,
     }
     for registry, declaration in added:
-        for function, returns in declaration.functions:
+        for function, returns in declaration.functions.items():
             line, reason = _why_not(function, [known[name] for name in parameters_of(function)], returns)
             if reason:
                 raise registry.error(function, f"line {line}: {reason}") from None
@@ -60,28 +56,24 @@ def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
 def _why_not(function: Function, arguments: list[Any], returns: str) -> tuple[int, str]:
     """Compile a function alone; return the line and the reason of its error, or no reason."""
     alone: Any = _njit(error_model="numpy", _nrt=False)(plain(function))
-    first = int(plain(function).__code__.co_firstlineno)
+    code = plain(function).__code__
     try:
         alone.compile(tuple(arguments))
     except Exception as error:  # the compiler may raise anything
         text = _COLOURS.sub("", str(error))
         unknown = _UNKNOWN.search(text)
-        if unknown or isinstance(error, KeyError):  # of a view, or of a record
-            return _unknown(function, unknown[1] if unknown else str(error.args[0]), arguments)
-        file = re.escape(Path(plain(function).__code__.co_filename).name)
-        lines = re.findall(rf'{file}(?:" *, line | \()(\d+)', text)
-        return int(lines[-1]) if lines else first, _short(_first_line(text))
+        if unknown or isinstance(error, KeyError):  # an attribute of a view, or of a record
+            name = unknown[1] if unknown else str(error.args[0])
+            near = difflib.get_close_matches(name, {each for kind in arguments for each in getattr(kind, "fields", ())})
+            hint = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+            places = [each.positions for each in dis.get_instructions(code) if each.argval == name]
+            return next(
+                (at.lineno for at in places if at and at.lineno), code.co_firstlineno
+            ), f"there is no field {name!r}{hint}"
+        lines = re.findall(rf'{re.escape(Path(code.co_filename).name)}(?:" *, line | \()(\d+)', text)
+        return int(lines[-1]) if lines else code.co_firstlineno, _short(_first_line(text))
     found: Any = alone.overloads[tuple(arguments)].signature.return_type
-    return first, "" if _fits(found, returns) else f"it returns {_short(str(found))}, not {returns}"
-
-
-def _unknown(function: Function, name: str, arguments: list[Any]) -> tuple[int, str]:
-    """Return the line and the reason of an attribute that none of the arguments has."""
-    places = (each.positions for each in dis.get_instructions(plain(function)) if each.argval == name)
-    line = next((place.lineno for place in places if place), None) or plain(function).__code__.co_firstlineno
-    fields = {name for kind in arguments for name in getattr(kind, "fields", ())}  # of records, views and mates
-    near = difflib.get_close_matches(name, fields)
-    return line, f"there is no field {name!r}" + (f" (did you mean {' or '.join(map(repr, near))}?)" if near else "")
+    return code.co_firstlineno, "" if _fits(found, returns) else f"it returns {_short(str(found))}, not {returns}"
 
 
 def _fits(found: Any, returns: str) -> bool:

@@ -33,19 +33,25 @@ from posse.rules.contact import touches_surroundings
 from posse.rules.discs import nonnegative
 from posse.rules.kinematics import turned
 from posse.rules.scratch import TEAM, Fields
-from posse.rules.state import CONDITION, FIX, NEVER, NO_BITS, POSE, Condition, Fix, Odometry, Pose, WorldArrays
+from posse.rules.state import (
+    CONDITION,
+    FIX,
+    NEVER,
+    NO_BITS,
+    POSE,
+    TARGET_POSE,
+    Condition,
+    Fix,
+    Odometry,
+    Pose,
+    WorldArrays,
+)
 
 OBSERVING: Final[Fields] = (
     # Eight numbers, one for each of eight worlds.
     ("column", WIDTH),  # of observations
     ("steps", WIDTH),  # control steps
-    ("target_x", WIDTH),
-    ("target_y", WIDTH),
-    ("target_cos", WIDTH),
-    ("target_sin", WIDTH),
-    ("target_speed", WIDTH),
-    ("target_turn_rate", WIDTH),
-    ("target_touching", WIDTH),
+    ("target_touching", WIDTH),  # 1: the target touches anything
     # Eight numbers for each tracker.
     ("team_x", WIDTH * TEAM),
     ("team_y", WIDTH * TEAM),
@@ -181,7 +187,7 @@ class Mate(NamedTuple):
 
 @compiled
 def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s: Record) -> None:
-    """Write what all agents of ``count`` worlds, at most eight, need: positions, control steps, target agents."""
+    """Write what all agents of ``count`` worlds, at most eight, need: positions, control steps, contacts of targets."""
     n = nonnegative(c.num_trackers)
     observers = Observers(first, n, count)
     for i in range(n):
@@ -193,44 +199,55 @@ def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s:
         w = worlds.world[e]
         s.steps[lane] = np.float32(w.step)
         if c.target_agent != 0:
-            s.target_x[lane], s.target_y[lane] = w.x, w.y
-            s.target_cos[lane], s.target_sin[lane] = w.heading_cos, w.heading_sin
-            s.target_speed[lane], s.target_turn_rate[lane] = w.speed, w.turn_rate
-            touching = w.touching != NO_BITS or touches_surroundings(c, w, worlds.obstacle[e])
-            s.target_touching[lane] = np.float32(touching)
+            s.target_touching[lane] = np.float32(
+                w.touching != NO_BITS or touches_surroundings(c, w, worlds.obstacle[e])
+            )
 
 
 @compiled
-def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
-    """Return the view of a tracker of eight worlds, its pose as it knows it; requires :func:`lay_out_observers`."""
-    own = Pose(*columns(worlds.tracker, observers, observers.i, POSE))
-    x, y, heading_cos, heading_sin = own.x, own.y, own.heading_cos, own.heading_sin
-    if c.drifts != 0:
-        error = Odometry(*columns(worlds.odometry, observers, observers.i, 0))
-        x, y = x + error.x, y + error.y
-        heading_cos, heading_sin = turned(heading_cos, heading_sin, error.cos, error.sin)
-    fix = Fix(*columns(worlds.tracker, observers, observers.i, FIX))
-    condition = Condition(*columns(worlds.tracker, observers, observers.i, CONDITION))
-    dx, dy, fixed_at = fix.x, fix.y, counts(condition.fix_step)
+def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
+    """Return the view of a robot of eight worlds; requires :func:`lay_out_observers`."""
+    if observers.i < c.num_trackers:
+        number = eight(np.float32(observers.i))
+        own = Pose(*columns(worlds.tracker, observers, observers.i, POSE))
+        if c.drifts != 0:  # its pose as it knows it
+            error = Odometry(*columns(worlds.odometry, observers, observers.i, 0))
+            cos, sin = turned(own.heading_cos, own.heading_sin, error.cos, error.sin)
+            x, y = own.x + error.x, own.y + error.y
+            own = Pose(x, y, cos, sin, own.speed, own.turn_rate, own.max_speed, own.max_turn_rate)
+        fix = Fix(*columns(worlds.tracker, observers, observers.i, FIX))
+        condition = Condition(*columns(worlds.tracker, observers, observers.i, CONDITION))
+        touching, sees, fixed_at = counts(condition.touching), counts(condition.sees), counts(condition.fix_step)
+        working = choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
+        per_acceleration, per_turn_acceleration = c.per_acceleration, c.per_turn_acceleration
+    else:  # a target agent: its limits act at once, and it has no target
+        zero, number = eight(ZERO), eight(-ONE)
+        x, y, cos, sin, speed, turn_rate, _, _ = columns(worlds.world.reshape(-1, 1), observers, 0, TARGET_POSE)
+        own = Pose(x, y, cos, sin, speed, turn_rate, eight(c.target_speed), eight(c.target_turn_rate))
+        fix = Fix(zero, zero, zero, zero, zero, zero, zero, zero)
+        touching, sees, fixed_at = load(s.target_touching, 0), zero, number
+        working = eight(ONE)
+        per_acceleration = per_turn_acceleration = ZERO
+    dx, dy = fix.x, fix.y
     if c.fix_bearing == 0:
         dx, dy = dx - x, dy - y
     return View(
-        number=eight(np.float32(observers.i)),
-        x=x,
-        y=y,
-        heading_cos=heading_cos,
-        heading_sin=heading_sin,
+        number=number,
+        x=own.x,
+        y=own.y,
+        heading_cos=own.heading_cos,
+        heading_sin=own.heading_sin,
         speed=own.speed,
         turn_rate=own.turn_rate,
-        touching=counts(condition.touching),
-        working=choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO),
+        touching=touching,
+        working=working,
         step=load(s.steps, 0),
         max_speed=own.max_speed,
         max_turn_rate=own.max_turn_rate,
-        acceleration_time=own.max_speed * c.per_acceleration,
-        turn_acceleration_time=own.max_turn_rate * c.per_turn_acceleration,
+        acceleration_time=own.max_speed * per_acceleration,
+        turn_acceleration_time=own.max_turn_rate * per_turn_acceleration,
         target_known=fixed_at >= ZERO,
-        target_seen=counts(condition.sees),
+        target_seen=sees,
         target_step=fixed_at,
         target_dx=dx,
         target_dy=dy,
@@ -241,41 +258,4 @@ def view_of_trackers(c: Record, worlds: WorldArrays, observers: Observers, s: Re
         target_frame_sin=fix.frame_sin,
         target_vx=fix.vx,
         target_vy=fix.vy,
-    )
-
-
-@compiled
-def view_of_targets(c: Record, s: Record) -> View:
-    """Return the view of the target agents of eight worlds, which have no acceleration own.
-
-    Requires :func:`lay_out_observers`.
-    """
-    zero, never = eight(ZERO), eight(-ONE)
-    return View(
-        number=eight(-ONE),
-        x=load(s.target_x, 0),
-        y=load(s.target_y, 0),
-        heading_cos=load(s.target_cos, 0),
-        heading_sin=load(s.target_sin, 0),
-        speed=load(s.target_speed, 0),
-        turn_rate=load(s.target_turn_rate, 0),
-        touching=load(s.target_touching, 0),
-        working=eight(ONE),
-        step=load(s.steps, 0),
-        max_speed=eight(c.target_speed),
-        max_turn_rate=eight(c.target_turn_rate),
-        acceleration_time=zero,
-        turn_acceleration_time=zero,
-        target_known=never >= ZERO,
-        target_seen=zero,
-        target_step=never,
-        target_dx=zero,
-        target_dy=zero,
-        target_distance=zero,
-        target_cos=zero,
-        target_sin=zero,
-        target_frame_cos=zero,
-        target_frame_sin=zero,
-        target_vx=zero,
-        target_vy=zero,
     )

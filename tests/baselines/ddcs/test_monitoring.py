@@ -49,12 +49,13 @@ def test_without_radio_nothing_heard_has_an_effect() -> None:
     observations = batch.reset()
     plain, deaf = begin(policy, batch), begin(policy, batch)
     for _ in range(80):
-        views = batch.layout.views(observations.copy())
+        alone = observations.copy()
+        views = batch.layout.views(alone)
         for name in ("neighbour_number", "neighbour_age", "neighbour_range"):
             views[name][...] = -1.0
         heard = views["target_seen"] == 0
         views["target_known"][heard] = 0.0
         actions, plain = policy.act(observations, plain)
-        without, deaf = policy.act(batch.layout.flatten(views), deaf)
+        without, deaf = policy.act(alone, deaf)
         np.testing.assert_array_equal(actions, without)
         observations, *_ = batch.step(actions)

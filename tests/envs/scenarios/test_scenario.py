@@ -77,7 +77,7 @@ def test_a_setting_says_what_it_is_and_keeps_to_its_range(name: str) -> None:
     assert setting.unit or setting.kind in ("str", "bool")
     for other in (object(), 1j, ({},), np.zeros((2, 2)), {"contact": "much"}):
         with pytest.raises(ScenarioError, match=name):
-            Scenario(**{"name": "mine", name: other})
+            Scenario(**{"name": "mine", name: other})  # type: ignore[arg-type]
     for bound, beyond in ((setting.low, -1), (setting.high, 1)):
         if math.isfinite(bound):
             wrong: Any = bound + beyond if abs(bound) < 1e6 else 2 * bound

@@ -14,13 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
-from posse.numeric import compiled
-from posse.registry import SENSORS, Declaration, Function, plain
+from posse.registry import SENSORS, Declaration, Function
 
 FIX_KINDS: Final = ("position", "bearing")
-MEASURE_PARAMETERS: Final = ("c", "w", "number", "dx", "dy")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,12 +30,8 @@ class Sensor(Declaration):
 
     measure: Function | None = None
     fix: str = "position"
-
-    @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
-        """Its functions, and what each returns."""
-        measure = () if self.measure is None else ((self.measure, "2 numbers"),)
-        return (self.function, "True or False"), *measure
+    returns: ClassVar[str] = "True or False"
+    further: ClassVar = {"measure": (("c", "w", "number", "dx", "dy"), "2 numbers")}
 
 
 def sensor(name: str, *, measure: Function | None = None, fix: str = "position") -> Callable[[Function], Function]:
@@ -61,11 +55,8 @@ def sensor(name: str, *, measure: Function | None = None, fix: str = "position")
     SENSORS.check_argument(name, '@posse.sensor("name")')
 
     def declare(function: Function) -> Function:
-        if measure is not None:
-            SENSORS.check_function(measure, MEASURE_PARAMETERS)
         if fix not in FIX_KINDS:
             raise SENSORS.error(function, f"unknown fix={fix!r}; allowed: {', '.join(FIX_KINDS)}")
-        measuring = None if measure is None else compiled(plain(measure))
-        return SENSORS.declare(Sensor, function, name=name, measure=measuring, fix=fix)
+        return SENSORS.declare(Sensor, function, name=name, measure=measure, fix=fix)
 
     return declare

@@ -6,12 +6,12 @@ steering law turns the target to it (:mod:`posse.rules.targets.steering`).
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from posse.numeric import compiled
-from posse.registry import METRICS, TARGET_MOTIONS, Bound, Declaration, Function, check_memory_name, plain
+from posse.registry import METRICS, TARGET_MOTIONS, Bound, Declaration, Function
 from posse.rules.state import WORLD_NAMES
 from posse.scenarios import Scenario
 
@@ -36,12 +36,8 @@ class TargetMotion(Declaration):
     draw: Function | None = None
     memory: tuple[Memory, ...] = ()
     mirrored: bool = True
-
-    @property
-    def functions(self) -> tuple[tuple[Function, str], ...]:
-        """Its functions, and what each returns."""
-        draw = () if self.draw is None else ((self.draw, "nothing"),)
-        return (self.function, "nothing"), *draw
+    returns: ClassVar[str] = "nothing"
+    further: ClassVar = {"draw": (("c", "w"), "nothing")}
 
     def check(self, scenario: Scenario) -> None:
         """Raise DeclarationError unless the bounds of its memory are finite and in order in a scenario."""
@@ -71,12 +67,11 @@ def target_motion(
     TARGET_MOTIONS.check_argument(name, '@posse.target_motion("name")')
 
     def declare(function: Function) -> Function:
-        if draw is not None:
-            TARGET_MOTIONS.check_function(draw, ("c", "w"))
+        if not isinstance(mirrored, bool):
+            raise TARGET_MOTIONS.error(function, f"mirrored={mirrored!r} must be True or False")
         _check_memory(function, memory)
-        drawing = None if draw is None else compiled(plain(draw))
         return TARGET_MOTIONS.declare(
-            TargetMotion, function, name=name, draw=drawing, memory=tuple(memory), mirrored=mirrored
+            TargetMotion, function, name=name, draw=draw, memory=tuple(memory), mirrored=mirrored
         )
 
     return declare
@@ -88,6 +83,10 @@ def _check_memory(function: Function, memory: Any) -> None:
     taken = {each.name for motion in TARGET_MOTIONS.built_in() for each in motion.memory}
     taken.update(WORLD_NAMES, (f"{name}_sum" for name in METRICS))
     for each in memory:
-        check_memory_name(TARGET_MOTIONS, function, each.name, taken)
-        TARGET_MOTIONS.check_bounds(function, each.low, each.high, f" of memory {each.name!r}")
+        if not isinstance(each.name, str) or not each.name.isidentifier() or keyword.iskeyword(each.name):
+            raise TARGET_MOTIONS.error(
+                function, f"invalid name {each.name!r} of a memory: use a name that Python allows"
+            )
+        if each.name in taken:
+            raise TARGET_MOTIONS.error(function, f"a world has a field {each.name!r}: choose another name")
         taken.add(each.name)
