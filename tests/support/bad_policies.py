@@ -110,11 +110,6 @@ class FailsOnSmart(_Still):
         return super().begin(layout, num_worlds)
 
 
-class HangsOnLoad(_Still):
-    def __init__(self) -> None:
-        time.sleep(600)
-
-
 class RaisesOnLoad(_Still):
     def __init__(self) -> None:
         raise LookupError("no weights")
