@@ -230,7 +230,7 @@ def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> 
         per_acceleration = per_turn_acceleration = ZERO
     dx, dy = fix.x, fix.y
     if c.fix_bearing == 0:
-        dx, dy = dx - x, dy - y
+        dx, dy = dx - own.x, dy - own.y
     return View(
         number=number,
         x=own.x,
