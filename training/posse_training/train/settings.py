@@ -191,6 +191,8 @@ class TrainSettings:
         Raises:
             SettingsError: An unknown setting, or an invalid value.
         """
+        if not isinstance(values, Mapping):
+            raise SettingsError(f"settings must map names to values, got {values!r:.80}")
         known = {f.name for f in dataclasses.fields(cls)}
         for name in values:
             if name not in known:
