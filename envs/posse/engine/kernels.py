@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import ONE, ZERO, BoolArray, FloatArray, Record, Records, compiled, kernel, stamp
+from posse.numeric import ONE, ZERO, BoolArray, FloatArray, Record, Records, compiled, fetch, kernel, stamp
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
 from posse.rules.faults import apply_faults, draw_coming_faults
@@ -148,6 +148,18 @@ START: Final = 1
 START_FROM_POSES: Final = 2
 LOOK: Final = 3
 
+LINE: Final = 64
+"""Bytes of a cache line."""
+FETCHED: Final = 16
+"""Greatest team size whose prefetched data fit in the first-level cache."""
+
+
+@compiled
+def fetch_all(array: npt.NDArray[Any]) -> None:
+    """Prefetch an array that is written soon."""
+    for offset in range(0, array.size * array.itemsize, LINE):
+        fetch(array, offset)
+
 
 @compiled
 def advance_worlds(
@@ -177,6 +189,8 @@ def advance_worlds(
     for e in range(first, first + count):
         w, trackers, obstacles = worlds.world[e], worlds.tracker[e], worlds.obstacle[e]
         observations, rewards, terms = results.observations[e], results.rewards[e], results.terms[e]
+        if count > 1 and trackers.shape[0] <= FETCHED:
+            fetch_all(observations)  # written below, after the loop; without it 16,384 worlds take a third longer
         order = orders[e]
         if order == STEP and w.over != 0:
             w.episode += 1
