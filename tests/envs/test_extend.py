@@ -110,7 +110,7 @@ own = {name: settings[name] for name in ("extra_fields", "reward_weights")}  # t
 team = gymnasium.make("posse/Team-v0", scenario="obstacles", **own)
 team.reset(seed=0)
 assert team.step(team.action_space.sample())[4]["reward/steady"].shape == (5,)
-print("hits", sum(batch._untyped.stats.cache_hits.values()))
+print("done")
 """
 
 
@@ -120,8 +120,8 @@ def test_fields_and_terms_are_part_of_the_kernel(tmp_path: Path) -> None:
     modules = {**EXAMPLES, "twice": TWICE}
     for _ in range(2):
         done = run(tmp_path, FIELDS_AND_TERMS, **modules)
-        assert done.stdout.startswith("hits"), done.stderr
-    assert done.stdout == "hits 1\n"
+        assert done.stdout == "done\n", done.stderr
+    assert "compiling kernels" not in done.stderr
     steady = EXAMPLES["steady"].replace("return 1 -", "return 2 -")
     assert "Not equal to tolerance" in run(tmp_path, FIELDS_AND_TERMS, **{**modules, "steady": steady}).stderr
 
