@@ -16,11 +16,20 @@ from posse.engine.infos import Infos
 from posse.engine.kernels import Results
 from posse.engine.opponent import batch_with
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario
+from posse.scenarios import Scenario, ScenarioError
 from posse.signals.global_state import StateLayout
 from posse.signals.layout import ObservationLayout
 
 RENDER_MODES: Final = ("human", "rgb_array")
+
+
+def with_horizon(overrides: dict[str, Any], name: str, steps: int | None) -> dict[str, Any]:
+    """Return overrides with the episode's length under a library's name for it; ScenarioError for both names."""
+    if steps is None:
+        return overrides
+    if "horizon" in overrides:
+        raise ScenarioError(f"{name} and horizon mean the same: give one of them")
+    return {**overrides, "horizon": steps}
 
 
 class BatchEnv:

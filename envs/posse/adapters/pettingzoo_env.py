@@ -13,7 +13,7 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from posse.adapters.actions import agent_names, as_motions, box, single_action_space
-from posse.adapters.base import WorldEnv
+from posse.adapters.base import WorldEnv, with_horizon
 from posse.engine.arguments import in_box, options_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, get_scenario
@@ -83,9 +83,8 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         first_world: int = 0,
         **overrides: Any,
     ) -> None:
-        length = {} if max_cycles is None else {"horizon": max_cycles}
         self._open(
-            get_scenario(scenario, target=target, **overrides, **length),
+            get_scenario(scenario, target=target, **with_horizon(overrides, "max_cycles", max_cycles)),
             clip_actions=clip_actions,
             render_mode=render_mode,
             seed=seed,

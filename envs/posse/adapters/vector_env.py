@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from posse.adapters.actions import Rows, as_motions, spaces_of
-from posse.adapters.base import BatchEnv
+from posse.adapters.base import BatchEnv, with_horizon
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
 from posse.engine.arguments import options_of
 from posse.engine.opponent import TargetPolicy
@@ -73,9 +73,8 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         target_policy: TargetPolicy | None = None,
         **overrides: Any,
     ) -> None:
-        length = {} if max_episode_steps is None else {"horizon": max_episode_steps}
         self._open(
-            self._fit(scenario, {**overrides, **length}),
+            self._fit(scenario, with_horizon(overrides, "max_episode_steps", max_episode_steps)),
             num_envs,
             clip_actions=clip_actions,
             render_mode=render_mode,

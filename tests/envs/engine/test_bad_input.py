@@ -64,6 +64,7 @@ def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str)
         ("batch", {"autoreset": "always"}, "unknown autoreset mode 'always'; known: next_step"),
         ("parallel", {"target": "smart"}, r"target='smart' .*'agent'"),
         ("parallel", {"max_cycles": 0}, r"horizon=0"),
+        ("parallel", {"max_cycles": 5, "horizon": 6}, "max_cycles and horizon mean the same"),
         ("parallel", {"render_mode": "ansi"}, r"unknown render_mode 'ansi'; known: human, rgb_array"),
         ("team", {"discrete_actions": 1}, r"discrete_actions=1 .*True or False"),
         ("team", {"discrete_actions": True, "message_size": 2}, r"message_size=2"),
@@ -73,6 +74,7 @@ def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str)
         ("solo vector", {"scenario": "leader-loss"}, "breaks=1"),
         ("team vector", {"autoreset": "never"}, r"unknown autoreset mode 'never'; known: next_step"),
         ("team vector", {"max_episode_steps": 0}, r"horizon=0"),
+        ("team vector", {"max_episode_steps": 5, "horizon": 6}, "max_episode_steps and horizon mean the same"),
     ],
     ids=str,
 )
