@@ -11,7 +11,13 @@ from posse_baselines.policy import Policy, PolicyError
 
 
 class Deployed:
-    """What :func:`deploy` returns: a policy that drives one robot, memory inside."""
+    """What :func:`deploy` returns: a policy that drives one robot, memory inside.
+
+    Attributes:
+        policy: The policy.
+        robot: The robot.
+        row: (F,) the robot's last observation.
+    """
 
     def __init__(self, policy: Policy, robot: Robot) -> None:
         if policy.reads_state:

@@ -109,6 +109,8 @@ def test_what_cannot_be_is_refused() -> None:
         (((0.0, math.nan, 0.0), 0.0, 0.0), "pose"),
         (((0.0, 0.0, 0.0), math.inf, 0.0), "speed"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, math.nan)), "fix"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, TargetFix(0.0, 0.0, 0.0, -1.0)), "age=-1.0"),
+        (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, age=math.nan)]), "age=nan"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, [1.0]), f"{beams} distances"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(1, 0.0, 0.0, 0.0, 0.0, 0.0)]), "no team-mate"),
         (((0.0, 0.0, 0.0), 0.0, 0.0, None, None, [Heard(0, 0.0, 0.0, 0.0, 0.0, 0.0, (1.0,))]), "wanted 0 numbers"),

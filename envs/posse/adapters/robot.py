@@ -9,7 +9,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from posse.engine.arguments import real_numbers
 from posse.engine.batch import Batch
+from posse.engine.kernels import MOST_ACTION
 from posse.numeric import FloatArray
 from posse.registry import SENSORS
 from posse.rules.kinematics import follow_heading
@@ -182,7 +184,7 @@ class Robot:
             ValueError: An action of a wrong shape, not finite or outside [-1, 1].
         """
         numbers = _finite("action", action, (2 + self.scenario.message_size,))
-        if np.abs(numbers).max() > 1 + 1e-6:
+        if np.abs(numbers).max() > MOST_ACTION:
             raise ValueError(f"action={action!r} must lie in [-1, 1]")
         forward, turn, *said = np.clip(numbers, -1.0, 1.0).tolist()
         self._said = tuple(said)
@@ -205,7 +207,8 @@ class Robot:
         return Heard(self.number, *self._pose, float(me.speed) / self.scale, float(me.turn_rate), self._said, fix)
 
     def _checked(self, message: Heard) -> Heard:
-        _finite("a message heard", (*message[1:6], message.age, *message.message), (6 + len(message.message),))
+        _finite("a message heard", (*message[1:6], *message.message), (5 + len(message.message),))
+        _check_age(message.age)
         if not 0 <= message.number < self.scenario.num_trackers or message.number == self.number:
             raise ValueError(f"heard number={message.number!r}, which is no team-mate of {self.number}")
         if len(message.message) not in (0, self.scenario.message_size):
@@ -214,6 +217,7 @@ class Robot:
 
     def _checked_fix(self, fix: TargetFix) -> TargetFix:
         _finite("a fix", [value for value in fix if value is not None], (5 - (fix.frame is None),))
+        _check_age(fix.age)
         return fix
 
     def _step_of(self, age: float) -> int:
@@ -262,8 +266,13 @@ def _place(record: Any, x: float, y: float, heading: float, prefix: str = "headi
     setattr(record, f"{prefix}sin", math.sin(heading))
 
 
+def _check_age(age: float) -> None:
+    if not 0.0 <= age < math.inf:
+        raise ValueError(f"age={age!r} must be the seconds since then, at least 0")
+
+
 def _finite(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    array = np.asarray(values, np.float64)
+    array = real_numbers(name, values).astype(np.float64)
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"{name}={values!r} must be {shape[0]} finite numbers")
     return array
