@@ -101,7 +101,8 @@ def command(
         to_speed, to_turn = speed + c.followed * (to_speed - speed), turn_rate + c.followed * (to_turn - turn_rate)
     speed, turn_rate = approach(speed, to_speed, c.speed_change), approach(turn_rate, to_turn, c.turn_change)
     if c.wheel_base > ZERO:
-        speed = lesser(speed, max_speed - HALF * c.wheel_base * greater(turn_rate, -turn_rate))
+        left = max_speed - HALF * c.wheel_base * greater(turn_rate, -turn_rate)
+        speed = lesser(speed, greater(left, ZERO))  # on the spot, rounding may leave less than nothing
     return speed, turn_rate
 
 

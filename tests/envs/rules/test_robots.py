@@ -65,6 +65,15 @@ def test_no_wheel_turns_faster_than_the_greatest_speed(seed: int, lag: float, ac
         assert (wheel <= batch.arrays.tracker["max_speed"] * (1 + 1e-6)).all()
 
 
+def test_a_robot_that_turns_as_fast_as_its_wheels_can_stands() -> None:
+    for rate in np.linspace(0.5, 3.0, 40):
+        batch = posse.batch("constant", tracker_turn_rate=float(rate), wheel_base=2 / float(rate))
+        batch.reset(seed=0)
+        observations = batch.step(np.ones(batch.action_shape))[0]
+        speed = batch.layout.views(observations)["speed"]
+        assert ((speed >= 0) & (speed < 1e-6)).all()
+
+
 def test_wheels_that_cannot_turn_on_the_spot_are_refused() -> None:
     with pytest.raises(ScenarioError, match=r"wheel_base=3.*lower it, or tracker_turn_rate"):
         posse.get_scenario("smart", wheel_base=3.0)
