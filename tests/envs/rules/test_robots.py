@@ -146,3 +146,17 @@ def test_a_world_replays_alone_and_its_state_decides_how_it_goes_on() -> None:
             saved, copy = many.save(), pickle.loads(pickle.dumps(many))  # noqa: S301 (our own)
     many.restore(saved)
     np.testing.assert_array_equal(drive(many, 10), drive(copy, 10))
+
+
+def test_the_state_vector_holds_commands_to_come_and_the_errors_of_own_poses() -> None:
+    env = posse.parallel_env("smart", command_delay=2, odometry_drift=0.1, heading_drift=0.1)
+    env.reset(seed=0)
+    rng, given = np.random.default_rng(0), []
+    for _ in range(5):
+        given.append(rng.uniform(-1, 1, (5, 2)).astype(np.float32))
+        observations = env.step(dict(zip(env.agents, given[-1], strict=True)))[0]
+    views = env.state_layout.views(env.state())
+    np.testing.assert_array_equal(views["command"], [given[-1], given[-2]])
+    seen = env.layout.views(np.stack(list(observations.values())))["position"]
+    for k, axis in enumerate("xy"):
+        np.testing.assert_allclose(seen[:, k], views[f"tracker_{axis}"] + views[f"odometry_{axis}"], atol=1e-5)
