@@ -90,10 +90,7 @@ class Guard(OwnArrays):
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return what it remembers as arrays (E, ...) by name; views, not copies."""
-        arrays: dict[str, npt.NDArray[Any]] = {"observed": self._observed}
-        for name, records in (("me", self._minds.me), ("mates", self._minds.mates)):
-            arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
-        return arrays
+        return {"observed": self._observed, **self._minds.arrays()}
 
 
 @kernel

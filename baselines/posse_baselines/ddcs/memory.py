@@ -170,6 +170,13 @@ class Minds(NamedTuple):
     seen: npt.NDArray[np.uint16]
     """(E, N, GRID²): own step + 1 at which a cell was last covered; (E, N, 0) if not needed."""
 
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the trackers' memory, field by field, as views."""
+        arrays: dict[str, npt.NDArray[Any]] = {"seen": self.seen}
+        for name, records in (("me", self.me), ("mates", self.mates)):
+            arrays |= {f"{name}.{field}": records[field] for field in records.dtype.names or ()}
+        return arrays
+
 
 @compiled
 def pair(row: FloatArray, at: int) -> complex:

@@ -156,11 +156,7 @@ class DDCS(OwnArrays, BasePolicy):
     def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
         """Return the trackers' memory, field by field, as views."""
         minds: Minds = memory.minds
-        arrays: dict[str, npt.NDArray[Any]] = {"seen": minds.seen}
-        for name, records in (("me", minds.me), ("mates", minds.mates)):
-            for field in records.dtype.names or ():
-                arrays[f"{name}.{field}"] = records[field]
-        return arrays
+        return minds.arrays()
 
 
 @kernel
