@@ -147,6 +147,10 @@ MATE, MATE_AT_START = _fields(
     ("velocity", _C, 0),
     ("heading", _C, 0),
     ("turn", _F, 0),  # turn rate, rad/s
+    # from its drifting frame to the own one, measured by the target that both see
+    ("aligned", _I, 0),  # 1: has been measured
+    ("shift", _C, 0),  # m
+    ("twist", _F, 0),  # rad
     ("task", _I, -1),
     ("leader", _I, -1),
     ("term", _I, -1),

@@ -20,6 +20,8 @@ COUNT: Final = 256
 """Terms and pulses count modulo this."""
 
 _MESSAGE_STEP: Final = 1.0 / 512.0
+_PART: Final = 0.45  # of a step; where poses drift, a number carries a measure beside its whole number
+_FARTHEST: Final = 32.0  # m; a target farther away does not align frames
 _SPEED_DECAY: Final = 3.0  # s; of the target's speed in an estimate older than 1 s
 _JUMP: Final = 1.0  # m; a fix farther than this from the estimate replaces it
 _UNKNOWN_SPEED: Final = 0.6  # of the target until it has been measured, as a share of the own greatest
@@ -29,15 +31,22 @@ _UNSEEN_MEMORY: Final = 2.5  # s; timeout of team-mates that may have had no pla
 
 
 @compiled
-def encode(value: int) -> float:
-    """Return a whole number, -1 (nothing) to 510, as a number in [0, 1); 0 is nothing."""
-    return (value + 1) * _MESSAGE_STEP
+def encode(value: int, part: float = 0.0) -> float:
+    """Return a whole number, -1 (nothing) to 510, and a measure in [-1, 1] as a number in [0, 1); 0 is nothing."""
+    return (value + 1 + _PART * part) * _MESSAGE_STEP
 
 
 @compiled
 def decode(number: float) -> int:
     """Inverse of :func:`encode`, defined for any number."""
     return round(number / _MESSAGE_STEP) - 1
+
+
+@compiled
+def part_of(number: float) -> float:
+    """Return the measure that :func:`encode` added."""
+    steps = number / _MESSAGE_STEP
+    return float((steps - round(steps)) / _PART)
 
 
 @compiled
@@ -48,13 +57,45 @@ def is_newer(value: int, old: int) -> bool:
 
 
 @compiled
-def write_message(me: Record, action: FloatArray) -> None:
-    """Write the message of a tracker into an action (2 + m,)."""
-    action[2] = encode(me.task)
-    action[3] = encode(me.leader)
-    action[4] = encode(me.term)
-    action[5] = encode(me.pulse)
+def write_message(team: Team, me: Record, row: FloatArray, action: FloatArray) -> None:
+    """Write the message of a tracker into an action (2 + m,).
+
+    Where poses drift, with the target as its own sensor measured it: seen or not, position and heading in its own axes.
+    """
+    at, seen, way, theta = team.at, 0.0, 0j, 0.0
+    if team.world.drifts != 0 and row[at.target_seen] > 0.0 and row[at.target_range] < _FARTHEST:
+        seen, theta = 1.0, angle_of(pair(row, at.target_heading)) / math.pi
+        way = scaled(pair(row, at.target_bearing), row[at.target_range] / _FARTHEST)
+    action[2] = encode(me.task, seen)
+    action[3] = encode(me.leader, way.real)
+    action[4] = encode(me.term, way.imag)
+    action[5] = encode(me.pulse, theta)
     action[6] = encode(me.slot)
+
+
+@compiled
+def align(team: Team, me: Record, mate: Record, row: FloatArray, m: int) -> None:
+    """Measure the offset of a team-mate's frame by the target that both see, and correct the mate's pose (m: message).
+
+    The message was written one control step before the pose was sent, so that both are taken back to that moment.
+    """
+    at, dt = team.at, float(team.world.dt)
+    if part_of(row[m]) > 0.5 and row[at.target_seen] > 0.0:
+        age = silence(team, me, mate) + dt
+        theta = wrap(me.fix_theta - me.target_turn * age)
+        target = me.fix - vector(me.target_speed * age, me.fix_theta - 0.5 * me.target_turn * age)
+        heading = wrap(theta - math.pi * part_of(row[m + 3]))  # of the mate, then, in the own frame
+        told = wrap(angle_of(mate.heading) - mate.turn * dt)
+        way = complex(_FARTHEST * part_of(row[m + 1]), _FARTHEST * part_of(row[m + 2]))
+        place = target - way * vector(1.0, heading)
+        before = mate.position - vector(length(mate.velocity) * dt, angle_of(mate.heading) - 0.5 * mate.turn * dt)
+        share = float(team.settings.frame_trust) if mate.aligned else 1.0
+        mate.twist = wrap(mate.twist + share * wrap(heading - told - mate.twist))
+        mate.shift += scaled(place - before - mate.shift, share)
+        mate.aligned = 1
+    turned = vector(1.0, mate.twist)
+    mate.position += mate.shift
+    mate.heading, mate.velocity = mate.heading * turned, mate.velocity * turned
 
 
 @compiled
@@ -165,6 +206,8 @@ def update_mates(team: Team, me: Record, mates: Records, row: FloatArray) -> Non
             m = at.neighbour_message + k
             mate.task, mate.leader, mate.term = decode(row[m]), decode(row[m + 1]), decode(row[m + 2])
             mate.pulse, mate.slot = decode(row[m + 3]), decode(row[m + 4])
+            if team.world.drifts != 0:
+                align(team, me, mate, row, m)
 
 
 @compiled

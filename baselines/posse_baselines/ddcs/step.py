@@ -79,5 +79,5 @@ def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Wor
     if turned or evades:
         speed, omega = regulate(me, velocity, 0.0)
     write_motion(action, speed, omega, me.max_speed, me.max_omega)
-    write_message(me, action)
+    write_message(team, me, row, action)
     me.step += 1

@@ -55,6 +55,7 @@ CONSTANTS: Final[np.dtype[Any]] = np.dtype(
                 ("extent", np.float32),  # greatest coordinate of a place that can be reached, m
                 ("walled", np.int32),
                 ("sight", np.float32),  # how far its target sensor reaches, m
+                ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
                 ("area", np.float32),  # half the side of the square that is to be searched, m
             ],
             align=True,
@@ -86,5 +87,6 @@ def constants_of(scenario: Scenario) -> Records:
     record["extent"] = scenario.position_bound
     record["sight"] = min(scenario.sensing_range, _MOST_SIGHT)
     record["area"] = min(scenario.arena / 2, _OPEN_AREA)
+    record["drifts"] = scenario.drifts
     record["walled"] = np.isfinite(scenario.arena)
     return record
