@@ -34,7 +34,7 @@ class _WithTeammates:
         # (E, N, F) what the team observes; never written to, since policies may keep observations.
         self._team: FloatArray = np.zeros(0, np.float32)
 
-    def _with_teammates(self, own: FloatArray) -> FloatArray:
+    def _of_team(self, own: FloatArray) -> FloatArray:
         """Return the teams' actions (E, N, 2 + m), given those of one tracker (E, 2 or 2 + m)."""
         self.batch.check_running()
         team = np.zeros(self.batch.action_shape, np.float32)
@@ -93,13 +93,9 @@ class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
         self._memory = begin(self.teammates, self.batch)
         return result
 
-    def _advance(self, actions: FloatArray) -> Any:
-        results = super()._advance(actions)
-        self._team = results.observations[None].copy()
-        return results
-
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        return self._with_teammates(motions[None])
+    def _advance(self, actions: FloatArray) -> None:
+        super()._advance(self._of_team(actions[:, 0]))
+        self._team = self._results.observations.copy()
 
 
 class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
@@ -140,9 +136,6 @@ class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
         if begins.any():
             self._memory = self.teammates.restart(self._memory, begins)
         return result
-
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        return self._with_teammates(motions)
 
     def _observed(self, observations: FloatArray) -> FloatArray:
         self._team = observations

@@ -6,7 +6,6 @@ import inspect
 from typing import Any
 
 import pytest
-from gymnasium.vector import AutoresetMode
 
 import posse
 from posse.adapters.gymnasium_env import SoloEnv, TeamEnv
@@ -59,11 +58,3 @@ def test_the_target_is_an_agent_by_one_name() -> None:
     for other in others:
         with pytest.raises(posse.ScenarioError, match="the one choice is 'agent'"):
             other("smart", target="evader")
-
-
-def test_autoreset_has_the_names_of_the_batch() -> None:
-    for mode in AutoresetMode:
-        name = mode.name.lower()
-        env = TeamVectorEnv("constant", 2, autoreset=name)
-        assert (env.batch.autoreset, env.autoreset_mode) == (name, mode)
-        assert TeamVectorEnv("constant", 2, autoreset=mode).batch.autoreset == name

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
 import secrets
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from posse.adapters.actions import Rows
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
 from posse.engine.kernels import Results
@@ -78,10 +79,6 @@ class BatchEnv:
         self._show()
         return observations
 
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
-        return motions.reshape(self.batch.action_shape)
-
     def _show(self) -> None:
         """Draw the first world in the window, in the mode "human"."""
         if self.render_mode == "human":
@@ -108,21 +105,39 @@ class BatchEnv:
 class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
+    _rows: Rows = slice(None)
+
     def _open(self, scenario: Scenario, num_worlds: int = 1, **settings: Any) -> None:
         super()._open(scenario, num_worlds, num_threads=1, autoreset="disabled", **settings)
         self._infos = Infos(self.scenario, 0.0)
         self._breakable = self.scenario.breaks > 0
-        self._results: tuple[Results, Results] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {**super().__getstate__(), "_results": None}
-        state.pop("state_layout", None)
-        return state
+        return {
+            k: v
+            for k, v in super().__getstate__().items()
+            if not isinstance(getattr(type(self), k, 0), cached_property)
+        }
 
-    @functools.cached_property
+    @cached_property
     def state_layout(self) -> StateLayout:
         """Names, units and ranges of what :meth:`state` returns."""
         return StateLayout(self.scenario)
+
+    @cached_property
+    def _results(self) -> Results:
+        """The results of a step, which the next one overwrites."""
+        return self.batch._new_results()
+
+    @cached_property
+    def _own(self) -> Results:
+        """The agents' observations (..., F), rewards (rows,) and terms (K, ...) in the results."""
+        results, rows = self._results, self._rows
+        return results._replace(
+            observations=results.observations[0, rows],
+            rewards=results.rewards[0, rows, ...].reshape(-1),
+            terms=results.terms[0, rows].T,
+        )
 
     def state(self) -> FloatArray:
         """Return the full state of the world, (S,) float32."""
@@ -137,25 +152,17 @@ class WorldEnv(BatchEnv):
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         if "reset_mask" in options_of(options):
             raise ValueError("unknown option 'reset_mask': an environment of one world has none")
-        return super()._start(seed, options)
+        observations: FloatArray = super()._start(seed, options)[0, self._rows]
+        for array in self._results[2:]:
+            array[...] = 0
+        return observations
 
-    def _advance(self, actions: FloatArray) -> Results:
-        """Perform a control step by valid actions; return its results, which the next step overwrites.
-
-        Observations are (rows, F), rewards (rows,) and terms (rows, K), the others as of a batch.
-        """
-        if self._results is None:
-            new = self.batch._new_results()
-            first = new.observations[0], new.rewards[0], new.terms[0]
-            self._results = new, Results(*first, new.scores, new.terminated, new.truncated)
-        results, own = self._results
-        self.batch._advance(actions, results)
+    def _advance(self, actions: FloatArray) -> None:
+        """Perform a control step by valid actions."""
+        self.batch._advance(actions, self._results)
         if self.render_mode == "human":
             self._draw(0)
-        return own
 
-    def _info(self, score: float, terms: Any = None) -> dict[str, Any]:
-        """Return an info, with every metric at the end of the episode."""
-        if not self.batch._over:
-            return self._infos.build(score, terms)
-        return self._infos.build(score, terms, {name: float(v[0]) for name, v in self.batch.metrics().items()})
+    def _metrics(self) -> dict[str, float] | None:
+        """Return every metric of the episode at its end, ``None`` before."""
+        return {name: float(v[0]) for name, v in self.batch.metrics().items()} if self.batch._over else None

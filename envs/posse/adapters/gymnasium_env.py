@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
-import numpy as np
 
-from posse.adapters.actions import Rows, as_motions, spaces_of
+from posse.adapters.actions import as_motions, spaces_of
 from posse.adapters.base import WorldEnv
 from posse.engine.arguments import in_box
 from posse.engine.opponent import TargetPolicy
@@ -82,7 +81,6 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         TypeError: ``target_policy`` is not the policy of a target.
     """
 
-    _rows: Rows = slice(None)
     _silent = False
     _fit = staticmethod(team_scenario)
 
@@ -109,16 +107,15 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
             target_policy=target_policy,
         )
         self.observation_space, self.action_space = spaces_of(self.scenario, self._rows, discrete_actions, self._silent)
-        self._discrete = discrete_actions
+        self._shape, self._discrete = self.action_space.shape, discrete_actions
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
-        observations = self._start(seed, options)
+        observation = self._start(seed, options)
         gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
-        rows, terms = observations.shape[1], len(self.batch.term_names)
-        return observations[0, self._rows], self._own_info(0.0, np.zeros((rows, terms), np.float32))
+        return observation, self._info()
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -127,18 +124,19 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An action out of its space; nothing is changed.
         """
-        self.batch.check_running()
-        motions = as_motions("action", action, self.action_space.shape, self._discrete)
-        results = self._advance(in_box(self._of_team(motions), self.batch.clip_actions))
-        rewards = results.rewards[self._rows].tolist()
-        reward = sum(rewards) / len(rewards) if isinstance(rewards, list) else rewards
-        info = self._own_info(results.scores.item(), results.terms)
-        ends = results.terminated.item(), results.truncated.item()
-        return results.observations[self._rows].copy(), reward, *ends, info
+        batch, own = self.batch, self._own
+        batch.check_running()
+        motions = as_motions("action", action, self._shape, self._discrete)
+        self._advance(in_box(motions.reshape(1, -1, motions.shape[-1]), batch.clip_actions))
+        rewards, over = own.rewards.tolist(), batch._over > 0
+        terminated = over and own.terminated.item()
+        return own.observations.copy(), sum(rewards) / len(rewards), terminated, over and not terminated, self._info()
 
-    def _own_info(self, score: float, terms: FloatArray) -> dict[str, Any]:
-        own = terms[self._rows].T
-        info = self._info(score, own.copy() if own.ndim == 2 else own.tolist())
+    def _info(self) -> dict[str, Any]:
+        """Return the info of the last step or reset."""
+        own = self._own
+        each = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
+        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, each)
         if self._breakable:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)

@@ -18,7 +18,7 @@ from posse.engine.arguments import in_box, options_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, get_scenario
 
-_Infos = dict[str, dict[str, Any]]
+_AgentInfos = dict[str, dict[str, Any]]
 
 
 class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
@@ -97,7 +97,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.action_spaces = {
             agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
         }
-        self._reader = _Reader(self.possible_agents, self.batch.action_shape[2], discrete_actions, clip_actions)
+        self._discrete = discrete_actions
         self._none_ended = dict.fromkeys(self.possible_agents, False)
         self.np_random = np.random.default_rng(seed)  # for wrappers; no world draws from it
 
@@ -116,97 +116,86 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, FloatArray], _Infos]:
+    ) -> tuple[dict[str, FloatArray], _AgentInfos]:
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         if options is not None:
             # PettingZoo's own tests send {"options": 1}, to see that options are taken.
             options = {key: value for key, value in options_of(options).items() if key != "options"}
-        observations = self._start(seed, options)[0]
+        observations = self._start(seed, options)
         self.agents = self.possible_agents.copy()
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        infos = self._infos_of(self.agents, 0.0, [[0.0] * len(self.batch.term_names)] * len(self.agents))
-        return dict(zip(self.agents, observations, strict=True)), infos
+        return dict(zip(self.agents, observations, strict=True)), self._infos_of(self.agents)
 
     def step(
         self, actions: Mapping[str, Any]
-    ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos]:
+    ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _AgentInfos]:
         """Advance the world by one control step, given an action for every agent.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
-        agents = self.agents
-        self.batch.check_running()
-        results = self._advance(self._reader.read(actions))
+        agents, batch, own = self.agents, self.batch, self._own
+        batch.check_running()
+        self._advance(in_box(self._read(actions), batch.clip_actions, self._place))
         terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
-        if self.batch._over:
-            (terminations if results.terminated[0] else truncations).update(dict.fromkeys(agents, True))
+        if batch._over:
+            (terminations if own.terminated.item() else truncations).update(dict.fromkeys(agents, True))
             self.agents = []
-        # No strict=True below: equal lengths, in the hot path.
         return (
-            dict(zip(agents, results.observations.copy())),  # noqa: B905
-            dict(zip(agents, results.rewards.tolist())),  # noqa: B905
+            dict(zip(agents, own.observations.copy())),  # noqa: B905  equal lengths, in the hot path
+            dict(zip(agents, own.rewards.tolist())),  # noqa: B905
             terminations,
             truncations,
-            self._infos_of(agents, results.scores.item(), results.terms.tolist()),
+            self._infos_of(agents),
         )
 
-    def _infos_of(self, agents: list[str], score: float, terms: list[list[float]]) -> _Infos:
-        """Return the infos, which differ in the agents' own reward terms (rows, K) only."""
-        common, rewards, infos = self._info(score), self._infos.rewards, {}
-        for agent, own in zip(agents, terms):  # noqa: B905
-            infos[agent] = info = common.copy()
-            for key, k in rewards:
-                info[key] = own[k]
+    def _infos_of(self, agents: list[str]) -> _AgentInfos:
+        """Return the infos of the last step or reset."""
+        own = self._own
+        infos = self._infos.by_agent(agents, own.scores.item(), self._metrics(), own.terms.T.tolist())
         if self._breakable:
             for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
                 infos[agent]["working"] = works  # a target never breaks
         return infos
 
+    @functools.cached_property
+    def _actions(self) -> FloatArray:
+        """The actions of a step, (1, rows, 2 + m)."""
+        return np.zeros(self.batch.action_shape, np.float32)
 
-class _Reader:
-    """Reads the actions of a dictionary by agent into an array for the kernel, always the same."""
+    @functools.cached_property
+    def _rows_of_actions(self) -> list[tuple[str, memoryview]]:
+        """Each agent with its row of the actions; assignment to a memoryview checks type and shape fastest."""
+        return [(agent, memoryview(row)) for agent, row in zip(self.possible_agents, self._actions[0], strict=True)]
 
-    def __init__(self, agents: list[str], length: int, discrete: bool, clip: bool) -> None:
-        self._arguments = agents, length, discrete, clip
-        self._array = np.zeros((1, len(agents), length), np.float32)
-        self._rows = [(agent, memoryview(row)) for agent, row in zip(agents, self._array[0], strict=True)]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _Reader, self._arguments  # so that the rows are views of the new array
-
-    def read(self, actions: Mapping[str, Any]) -> FloatArray:
-        """Return the actions, (1, rows, 2 + m); ValueError if one is missing, unknown or out of its space."""
-        agents, _, discrete, clip = self._arguments
-        # Assignment to a memoryview checks type and shape faster than explicit tests.
+    def _read(self, actions: Mapping[str, Any]) -> FloatArray:
+        """Return actions by agent as an array, whose range is not checked; ValueError names a wrong one."""
         try:
-            if discrete or type(actions) is not dict or len(actions) != len(agents):
+            if self._discrete or type(actions) is not dict or len(actions) != len(self.agents):
                 raise TypeError
-            for agent, row in self._rows:
+            for agent, row in self._rows_of_actions:
                 row[:] = actions[agent]
-        except (KeyError, TypeError, ValueError, BufferError):
-            self._read_any(actions)
-        return in_box(self._array, clip, self._place)
-
-    def _read_any(self, actions: Mapping[str, Any]) -> None:
-        """Read actions of any type, and report which one is invalid."""
-        agents, length, discrete, _ = self._arguments
+            return self._actions
+        except (KeyError, TypeError, ValueError, BufferError):  # of another type, or invalid
+            pass
         if not isinstance(actions, Mapping):
             raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
-        known = f"agents are: {', '.join(agents)}"
+        known = f"agents are: {', '.join(self.agents)}"
         for agent in actions:
-            if agent not in agents:
+            if agent not in self.agents:
                 raise ValueError(f"action for unknown agent {reprlib.repr(agent)}; {known}")
-        for agent, row in zip(agents, self._array[0], strict=True):
+        for agent, row in zip(self.agents, self._actions[0], strict=True):
             if agent not in actions:
                 raise ValueError(f"no action for {agent}: every agent needs one; {known}")
-            row[...] = as_motions(f"action of {agent}", actions[agent], () if discrete else (length,), discrete)
+            shape = self.action_spaces[agent].shape
+            row[...] = as_motions(f"action of {agent}", actions[agent], shape, self._discrete)
+        return self._actions
 
     def _place(self, _: int, row: int, k: int) -> str:
         parts = ("speed", "turn rate")
-        return f"action of {self._arguments[0][row]}: {parts[k] if k < 2 else f'message[{k - 2}]'}"
+        return f"action of {self.agents[row]}: {parts[k] if k < 2 else f'message[{k - 2}]'}"
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:

@@ -399,9 +399,7 @@ class Batch:
         if over:
             ended = terminated | truncated
             metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        infos = self._infos.build(scores, terms.transpose(2, 0, 1), metrics)
-        if self.scenario.breaks > 0:
-            infos["working"] = self.working
+        infos = self._infos_of(scores, terms, metrics)
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
@@ -414,6 +412,15 @@ class Batch:
                 self._started = False  # only a reset helps
                 raise
         return observations, rewards, terminated, truncated, infos
+
+    def _infos_of(
+        self, scores: npt.NDArray[Any], terms: FloatArray, metrics: Mapping[str, npt.NDArray[Any]] | None = None
+    ) -> dict[str, Any]:
+        """Return the infos of scores (E,) and terms (E, rows, K), with ``metrics`` where an episode ends."""
+        infos = self._infos.build(scores, metrics, terms.transpose(2, 0, 1))
+        if self.scenario.breaks > 0:
+            infos["working"] = self.working
+        return infos
 
     def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
         """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
@@ -431,14 +438,16 @@ class Batch:
         """
         if orders is None:
             orders = self._orders
-        if len(self._scratch) == 1:
-            self._over = self._work(actions, results, orders, 0, 0, self.num_worlds)
+        scratch = self._scratch
+        if len(scratch) == 1:
+            over = self._kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self.num_worlds)
         else:
-            arguments, threads = (actions, results, orders), len(self._scratch)
-            self._over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, threads))
+            arguments = actions, results, orders
+            over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, len(scratch)))
+        self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
-        return self._over
+        return over
 
     def _work(
         self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8], thread: int, first: int, end: int
