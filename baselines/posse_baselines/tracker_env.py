@@ -142,7 +142,7 @@ class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
         return super()._observed(observations)
 
 
-def _fitting(teammates: Policy, number: int, scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario with messages as long as the team-mates need."""
     found = get_scenario(scenario, **overrides)
     if found.target_motion == "agent":

@@ -2,73 +2,114 @@
 
 from __future__ import annotations
 
-import importlib
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.vector.utils import batch_space
 
-from posse.adapters.actions import Rows
+from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
 from posse.engine.kernels import Results
-from posse.engine.opponent import batch_with
+from posse.engine.opponent import TargetPolicy, batch_with
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, ScenarioError
+from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
 from posse.signals.layout import ObservationLayout
 
 RENDER_MODES: Final = ("human", "rgb_array")
 
 
-def with_horizon(overrides: dict[str, Any], name: str, steps: int | None) -> dict[str, Any]:
-    """Return overrides with the episode's length under a library's name for it; ScenarioError for both names."""
-    if steps is None:
-        return overrides
-    if "horizon" in overrides:
-        raise ScenarioError(f"{name} and horizon mean the same: give one of them")
-    return {**overrides, "horizon": steps}
-
-
 class BatchEnv:
     """An environment on a batch.
+
+    Args:
+        scenario: Name of a scenario, or a scenario.
+        num_worlds: E.
+        discrete_actions: Whether actions are numbers of :data:`posse.adapters.actions.MOTIONS`.
+        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
+        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
+        seed: Seed of all random draws; ``None``: an arbitrary one.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Index of the first world within the seed.
+        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
+        autoreset: As for :class:`posse.Batch`.
+        num_threads: As for :class:`posse.Batch`.
+        overrides: Any field of :class:`posse.Scenario`.
 
     Attributes:
         scenario: Scenario of the worlds.
         batch: The worlds.
         layout: Position of each field in an observation.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
+
+    Raises:
+        ScenarioError: An unknown scenario, split or mode, or an unknown or invalid setting.
+        TypeError: ``target_policy`` is not the policy of a target.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}
+    _rows: int | slice = slice(None)
+    """The robots that an agent moves, as rows of the batch: one, or all."""
+    _fit: Callable[..., Scenario] = staticmethod(get_scenario)
+    """Returns the scenario of a name, or a scenario, and overrides."""
+    _silent = False
+    """Whether actions are without the message."""
 
-    def _open(
+    def __init__(
         self,
-        scenario: Scenario,
+        scenario: str | Scenario,
         num_worlds: int,
         *,
-        render_mode: str | None,
-        seed: int | None,
-        target_policy: Any = None,
-        **settings: Any,
+        discrete_actions: bool = False,
+        clip_actions: bool = False,
+        render_mode: str | None = None,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        target_policy: TargetPolicy | None = None,
+        autoreset: str,
+        num_threads: int | None,
+        **overrides: Any,
     ) -> None:
-        """Create the worlds; ``settings`` are further arguments of :class:`posse.Batch`."""
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        self.batch = batch_with(scenario, num_worlds, target_policy, seed=0 if seed is None else seed, **settings)
+        self.batch = batch_with(
+            self._fit(scenario, **overrides),
+            num_worlds,
+            target_policy,
+            seed=0 if seed is None else seed,
+            split=split,
+            first_world=first_world,
+            autoreset=autoreset,
+            num_threads=num_threads,
+            clip_actions=clip_actions,
+        )
         self.scenario: Scenario = self.batch.scenario
         self.layout: ObservationLayout = self.batch.layout
         self.render_mode = render_mode
         fps = max(1, round(1 / self.scenario.control_step))  # real time
         self.metadata = {**type(self).metadata, "render_fps": fps}  # type: ignore[misc]
+        self._discrete = discrete_actions
         self._seeded = seed is not None
-        self._renderer: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None}
+        """Return the attributes without cached ones, which are made again."""
+        cached = {name for name in self.__dict__ if isinstance(getattr(type(self), name, None), cached_property)}
+        return {name: value for name, value in self.__dict__.items() if name not in cached}
+
+    def _spaces(self) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+        """Return the spaces of an agent's observations and actions."""
+        scenario = self.scenario.replace(message_size=0) if self._silent else self.scenario
+        observation, action = box(*self.layout.bounds()), single_action_space(scenario, self._discrete)
+        if isinstance(self._rows, int):
+            return observation, action
+        return batch_space(observation, scenario.num_trackers), batch_space(action, scenario.num_trackers)
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start episodes, of an arbitrary seed if none was ever given, and return the observations (E, rows, F)."""
@@ -84,40 +125,34 @@ class BatchEnv:
         if self.render_mode == "human":
             self._draw(0)
 
+    @cached_property
+    def _renderer(self) -> Any:
+        from posse.rendering.renderer import Renderer  # imports pygame
+
+        return Renderer(self.scenario, self.render_mode or "")
+
     def _draw(self, world: int) -> npt.NDArray[np.uint8] | None:
         """Draw the current state of a world: (H, W, 3) uint8 in the mode "rgb_array", a window in "human"."""
         self.batch.check_started("render")
         if self.render_mode is None:
             return None
-        if self._renderer is None:  # imports pygame
-            renderer = importlib.import_module("posse.rendering.renderer").Renderer
-            self._renderer = renderer(self.scenario, self.render_mode)
         picture: npt.NDArray[np.uint8] | None = self._renderer.draw(self.batch, world=world)
         return picture
 
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
-        if self._renderer is not None:
+        if "_renderer" in self.__dict__:
             self._renderer.close()
-            self._renderer = None
+            del self._renderer
 
 
 class WorldEnv(BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
-    _rows: Rows = slice(None)
-
-    def _open(self, scenario: Scenario, num_worlds: int = 1, **settings: Any) -> None:
-        super()._open(scenario, num_worlds, num_threads=1, autoreset="disabled", **settings)
+    def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
+        super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
         self._infos = Infos(self.scenario, 0.0)
         self._breakable = self.scenario.breaks > 0
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {
-            k: v
-            for k, v in super().__getstate__().items()
-            if not isinstance(getattr(type(self), k, 0), cached_property)
-        }
 
     @cached_property
     def state_layout(self) -> StateLayout:
@@ -150,6 +185,7 @@ class WorldEnv(BatchEnv):
         return self._draw(0)
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+        """Start an episode and return the agents' observations (..., F)."""
         if "reset_mask" in options_of(options):
             raise ValueError("unknown option 'reset_mask': an environment of one world has none")
         observations: FloatArray = super()._start(seed, options)[0, self._rows]
@@ -160,8 +196,7 @@ class WorldEnv(BatchEnv):
     def _advance(self, actions: FloatArray) -> None:
         """Perform a control step by valid actions."""
         self.batch._advance(actions, self._results)
-        if self.render_mode == "human":
-            self._draw(0)
+        self._show()
 
     def _metrics(self) -> dict[str, float] | None:
         """Return every metric of the episode at its end, ``None`` before."""

@@ -6,15 +6,14 @@ from typing import Any
 
 import gymnasium
 
-from posse.adapters.actions import as_motions, spaces_of
+from posse.adapters.actions import as_motions
 from posse.adapters.base import WorldEnv
 from posse.engine.arguments import in_box
-from posse.engine.opponent import TargetPolicy
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 
 
-def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+def team_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario of an environment of one agent; ScenarioError if its target is an agent."""
     found = get_scenario(scenario, **overrides)
     if found.target_motion == "agent":
@@ -25,9 +24,9 @@ def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenar
     return found
 
 
-def solo_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+def solo_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario with one tracker; ScenarioError if it is to have more, or one that breaks."""
-    if overrides.get("num_trackers", 1) != 1:
+    if overrides.setdefault("num_trackers", 1) != 1:
         raise ScenarioError(
             f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has one: use posse/Team-v0"
         )
@@ -38,7 +37,7 @@ def solo_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenar
             "of the trackers break down, and a team of one would be left with none. Pass "
             "breaks=0, or use posse/Team-v0"
         )
-    return team_scenario(scenario, {**overrides, "num_trackers": 1})
+    return team_scenario(scenario, **overrides)
 
 
 class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
@@ -67,47 +66,20 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
 
     Args:
         scenario: Name of a scenario, or a scenario.
-        discrete_actions: Whether actions are discrete.
-        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
-        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
-        seed: Seed of all random draws; ``None``: an arbitrary one.
-        split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Index of the world within the seed.
-        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
-        overrides: Any field of :class:`posse.Scenario`.
+        settings: Further arguments of :class:`posse.adapters.base.BatchEnv`, or any field of
+            :class:`posse.Scenario`.
 
     Raises:
         ScenarioError: An unknown scenario, or an unknown or invalid setting.
         TypeError: ``target_policy`` is not the policy of a target.
     """
 
-    _silent = False
     _fit = staticmethod(team_scenario)
 
-    def __init__(
-        self,
-        scenario: str | Scenario = "constant",
-        *,
-        discrete_actions: bool = False,
-        clip_actions: bool = False,
-        render_mode: str | None = None,
-        seed: int | None = None,
-        split: str = "train",
-        first_world: int = 0,
-        target_policy: TargetPolicy | None = None,
-        **overrides: Any,
-    ) -> None:
-        self._open(
-            self._fit(scenario, overrides),
-            clip_actions=clip_actions,
-            render_mode=render_mode,
-            seed=seed,
-            split=split,
-            first_world=first_world,
-            target_policy=target_policy,
-        )
-        self.observation_space, self.action_space = spaces_of(self.scenario, self._rows, discrete_actions, self._silent)
-        self._shape, self._discrete = self.action_space.shape, discrete_actions
+    def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
+        super().__init__(scenario, **settings)
+        self.observation_space, self.action_space = self._spaces()
+        self._shape = self.action_space.shape
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -13,10 +13,10 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from posse.adapters.actions import agent_names, as_motions, box, single_action_space
-from posse.adapters.base import WorldEnv, with_horizon
+from posse.adapters.base import WorldEnv
 from posse.engine.arguments import in_box, options_of
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, get_scenario
+from posse.scenarios import Scenario, ScenarioError
 
 _AgentInfos = dict[str, dict[str, Any]]
 
@@ -52,54 +52,30 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     Args:
         scenario: Name of a scenario, or a scenario.
-        target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
-        discrete_actions: Whether actions are ``Discrete``.
-        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
         max_cycles: PettingZoo's name for ``horizon``.
-        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
-        seed: Seed of all random draws; ``None``: an arbitrary one.
-        split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Index of the world within the seed.
-        overrides: Any field of :class:`posse.Scenario`.
+        settings: ``target="agent"`` makes the target an agent; further arguments of
+            :class:`posse.adapters.base.BatchEnv`, or any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown scenario, or an unknown or invalid setting.
-        ValueError: An unknown split or render mode, a negative seed.
+        ScenarioError: An unknown scenario, split or render mode, or an unknown or invalid setting.
     """
 
     metadata: ClassVar[dict[str, Any]] = {**WorldEnv.metadata, "name": "posse_track_v0", "is_parallelizable": True}
 
     def __init__(
-        self,
-        scenario: str | Scenario = "constant",
-        *,
-        target: str | None = None,
-        discrete_actions: bool = False,
-        clip_actions: bool = False,
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-        seed: int | None = None,
-        split: str = "train",
-        first_world: int = 0,
-        **overrides: Any,
+        self, scenario: str | Scenario = "constant", *, max_cycles: int | None = None, **settings: Any
     ) -> None:
-        self._open(
-            get_scenario(scenario, target=target, **with_horizon(overrides, "max_cycles", max_cycles)),
-            clip_actions=clip_actions,
-            render_mode=render_mode,
-            seed=seed,
-            split=split,
-            first_world=first_world,
-        )
-        self.possible_agents = agent_names(self.scenario)
+        if max_cycles is not None:
+            if "horizon" in settings:
+                raise ScenarioError("max_cycles and horizon mean the same: give one of them")
+            settings["horizon"] = max_cycles
+        super().__init__(scenario, **settings)
+        self.possible_agents = agent_names(self.scenario)[: self.batch.action_shape[1]]
         self.agents: list[str] = []
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
-        self.action_spaces = {
-            agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
-        }
-        self._discrete = discrete_actions
+        self.action_spaces = {a: single_action_space(self.scenario, self._discrete) for a in self.possible_agents}
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self.np_random = np.random.default_rng(seed)  # for wrappers; no world draws from it
+        self.np_random = np.random.default_rng(settings.get("seed"))  # for wrappers; no world draws from it
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""

@@ -10,11 +10,10 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from posse.adapters.actions import Rows, as_motions, spaces_of
-from posse.adapters.base import BatchEnv, with_horizon
+from posse.adapters.actions import as_motions
+from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
 from posse.engine.arguments import options_of
-from posse.engine.opponent import TargetPolicy
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
 
@@ -31,17 +30,15 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as in
     :class:`TeamEnv`.
 
-    Further arguments as for :class:`TeamEnv`.
-
     Args:
+        scenario: Name of a scenario, or a scenario.
         num_envs: E, at least 1.
         autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`. ``"next_step"``: the
             next step starts a new one and ignores its action; ``"same_step"``: a new one starts at
             once, the last observation is ``info["final_obs"]``, the last info ``info["final_info"]``;
             ``"disabled"``: the caller resets, with ``options={"reset_mask": mask}``.
-        max_episode_steps: Gymnasium's name for ``horizon``.
-        first_world: Index of the first world.
         num_threads: Threads that step the worlds; never changes a result.
+        settings: As for :class:`TeamEnv`.
 
     Raises:
         ScenarioError: As for :class:`posse.adapters.gymnasium_env.TeamEnv`; or an unknown mode of autoreset.
@@ -51,8 +48,6 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         **BatchEnv.metadata,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
-    _rows: Rows = slice(None)
-    _silent = False
     _fit = staticmethod(team_scenario)
 
     def __init__(
@@ -61,38 +56,16 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         num_envs: int = 1,
         *,
         autoreset: str = "next_step",
-        max_episode_steps: int | None = None,
-        discrete_actions: bool = False,
-        clip_actions: bool = False,
-        render_mode: str | None = None,
-        seed: int | None = None,
-        split: str = "train",
-        first_world: int = 0,
         num_threads: int | None = None,
-        target_policy: TargetPolicy | None = None,
-        **overrides: Any,
+        **settings: Any,
     ) -> None:
-        self._open(
-            self._fit(scenario, with_horizon(overrides, "max_episode_steps", max_episode_steps)),
-            num_envs,
-            clip_actions=clip_actions,
-            render_mode=render_mode,
-            seed=seed,
-            split=split,
-            first_world=first_world,
-            target_policy=target_policy,
-            autoreset=autoreset,
-            num_threads=num_threads,
-        )
+        super().__init__(scenario, num_envs, autoreset=autoreset, num_threads=num_threads, **settings)
         self.num_envs = self.batch.num_worlds
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
         self.metadata["autoreset_mode"] = self.autoreset_mode
-        self.single_observation_space, self.single_action_space = spaces_of(
-            self.scenario, self._rows, discrete_actions, self._silent
-        )
+        self.single_observation_space, self.single_action_space = self._spaces()
         self.observation_space: spaces.Space[Any] = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._discrete = discrete_actions
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, _Info]:
         """Start episodes as :meth:`posse.Batch.reset` does, and return the observations and infos of all worlds."""
