@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 from posse import Batch, Scenario, ScenarioError, get_scenario
 from posse.adapters.gymnasium_env import TeamEnv
 from posse.adapters.vector_env import TeamVectorEnv
-from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
@@ -47,7 +47,7 @@ class _WithTeammates:
         return team
 
 
-class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
+class TrackerEnv(_WithTeammates, TeamEnv):
     """``posse/Tracker-v0``, after ``import posse_baselines``: one tracker whose team-mates run a policy.
 
     **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages

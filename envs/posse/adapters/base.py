@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping
-from functools import cached_property
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -15,14 +14,14 @@ from gymnasium.vector.utils import batch_space
 from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
-from posse.engine.kernels import Results
 from posse.engine.opponent import TargetPolicy, batch_with
-from posse.numeric import FloatArray
+from posse.numeric import FloatArray, OwnArrays
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
 from posse.signals.layout import ObservationLayout
 
 RENDER_MODES: Final = ("human", "rgb_array")
+_ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 
 
 class BatchEnv:
@@ -97,11 +96,10 @@ class BatchEnv:
         self.metadata = {**type(self).metadata, "render_fps": fps}  # type: ignore[misc]
         self._discrete = discrete_actions
         self._seeded = seed is not None
+        self._renderer: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the attributes without cached ones, which are made again."""
-        cached = {name for name in self.__dict__ if isinstance(getattr(type(self), name, None), cached_property)}
-        return {name: value for name, value in self.__dict__.items() if name not in cached}
+        return {**self.__dict__, "_renderer": None}
 
     def _spaces(self) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Return the spaces of an agent's observations and actions."""
@@ -125,54 +123,50 @@ class BatchEnv:
         if self.render_mode == "human":
             self._draw(0)
 
-    @cached_property
-    def _renderer(self) -> Any:
-        from posse.rendering.renderer import Renderer  # imports pygame
-
-        return Renderer(self.scenario, self.render_mode or "")
-
     def _draw(self, world: int) -> npt.NDArray[np.uint8] | None:
         """Draw the current state of a world: (H, W, 3) uint8 in the mode "rgb_array", a window in "human"."""
         self.batch.check_started("render")
         if self.render_mode is None:
             return None
+        if self._renderer is None:
+            from posse.rendering.renderer import Renderer  # imports pygame
+
+            self._renderer = Renderer(self.scenario, self.render_mode)
         picture: npt.NDArray[np.uint8] | None = self._renderer.draw(self.batch, world=world)
         return picture
 
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
-        if "_renderer" in self.__dict__:
+        if self._renderer is not None:
             self._renderer.close()
-            del self._renderer
+            self._renderer = None
 
 
-class WorldEnv(BatchEnv):
+class WorldEnv(OwnArrays, BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
     def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
         super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
         self._infos = Infos(self.scenario, 0.0)
         self._breakable = self.scenario.breaks > 0
+        self.state_layout = StateLayout(self.scenario)
+        self._allocate()
 
-    @cached_property
-    def state_layout(self) -> StateLayout:
-        """Names, units and ranges of what :meth:`state` returns."""
-        return StateLayout(self.scenario)
-
-    @cached_property
-    def _results(self) -> Results:
-        """The results of a step, which the next one overwrites."""
-        return self.batch._new_results()
-
-    @cached_property
-    def _own(self) -> Results:
-        """The agents' observations (..., F), rewards (rows,) and terms (K, ...) in the results."""
-        results, rows = self._results, self._rows
-        return results._replace(
-            observations=results.observations[0, rows],
-            rewards=results.rewards[0, rows, ...].reshape(-1),
-            terms=results.terms[0, rows].T,
+    def _allocate(self) -> None:
+        """Allocate the results of a step, which the next one overwrites, and find the agents' part of them."""
+        self._results, rows = self.batch._new_results(), self._rows
+        self._own = self._results._replace(
+            observations=self._results.observations[0, rows],  # (..., F)
+            rewards=self._results.rewards[0, rows, ...].reshape(-1),  # (rows,)
+            terms=self._results.terms[0, rows].T,  # (K, ...)
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in super().__getstate__().items() if name not in _ALLOCATED}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._allocate()
 
     def state(self) -> FloatArray:
         """Return the full state of the world, (S,) float32."""

@@ -80,6 +80,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         super().__init__(scenario, **settings)
         self.observation_space, self.action_space = self._spaces()
         self._shape = self.action_space.shape
+        self._rows_shape = 1, -1, 2 if self._silent else self.batch.action_shape[2]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -99,16 +100,16 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         batch, own = self.batch, self._own
         batch.check_running()
         motions = as_motions("action", action, self._shape, self._discrete)
-        self._advance(in_box(motions.reshape(1, -1, motions.shape[-1]), batch.clip_actions))
-        rewards, over = own.rewards.tolist(), batch._over > 0
-        terminated = over and own.terminated.item()
-        return own.observations.copy(), sum(rewards) / len(rewards), terminated, over and not terminated, self._info()
+        self._advance(in_box(motions.reshape(self._rows_shape), batch.clip_actions))
+        rewards = own.rewards.tolist()
+        ends = own.terminated.item(), own.truncated.item()
+        return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
 
     def _info(self) -> dict[str, Any]:
         """Return the info of the last step or reset."""
         own = self._own
-        each = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
-        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, each)
+        terms = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
+        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, terms)
         if self._breakable:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import reprlib
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -74,6 +73,7 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         self.agents: list[str] = []
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
         self.action_spaces = {a: single_action_space(self.scenario, self._discrete) for a in self.possible_agents}
+        self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
         self.np_random = np.random.default_rng(settings.get("seed"))  # for wrappers; no world draws from it
 
@@ -84,11 +84,6 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """Return the action space of an agent; the same object at each call."""
         return self.action_spaces[agent]
-
-    @functools.cached_property
-    def state_space(self) -> spaces.Box:
-        """Space of :meth:`state`."""
-        return spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -136,33 +131,30 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
                 infos[agent]["working"] = works  # a target never breaks
         return infos
 
-    @functools.cached_property
-    def _actions(self) -> FloatArray:
-        """The actions of a step, (1, rows, 2 + m)."""
-        return np.zeros(self.batch.action_shape, np.float32)
-
-    @functools.cached_property
-    def _rows_of_actions(self) -> list[tuple[str, memoryview]]:
-        """Each agent with its row of the actions; assignment to a memoryview checks type and shape fastest."""
-        return [(agent, memoryview(row)) for agent, row in zip(self.possible_agents, self._actions[0], strict=True)]
+    def _allocate(self) -> None:
+        super()._allocate()
+        self._actions = np.zeros(self.batch.action_shape, np.float32)
+        # Assignment to a memoryview checks type and shape fastest.
+        self._action_of = [memoryview(row) for row in self._actions[0]]
 
     def _read(self, actions: Mapping[str, Any]) -> FloatArray:
         """Return actions by agent as an array, whose range is not checked; ValueError names a wrong one."""
+        agents = self.agents
         try:
-            if self._discrete or type(actions) is not dict or len(actions) != len(self.agents):
+            if self._discrete or type(actions) is not dict or len(actions) != len(agents):
                 raise TypeError
-            for agent, row in self._rows_of_actions:
+            for agent, row in zip(agents, self._action_of):  # noqa: B905  equal lengths, in the hot path
                 row[:] = actions[agent]
             return self._actions
         except (KeyError, TypeError, ValueError, BufferError):  # of another type, or invalid
             pass
         if not isinstance(actions, Mapping):
             raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
-        known = f"agents are: {', '.join(self.agents)}"
+        known = f"agents are: {', '.join(agents)}"
         for agent in actions:
-            if agent not in self.agents:
+            if agent not in agents:
                 raise ValueError(f"action for unknown agent {reprlib.repr(agent)}; {known}")
-        for agent, row in zip(self.agents, self._actions[0], strict=True):
+        for agent, row in zip(agents, self._actions[0], strict=True):
             if agent not in actions:
                 raise ValueError(f"no action for {agent}: every agent needs one; {known}")
             shape = self.action_spaces[agent].shape
