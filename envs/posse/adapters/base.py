@@ -16,11 +16,11 @@ from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
 from posse.engine.opponent import TargetPolicy, batch_with
 from posse.numeric import FloatArray, OwnArrays
+from posse.rendering.style import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
 from posse.signals.layout import ObservationLayout
 
-RENDER_MODES: Final = ("human", "rgb_array")
 _ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 
 
