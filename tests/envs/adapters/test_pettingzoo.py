@@ -163,8 +163,8 @@ def test_the_target_is_an_agent_by_one_name() -> None:
 
 
 def test_a_policy_moves_the_target_as_in_a_batch() -> None:
-    env = posse.parallel_env("duel", target_policy=load_target("evader"))
-    batch = posse.batch("duel", target_policy=load_target("evader"))
+    env = posse.parallel_env("duel", target_policy=load_target("evader").policy)
+    batch = posse.batch("duel", target_policy=load_target("evader").policy)
     env.reset(seed=0)
     batch.reset(seed=0)
     assert env.agents == env.possible_agents == [f"tracker_{i}" for i in range(5)]
