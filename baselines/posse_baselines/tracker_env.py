@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 from posse import Batch, Scenario, ScenarioError, get_scenario
 from posse.adapters.gymnasium_env import TeamEnv
 from posse.adapters.vector_env import TeamVectorEnv
-from posse.numeric import BoolArray, FloatArray, OwnArrays
+from posse.numeric import BoolArray, FloatArray
 from posse_baselines.policy import Policy, begin
 from posse_baselines.registry import load
 
@@ -34,7 +34,7 @@ class _WithTeammates:
         # (E, N, F) what the team observes; never written to, since policies may keep observations.
         self._team: FloatArray = np.zeros(0, np.float32)
 
-    def _with_teammates(self, own: FloatArray) -> FloatArray:
+    def _of_team(self, own: FloatArray) -> FloatArray:
         """Return the teams' actions (E, N, 2 + m), given those of one tracker (E, 2 or 2 + m)."""
         self.batch.check_running()
         team = np.zeros(self.batch.action_shape, np.float32)
@@ -47,7 +47,7 @@ class _WithTeammates:
         return team
 
 
-class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
+class TrackerEnv(_WithTeammates, TeamEnv):
     """``posse/Tracker-v0``, after ``import posse_baselines``: one tracker whose team-mates run a policy.
 
     **Observation**: ``Box`` (F,) float32, the observation of this tracker, including the messages
@@ -93,13 +93,9 @@ class TrackerEnv(_WithTeammates, OwnArrays, TeamEnv):
         self._memory = begin(self.teammates, self.batch)
         return result
 
-    def _advance(self, actions: FloatArray) -> Any:
-        results = super()._advance(actions)
-        self._team = results.observations[None].copy()
-        return results
-
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        return self._with_teammates(motions[None])
+    def _advance(self, actions: FloatArray) -> None:
+        super()._advance(self._of_team(actions[:, 0]))
+        self._team = self._results.observations.copy()
 
 
 class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
@@ -141,15 +137,12 @@ class TrackerVectorEnv(_WithTeammates, TeamVectorEnv):
             self._memory = self.teammates.restart(self._memory, begins)
         return result
 
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        return self._with_teammates(motions)
-
     def _observed(self, observations: FloatArray) -> FloatArray:
         self._team = observations
         return super()._observed(observations)
 
 
-def _fitting(teammates: Policy, number: int, scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+def _fitting(teammates: Policy, number: int, scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario with messages as long as the team-mates need."""
     found = get_scenario(scenario, **overrides)
     if found.target_motion == "agent":

@@ -111,7 +111,7 @@ def test_many_worlds_agree_with_gymnasiums_own_vector_of_single_ones(
     mode: AutoresetMode, kind: dict[str, bool]
 ) -> None:
     settings = {**SETTINGS, **kind}
-    ours = vector(autoreset=mode, **settings)
+    ours = vector(autoreset=mode.name.lower(), **settings)
     makes = [lambda i=i: gymnasium.make(NAME, first_world=i, **settings) for i in range(E)]
     theirs: Any = SyncVectorEnv(makes, autoreset_mode=mode)
     assert ours.observation_space == theirs.observation_space

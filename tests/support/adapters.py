@@ -8,11 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import posse
-
-SOLO_SCENARIOS = tuple(name for name in posse.scenario_names() if posse.get_scenario(name).breaks == 0)
-"""Scenarios possible with a single tracker: without breaks."""
-
 
 def part(info: Any, prefix: str) -> dict[str, Any]:
     """Return the entries of an info whose names begin with a prefix, under the rest of their names."""

@@ -6,30 +6,22 @@ has three speeds by five turn rates.
 
 from __future__ import annotations
 
+import itertools
 import reprlib
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
-from gymnasium.vector.utils import batch_space
 
 from posse.engine.arguments import as_float32, real_numbers
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError
-from posse.signals.layout import ObservationLayout
 
-SPEEDS: Final = (-1.0, 0.0, 1.0)
-"""Discrete speeds: at rest, half, full."""
-TURN_RATES: Final = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Discrete turn rates: maximum right to maximum left."""
-MOTIONS: Final = np.array([(v, turn) for v in SPEEDS for turn in TURN_RATES], np.float32)
-"""The discrete actions, (15, 2): number 5 i + j is speed i with turn rate j."""
+MOTIONS: Final = np.array(list(itertools.product((-1, 0, 1), (-1, -0.5, 0, 0.5, 1))), np.float32)
+"""The discrete actions, (15, 2): number 5 i + j is speed i (rest, half, full) with turn rate j (right to left)."""
 
 _FLOAT32: Final = np.dtype(np.float32)
-
-Rows = int | slice
-"""The robots that an agent moves, as rows of a batch: one, or all."""
 
 
 def agent_names(scenario: Scenario) -> list[str]:
@@ -60,17 +52,6 @@ def single_action_space(scenario: Scenario, discrete: bool) -> spaces.Space[Any]
             f"discrete_actions=True cannot encode messages of message_size={scenario.message_size}: unset one of them"
         )
     return spaces.Discrete(len(MOTIONS))
-
-
-def spaces_of(
-    scenario: Scenario, rows: Rows, discrete: bool, silent: bool = False
-) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
-    """Return the spaces of an agent that moves some rows; ``silent``: without the message."""
-    observation = box(*ObservationLayout(scenario).bounds())
-    action = single_action_space(scenario.replace(message_size=0) if silent else scenario, discrete)
-    if isinstance(rows, int):
-        return observation, action
-    return batch_space(observation, scenario.num_trackers), batch_space(action, scenario.num_trackers)
 
 
 def as_motions(name: str, action: object, shape: tuple[int, ...] | None, discrete: bool) -> FloatArray:

@@ -2,72 +2,112 @@
 
 from __future__ import annotations
 
-import functools
-import importlib
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.vector.utils import batch_space
 
+from posse.adapters.actions import box, single_action_space
 from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
-from posse.engine.kernels import Results
-from posse.engine.opponent import batch_with
-from posse.numeric import FloatArray
-from posse.scenarios import Scenario, ScenarioError
+from posse.engine.opponent import TargetPolicy, batch_with
+from posse.numeric import FloatArray, OwnArrays
+from posse.rendering.style import RENDER_MODES
+from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
 from posse.signals.layout import ObservationLayout
 
-RENDER_MODES: Final = ("human", "rgb_array")
-
-
-def with_horizon(overrides: dict[str, Any], name: str, steps: int | None) -> dict[str, Any]:
-    """Return overrides with the episode's length under a library's name for it; ScenarioError for both names."""
-    if steps is None:
-        return overrides
-    if "horizon" in overrides:
-        raise ScenarioError(f"{name} and horizon mean the same: give one of them")
-    return {**overrides, "horizon": steps}
+_ALLOCATED: Final = ("_results", "_own", "_actions", "_action_of")  # arrays of a step, not pickled
 
 
 class BatchEnv:
     """An environment on a batch.
+
+    Args:
+        scenario: Name of a scenario, or a scenario.
+        num_worlds: E.
+        discrete_actions: Whether actions are numbers of :data:`posse.adapters.actions.MOTIONS`.
+        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
+        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
+        seed: Seed of all random draws; ``None``: an arbitrary one.
+        split: ``"train"``, ``"validation"`` or ``"test"``.
+        first_world: Index of the first world within the seed.
+        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
+        autoreset: As for :class:`posse.Batch`.
+        num_threads: As for :class:`posse.Batch`.
+        overrides: Any field of :class:`posse.Scenario`.
 
     Attributes:
         scenario: Scenario of the worlds.
         batch: The worlds.
         layout: Position of each field in an observation.
         render_mode: ``"human"``, ``"rgb_array"`` or ``None``.
+
+    Raises:
+        ScenarioError: An unknown scenario, split or mode, or an unknown or invalid setting.
+        TypeError: ``target_policy`` is not the policy of a target.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}
+    _rows: int | slice = slice(None)
+    """The robots that an agent moves, as rows of the batch: one, or all."""
+    _fit: Callable[..., Scenario] = staticmethod(get_scenario)
+    """Returns the scenario of a name, or a scenario, and overrides."""
+    _silent = False
+    """Whether actions are without the message."""
 
-    def _open(
+    def __init__(
         self,
-        scenario: Scenario,
+        scenario: str | Scenario,
         num_worlds: int,
         *,
-        render_mode: str | None,
-        seed: int | None,
-        target_policy: Any = None,
-        **settings: Any,
+        discrete_actions: bool = False,
+        clip_actions: bool = False,
+        render_mode: str | None = None,
+        seed: int | None = None,
+        split: str = "train",
+        first_world: int = 0,
+        target_policy: TargetPolicy | None = None,
+        autoreset: str,
+        num_threads: int | None,
+        **overrides: Any,
     ) -> None:
-        """Create the worlds; ``settings`` are further arguments of :class:`posse.Batch`."""
         if render_mode is not None:
             check_choice("render_mode", render_mode, RENDER_MODES)
-        self.batch = batch_with(scenario, num_worlds, target_policy, seed=0 if seed is None else seed, **settings)
+        self.batch = batch_with(
+            self._fit(scenario, **overrides),
+            num_worlds,
+            target_policy,
+            seed=0 if seed is None else seed,
+            split=split,
+            first_world=first_world,
+            autoreset=autoreset,
+            num_threads=num_threads,
+            clip_actions=clip_actions,
+        )
         self.scenario: Scenario = self.batch.scenario
         self.layout: ObservationLayout = self.batch.layout
         self.render_mode = render_mode
         fps = max(1, round(1 / self.scenario.control_step))  # real time
         self.metadata = {**type(self).metadata, "render_fps": fps}  # type: ignore[misc]
+        self._discrete = discrete_actions
         self._seeded = seed is not None
         self._renderer: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None}
+
+    def _spaces(self) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+        """Return the spaces of an agent's observations and actions."""
+        scenario = self.scenario.replace(message_size=0) if self._silent else self.scenario
+        observation, action = box(*self.layout.bounds()), single_action_space(scenario, self._discrete)
+        if isinstance(self._rows, int):
+            return observation, action
+        return batch_space(observation, scenario.num_trackers), batch_space(action, scenario.num_trackers)
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start episodes, of an arbitrary seed if none was ever given, and return the observations (E, rows, F)."""
@@ -77,10 +117,6 @@ class BatchEnv:
         self._seeded = True
         self._show()
         return observations
-
-    def _of_team(self, motions: FloatArray) -> FloatArray:
-        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
-        return motions.reshape(self.batch.action_shape)
 
     def _show(self) -> None:
         """Draw the first world in the window, in the mode "human"."""
@@ -92,9 +128,10 @@ class BatchEnv:
         self.batch.check_started("render")
         if self.render_mode is None:
             return None
-        if self._renderer is None:  # imports pygame
-            renderer = importlib.import_module("posse.rendering.renderer").Renderer
-            self._renderer = renderer(self.scenario, self.render_mode)
+        if self._renderer is None:
+            from posse.rendering.renderer import Renderer  # imports pygame
+
+            self._renderer = Renderer(self.scenario, self.render_mode)
         picture: npt.NDArray[np.uint8] | None = self._renderer.draw(self.batch, world=world)
         return picture
 
@@ -105,24 +142,31 @@ class BatchEnv:
             self._renderer = None
 
 
-class WorldEnv(BatchEnv):
+class WorldEnv(OwnArrays, BatchEnv):
     """An environment of one world, but for the interface of its library."""
 
-    def _open(self, scenario: Scenario, num_worlds: int = 1, **settings: Any) -> None:
-        super()._open(scenario, num_worlds, num_threads=1, autoreset="disabled", **settings)
+    def __init__(self, scenario: str | Scenario, **settings: Any) -> None:
+        super().__init__(scenario, 1, autoreset="disabled", num_threads=1, **settings)
         self._infos = Infos(self.scenario, 0.0)
         self._breakable = self.scenario.breaks > 0
-        self._results: tuple[Results, Results] | None = None
+        self.state_layout = StateLayout(self.scenario)
+        self._allocate()
+
+    def _allocate(self) -> None:
+        """Allocate the results of a step, which the next one overwrites, and find the agents' part of them."""
+        self._results, rows = self.batch._new_results(), self._rows
+        self._own = self._results._replace(
+            observations=self._results.observations[0, rows],  # (..., F)
+            rewards=self._results.rewards[0, rows, ...].reshape(-1),  # (rows,)
+            terms=self._results.terms[0, rows].T,  # (K, ...)
+        )
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {**super().__getstate__(), "_results": None}
-        state.pop("state_layout", None)
-        return state
+        return {name: value for name, value in super().__getstate__().items() if name not in _ALLOCATED}
 
-    @functools.cached_property
-    def state_layout(self) -> StateLayout:
-        """Names, units and ranges of what :meth:`state` returns."""
-        return StateLayout(self.scenario)
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._allocate()
 
     def state(self) -> FloatArray:
         """Return the full state of the world, (S,) float32."""
@@ -135,27 +179,19 @@ class WorldEnv(BatchEnv):
         return self._draw(0)
 
     def _start(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+        """Start an episode and return the agents' observations (..., F)."""
         if "reset_mask" in options_of(options):
             raise ValueError("unknown option 'reset_mask': an environment of one world has none")
-        return super()._start(seed, options)
+        observations: FloatArray = super()._start(seed, options)[0, self._rows]
+        for array in self._results[2:]:
+            array[...] = 0
+        return observations
 
-    def _advance(self, actions: FloatArray) -> Results:
-        """Perform a control step by valid actions; return its results, which the next step overwrites.
+    def _advance(self, actions: FloatArray) -> None:
+        """Perform a control step by valid actions."""
+        self.batch._advance(actions, self._results)
+        self._show()
 
-        Observations are (rows, F), rewards (rows,) and terms (rows, K), the others as of a batch.
-        """
-        if self._results is None:
-            new = self.batch._new_results()
-            first = new.observations[0], new.rewards[0], new.terms[0]
-            self._results = new, Results(*first, new.scores, new.terminated, new.truncated)
-        results, own = self._results
-        self.batch._advance(actions, results)
-        if self.render_mode == "human":
-            self._draw(0)
-        return own
-
-    def _info(self, score: float, terms: Any = None) -> dict[str, Any]:
-        """Return an info, with every metric at the end of the episode."""
-        if not self.batch._over:
-            return self._infos.build(score, terms)
-        return self._infos.build(score, terms, {name: float(v[0]) for name, v in self.batch.metrics().items()})
+    def _metrics(self) -> dict[str, float] | None:
+        """Return every metric of the episode at its end, ``None`` before."""
+        return {name: float(v[0]) for name, v in self.batch.metrics().items()} if self.batch._over else None

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
-import numpy as np
 
-from posse.adapters.actions import Rows, as_motions, spaces_of
+from posse.adapters.actions import as_motions
 from posse.adapters.base import WorldEnv
 from posse.engine.arguments import in_box
-from posse.engine.opponent import TargetPolicy
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario, ScenarioError, get_scenario
 
 
-def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+def team_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario of an environment of one agent; ScenarioError if its target is an agent."""
     found = get_scenario(scenario, **overrides)
     if found.target_motion == "agent":
@@ -26,9 +24,9 @@ def team_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenar
     return found
 
 
-def solo_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenario:
+def solo_scenario(scenario: str | Scenario, **overrides: Any) -> Scenario:
     """Return the scenario with one tracker; ScenarioError if it is to have more, or one that breaks."""
-    if overrides.get("num_trackers", 1) != 1:
+    if overrides.setdefault("num_trackers", 1) != 1:
         raise ScenarioError(
             f"num_trackers={overrides['num_trackers']!r} does not fit posse/Solo-v0, which has one: use posse/Team-v0"
         )
@@ -39,7 +37,7 @@ def solo_scenario(scenario: str | Scenario, overrides: dict[str, Any]) -> Scenar
             "of the trackers break down, and a team of one would be left with none. Pass "
             "breaks=0, or use posse/Team-v0"
         )
-    return team_scenario(scenario, {**overrides, "num_trackers": 1})
+    return team_scenario(scenario, **overrides)
 
 
 class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
@@ -68,57 +66,29 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
 
     Args:
         scenario: Name of a scenario, or a scenario.
-        discrete_actions: Whether actions are discrete.
-        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
-        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
-        seed: Seed of all random draws; ``None``: an arbitrary one.
-        split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Index of the world within the seed.
-        target_policy: Moves the target (:class:`posse.TargetPolicy`); default: its scripted motion.
-        overrides: Any field of :class:`posse.Scenario`.
+        settings: Further arguments of :class:`posse.adapters.base.BatchEnv`, or any field of
+            :class:`posse.Scenario`.
 
     Raises:
         ScenarioError: An unknown scenario, or an unknown or invalid setting.
         TypeError: ``target_policy`` is not the policy of a target.
     """
 
-    _rows: Rows = slice(None)
-    _silent = False
     _fit = staticmethod(team_scenario)
 
-    def __init__(
-        self,
-        scenario: str | Scenario = "constant",
-        *,
-        discrete_actions: bool = False,
-        clip_actions: bool = False,
-        render_mode: str | None = None,
-        seed: int | None = None,
-        split: str = "train",
-        first_world: int = 0,
-        target_policy: TargetPolicy | None = None,
-        **overrides: Any,
-    ) -> None:
-        self._open(
-            self._fit(scenario, overrides),
-            clip_actions=clip_actions,
-            render_mode=render_mode,
-            seed=seed,
-            split=split,
-            first_world=first_world,
-            target_policy=target_policy,
-        )
-        self.observation_space, self.action_space = spaces_of(self.scenario, self._rows, discrete_actions, self._silent)
-        self._discrete = discrete_actions
+    def __init__(self, scenario: str | Scenario = "constant", **settings: Any) -> None:
+        super().__init__(scenario, **settings)
+        self.observation_space, self.action_space = self._spaces()
+        self._shape = self.action_space.shape
+        self._rows_shape = 1, -1, 2 if self._silent else self.batch.action_shape[2]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
-        observations = self._start(seed, options)
+        observation = self._start(seed, options)
         gymnasium.Env.reset(self, seed=None if seed is None else int(seed))
-        rows, terms = observations.shape[1], len(self.batch.term_names)
-        return observations[0, self._rows], self._own_info(0.0, np.zeros((rows, terms), np.float32))
+        return observation, self._info()
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
@@ -127,18 +97,19 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An action out of its space; nothing is changed.
         """
-        self.batch.check_running()
-        motions = as_motions("action", action, self.action_space.shape, self._discrete)
-        results = self._advance(in_box(self._of_team(motions), self.batch.clip_actions))
-        rewards = results.rewards[self._rows].tolist()
-        reward = sum(rewards) / len(rewards) if isinstance(rewards, list) else rewards
-        info = self._own_info(results.scores.item(), results.terms)
-        ends = results.terminated.item(), results.truncated.item()
-        return results.observations[self._rows].copy(), reward, *ends, info
+        batch, own = self.batch, self._own
+        batch.check_running()
+        motions = as_motions("action", action, self._shape, self._discrete)
+        self._advance(in_box(motions.reshape(self._rows_shape), batch.clip_actions))
+        rewards = own.rewards.tolist()
+        ends = own.terminated.item(), own.truncated.item()
+        return own.observations.copy(), sum(rewards) / len(rewards), *ends, self._info()
 
-    def _own_info(self, score: float, terms: FloatArray) -> dict[str, Any]:
-        own = terms[self._rows].T
-        info = self._info(score, own.copy() if own.ndim == 2 else own.tolist())
+    def _info(self) -> dict[str, Any]:
+        """Return the info of the last step or reset."""
+        own = self._own
+        terms = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
+        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, terms)
         if self._breakable:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import reprlib
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -13,12 +12,12 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from posse.adapters.actions import agent_names, as_motions, box, single_action_space
-from posse.adapters.base import WorldEnv, with_horizon
+from posse.adapters.base import WorldEnv
 from posse.engine.arguments import in_box, options_of
 from posse.numeric import FloatArray
-from posse.scenarios import Scenario, get_scenario
+from posse.scenarios import Scenario, ScenarioError
 
-_Infos = dict[str, dict[str, Any]]
+_AgentInfos = dict[str, dict[str, Any]]
 
 
 class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
@@ -52,54 +51,31 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
 
     Args:
         scenario: Name of a scenario, or a scenario.
-        target: ``"agent"`` makes the target an agent; short for ``target_motion="agent"``.
-        discrete_actions: Whether actions are ``Discrete``.
-        clip_actions: Whether finite actions outside [-1, 1] are clipped instead of refused.
         max_cycles: PettingZoo's name for ``horizon``.
-        render_mode: ``"human"`` (a window, drawn at each step), ``"rgb_array"`` or ``None``.
-        seed: Seed of all random draws; ``None``: an arbitrary one.
-        split: ``"train"``, ``"validation"`` or ``"test"``.
-        first_world: Index of the world within the seed.
-        overrides: Any field of :class:`posse.Scenario`.
+        settings: ``target="agent"`` makes the target an agent; further arguments of
+            :class:`posse.adapters.base.BatchEnv`, or any field of :class:`posse.Scenario`.
 
     Raises:
-        ScenarioError: An unknown scenario, or an unknown or invalid setting.
-        ValueError: An unknown split or render mode, a negative seed.
+        ScenarioError: An unknown scenario, split or render mode, or an unknown or invalid setting.
     """
 
     metadata: ClassVar[dict[str, Any]] = {**WorldEnv.metadata, "name": "posse_track_v0", "is_parallelizable": True}
 
     def __init__(
-        self,
-        scenario: str | Scenario = "constant",
-        *,
-        target: str | None = None,
-        discrete_actions: bool = False,
-        clip_actions: bool = False,
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-        seed: int | None = None,
-        split: str = "train",
-        first_world: int = 0,
-        **overrides: Any,
+        self, scenario: str | Scenario = "constant", *, max_cycles: int | None = None, **settings: Any
     ) -> None:
-        self._open(
-            get_scenario(scenario, target=target, **with_horizon(overrides, "max_cycles", max_cycles)),
-            clip_actions=clip_actions,
-            render_mode=render_mode,
-            seed=seed,
-            split=split,
-            first_world=first_world,
-        )
-        self.possible_agents = agent_names(self.scenario)
+        if max_cycles is not None:
+            if "horizon" in settings:
+                raise ScenarioError("max_cycles and horizon mean the same: give one of them")
+            settings["horizon"] = max_cycles
+        super().__init__(scenario, **settings)
+        self.possible_agents = agent_names(self.scenario)[: self.batch.action_shape[1]]
         self.agents: list[str] = []
         self.observation_spaces = {agent: box(*self.layout.bounds()) for agent in self.possible_agents}
-        self.action_spaces = {
-            agent: single_action_space(self.scenario, discrete_actions) for agent in self.possible_agents
-        }
-        self._reader = _Reader(self.possible_agents, self.batch.action_shape[2], discrete_actions, clip_actions)
+        self.action_spaces = {a: single_action_space(self.scenario, self._discrete) for a in self.possible_agents}
+        self.state_space = spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
         self._none_ended = dict.fromkeys(self.possible_agents, False)
-        self.np_random = np.random.default_rng(seed)  # for wrappers; no world draws from it
+        self.np_random = np.random.default_rng(settings.get("seed"))  # for wrappers; no world draws from it
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the observation space of an agent; the same object at each call."""
@@ -109,104 +85,85 @@ class TeamParallelEnv(WorldEnv, ParallelEnv[str, Any, Any]):
         """Return the action space of an agent; the same object at each call."""
         return self.action_spaces[agent]
 
-    @functools.cached_property
-    def state_space(self) -> spaces.Box:
-        """Space of :meth:`state`."""
-        return spaces.Box(-np.inf, np.inf, (self.state_layout.size,), np.float32)
-
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, FloatArray], _Infos]:
+    ) -> tuple[dict[str, FloatArray], _AgentInfos]:
         """Start an episode; a bad seed or option is a ValueError that changes nothing."""
         if options is not None:
             # PettingZoo's own tests send {"options": 1}, to see that options are taken.
             options = {key: value for key, value in options_of(options).items() if key != "options"}
-        observations = self._start(seed, options)[0]
+        observations = self._start(seed, options)
         self.agents = self.possible_agents.copy()
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        infos = self._infos_of(self.agents, 0.0, [[0.0] * len(self.batch.term_names)] * len(self.agents))
-        return dict(zip(self.agents, observations, strict=True)), infos
+        return dict(zip(self.agents, observations, strict=True)), self._infos_of(self.agents)
 
     def step(
         self, actions: Mapping[str, Any]
-    ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _Infos]:
+    ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], _AgentInfos]:
         """Advance the world by one control step, given an action for every agent.
 
         Raises:
             ResetNeeded: Before the first reset, or after the end.
             ValueError: An agent is missing or unknown, or its action is out of its space; nothing is changed.
         """
-        agents = self.agents
-        self.batch.check_running()
-        results = self._advance(self._reader.read(actions))
+        agents, batch, own = self.agents, self.batch, self._own
+        batch.check_running()
+        self._advance(in_box(self._read(actions), batch.clip_actions, self._place))
         terminations, truncations = self._none_ended.copy(), self._none_ended.copy()
-        if self.batch._over:
-            (terminations if results.terminated[0] else truncations).update(dict.fromkeys(agents, True))
+        if batch._over:
+            (terminations if own.terminated.item() else truncations).update(dict.fromkeys(agents, True))
             self.agents = []
-        # No strict=True below: equal lengths, in the hot path.
         return (
-            dict(zip(agents, results.observations.copy())),  # noqa: B905
-            dict(zip(agents, results.rewards.tolist())),  # noqa: B905
+            dict(zip(agents, own.observations.copy())),  # noqa: B905  equal lengths, in the hot path
+            dict(zip(agents, own.rewards.tolist())),  # noqa: B905
             terminations,
             truncations,
-            self._infos_of(agents, results.scores.item(), results.terms.tolist()),
+            self._infos_of(agents),
         )
 
-    def _infos_of(self, agents: list[str], score: float, terms: list[list[float]]) -> _Infos:
-        """Return the infos, which differ in the agents' own reward terms (rows, K) only."""
-        common, rewards, infos = self._info(score), self._infos.rewards, {}
-        for agent, own in zip(agents, terms):  # noqa: B905
-            infos[agent] = info = common.copy()
-            for key, k in rewards:
-                info[key] = own[k]
+    def _infos_of(self, agents: list[str]) -> _AgentInfos:
+        """Return the infos of the last step or reset."""
+        own = self._own
+        infos = self._infos.by_agent(agents, own.scores.item(), self._metrics(), own.terms.T.tolist())
         if self._breakable:
             for agent, works in zip(agents, [*self.batch.working[0].tolist(), True]):  # noqa: B905
                 infos[agent]["working"] = works  # a target never breaks
         return infos
 
+    def _allocate(self) -> None:
+        super()._allocate()
+        self._actions = np.zeros(self.batch.action_shape, np.float32)
+        # Assignment to a memoryview checks type and shape fastest.
+        self._action_of = [memoryview(row) for row in self._actions[0]]
 
-class _Reader:
-    """Reads the actions of a dictionary by agent into an array for the kernel, always the same."""
-
-    def __init__(self, agents: list[str], length: int, discrete: bool, clip: bool) -> None:
-        self._arguments = agents, length, discrete, clip
-        self._array = np.zeros((1, len(agents), length), np.float32)
-        self._rows = [(agent, memoryview(row)) for agent, row in zip(agents, self._array[0], strict=True)]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _Reader, self._arguments  # so that the rows are views of the new array
-
-    def read(self, actions: Mapping[str, Any]) -> FloatArray:
-        """Return the actions, (1, rows, 2 + m); ValueError if one is missing, unknown or out of its space."""
-        agents, _, discrete, clip = self._arguments
-        # Assignment to a memoryview checks type and shape faster than explicit tests.
+    def _read(self, actions: Mapping[str, Any]) -> FloatArray:
+        """Return actions by agent as an array, whose range is not checked; ValueError names a wrong one."""
+        agents = self.agents
         try:
-            if discrete or type(actions) is not dict or len(actions) != len(agents):
+            if self._discrete or type(actions) is not dict or len(actions) != len(agents):
                 raise TypeError
-            for agent, row in self._rows:
+            for agent, row in zip(agents, self._action_of):  # noqa: B905  equal lengths, in the hot path
                 row[:] = actions[agent]
-        except (KeyError, TypeError, ValueError, BufferError):
-            self._read_any(actions)
-        return in_box(self._array, clip, self._place)
-
-    def _read_any(self, actions: Mapping[str, Any]) -> None:
-        """Read actions of any type, and report which one is invalid."""
-        agents, length, discrete, _ = self._arguments
+            return self._actions
+        except (KeyError, TypeError, ValueError, BufferError):  # of another type, or invalid
+            pass
         if not isinstance(actions, Mapping):
             raise ValueError(f"actions must be a dictionary by agent, got {type(actions).__name__}")
         known = f"agents are: {', '.join(agents)}"
         for agent in actions:
             if agent not in agents:
                 raise ValueError(f"action for unknown agent {reprlib.repr(agent)}; {known}")
-        for agent, row in zip(agents, self._array[0], strict=True):
+        for agent, row in zip(agents, self._actions[0], strict=True):
             if agent not in actions:
                 raise ValueError(f"no action for {agent}: every agent needs one; {known}")
-            row[...] = as_motions(f"action of {agent}", actions[agent], () if discrete else (length,), discrete)
+            shape = self.action_spaces[agent].shape
+            row[...] = as_motions(f"action of {agent}", actions[agent], shape, self._discrete)
+        return self._actions
 
     def _place(self, _: int, row: int, k: int) -> str:
         parts = ("speed", "turn rate")
-        return f"action of {self._arguments[0][row]}: {parts[k] if k < 2 else f'message[{k - 2}]'}"
+        return f"action of {self.agents[row]}: {parts[k] if k < 2 else f'message[{k - 2}]'}"
 
 
 def parallel_env(scenario: str | Scenario = "constant", **settings: Any) -> TeamParallelEnv:

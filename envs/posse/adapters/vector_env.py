@@ -10,11 +10,10 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from posse.adapters.actions import Rows, as_motions, spaces_of
-from posse.adapters.base import BatchEnv, with_horizon
+from posse.adapters.actions import as_motions
+from posse.adapters.base import BatchEnv
 from posse.adapters.gymnasium_env import solo_scenario, team_scenario
 from posse.engine.arguments import options_of
-from posse.engine.opponent import TargetPolicy
 from posse.numeric import BoolArray, FloatArray
 from posse.scenarios import Scenario
 
@@ -31,18 +30,15 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
     worlds, and under ``"_" + name`` a mask of the worlds that have it; names and zeros as in
     :class:`TeamEnv`.
 
-    Further arguments as for :class:`TeamEnv`.
-
     Args:
+        scenario: Name of a scenario, or a scenario.
         num_envs: E, at least 1.
-        autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`, or a
-            ``gymnasium.vector.AutoresetMode``. ``"next_step"``: the next step starts a new one and
-            ignores its action; ``"same_step"``: a new one starts at once, the last observation is
-            ``info["final_obs"]``, the last info ``info["final_info"]``; ``"disabled"``: the caller
-            resets, with ``options={"reset_mask": mask}``.
-        max_episode_steps: Gymnasium's name for ``horizon``.
-        first_world: Index of the first world.
+        autoreset: Behaviour at the end of an episode, as for :func:`posse.batch`. ``"next_step"``: the
+            next step starts a new one and ignores its action; ``"same_step"``: a new one starts at
+            once, the last observation is ``info["final_obs"]``, the last info ``info["final_info"]``;
+            ``"disabled"``: the caller resets, with ``options={"reset_mask": mask}``.
         num_threads: Threads that step the worlds; never changes a result.
+        settings: As for :class:`TeamEnv`.
 
     Raises:
         ScenarioError: As for :class:`posse.adapters.gymnasium_env.TeamEnv`; or an unknown mode of autoreset.
@@ -52,8 +48,6 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         **BatchEnv.metadata,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
-    _rows: Rows = slice(None)
-    _silent = False
     _fit = staticmethod(team_scenario)
 
     def __init__(
@@ -61,47 +55,27 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         scenario: str | Scenario = "constant",
         num_envs: int = 1,
         *,
-        autoreset: str | AutoresetMode = "next_step",
-        max_episode_steps: int | None = None,
-        discrete_actions: bool = False,
-        clip_actions: bool = False,
-        render_mode: str | None = None,
-        seed: int | None = None,
-        split: str = "train",
-        first_world: int = 0,
+        autoreset: str = "next_step",
         num_threads: int | None = None,
-        target_policy: TargetPolicy | None = None,
-        **overrides: Any,
+        **settings: Any,
     ) -> None:
-        self._open(
-            self._fit(scenario, with_horizon(overrides, "max_episode_steps", max_episode_steps)),
-            num_envs,
-            clip_actions=clip_actions,
-            render_mode=render_mode,
-            seed=seed,
-            split=split,
-            first_world=first_world,
-            target_policy=target_policy,
-            autoreset=autoreset.name.lower() if isinstance(autoreset, AutoresetMode) else autoreset,
-            num_threads=num_threads,
-        )
+        super().__init__(scenario, num_envs, autoreset=autoreset, num_threads=num_threads, **settings)
         self.num_envs = self.batch.num_worlds
         self.autoreset_mode = AutoresetMode[self.batch.autoreset.upper()]
         self.metadata["autoreset_mode"] = self.autoreset_mode
-        self.single_observation_space, self.single_action_space = spaces_of(
-            self.scenario, self._rows, discrete_actions, self._silent
-        )
+        self.single_observation_space, self.single_action_space = self._spaces()
         self.observation_space: spaces.Space[Any] = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._discrete = discrete_actions
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, _Info]:
         """Start episodes as :meth:`posse.Batch.reset` does, and return the observations and infos of all worlds."""
         observations = self._start(seed, options)
         super().reset(seed=None if seed is None else int(seed))
         mask = options_of(options).get("reset_mask")
-        mask = np.ones(self.num_envs, np.bool_) if mask is None else np.array(mask)
-        return self._observed(observations), _masked(_zeroed(self._at_start(), mask), mask)
+        begun = np.ones(self.num_envs, np.bool_) if mask is None else np.array(mask)
+        terms = np.zeros((*self.batch.observation_shape[:2], len(self.batch.term_names)), np.float32)
+        infos = self._own(self.batch._infos_of(np.zeros(self.num_envs), terms))
+        return self._observed(observations), _with_masks(_zeroed(infos, begun), begun)
 
     def step(self, actions: Any) -> tuple[FloatArray, _Rewards, BoolArray, BoolArray, _Info]:
         """Advance every world by one control step.
@@ -113,44 +87,33 @@ class TeamVectorEnv(BatchEnv, VectorEnv[FloatArray, Any, npt.NDArray[Any]]):
         motions = as_motions("actions", actions, self.action_space.shape, self._discrete)
         observations, rewards, terminated, truncated, found = self.batch.step(self._of_team(motions))
         self._show()
-        ended, everywhere = terminated | truncated, np.ones(self.num_envs, np.bool_)
-        last = found.pop("final_obs", None)
-        infos = self._own(found)
-        if last is None or not ended.any():
-            infos = _masked(infos, everywhere)
-        else:
-            final = _masked(_zeroed(infos, ended), ended)
+        ended, last = terminated | truncated, found.pop("final_obs", None)
+        infos, more = self._own(found), {}
+        if last is not None and ended.any():
+            each = np.full(self.num_envs, None, dtype=object)
+            for e in np.flatnonzero(ended):
+                each[e] = last[e, self._rows].copy()
+            final = _with_masks(_zeroed(infos, ended), ended)
+            more = _with_masks({"final_obs": each, "final_info": final}, ended)
             infos = _zeroed(infos, ~ended)
             if "working" in infos:
-                infos["working"] = self._at_start()["working"]
-            kept = np.full(self.num_envs, None, dtype=object)
-            for e in np.flatnonzero(ended):
-                kept[e] = last[e, self._rows].copy()
-            infos = _masked(infos, everywhere)
-            infos |= {"final_obs": kept, "_final_obs": ended, "final_info": final, "_final_info": ended}
-        own = rewards[:, self._rows]
-        mean: _Rewards = own.mean(axis=1, dtype=np.float64) if own.ndim == 2 else own.astype(np.float64)
-        return self._observed(observations), mean, terminated, truncated, infos
+                infos["working"] = self.batch.working[:, self._rows]
+        own = rewards[:, self._rows].reshape(self.num_envs, -1).mean(axis=1, dtype=np.float64)
+        infos = _with_masks(infos, np.ones(self.num_envs, np.bool_))
+        return self._observed(observations), own, terminated, truncated, infos | more
+
+    def _of_team(self, own: FloatArray) -> FloatArray:
+        """Return the actions of all trackers (E, N, 2 + m), given those of the agents."""
+        return own.reshape(self.batch.action_shape)
 
     def _observed(self, observations: FloatArray) -> FloatArray:
+        """Return the agents' part of the observations."""
         return np.ascontiguousarray(observations[:, self._rows])
-
-    def _at_start(self) -> _Info:
-        """Return the infos of worlds whose episodes have just started."""
-        rows = np.zeros(self.batch.observation_shape[:2], np.float32)
-        infos = self.batch._infos.build(np.zeros(self.num_envs), [rows] * len(self.batch.term_names))
-        if self.scenario.breaks > 0:
-            infos["working"] = self.batch.working
-        return self._own(infos)
 
     def _own(self, infos: _Info) -> _Info:
         """Return the agents' part of a batch's infos, in the types of Gymnasium's own vector environments."""
-        own = {}
-        for name, values in infos.items():
-            part = values[:, self._rows] if values.ndim == 2 else values
-            single = values.ndim == 1 or isinstance(self._rows, int)
-            own[name] = part.astype(np.float64) if single and part.dtype == np.float32 else part
-        return own
+        parts = {name: values[:, self._rows] if values.ndim == 2 else values for name, values in infos.items()}
+        return {k: v.astype(np.float64) if v.ndim == 1 and v.dtype == np.float32 else v for k, v in parts.items()}
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Draw every world, (H, W, 3) uint8 each; in the mode "human", world 0 in a window."""
@@ -171,12 +134,9 @@ class SoloVectorEnv(TeamVectorEnv):
 
 def _zeroed(infos: _Info, mask: BoolArray) -> _Info:
     """Return infos with zeros where a mask is false."""
-    return {
-        name: np.where(mask if values.ndim == 1 else mask[:, None], values, np.zeros((), values.dtype))
-        for name, values in infos.items()
-    }
+    return {name: np.where(mask, values.T, values.dtype.type(0)).T for name, values in infos.items()}
 
 
-def _masked(infos: _Info, mask: BoolArray) -> _Info:
+def _with_masks(infos: _Info, mask: BoolArray) -> _Info:
     """Return infos, each with a mask."""
-    return {key: value for name, values in infos.items() for key, value in ((name, values), (f"_{name}", mask))}
+    return infos | {f"_{name}": mask for name in infos}

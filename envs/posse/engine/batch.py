@@ -44,6 +44,10 @@ _OPTIONS: Final = ("reset_mask", "tracker_pose", "target_pose")
 _RECYCLED_FROM: Final = 1 << 14
 """Numbers in the observations from which the memory of returned arrays is used again."""
 _FLOAT32: Final = np.dtype(np.float32)
+# Listed, not found by looking: Python 3.11 reads each attribute of an object five times slower once its __dict__ was.
+_DERIVED: Final = frozenset(
+    ("_declared", "_own_terms", "_tables", "_dispatcher", "_kernel", "_orders", "_scratch", "_returned", "_infos")
+)
 
 Step = tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
@@ -124,8 +128,7 @@ class Batch:
         self._prepare()
 
     def _prepare(self) -> None:
-        """Set the attributes that are not pickled."""
-        kept = set(self.__dict__)
+        """Set the attributes that are not pickled (:data:`_DERIVED`)."""
         self._declared = declarations_for(self.scenario)
         self._own_terms = not all(term.built_in for term in self._declared.reward_terms)
         self._tables = tables_of(self.scenario)
@@ -138,10 +141,9 @@ class Batch:
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
         self._infos = Infos(self.scenario, zeros)
-        self._not_pickled = {"_not_pickled", *self.__dict__} - kept
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {name: value for name, value in self.__dict__.items() if name not in self._not_pickled}
+        state = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
         return {**state, "fingerprints": self._declared.fingerprints()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -399,9 +401,7 @@ class Batch:
         if over:
             ended = terminated | truncated
             metrics = {name: np.where(ended, values, 0.0) for name, values in self.metrics().items()}
-        infos = self._infos.build(scores, terms.transpose(2, 0, 1), metrics)
-        if self.scenario.breaks > 0:
-            infos["working"] = self.working
+        infos = self._infos_of(scores, terms, metrics)
         if self.autoreset == "same_step":
             infos["final_obs"] = observations
             if over:
@@ -414,6 +414,15 @@ class Batch:
                 self._started = False  # only a reset helps
                 raise
         return observations, rewards, terminated, truncated, infos
+
+    def _infos_of(
+        self, scores: npt.NDArray[Any], terms: FloatArray, metrics: Mapping[str, npt.NDArray[Any]] | None = None
+    ) -> dict[str, Any]:
+        """Return the infos of scores (E,) and terms (E, rows, K), with ``metrics`` where an episode ends."""
+        infos = self._infos.build(scores, metrics, terms.transpose(2, 0, 1))
+        if self.scenario.breaks > 0:
+            infos["working"] = self.working
+        return infos
 
     def check_actions(self, actions: npt.ArrayLike) -> FloatArray:
         """Return actions as the kernel takes them, or raise ValueError as :meth:`step` does."""
@@ -431,14 +440,16 @@ class Batch:
         """
         if orders is None:
             orders = self._orders
-        if len(self._scratch) == 1:
-            self._over = self._work(actions, results, orders, 0, 0, self.num_worlds)
+        scratch = self._scratch
+        if len(scratch) == 1:
+            over = self._kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self.num_worlds)
         else:
-            arguments, threads = (actions, results, orders), len(self._scratch)
-            self._over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, threads))
+            arguments = actions, results, orders
+            over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, len(scratch)))
+        self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
-        return self._over
+        return over
 
     def _work(
         self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8], thread: int, first: int, end: int

@@ -22,25 +22,33 @@ class Infos:
     Args:
         scenario: Names the terms and metrics.
         zero: A metric before the end of the episode.
-
-    Attributes:
-        rewards: Keys of the reward terms, each with its number.
     """
 
     def __init__(self, scenario: Scenario, zero: Any) -> None:
         declared = declarations_for(scenario)
         rewards = [f"reward/{name}" for name in declared.term_names]
-        self.rewards = tuple(zip(rewards, range(len(rewards)), strict=True))
+        self._rewards = tuple(zip(rewards, range(len(rewards)), strict=True))
         names = ("score", *rewards, *(f"metrics/{metric.name}" for metric in declared.metrics))
         self._template = dict.fromkeys(names, zero)
 
-    def build(self, score: Any, terms: Any = None, metrics: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Return an info; ``terms`` (K, ...) in the order of the names, ``metrics`` by name where the episode ends."""
+    def build(self, score: Any, metrics: Mapping[str, Any] | None, terms: Any = None) -> dict[str, Any]:
+        """Return an info; ``metrics`` by name where the episode ends, ``terms`` (K, ...) in the order of the names."""
         info = self._template.copy()
         info["score"] = score
-        if terms is not None:
-            for key, k in self.rewards:  # faster than dict.update(zip(...)), which creates tuples
-                info[key] = terms[k]
         if metrics is not None:
             info.update((f"metrics/{name}", value) for name, value in metrics.items())
+        if terms is not None:
+            for key, k in self._rewards:  # faster than dict.update(zip(...)), which creates tuples
+                info[key] = terms[k]
         return info
+
+    def by_agent(
+        self, agents: list[str], score: float, metrics: Mapping[str, float] | None, terms: list[list[float]]
+    ) -> dict[str, dict[str, Any]]:
+        """Return the infos of agents by name, which differ in their own terms (rows, K)."""
+        common, rewards, infos = self.build(score, metrics), self._rewards, {}
+        for agent, own in zip(agents, terms):  # noqa: B905  equal lengths, in the hot path
+            infos[agent] = info = common.copy()
+            for key, k in rewards:
+                info[key] = own[k]
+        return infos

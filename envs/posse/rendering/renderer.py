@@ -12,15 +12,15 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from posse.engine.arguments import check_choice
 from posse.engine.batch import Batch
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, Window
 from posse.rendering.layers import FOOTER, HEADER, Drawing, draw
 from posse.rendering.scene import History, Scene
-from posse.rendering.style import DESIGN_SIZE, Colour
+from posse.rendering.style import DESIGN_SIZE, RENDER_MODES, Colour
 from posse.scenarios import Scenario
 
-RENDER_MODES: Final = ("human", "rgb_array")
 LEAST_SIZE: Final = 200  # px, of width and height
 
 
@@ -58,8 +58,7 @@ class Renderer:
         title: str | None = None,
         keys: Mapping[str, str] | None = None,
     ) -> None:
-        if mode not in RENDER_MODES:
-            raise ValueError(f"unknown render mode {mode!r}; modes are: {', '.join(RENDER_MODES)}")
+        check_choice("render_mode", mode, RENDER_MODES)
         given = np.asarray(size)
         if given.shape != (2,) or given.dtype.kind not in "iu" or given.min() < LEAST_SIZE:
             raise ValueError(f"size={size!r} must be (width, height), whole numbers of at least {LEAST_SIZE} px")

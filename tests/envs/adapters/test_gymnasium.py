@@ -1,4 +1,4 @@
-"""`posse/Team-v0` and `posse/Solo-v0`: the checkers of Gymnasium and SB3, and further checks."""
+"""`posse/Team-v0` and `posse/Solo-v0`: what they return, when they end, what they refuse."""
 
 from __future__ import annotations
 
@@ -8,23 +8,12 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.wrappers import FlattenObservation
-from tests.support.adapters import SOLO_SCENARIOS, f32, part
+from tests.support.adapters import f32, part
 
 import posse
 
 TEAM, SOLO = "posse/Team-v0", "posse/Solo-v0"
-VARIANTS: list[tuple[str, dict[str, Any]]] = [
-    *((TEAM, {"scenario": name}) for name in posse.scenario_names()),
-    *((SOLO, {"scenario": name}) for name in SOLO_SCENARIOS),
-    (TEAM, {"scenario": "smart", "discrete_actions": True}),
-    (SOLO, {"scenario": "smart", "discrete_actions": True}),
-    (TEAM, {"scenario": "radio", "message_size": 3}),
-    (TEAM, {"scenario": "constant", "num_trackers": 1}),
-]
-variants = pytest.mark.parametrize(
-    ("name", "settings"), VARIANTS, ids=lambda v: v if isinstance(v, str) else str(v["scenario"])
-)
+BREAKING = [name for name in posse.scenario_names() if posse.get_scenario(name).breaks > 0]
 
 
 @pytest.fixture(autouse=True)
@@ -45,24 +34,9 @@ def play(env: gymnasium.Env[Any, Any], steps: int, seed: int = 3) -> list[Any]:
     return returned
 
 
-@variants
-def test_gymnasium_finds_the_environment_sound(name: str, settings: dict[str, Any]) -> None:
-    env = gymnasium.make(name, **settings).unwrapped
-    # Drawing is the same for all: checked once, below.
-    check_env(env, skip_render_check=True)
-
-
 @pytest.mark.parametrize("name", [TEAM, SOLO])
 def test_gymnasium_finds_the_drawing_sound(name: str) -> None:
     check_env(gymnasium.make(name, scenario="smart").unwrapped)
-
-
-@variants
-def test_stable_baselines3_finds_the_environment_sound(name: str, settings: dict[str, Any]) -> None:
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    env = gymnasium.make(name, **settings)
-    # Stable-Baselines3's networks take vectors.
-    checker.check_env(FlattenObservation(env) if name == TEAM else env.unwrapped)
 
 
 def test_a_team_is_the_first_world_of_a_batch() -> None:
@@ -127,3 +101,16 @@ def test_info_says_who_is_broken() -> None:
     env.reset(seed=0)
     working = [int(info["working"].sum()) for *_, info in play(env, 10)]
     assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
+
+
+@pytest.mark.parametrize("scenario", BREAKING)
+def test_solo_says_why_it_cannot_play(scenario: str) -> None:
+    with pytest.raises(posse.ScenarioError, match=rf"{scenario!r} does not fit posse/Solo-v0.*"):
+        gymnasium.make(SOLO, scenario=scenario)
+    gymnasium.make(SOLO, scenario=scenario, breaks=0).reset(seed=0)
+
+
+def test_an_unknown_keyword_is_a_type_error_too() -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'") as caught:
+        gymnasium.make(TEAM, frameskip=1)
+    assert isinstance(caught.value, posse.ScenarioError)

@@ -1,4 +1,4 @@
-"""The PettingZoo environments: PettingZoo's API tests, and further checks."""
+"""The PettingZoo environments: what they return, when they end, and their actions."""
 
 from __future__ import annotations
 
@@ -7,29 +7,15 @@ from typing import Any
 import numpy as np
 import pettingzoo
 import pytest
-from pettingzoo.test import (
-    api_test,
-    max_cycles_test,
-    parallel_api_test,
-    parallel_seed_test,
-    render_test,
-    seed_test,
-    state_test,
-)
+from pettingzoo.test import max_cycles_test, render_test
 from tests.support.adapters import f32, part
 
 import posse
 from posse.adapters.actions import MOTIONS
+from posse.adapters.gymnasium_env import TeamEnv
 from posse.adapters.pettingzoo_env import TeamParallelEnv
-
-VARIANTS: list[dict[str, Any]] = [
-    *({"scenario": name} for name in posse.scenario_names()),
-    {"scenario": "smart", "target": "agent"},
-    {"scenario": "obstacles", "discrete_actions": True},
-    {"scenario": "field", "message_size": 2},
-    {"scenario": "constant", "num_trackers": 1},
-]
-variants = pytest.mark.parametrize("settings", VARIANTS, ids=lambda s: "-".join(map(str, s.values())))
+from posse.adapters.vector_env import TeamVectorEnv
+from posse_baselines import load_target
 
 
 def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
@@ -42,25 +28,6 @@ def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
         actions = {agent: rng.uniform(-1, 1, env.action_space(agent).shape).astype(np.float32) for agent in env.agents}
         returned.append(env.step(actions))
     return returned
-
-
-@variants
-def test_pettingzoo_finds_the_parallel_environment_sound(settings: dict[str, Any]) -> None:
-    parallel_api_test(posse.parallel_env(**settings, horizon=40), num_cycles=100)
-    parallel_seed_test(lambda: posse.parallel_env(**settings, horizon=40))
-
-
-@variants
-def test_pettingzoo_finds_the_environment_in_turns_sound(settings: dict[str, Any]) -> None:
-    api_test(posse.env(**settings, horizon=40), num_cycles=100)
-    seed_test(lambda: posse.env(**settings), num_cycles=20)
-
-
-@pytest.mark.filterwarnings("ignore:Environment's m:UserWarning")  # the space has no bounds
-@variants
-def test_the_state_lies_in_its_space(settings: dict[str, Any]) -> None:
-    short = {"horizon": 40, **settings}
-    state_test(posse.env(**short), posse.parallel_env(**short), num_cycles=50)
 
 
 def test_max_cycles_is_the_length_of_an_episode() -> None:
@@ -183,3 +150,25 @@ def test_turns_check_all_actions_when_the_last_has_acted() -> None:
     with pytest.raises(ValueError, match=r"tracker_0: speed = 2\.0 .*clip_actions=True"):
         env.step(f32([1, 0]))
     assert np.array_equal(env.state(), before)
+
+
+def test_the_target_is_an_agent_by_one_name() -> None:
+    wanted = posse.parallel_env("smart", target="agent").scenario
+    assert posse.batch("smart", target="agent").scenario == posse.get_scenario("smart", target="agent") == wanted
+    for made in (TeamEnv, TeamVectorEnv):
+        with pytest.raises(posse.ScenarioError, match="target"):
+            made("smart", target="agent")
+    with pytest.raises(posse.ScenarioError, match="the one choice is 'agent'"):
+        posse.parallel_env("smart", target="evader")
+
+
+def test_a_policy_moves_the_target_as_in_a_batch() -> None:
+    env = posse.parallel_env("duel", target_policy=load_target("evader").policy)
+    batch = posse.batch("duel", target_policy=load_target("evader").policy)
+    env.reset(seed=0)
+    batch.reset(seed=0)
+    assert env.agents == env.possible_agents == [f"tracker_{i}" for i in range(5)]
+    for _ in range(5):
+        actions = np.full((1, 5, 2), 0.5, np.float32)
+        seen = env.step(dict(zip(env.agents, actions[0], strict=True)))[0]
+        np.testing.assert_array_equal(list(seen.values()), batch.step(actions)[0][0])

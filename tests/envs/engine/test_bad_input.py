@@ -73,8 +73,6 @@ def test_impossible_settings(kind: str, arguments: dict[str, Any], message: str)
         ("solo", {"num_trackers": 3}, r"num_trackers=3 .*posse/Team-v0"),
         ("solo vector", {"scenario": "leader-loss"}, "breaks=1"),
         ("team vector", {"autoreset": "never"}, r"unknown autoreset mode 'never'; known: next_step"),
-        ("team vector", {"max_episode_steps": 0}, r"horizon=0"),
-        ("team vector", {"max_episode_steps": 5, "horizon": 6}, "max_episode_steps and horizon mean the same"),
     ],
     ids=str,
 )

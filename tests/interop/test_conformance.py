@@ -1,0 +1,156 @@
+"""The checkers of other libraries find every registered scenario sound, and variants with other settings."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env as gymnasium_check
+from gymnasium.wrappers import FlattenObservation
+from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, seed_test
+from stable_baselines3.common.env_checker import check_env as sb3_check
+from torchrl.envs import GymEnv, PettingZooWrapper
+from torchrl.envs.utils import check_env_specs
+
+import posse
+import posse_baselines  # noqa: F401  registers posse/Tracker-v0
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # it imports PettingZoo by names of older releases
+    import supersuit
+
+Settings = dict[str, Any]
+VARIANTS: dict[str, Settings] = {
+    **{name: {"scenario": name} for name in posse.scenario_names()},
+    "discrete actions": {"scenario": "obstacles", "discrete_actions": True},
+    "one tracker": {"scenario": "constant", "num_trackers": 1},
+    "messages": {"scenario": "field", "message_size": 2},
+    "the target an agent": {"scenario": "smart", "target": "agent"},
+}
+KEYS = {"score", *(f"reward/{t.name}" for t in posse.REWARD_TERMS), *(f"metrics/{m.name}" for m in posse.METRICS)}
+PLAIN = "black_death_v3 clip_reward_v0 flatten_v0 nan_random_v0 nan_zeros_v0 normalize_obs_v0 pad_observations_v0"
+WITH_ARGUMENTS: dict[str, Any] = {"delay_observations_v0": 2, "frame_skip_v0": (1, 3), "frame_stack_v2": 3}
+WRAPPERS = {**dict.fromkeys(PLAIN.split()), **WITH_ARGUMENTS, "max_observation_v0": 2, "sticky_actions_v0": 0.3}
+
+
+def parallel(settings: Settings) -> Any:
+    return posse.parallel_env(**settings, horizon=40)
+
+
+def types_of(info: dict[str, Any]) -> dict[str, Any]:
+    return {key: (type(value), np.shape(value), np.asarray(value).dtype) for key, value in info.items()}
+
+
+def all_at_once(settings: Settings) -> None:
+    parallel_api_test(parallel(settings), num_cycles=100)
+    parallel_seed_test(lambda: parallel(settings))
+
+
+def in_turns(settings: Settings) -> None:
+    api_test(posse.env(**settings, horizon=40), num_cycles=100)
+    seed_test(lambda: posse.env(**settings), num_cycles=20)
+
+
+def spaces_and_infos(settings: Settings) -> None:
+    """What is returned lies in its spaces over an episode, and an info has the same keys and types at every step."""
+    env = parallel(settings)
+    seen, infos = env.reset(seed=1)
+    types = types_of(infos["tracker_0"])
+    assert types.keys() - {"working"} == KEYS
+    assert ("working" in types) == (env.scenario.breaks > 0)
+    while True:
+        assert all(env.observation_space(agent).contains(row) for agent, row in seen.items())
+        assert env.state_space.contains(env.state())
+        assert all(types_of(info) == types for info in infos.values())
+        if not env.agents:
+            return
+        seen, rewards, *_, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+        assert np.isfinite(list(rewards.values())).all()
+
+
+def wrapped_by_supersuit(settings: Settings) -> None:
+    wrapped = {n: getattr(supersuit, n)(parallel(settings), *([] if v is None else [v])) for n, v in WRAPPERS.items()}
+    wrapped["agent_indicator_v0"] = supersuit.agent_indicator_v0(supersuit.normalize_obs_v0(parallel(settings)))
+    for name, env in wrapped.items():
+        seen, _ = env.reset(seed=1)
+        seen, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+        assert all(env.observation_space(agent).contains(row) for agent, row in seen.items()), name
+    many = supersuit.concat_vec_envs_v1(supersuit.pettingzoo_env_to_vec_env_v1(parallel(settings)), 2, num_cpus=1)
+    many.reset(seed=1)
+    actions = np.stack([many.action_space.sample() for _ in range(many.num_envs)])
+    assert many.step(actions)[0].shape == (many.num_envs, *many.observation_space.shape)
+
+
+def wrapped_by_torchrl(settings: Settings) -> None:
+    check_env_specs(PettingZooWrapper(parallel(settings), return_state=True))
+
+
+CHECKS: tuple[Callable[[Settings], None], ...] = (
+    all_at_once,
+    in_turns,
+    spaces_and_infos,
+    wrapped_by_supersuit,
+    wrapped_by_torchrl,
+)
+
+
+@pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL", "ignore:Environment's m:UserWarning")
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("check", CHECKS)
+def test_many_agents(check: Callable[[Settings], None], variant: str) -> None:
+    check(VARIANTS[variant])
+
+
+@pytest.mark.parametrize("variant", [name for name in VARIANTS if "target" not in VARIANTS[name]])
+@pytest.mark.parametrize("name", ["Team", "Solo", "Tracker"])
+def test_one_agent(name: str, variant: str) -> None:
+    settings = {**VARIANTS[variant], "horizon": 8}
+    if name == "Solo":
+        settings |= {"num_trackers": 1, "breaks": 0}
+    elif name == "Tracker" and variant == "one tracker":
+        settings["num_trackers"] = 2
+    env = gymnasium.make(f"posse/{name}-v0", **settings)
+    gymnasium_check(env.unwrapped, skip_render_check=True)
+    sb3_check(FlattenObservation(env) if name == "Team" else env.unwrapped)  # networks of SB3 take vectors
+    check_env_specs(GymEnv(f"posse/{name}-v0", **settings))
+    types, ended = types_of(env.reset(seed=1)[1]), False
+    assert types.keys() - {"working"} == KEYS
+    while not ended:
+        seen, _, _, ended, info = env.step(env.action_space.sample())
+        assert env.observation_space.contains(seen)
+        assert types_of(info) == types
+    assert info["metrics/duration"] == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+def test_infos_of_many_worlds_keep_their_keys_and_types(autoreset: str) -> None:
+    settings: Settings = {"scenario": "leader-loss", "horizon": 4, "autoreset": autoreset}
+    batch = posse.batch(num_worlds=3, **settings)
+    batch.reset()
+    infos = [batch.step(np.zeros(batch.action_shape))[-1] for _ in range(4)]
+    assert infos[0].keys() == KEYS | {"working"} | ({"final_obs"} if autoreset == "same_step" else set())
+    assert all(types_of(info) == types_of(infos[0]) for info in infos)
+    assert all((info["metrics/duration"] == 0).all() for info in infos[:-1])
+    assert infos[-1]["metrics/duration"] == pytest.approx(0.4)
+    with pytest.raises(ValueError, match="read-only"):
+        infos[0]["metrics/duration"][0] = 1.0
+    for name in ("Team", "Tracker"):
+        env = gymnasium.make_vec(f"posse/{name}-v0", 3, **settings)
+        first = env.reset(seed=1)[1]
+        told = [env.step(np.zeros(env.action_space.shape or (), np.float32))[-1] for _ in range(4)]
+        last = told[-1]["final_info"] if autoreset == "same_step" else told[-1]
+        assert first.keys() == last.keys() == KEYS | {"working"} | {f"_{key}" for key in (*KEYS, "working")}
+        assert last["metrics/duration"] == pytest.approx(0.4)
+
+
+def test_torchrl_starts_processes_of_its_own() -> None:
+    envs = GymEnv("posse:posse/Team-v0", num_envs=2, scenario="smart", horizon=4)
+    check_env_specs(envs)
+    rollout = envs.rollout(6, break_when_any_done=False)
+    assert rollout["next", "reward/slot"].shape[:2] == (2, 6)
+    assert rollout["next", "done"].sum() == 2
+    envs.close()
