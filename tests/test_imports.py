@@ -50,7 +50,7 @@ def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
 
 
 # A room imports only rooms before it; rendering is on the level of the adapters.
-ROOMS = ("shown", "numeric", "registry", "scenarios", "rules", "signals", "engine", "adapters")
+ROOMS = ("shown", "numeric", "registry", "declarations", "scenarios", "rules", "signals", "engine", "adapters")
 INTERNAL = ("posse.engine", "posse.numeric.", "posse.rules.")
 
 
