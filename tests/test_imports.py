@@ -50,7 +50,7 @@ def test_playing_does_not_load_the_learning_libraries(package: str) -> None:
 
 
 # A room imports only rooms before it.
-ROOMS = ("numeric", "registry", "scenarios", "rules", "signals", "engine", "rendering", "adapters")
+ROOMS = ("numeric", "registry", "declarations", "scenarios", "rules", "signals", "engine", "rendering", "adapters")
 INTERNAL = ("posse.engine", "posse.numeric.", "posse.rules.")
 
 

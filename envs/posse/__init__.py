@@ -4,27 +4,37 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from posse import registry
+from posse import declarations
 from posse.adapters.pettingzoo_env import env, parallel_env
 from posse.adapters.registration import register as _register
 from posse.adapters.robot import Command, Heard, Robot, TargetFix
+from posse.declarations import (
+    SENSORS,
+    TARGET_MOTIONS,
+    Field,
+    Memory,
+    Metric,
+    RewardTerm,
+    Sensor,
+    TargetMotion,
+    field,
+    metric,
+    reward_term,
+    sensor,
+    target_motion,
+)
 from posse.engine.batch import Batch, Snapshot
 from posse.engine.opponent import PairedBatch, TargetPolicy, batch_with
-from posse.registry import SENSORS, TARGET_MOTIONS, DeclarationError
-from posse.rules.senses import Sensor, sensor
-from posse.rules.targets import Memory, TargetMotion, target_motion
+from posse.registry import DeclarationError
 from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
-from posse.signals.fields import Field, field
 from posse.signals.generate import declarations_for, source_of
 from posse.signals.layout import ObservationLayout
-from posse.signals.metrics import Metric, metric
-from posse.signals.reward import RewardTerm, reward_term
 
 __version__ = "0.1.0"
 
-METRICS: Final[tuple[Metric, ...]] = registry.METRICS.built_in()
+METRICS: Final[tuple[Metric, ...]] = declarations.METRICS.built_in()
 """Every built-in metric, in the order in which they are reported."""
-REWARD_TERMS: Final[tuple[RewardTerm, ...]] = registry.REWARD_TERMS.built_in()
+REWARD_TERMS: Final[tuple[RewardTerm, ...]] = declarations.REWARD_TERMS.built_in()
 """The built-in reward terms, in the order in which they are reported."""
 
 _register()

@@ -1,9 +1,4 @@
-"""Declarations by name: observation fields, reward terms, metrics, target motions, sensors.
-
-A declaration is a function with a name, a unit and a meaning, which is its docstring. Those of
-posse's own modules are *built in* and apply to every world. Those of a user's module are available
-after its import, and a scenario selects them by name.
-"""
+"""What every declaration has, and registries of declarations by name (:mod:`posse.declarations`)."""
 
 from __future__ import annotations
 
@@ -73,7 +68,9 @@ class Declaration:
         name: Its name.
         unit: Unit of its value; empty for rules, which have none.
         meaning: Its docstring.
-        function: The function, compiled.
+        function: The function, compiled if kernels call it.
+        kind: Name of the kind for messages, such as ``"reward term"``.
+        allowed: The lists of parameters that the function may have.
         returns: What it returns.
         further: Names of further functions, each with its parameters and what it returns; ``None`` if it is not given.
     """
@@ -82,8 +79,13 @@ class Declaration:
     unit: str = ""
     meaning: str
     function: Function
+    kind: ClassVar[str]
+    allowed: ClassVar[tuple[Parameters, ...]]
     returns: ClassVar[str] = "a number"
     further: ClassVar[Mapping[str, tuple[Parameters, str]]] = {}
+
+    def __post_init__(self) -> None:
+        """Raise DeclarationError if an option is invalid."""
 
     @property
     def functions(self) -> dict[Function, str]:
@@ -105,98 +107,91 @@ class Declaration:
         """Return a hash of the options and of all that its functions reach."""
         return stamp(*(getattr(self, field.name) for field in dataclasses.fields(self)))
 
-
-D = TypeVar("D", bound=Declaration)
-
-
-class Registry(dict[str, D]):
-    """Declarations of one kind by name, in order.
-
-    Args:
-        kind: Name of the kind for messages, such as ``"reward term"``.
-        *allowed: The lists of parameters that its functions may have.
-    """
-
-    def __init__(self, kind: str, *allowed: Parameters) -> None:
-        super().__init__()
-        self.kind = kind
-        self.allowed = allowed
-
-    def declare(self, make: type[D], function: Any, *, name: Any = None, **options: Any) -> Function:
-        """Add the declaration that is made on a function, and return the function, compiled.
-
-        It replaces one that was made on a function of the same module and qualified name.
-
-        Args:
-            make: The class of the declaration.
-            function: The function.
-            name: The declaration's name; default: that of the function.
-            **options: Further attributes of the declaration.
-
-        Raises:
-            DeclarationError: The name is invalid or taken, a function has no docstring or other
-                parameters, or its unit is none.
-        """
-        parameters = self.check_function(function, *self.allowed)
-        for further, (wanted, _) in make.further.items():
-            if options.get(further) is not None:
-                self.check_function(options[further], wanted)
-                options[further] = compiled(plain(options[further]))
-        name = plain(function).__name__ if name is None else name
-        if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
-            raise self.error(function, f"invalid name {name!r}: use letters, digits, _ and -")
-        taken = self.get(name)
-        if taken is not None and _home(taken.function) != _home(function):
-            raise self.error(function, f"the name {name!r} is taken by {place_of(taken.function)}")
-        meaning = inspect.getdoc(plain(function)) or ""
-        if not meaning.strip():
-            raise self.error(function, "its docstring, which must state its meaning, is missing")
-        unit = options.get("unit", "-")
-        if not isinstance(unit, str) or not unit:
-            raise self.error(function, f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
-        working: Function = compiled(plain(function)) if parameters[0] == "c" else function
-        self[name] = make(name=name, meaning=meaning, function=working, **options)
-        return working
-
-    def check_function(self, function: Any, *allowed: Parameters) -> Parameters:
-        """Return the parameters of a function; raise DeclarationError unless it is one with parameters allowed."""
-        if not isinstance(plain(function), FunctionType):
-            raise self.error(function, f"declare a function, made by def, not a {type(function).__name__}")
-        signature = inspect.signature(plain(function))
-        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
-        given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
-        wanted = [f"({', '.join(each)})" for each in allowed]
-        if given not in wanted:
-            raise self.error(function, f"its parameters are {given}, not {' or '.join(wanted)}")
-        return parameters_of(function)
-
-    def check_argument(self, argument: object, usage: str) -> None:
-        """Raise if a decorator was used without its arguments, on the function itself."""
-        if callable(argument):
-            raise self.error(argument, f"the decorator needs arguments: {usage}")
-
-    def bounds_of(self, function: Function, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
+    def bounds(self, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
         """Return the bounds ``of`` a value in a scenario; raise unless they are finite and in order."""
         values = []
         for name, bound in (("low", low), ("high", high)):
             try:
                 value = bound(scenario) if callable(bound) else bound
             except Exception as error:  # a user's function
-                raise self.error(function, f"{name}{of} in {scenario.name!r}: {error!r}") from error
+                raise self.error(f"{name}{of} in {scenario.name!r}: {error!r}") from error
             if not is_number(value):
-                raise self.error(function, f"{name}={value!r}{of} in {scenario.name!r} is not a finite number")
+                raise self.error(f"{name}={value!r}{of} in {scenario.name!r} is not a finite number")
             values.append(float(value))
         if values[0] > values[1]:
-            raise self.error(function, f"low={values[0]:g}{of} is above high={values[1]:g} in {scenario.name!r}")
+            raise self.error(f"low={values[0]:g}{of} is above high={values[1]:g} in {scenario.name!r}")
         return values
 
-    def error(self, function: Function, reason: str) -> DeclarationError:
-        """Return the error for an invalid declaration."""
-        return DeclarationError(f"{self.kind} {place_of(function)}: {reason}")
+    def error(self, reason: str, function: Function | None = None) -> DeclarationError:
+        """Return the error for an invalid declaration, or for one of its further functions."""
+        return _error(self.kind, function or self.function, reason)
 
-    def is_built_in(self, name: str) -> bool:
-        """Return whether posse itself declares this name."""
-        return self[name].built_in
+
+D = TypeVar("D", bound=Declaration)
+
+
+class Registry(dict[str, D]):
+    """Declarations of one kind by name, in order."""
+
+    def __init__(self, make: type[D]) -> None:
+        super().__init__()
+        self.make = make
+        self.kind = make.kind
+
+    def decorator(self, first: object, **options: Any) -> Callable[[Function], Function]:
+        """Return the decorator that declares a function; raise if the function is its first argument."""
+        if callable(first):
+            raise self._error(first, 'the decorator needs arguments: a unit, such as "1", or a name')
+        return lambda function: self.declare(function, **options)
+
+    def declare(self, function: Any, *, name: Any = None, **options: Any) -> Function:
+        """Add the declaration made on a function, and return the function, compiled if kernels call it.
+
+        It replaces one that was made on a function of the same module and qualified name.
+
+        Args:
+            function: The function.
+            name: The declaration's name; default: that of the function.
+            **options: Further attributes of the declaration.
+
+        Raises:
+            DeclarationError: The name is invalid or taken, a function has no docstring or other
+                parameters, or an option is invalid.
+        """
+        self._check(function, *self.make.allowed)
+        for further, (wanted, _) in self.make.further.items():
+            if options[further] is not None:
+                self._check(options[further], wanted)
+                options[further] = compiled(plain(options[further]))
+        name = plain(function).__name__ if name is None else name
+        if not isinstance(name, str) or not name.replace("-", "_").isidentifier():
+            raise self._error(function, f"invalid name {name!r}: use letters, digits, _ and -")
+        taken = self.get(name)
+        if taken is not None and _home(taken.function) != _home(function):
+            raise self._error(function, f"the name {name!r} is taken by {place_of(taken.function)}")
+        meaning = inspect.getdoc(plain(function)) or ""
+        if not meaning.strip():
+            raise self._error(function, "its docstring, which must state its meaning, is missing")
+        unit = options.get("unit", "-")
+        if not isinstance(unit, str) or not unit:
+            raise self._error(function, f'unit={unit!r} must be a text, such as "m/s", or "1" for a plain number')
+        working: Function = compiled(plain(function)) if parameters_of(function)[0] == "c" else function
+        self[name] = self.make(name=name, meaning=meaning, function=working, **options)
+        return working
+
+    def _check(self, function: Any, *allowed: Parameters) -> None:
+        """Raise DeclarationError unless a function has parameters allowed."""
+        if not isinstance(plain(function), FunctionType):
+            raise self._error(function, f"declare a function, made by def, not a {type(function).__name__}")
+        signature = inspect.signature(plain(function))
+        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
+        given = str(signature.replace(parameters=bare, return_annotation=signature.empty))  # with * and defaults
+        wanted = [f"({', '.join(each)})" for each in allowed]
+        if given not in wanted:
+            raise self._error(function, f"its parameters are {given}, not {' or '.join(wanted)}")
+
+    def _error(self, function: Any, reason: str) -> DeclarationError:
+        return _error(self.kind, function, reason)
 
     def built_in(self) -> tuple[D, ...]:
         """Return the built-in declarations, in order."""
@@ -211,28 +206,13 @@ class Registry(dict[str, D]):
         added = (self[name] for name in dict.fromkeys(names))
         return (*self.built_in(), *(each for each in added if not each.built_in))
 
-    def unknown(self, name: object) -> str:
-        """Return the message for an unknown name."""
-        return f"{unknown(self.kind, name, self)}. To use a declaration of your own, import its module first"
-
     def __missing__(self, name: str) -> D:
-        raise KeyError(self.unknown(name))
+        raise KeyError(f"{unknown(self.kind, name, self)}. To use a declaration of your own, import its module first")
+
+
+def _error(kind: str, function: Any, reason: str) -> DeclarationError:
+    return DeclarationError(f"{kind} {place_of(function)}: {reason}")
 
 
 def _home(function: Function) -> tuple[str, str]:
     return plain(function).__module__, plain(function).__qualname__
-
-
-FIELDS: Final[Registry[Any]] = Registry("observation field", ("c",), ("c", "v"), ("c", "v", "m"))
-METRICS: Final[Registry[Any]] = Registry(
-    "metric", ("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots"), ("s", "w")
-)
-REWARD_TERMS: Final[Registry[Any]] = Registry("reward term", ("c", "w", "t"), ("c", "w"))
-SENSORS: Final[Registry[Any]] = Registry("sensor", ("c", "w", "t", "dx", "dy"), ("c", "w", "t", "dx", "dy", "s"))
-TARGET_MOTIONS: Final[Registry[Any]] = Registry(
-    "target motion",
-    ("c", "w"),
-    ("c", "w", "trackers"),
-    ("c", "w", "trackers", "obstacles"),
-    ("c", "w", "trackers", "obstacles", "s"),
-)

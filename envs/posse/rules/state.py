@@ -16,8 +16,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from posse.declarations import METRICS, SENSORS, TARGET_MOTIONS, Metric, TargetMotion
 from posse.numeric import FloatArray, Lanes, Records
-from posse.registry import METRICS, SENSORS, TARGET_MOTIONS
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
 from posse.scenarios.limits import FAR, SAFE_MARGIN
@@ -173,8 +173,6 @@ _WORLD: Final = (
     ("contacts_target", _I),
     ("least_gap", _F),
 )
-WORLD_NAMES: Final = tuple(name for name, _ in _WORLD)
-"""Fields of every world, without those of declared metrics and motions."""
 
 
 def world_record(scenario: Scenario) -> np.dtype[Any]:
@@ -187,13 +185,15 @@ def world_record(scenario: Scenario) -> np.dtype[Any]:
 
 
 @functools.cache
-def world_record_of(motions: tuple[Any, ...], metrics: tuple[Any, ...]) -> np.dtype[Any]:
-    """Return the record of one world for declared motions and metrics."""
-    return _record(
-        *_WORLD,
-        *(field for metric in metrics for field in metric.fields),
-        *((memory.name, _F) for motion in motions for memory in motion.memory),
-    )
+def world_record_of(motions: tuple[TargetMotion, ...], metrics: tuple[Metric, ...]) -> np.dtype[Any]:
+    """Return the record of one world for declared motions and metrics; raise DeclarationError if a name is taken."""
+    fields: dict[str, Any] = {**dict(_WORLD), **{metric.sum_name: np.float64 for metric in metrics if metric.summed}}
+    for motion in motions:
+        for memory in motion.memory:
+            if memory.name in fields:
+                raise motion.error(f"a world has a field {memory.name!r}: choose another name for this memory")
+            fields[memory.name] = _F
+    return _record(*fields.items())
 
 
 # Blocks of eight fields, which kernels read and write at once, as eight consecutive numbers of 4 bytes.
@@ -265,7 +265,7 @@ class Odometry(NamedTuple):
 
 
 FIX_RECORD: Final = _record(*((name, _F) for name in Fix._fields))
-"""A fix of the target: a position or a bearing, depending on the sensor (:mod:`posse.rules.senses.declaration`)."""
+"""A fix of the target: a position or a bearing, depending on the sensor (:func:`posse.sensor`)."""
 
 TRACKER: Final = _record(
     *((name, _F) for name in Pose._fields),

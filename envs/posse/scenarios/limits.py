@@ -18,6 +18,9 @@ The common frame of the trackers is that of the world: if the target started at 
 would reveal its position.
 """
 
+SLACK: Final = 1.001
+"""Factor by which bounds of observations and states are widened to allow for float32 rounding."""
+
 # Beyond these, increments and squares would be lost to rounding.
 SMALL: Final = 1e-3
 WIDE: Final = 1e4

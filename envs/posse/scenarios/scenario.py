@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from posse.registry import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS, unknown
+from posse.declarations import FIELDS, METRICS, REWARD_TERMS, SENSORS, TARGET_MOTIONS
+from posse.registry import unknown
 from posse.scenarios.formation import FORMATIONS, slot_offsets
 from posse.scenarios.limits import (
     FAR,
@@ -418,5 +419,5 @@ def _in_declarations(s: Scenario) -> _Conflicts:
         for name in names:
             if name not in known:
                 yield where, f"{unknown(kind, name, known)}. To use a declaration of your own, import its module first"
-    for name in filter(FIELDS.is_built_in, s.extra_fields):
+    for name in (name for name in s.extra_fields if FIELDS[name].built_in):
         yield "extra_fields", f"{name!r} is in every observation: leave it out"

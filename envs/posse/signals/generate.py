@@ -12,27 +12,23 @@ import linecache
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
-import posse.signals.own_fields  # noqa: F401  (declares the built-in fields)
-from posse.numeric import WIDTH
-from posse.registry import (
+import posse.signals.metrics
+import posse.signals.own_fields  # noqa: F401  (declare the built-in metrics and fields)
+from posse.declarations import (
     FIELDS,
     METRICS,
-    REWARD_TERMS,
     SENSORS,
     TARGET_MOTIONS,
-    Declaration,
-    DeclarationError,
-    Function,
-    Registry,
-    parameters_of,
-    place_of,
+    FieldDeclaration,
+    Metric,
+    RewardTerm,
+    Sensor,
+    TargetMotion,
 )
-from posse.rules.senses import Sensor
-from posse.rules.targets import TargetMotion
+from posse.numeric import WIDTH
+from posse.registry import Declaration, DeclarationError, Function, parameters_of, place_of
 from posse.scenarios import Scenario
-from posse.signals.fields import FieldDeclaration
-from posse.signals.metrics import Metric
-from posse.signals.reward import RewardTerm, terms_for
+from posse.signals.reward import terms_for
 
 
 class Declarations(NamedTuple):
@@ -50,14 +46,13 @@ class Declarations(NamedTuple):
         """Names of the reward terms."""
         return tuple(term.name for term in self.reward_terms)
 
-    def added(self) -> Iterator[tuple[Registry[Any], Declaration]]:
-        """Yield the declarations of users' modules, each with its registry."""
-        for registry, group in zip((FIELDS, TARGET_MOTIONS, SENSORS, METRICS, REWARD_TERMS), self, strict=True):
-            yield from ((registry, each) for each in group if not each.built_in)
+    def added(self) -> list[Declaration]:
+        """Return the declarations of users' modules."""
+        return [each for group in self for each in group if not each.built_in]
 
     def fingerprints(self) -> dict[str, str]:
         """Return a hash of each declaration of a user's module, by kind and name."""
-        return {f"{registry.kind} {each.name!r}": each.fingerprint() for registry, each in self.added()}
+        return {f"{each.kind} {each.name!r}": each.fingerprint() for each in self.added()}
 
     def check_fingerprints(self, others: Mapping[str, str]) -> None:
         """Raise DeclarationError if saved worlds were made with other declarations than these."""
@@ -155,7 +150,7 @@ class _Module:
         _, motions, sensors, metrics, terms = declarations
         own = [field for field in declarations.fields if not field.of_mate]
         of_mate = [field for field in declarations.fields if field.of_mate]
-        summed = [metric for metric in metrics if metric.per]
+        summed = [metric for metric in metrics if metric.summed]
         functions = {
             "write_own(c, v, s, rows)": self._columns(own),
             "write_mate(c, v, m, s, rows)": ["there = m.number >= ZERO", *self._columns(of_mate)],

@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from posse.declarations import TARGET_MOTIONS
 from posse.numeric import FloatArray
-from posse.registry import TARGET_MOTIONS
 from posse.rules.state import NEVER, WorldArrays
 from posse.scenarios import Scenario
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from posse.declarations import FIELDS, Field
 from posse.numeric import FloatArray
-from posse.registry import FIELDS
 from posse.scenarios import Scenario
-from posse.signals.fields import SLACK, Field
+from posse.scenarios.limits import SLACK
 
 _SONAR = (
     "Distance from its rim to the nearest disc or wall along each beam, from straight ahead to the left; "
@@ -69,10 +69,8 @@ class ObservationLayout:
                 low, high = np.float32(field.low), np.float32(field.high)
                 wrong = values[~((values >= low) & (values <= high))]
                 if wrong.size:
-                    raise FIELDS.error(
-                        FIELDS[field.name].function,
-                        f"it returned {wrong.flat[0]:g}, which is not from low={field.low:g} to high={field.high:g}",
-                    )
+                    where = f"from low={field.low:g} to high={field.high:g}"
+                    raise FIELDS[field.name].error(f"it returned {wrong.flat[0]:g}, which is not {where}")
 
     def views(self, observations: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
         """Return named views of flat observations (..., F), sharing their memory.

@@ -1,94 +1,23 @@
-"""The metrics of an episode: the score, and further quantities in physical units.
+"""The built-in metrics of an episode: the score, and further quantities in physical units.
 
-A metric is declared, here or in a module of your own, on the function whose value is added to a
-running sum in each control step. The sum is the field ``<name>_sum`` of the world's record, and is
-divided at the end of the episode. The parameters of the function determine what is summed:
-
-========================= ========================================================================
-(c, w)                    a value of the world
-(c, w, t)                 a value of each working tracker
-(c, w, trackers)          a value of the team
-(c, w, trackers, slots)   a value of the team, with the slots
-(s, w)                    nothing: called from Python with the scenario and the records of all
-                          worlds, it returns the metric of each, (E,)
-========================= ========================================================================
-
-``info`` reports the built-in metrics at the end of every episode, and others if the scenario names
-them. ``nan`` stands for "never happened".
+To add one, declare it here, or in a module of your own (:func:`posse.metric`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from posse.declarations import metric
 from posse.numeric import ONE, ZERO, Record, Records
-from posse.registry import METRICS, Declaration, Function
 from posse.rules.score import could_arrive
 from posse.rules.senses.radio import connected
 from posse.rules.state import NEVER
 from posse.scenarios import Scenario
 
 Column = npt.NDArray[np.float64]
-
-_STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Metric(Declaration):
-    """One metric of an episode.
-
-    Attributes:
-        per: Divisor of the sum: ``"step"``, ``"tracker_step"`` or ``"episode"``; ``None``: it has no sum.
-    """
-
-    per: str | None
-
-    @property
-    def sum_name(self) -> str:
-        """Name of the field of the world's record that holds the sum."""
-        return f"{self.name}_sum"
-
-    @property
-    def fields(self) -> tuple[tuple[str, type], ...]:
-        """Fields that the metric adds to the world's record."""
-        return () if self.per is None else ((self.sum_name, np.float64),)
-
-    @property
-    def functions(self) -> dict[Function, str]:
-        """Its function, if that is compiled, and what it returns."""
-        return {} if self.per is None else super().functions
-
-    def of(self, scenario: Scenario, worlds: Records) -> Column:
-        """Return the metric of the current episodes, (E,)."""
-        if self.per is None:
-            return np.asarray(self.function(scenario, worlds), np.float64)
-        total: Column = np.asarray(worlds[self.sum_name], np.float64)
-        steps = _STEPS[self.per]
-        return total if steps is None else total / np.maximum(worlds[steps], 1)
-
-
-def metric(unit: str, *, per: str = "step") -> Callable[[Function], Function]:
-    """Declare a metric with the function's name; the function's docstring is the meaning.
-
-    Args:
-        unit: Unit of the metric.
-        per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
-            control steps of all working trackers; ``"episode"``: 1.
-    """
-    METRICS.check_argument(unit, '@posse.metric("1")')
-
-    def declare(function: Function) -> Function:
-        if per not in tuple(_STEPS):
-            raise METRICS.error(function, f"unknown per={per!r}; allowed: {', '.join(_STEPS)}")
-        summed = METRICS.check_function(function, *METRICS.allowed)[0] == "c"
-        return METRICS.declare(Metric, function, unit=unit, per=per if summed else None)
-
-    return declare
 
 
 def _time(steps: npt.NDArray[Any], scenario: Scenario) -> Column:

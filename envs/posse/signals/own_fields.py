@@ -3,7 +3,7 @@
 *Ego* means the robot's own frame, x ahead and y to the left; the *common frame* is a fixed frame
 shared by the team. Directions are given as cosine and sine. Team-mates are described as they are
 now if the radio is perfect, else as in the last message received. To add a field, declare it here,
-or in a module of your own (:mod:`posse.signals.fields`).
+or in a module of your own (:func:`posse.field`).
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import math
 
 import numpy as np
 
+from posse.declarations import field
 from posse.numeric import ONE, TINY, ZERO, Lanes, Record, choose, compiled, eight, greater
 from posse.rules.discs import within_one
 from posse.scenarios import Scenario
 from posse.scenarios.formation import FORMATIONS
-from posse.signals.fields import SLACK, field, setting
+from posse.scenarios.limits import FAR, SLACK
 from posse.signals.views import Mate, View, ego
 
 Pair = tuple[Lanes, Lanes]
@@ -36,6 +37,28 @@ def _place(s: Scenario) -> float:
 
 def _fast(s: Scenario) -> float:
     return max(s.tracker_speeds) * SLACK
+
+
+def setting(name: str) -> None:
+    """Declare a number of the scenario as a field of its name, with its unit and meaning; -1 for an unlimited one.
+
+    The range holds the value, 0 and 1: wrappers of other libraries pad observations with 0 and 1.
+    """
+    declared = Scenario.settings()[name]
+
+    def limited(c: Record) -> np.float32:
+        return np.float32(c[name] if c[name] < FAR else -1.0)
+
+    def low(s: Scenario) -> float:
+        return -1.0 if math.isinf(getattr(s, name)) else 0.0
+
+    def high(s: Scenario) -> float:
+        value: float = getattr(s, name)
+        return 1.0 if math.isinf(value) else max(1.0, value * SLACK)
+
+    limited.__name__ = name
+    limited.__doc__ = f"{declared.meaning[0].upper()}{declared.meaning[1:]}.".replace("inf:", "-1:")
+    field(declared.unit, low, high)(limited)
 
 
 # Own motion

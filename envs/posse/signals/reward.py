@@ -1,55 +1,18 @@
-"""The reward: named, unscaled terms, weighted by the scenario; ``info`` reports each by name.
+"""The built-in terms of the reward, unscaled; a scenario weights them, and ``info`` reports each by name.
 
-A term is declared on its formula, here or in a module of your own. Those declared here are computed
+To add one, declare it here, or in a module of your own (:func:`posse.reward_term`). Those declared here are computed
 and reported in every scenario, others in scenarios that give them a weight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from posse.declarations import REWARD_TERMS, RewardTerm, reward_term
 from posse.numeric import ONE, ZERO, FloatArray, Record
-from posse.registry import REWARD_TERMS, Declaration, Function
 from posse.scenarios import Scenario
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RewardTerm(Declaration):
-    """One term of the reward.
-
-    Its function gives the value for a tracker, ``(c, w, t)``, or one of the world, ``(c, w)``.
-
-    Attributes:
-        target: The value for a target that is an agent, ``(c, w)``, if it differs.
-    """
-
-    target: Function | None = None
-    further: ClassVar = {"target": (("c", "w"), "a number")}
-
-    @property
-    def of_target(self) -> Function | None:
-        """The function for a target that is an agent; ``None``: it has none."""
-        return self.function if self.target is None and "t" not in self.parameters else self.target
-
-
-def reward_term(unit: str, *, target: Function | None = None) -> Callable[[Function], Function]:
-    """Declare a function as a reward term with its name; its docstring is the meaning.
-
-    The function takes ``(c, w, t)``: the records of the scenario, the world and a tracker
-    (:mod:`posse.rules.state`) after the step; or ``(c, w)``, for a value of the world that is the
-    same for every tracker and for a target that is an agent. It returns a number.
-
-    Args:
-        unit: Unit of the term.
-        target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
-            ``(c, w, t)`` is for trackers only.
-    """
-    REWARD_TERMS.check_argument(unit, '@posse.reward_term("1")')
-    return lambda function: REWARD_TERMS.declare(RewardTerm, function, unit=unit, target=target)
 
 
 @reward_term("1")
@@ -121,4 +84,4 @@ def check_terms(terms: Sequence[RewardTerm], rewards: FloatArray, values: FloatA
     for k, term in enumerate(terms):
         wrong = values[..., k][~np.isfinite(values[..., k])]
         if wrong.size:
-            raise REWARD_TERMS.error(term.function, f"it returned {wrong[0]:g}, and a reward must be finite")
+            raise term.error(f"it returned {wrong[0]:g}, and a reward must be finite")

@@ -31,7 +31,7 @@ _LONGEST: Final = 200
 
 def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
     """Raise DeclarationError for a user's function that cannot be compiled. Takes some tenths of a second for each."""
-    added = list(declarations.added())
+    added = declarations.added()
     if UNCOMPILED or not added:
         return
     world = world_record_of(declarations.motions, declarations.metrics)
@@ -46,11 +46,11 @@ def check_functions(declarations: Declarations, scratch: np.dtype[Any]) -> None:
         "dx": types.float32,
         "dy": types.float32,
     }
-    for registry, declaration in added:
+    for declaration in added:
         for function, returns in declaration.functions.items():
             line, reason = _why_not(function, [known[name] for name in parameters_of(function)], returns)
             if reason:
-                raise registry.error(function, f"line {line}: {reason}") from None
+                raise declaration.error(f"line {line}: {reason}", function) from None
 
 
 def _why_not(function: Function, arguments: list[Any], returns: str) -> tuple[int, str]:

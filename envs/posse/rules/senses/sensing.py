@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from posse.declarations import sensor
 from posse.numeric import ONE, TINY, WIDTH, ZERO, Record, Records, bits, compiled, load, root
 from posse.rules.discs import blocks, nonnegative
 from posse.rules.kinematics import turned
 from posse.rules.randomness import HEADING_NOISE, SENSOR_NOISE, normal_pair
-from posse.rules.senses.declaration import sensor
 from posse.rules.state import NEVER
 
 _VELOCITY_MEMORY: Final = np.float32(1.0)  # s; older fixes give no velocity

@@ -7,12 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from posse.declarations import Memory, target_motion
 from posse.numeric import ZERO, Record, compiled
 from posse.rules.kinematics import arc
 from posse.rules.randomness import TARGET, TWO_PI, between, uniform
-from posse.rules.targets.declaration import Memory, target_motion
+from posse.scenarios.limits import SLACK
 
-_SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _LEAST_RATE: Final = 0.2  # rad/s
 _MOST_RATE: Final = 0.8
 _LEAST: Final = 0.4  # least and greatest turn rate, as shares of the limit
@@ -24,9 +24,9 @@ _AMPLITUDE_WALK: Final = 0.05
 _RATE_WALK: Final = 0.03
 
 _MEMORY: Final = (
-    Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * _SLACK, "of an accelerating target"),
+    Memory("weave_amplitude", "rad/s", 0, lambda s: s.target_turn_rate * SLACK, "of an accelerating target"),
     Memory("weave_rate", "rad/s", 0, 1, "of an accelerating target"),
-    Memory("weave_phase", "rad", 0, 2 * math.pi * _SLACK, "of an accelerating target"),
+    Memory("weave_phase", "rad", 0, 2 * math.pi * SLACK, "of an accelerating target"),
 )
 
 

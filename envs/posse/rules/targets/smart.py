@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from posse.declarations import Memory, target_motion
 from posse.numeric import (
     HALF,
     ONE,
@@ -29,14 +30,13 @@ from posse.numeric import (
 )
 from posse.rules.kinematics import arc, follow_heading
 from posse.rules.state import NEVER, NO_BITS
-from posse.rules.targets.declaration import Memory, target_motion
+from posse.scenarios.limits import SLACK
 
 SMART_REPLAN: Final = 5
 """Control steps between decisions."""
 PATIENCE: Final = np.float32(3.0)
 """Time of station keeping by the whole team that triggers a dart, s."""
 
-_SLACK: Final = 1.001  # bounds are true for numbers rounded to float32, too
 _STATION_MARGIN: Final = np.float32(1.0)  # m; beyond the outermost slot, counts as near
 _STATION_SPEED: Final = np.float32(0.9)  # relative speed, as a share of V - v_t, that counts
 _DANGER: Final = np.float32(0.6)  # times formation_distance; a nearer tracker triggers a dart
@@ -65,7 +65,7 @@ _DIRECTION_SIN: Final = np.sin(_ANGLES).astype(np.float32)
 _PRESSED: Final = Memory(
     "pressed",
     "s",
-    lambda s: -float(DART_TURN) / s.target_turn_rate * _SLACK,
+    lambda s: -float(DART_TURN) / s.target_turn_rate * SLACK,
     float(PATIENCE),
     "of a smart target: time that the team has kept station; < 0: dart",
 )

@@ -1,0 +1,327 @@
+"""What can be declared: observation fields, reward terms, metrics, target motions, sensors.
+
+A declaration is a function with a name, a unit and a meaning, which is its docstring. Those of
+posse's own modules are *built in* and apply to every world. Those of a user's module are available
+after its import, and a scenario selects them by name.
+
+The functions take records: ``c`` the scenario (:data:`posse.rules.state.CONFIG`), ``w`` the world, ``t`` a tracker
+(:mod:`posse.rules.state`), ``s`` scratch memory, except where a table below says otherwise.
+"""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from posse.numeric import Records
+from posse.registry import Bound, Declaration, Function, Registry, is_number
+
+Decorator = Callable[[Function], Function]
+
+MOST_NUMBERS: Final = 256
+"""Most values of one field."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One named part of a scenario's observation."""
+
+    name: str
+    size: int
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    unknown: float | None = None
+    """The value for "unknown", or ``None`` if it is always known."""
+    of_neighbour: bool = False
+    """Whether it is repeated for each place of a team-mate."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FieldDeclaration(Declaration):
+    """A field of any scenario, and the function that computes it."""
+
+    kind = "observation field"
+    allowed = (("c",), ("c", "v"), ("c", "v", "m"))
+
+    size: int
+    low: Bound
+    high: Bound
+    unknown: float | None
+
+    def __post_init__(self) -> None:
+        """Raise DeclarationError if the size is invalid."""
+        if type(self.size) is not int or not 1 <= self.size <= MOST_NUMBERS:
+            raise self.error(f"size={self.size!r} must be a whole number from 1 to {MOST_NUMBERS}")
+
+    @property
+    def of_mate(self) -> bool:
+        """Whether it describes a team-mate."""
+        return "m" in self.parameters
+
+    @property
+    def functions(self) -> dict[Function, str]:
+        """Its function, and what it returns."""
+        return {self.function: f"{self.size} numbers" if self.size > 1 else "a number"}
+
+    def of(self, scenario: Any) -> Field:
+        """Return the field in a scenario; raise DeclarationError if its bounds or its value for "unknown" are wrong."""
+        low, high = self.bounds(self.low, self.high, scenario)
+        empty = 0.0 if self.unknown is None and self.of_mate else self.unknown
+        if empty is not None and not (is_number(empty) and low <= empty <= high):
+            where = f"between low={low:g} and high={high:g} in {scenario.name!r}"
+            raise self.error(f"unknown={empty!r} is not a number {where}")
+        return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
+
+
+def field(unit: str, low: Bound, high: Bound, unknown: float | None = None, *, size: int = 1) -> Decorator:
+    """Declare a function as an observation field of its name; its docstring is the meaning.
+
+    The parameters of the function determine the field's subject:
+
+    ========== ===================================================================================
+    (c)        a setting of the scenario, a constant
+    (c, v)     the robot itself or its knowledge of the target (:class:`posse.signals.views.View`)
+    (c, v, m)  a team-mate (:class:`posse.signals.views.Mate`), for each of them
+    ========== ===================================================================================
+
+    ``v`` and ``m`` hold eight observers, so a formula is written for a block of eight numbers like for one
+    (:mod:`posse.numeric`). The function returns a number, or a tuple of ``size`` of them.
+
+    Args:
+        unit: Its unit; ``"1"`` for a plain number.
+        low: The least value, or a function (scenario) -> least value.
+        high: The greatest, likewise.
+        unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
+        size: Number of values that the function returns, at most 256; as a tuple if more than one.
+    """
+    return FIELDS.decorator(unit, unit=unit, low=low, high=high, unknown=unknown, size=size)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RewardTerm(Declaration):
+    """One term of the reward; :func:`reward_term` describes the attributes."""
+
+    kind = "reward term"
+    allowed = (("c", "w", "t"), ("c", "w"))
+    further: ClassVar = {"target": (("c", "w"), "a number")}
+
+    target: Function | None
+
+    @property
+    def of_target(self) -> Function | None:
+        """The function for a target that is an agent; ``None``: it has none."""
+        return self.function if self.target is None and "t" not in self.parameters else self.target
+
+
+def reward_term(unit: str, *, target: Function | None = None) -> Decorator:
+    """Declare a function as a reward term with its name; its docstring is the meaning.
+
+    The function takes ``(c, w, t)``: the records of the scenario, the world and a tracker
+    (:mod:`posse.rules.state`) after the step; or ``(c, w)``, for a value of the world that is the
+    same for every tracker and for a target that is an agent. It returns a number.
+
+    Args:
+        unit: Unit of the term.
+        target: The term's formula ``(c, w)`` for a target that is an agent; without one, a term of
+            ``(c, w, t)`` is for trackers only.
+    """
+    return REWARD_TERMS.decorator(unit, unit=unit, target=target)
+
+
+_STEPS: Final[dict[str, str | None]] = {"step": "step", "tracker_step": "tracker_steps", "episode": None}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Metric(Declaration):
+    """One metric of an episode; :func:`metric` describes the attributes."""
+
+    kind = "metric"
+    allowed = (("c", "w"), ("c", "w", "t"), ("c", "w", "trackers"), ("c", "w", "trackers", "slots"), ("s", "w"))
+
+    per: str
+
+    def __post_init__(self) -> None:
+        """Raise DeclarationError if the divisor is unknown."""
+        if self.per not in tuple(_STEPS):
+            raise self.error(f"unknown per={self.per!r}; allowed: {', '.join(_STEPS)}")
+
+    @property
+    def summed(self) -> bool:
+        """Whether its function is compiled, and its values are summed over the steps."""
+        return self.parameters[0] == "c"
+
+    @property
+    def sum_name(self) -> str:
+        """Name of the field of the world's record that holds the sum."""
+        return f"{self.name}_sum"
+
+    @property
+    def functions(self) -> dict[Function, str]:
+        """Its function, if that is compiled, and what it returns."""
+        return super().functions if self.summed else {}
+
+    def of(self, scenario: Any, worlds: Records) -> npt.NDArray[np.float64]:
+        """Return the metric of the current episodes, (E,)."""
+        if not self.summed:
+            return np.asarray(self.function(scenario, worlds), np.float64)
+        total: npt.NDArray[np.float64] = np.asarray(worlds[self.sum_name], np.float64)
+        steps = _STEPS[self.per]
+        return total if steps is None else total / np.maximum(worlds[steps], 1)
+
+
+def metric(unit: str, *, per: str = "step") -> Decorator:
+    """Declare a function as a metric of an episode with its name; its docstring is the meaning.
+
+    Its value is added in each control step to a sum, the field ``<name>_sum`` of the world's record, which is divided
+    at the end of the episode. The parameters of the function determine what is summed:
+
+    ========================= ========================================================================
+    (c, w)                    a value of the world
+    (c, w, t)                 a value of each working tracker
+    (c, w, trackers)          a value of the team
+    (c, w, trackers, slots)   a value of the team, with the slots
+    (s, w)                    nothing: called from Python with the scenario and the records of all
+                              worlds, it returns the metric of each, (E,)
+    ========================= ========================================================================
+
+    ``info`` reports the built-in metrics at the end of every episode, and others if the scenario names
+    them. ``nan`` stands for "never happened".
+
+    Args:
+        unit: Unit of the metric.
+        per: Divisor of the sum: ``"step"``: control steps of the episode; ``"tracker_step"``:
+            control steps of all working trackers; ``"episode"``: 1.
+    """
+    return METRICS.decorator(unit, unit=unit, per=per)
+
+
+class Memory(NamedTuple):
+    """A state variable of a motion: a float32 of the world's record, 0 at the start.
+
+    It is part of the global state, within its bounds: numbers, or functions of the scenario.
+    """
+
+    name: str
+    unit: str
+    low: Bound
+    high: Bound
+    meaning: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TargetMotion(Declaration):
+    """A motion of the target; its function sets the goal heading. :func:`target_motion` describes the attributes."""
+
+    kind = "target motion"
+    allowed = tuple(("c", "w", "trackers", "obstacles", "s")[:count] for count in (2, 3, 4, 5))
+    returns = "nothing"
+    further: ClassVar = {"draw": (("c", "w"), "nothing")}
+
+    draw: Function | None
+    memory: Sequence[Memory]
+    mirrored: bool
+
+    def __post_init__(self) -> None:
+        """Raise DeclarationError if an option has a wrong type, or a memory an invalid name."""
+        given: Any = self.memory
+        if not isinstance(self.mirrored, bool):
+            raise self.error(f"mirrored={self.mirrored!r} must be True or False")
+        if not isinstance(given, (list, tuple)) or not all(isinstance(each, Memory) for each in given):
+            raise self.error(f"memory={given!r} must be a list of posse.Memory")
+        for each in given:
+            if not isinstance(each.name, str) or not each.name.isidentifier() or keyword.iskeyword(each.name):
+                raise self.error(f"invalid name {each.name!r} of a memory: use a name that Python allows")
+
+    def check(self, scenario: Any) -> None:
+        """Raise DeclarationError unless the bounds of its memory are finite and in order in a scenario."""
+        for each in self.memory:
+            self.bounds(each.low, each.high, scenario, f" of memory {each.name!r}")
+
+
+def target_motion(
+    name: str, *, draw: Function | None = None, memory: Sequence[Memory] = (), mirrored: bool = True
+) -> Decorator:
+    """Declare a function as a target motion; its docstring is the meaning.
+
+    In every control step it sets the goal heading, ``w.goal_cos`` and ``w.goal_sin``, to which one steering law turns
+    the target (:mod:`posse.rules.targets.steering`). The function takes ``(c, w)``, the scenario as kernels read it and
+    the world, and optionally the trackers, the obstacles and scratch memory: ``(c, w, trackers, obstacles, s)``. A
+    policy controls the target of the built-in motion ``"agent"``, whose function does nothing.
+
+    Args:
+        name: What ``target_motion`` of a scenario calls it.
+        draw: A function ``(c, w)`` that draws the parameters of an episode.
+        memory: Its state variables, fields of ``w``.
+        mirrored: Whether the goal is mirrored near walls; not needed by a motion that avoids them.
+
+    Raises:
+        DeclarationError: The name is taken, the docstring is missing, or an argument or the
+            parameters of a function are wrong.
+    """
+    return TARGET_MOTIONS.decorator(name, name=name, draw=draw, memory=memory, mirrored=mirrored)
+
+
+FIX_KINDS: Final = ("position", "bearing")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sensor(Declaration):
+    """A kind of target sensor; its function tells whether the target is in sight.
+
+    :func:`sensor` describes the attributes.
+    """
+
+    kind = "sensor"
+    allowed = (("c", "w", "t", "dx", "dy"), ("c", "w", "t", "dx", "dy", "s"))
+    returns = "True or False"
+    further: ClassVar = {"measure": (("c", "w", "number", "dx", "dy"), "2 numbers")}
+
+    measure: Function | None
+    fix: str
+
+    def __post_init__(self) -> None:
+        """Raise DeclarationError if there is no such kind of fix."""
+        if self.fix not in FIX_KINDS:
+            raise self.error(f"unknown fix={self.fix!r}; allowed: {', '.join(FIX_KINDS)}")
+
+
+def sensor(name: str, *, measure: Function | None = None, fix: str = "position") -> Decorator:
+    """Declare a function as the sight of a kind of sensor; its docstring is the meaning.
+
+    The function takes the scenario, the world, the tracker, the vector (dx, dy) to the target in
+    the common frame, and scratch memory with the obstacles' positions, and returns whether the
+    target is in sight. The built-in one is :func:`posse.rules.senses.in_sight`. The result is a
+    *fix* (:data:`posse.rules.state.FIX_RECORD`), of one of these kinds:
+
+    ============ ======================================================================================
+    ``position`` position and heading of the target, slot frame; velocity from successive fixes
+    ``bearing``  direction of the target; range, heading, frame and velocity stay unknown. Not sent by
+                 radio, since the direction depends on the observer
+    ============ ======================================================================================
+
+    Args:
+        name: What ``sensor`` of a scenario calls it.
+        measure: A function of the scenario, the world, the tracker's number and the vector to the
+            target, which returns the measured vector. Default: the true one with the scenario's
+            ``range_noise`` and ``bearing_noise``.
+        fix: The kind of a fix, ``"position"`` or ``"bearing"``.
+
+    Raises:
+        DeclarationError: The name is taken, the docstring is missing, the parameters are others, or
+            there is no such kind.
+    """
+    return SENSORS.decorator(name, name=name, measure=measure, fix=fix)
+
+
+FIELDS: Final = Registry(FieldDeclaration)
+METRICS: Final = Registry(Metric)
+REWARD_TERMS: Final = Registry(RewardTerm)
+SENSORS: Final = Registry(Sensor)
+TARGET_MOTIONS: Final = Registry(TargetMotion)
