@@ -16,7 +16,7 @@ from tests.support.reference.senses import Senses
 from tests.support.reference.state import State, headings, one_world, positions, snapshot
 
 import posse
-from posse.registry import TARGET_MOTIONS
+from posse.declarations import TARGET_MOTIONS
 from posse.scenarios.formation import FORMATIONS
 
 STEPS = 25

@@ -8,8 +8,8 @@ from posse_baselines import load, play
 
 def test_drifting_poses_cost_the_baseline_hardly_anything() -> None:
     policy = load("pngl-l-phi")
-    drift = {"odometry_drift": 0.05, "heading_drift": 0.01}
-    batch = posse.batch("constant", 60, split="train", message_size=policy.message_size, **drift)
+    drifting = posse.get_scenario("constant", odometry_drift=0.05, heading_drift=0.01)
+    batch = posse.batch(drifting, 60, split="train", message_size=policy.message_size)
     metrics = play(batch, policy)
     assert metrics["safe_score"].mean() >= 0.75
     assert (metrics["contact_free"] == 0).mean() <= 0.02

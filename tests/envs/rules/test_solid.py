@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tests.support.crowding import TOLERANCE, Complexes, Team, depth, points
 
 import posse
-from posse.registry import TARGET_MOTIONS
+from posse.declarations import TARGET_MOTIONS
 from posse.scenarios import ScenarioError
 from posse.scenarios.formation import FORMATIONS
 
