@@ -1,0 +1,101 @@
+"""Every command of the README and the manual's pages runs, read from the pages themselves.
+
+A page is followed from top to bottom in an empty folder, its Python and its shell, with the smallest budgets.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.support.pages import PAGES, ROOT, blocks, named, script_of
+
+from posse_training.cli import COMMANDS
+
+NOT_RUN = {
+    "pip install": "it changes the environment: tests/package installs the wheel into an empty one",
+    "ray start": "it starts a cluster that outlives the test: tests/training/cluster has one of two nodes",
+    "ray stop": "it stops every cluster of this machine",
+    "10.0.0.1": "the address of another machine",
+    "...": "what the dots stand for is elsewhere on the page",
+    "scripts/ship.py": "it writes to the package: tests/training/test_ship.py",
+    "class Tracker(Node)": "a listing for ROS 2, which is no Python package",
+}
+"""Parts of commands and Python that are not run, and why not."""
+SHORTER = {
+    r"^posse demo$": r"posse demo --episodes 2 --seconds 1",
+    r"^posse train .*(?<!--ray)$": r"\g<0> --steps 512 --num-worlds 4 --rollout 16 --minibatch 64 --evaluate-worlds 2",
+    r"^posse league .*$": r"\g<0> --generations 1 --target-steps 256 --team-steps 256 --response-steps 256"
+    " --episodes 2 --training num_worlds 4 evaluate_worlds 2",
+    r"^posse compare .*$": r"\g<0> --episodes 2 --no-figures",
+    r"^posse submit .*$": r"\g<0> --worlds 4",
+    r"^posse verify .*$": r"\g<0> --worlds 4",
+    r"^posse tune .*$": r"\g<0> --generations 1 --population 4 --worlds 2 --validation-worlds 2",
+    r"^posse (replay|watch .*--page).*$": r"\g<0> --seconds 1",
+    r"--seconds \d+": "--seconds 1",
+    r"episodes=[\d_]+": "episodes=2",
+    r"(evaluate\((?!.*episodes=).*)\)": r"\1, episodes=2)",
+    r"num_worlds=[\d_]+": "num_worlds=2",
+    r"learn\([\d_]+\)": "learn(64)",
+    r"n_steps=\d+, batch_size=\d+": "n_steps=8, batch_size=80",
+}
+"""Smallest budgets: replacements by regular expression."""
+GIVEN = {
+    "mypackage/mine.py": "from posse_baselines.policies.simple import Idle as Policy\n",
+    "my_targets.py": "from posse_baselines import load_target\nZigzag = lambda: load_target('evader').policy\n",
+    "my_policy": "from posse_baselines import load; my_policy = load('pursuit')",
+    "choose": "choose = lambda observations: 0 * observations[..., :2]",
+    "mask": "import numpy; mask = numpy.array([True, False])",
+}
+"""What a page leaves to its reader: names of Python, or files."""
+FOLLOWED = [page for page in sorted(PAGES) if any("--8<--" not in text for _, _, text in blocks(page))]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", FOLLOWED)
+def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
+    (tmp_path / "page.py").write_text(script_of(page, NOT_RUN, SHORTER, GIVEN), encoding="utf-8")
+    paths = [str(tmp_path), str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
+    done = subprocess.run(
+        [sys.executable, "page.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=900,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SDL_VIDEODRIVER": "dummy", "BROWSER": "true"},
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+
+
+@pytest.mark.parametrize("part", NOT_RUN)
+def test_what_is_not_run(part: str) -> None:
+    assert any(part in text for page in FOLLOWED for _, _, text in blocks(page)), "no page has it: remove it"
+    pytest.skip(f"{part}: {NOT_RUN[part]}")
+
+
+@functools.cache
+def help_of(command: str) -> str:
+    if command not in COMMANDS:
+        return ""
+    code = f"from posse_training.cli import main; main([{command!r}, '--help'])"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False).stdout
+
+
+@pytest.mark.parametrize("page", [page for page in sorted(PAGES) if named(page)])
+def test_every_command_that_a_page_names_is_there(page: str) -> None:
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    for line in named(page):
+        program, word, *rest = [*line.split(), ""]
+        if program == "posse":
+            assert word in COMMANDS, line
+            missing = [option for option in rest if re.match("--[a-z]", option) and option not in help_of(word)]
+            assert not missing, f"{line}: {missing}"
+        elif program == "make":
+            assert "=" in word or word in ["", *targets], line
+        elif program == "python" and word != "-m":
+            assert (ROOT / word).is_file(), line

@@ -1,0 +1,102 @@
+"""A page of the README or the manual as a script: its Python and the lines of its shell, in order."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PAGES = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
+PAGES |= {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "CONTRIBUTING.md")}
+PROGRAMS = ("posse", "make", "python", "pip", "ray")
+SHIPPED = ROOT / "baselines/posse_baselines/shipped"
+_FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
+_INLINE = re.compile(r"`((?:posse|make|python) [^`]+)`")
+# Closes every window after half a second, as a reader would some time.
+_POSSE = """
+import sys, threading, time
+from posse_training.cli import main
+def close():
+    while True:
+        time.sleep(0.5)
+        pygame = sys.modules.get("pygame")
+        if pygame and pygame.display.get_init():
+            pygame.event.post(pygame.event.Event(pygame.QUIT))
+threading.Thread(target=close, daemon=True).start()
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def shell_lines(text: str) -> list[str]:
+    """Return the commands of a block, or none if it is no shell's."""
+    lines = [line.removeprefix("$ ").partition("  #")[0].strip() for line in text.splitlines() if line.strip()]
+    return lines if lines and all(line.startswith(PROGRAMS) for line in lines) else []
+
+
+def blocks(page: str) -> Iterator[tuple[str, str | None, str]]:
+    """Yield the blocks of a page: "python" or "shell", the title, and the text or one command."""
+    for _, info, body in _FENCE.findall(PAGES[page]):
+        text, title = textwrap.dedent(body), re.search(r'title="(.+?)"', info)
+        if "python" in info:
+            yield "python", title and title[1], text
+        else:
+            assert shell_lines(text) or info not in ("console", "sh", "bash"), f"{page}: unknown program in {text!r}"
+            yield from (("shell", None, line) for line in shell_lines(text))
+
+
+def named(page: str) -> set[str]:
+    """Return every command that a page names, in its blocks or its sentences."""
+    inline = {" ".join(command.split()) for command in _INLINE.findall(_FENCE.sub("", PAGES[page]))}
+    return inline | {text for kind, _, text in blocks(page) if kind == "shell"}
+
+
+def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], given: Mapping[str, str]) -> str:
+    """Return a page as a script.
+
+    Args:
+        page: Its name.
+        not_run: Parts of commands, of lines of Python, or of the first lines of its blocks, that are left out.
+        shorter: Replacements by regular expression, in commands and Python.
+        given: What the page leaves to its reader: names of Python, or files, and their text.
+    """
+    parts = ["from tests.support.pages import sh, write"]
+    for name, text in given.items():
+        parts.append(f"write({name!r}, {text!r})" if "." in name else text)
+    for kind, title, text in blocks(page):
+        first, *others = text.splitlines()
+        if "--8<--" in first or any(part in first for part in not_run):
+            continue
+        text = "\n".join([first, *(line for line in others if not any(part in line for part in not_run))])
+        for pattern, replacement in shorter.items():
+            text = re.sub(pattern, replacement, text, flags=re.MULTILINE)
+        if title is not None:
+            parts.append(f"write({title!r}, {text!r})\nimport {Path(title).stem}")
+        else:
+            parts.append(text if kind == "python" else f"sh(*{shlex.split(text)!r})")
+    return "\n".join(parts) + "\n"
+
+
+def write(name: str, text: str) -> None:
+    """Write a file of the reader."""
+    Path(name).parent.mkdir(parents=True, exist_ok=True)
+    Path(name).write_text(text, encoding="utf-8")
+
+
+def sh(program: str, *words: str) -> None:
+    """Run a command of a page; a policy file that the reader should have is a shipped one."""
+    for path in re.findall(r"[\w./-]+\.safetensors", " ".join(words)):
+        if not Path(path).exists():
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(SHIPPED / "learned-smart.safetensors", path)
+    commands = {
+        "posse": [sys.executable, "-c", _POSSE, *words],
+        "python": [sys.executable, str(ROOT / words[0]), *words[1:]],
+        "make": ["make", "--dry-run", "--directory", str(ROOT), *words],  # it would install everything
+    }
+    subprocess.run(commands[program], check=True)
