@@ -16,7 +16,7 @@ from posse.engine.arguments import check_choice, options_of
 from posse.engine.infos import Infos
 from posse.engine.opponent import TargetPolicy, batch_with
 from posse.numeric import FloatArray, OwnArrays
-from posse.rendering.style import RENDER_MODES
+from posse.rendering import RENDER_MODES
 from posse.scenarios import Scenario, get_scenario
 from posse.signals.global_state import StateLayout
 from posse.signals.layout import ObservationLayout

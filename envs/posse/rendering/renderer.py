@@ -14,11 +14,12 @@ import numpy.typing as npt
 
 from posse.engine.arguments import check_choice
 from posse.engine.batch import Batch
+from posse.rendering import RENDER_MODES
 from posse.rendering.camera import Camera
 from posse.rendering.canvas import Canvas, Window
 from posse.rendering.layers import FOOTER, HEADER, Drawing, draw
 from posse.rendering.scene import History, Scene
-from posse.rendering.style import DESIGN_SIZE, RENDER_MODES, Colour
+from posse.rendering.style import DESIGN_SIZE, Colour
 from posse.scenarios import Scenario
 
 LEAST_SIZE: Final = 200  # px, of width and height

@@ -1,4 +1,4 @@
-"""The style of frames: where they appear, colours, and lengths in points.
+"""The style of frames: colours, and lengths in points.
 
 The hues are Okabe and Ito's, which colour-blind people tell apart. The target, its slots and its
 frame are vermilion, the team grey or blue. A *point* is a pixel in a frame whose shorter side is
@@ -11,8 +11,6 @@ from typing import Final
 
 Colour = tuple[int, int, int]
 
-RENDER_MODES: Final = ("human", "rgb_array")
-"""In a window, or as frames (H, W, 3) uint8."""
 DESIGN_SIZE: Final = 640  # px
 
 PAPER: Final[Colour] = (255, 255, 255)
