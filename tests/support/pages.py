@@ -65,7 +65,7 @@ def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], giv
         shorter: Replacements by regular expression, in commands and Python.
         given: What the page leaves to its reader: names of Python, or files, and their text.
     """
-    parts = ["from tests.support.pages import sh, write"]
+    parts = ["from tests.support.pages import provide, sh, write"]
     for name, text in given.items():
         parts.append(f"write({name!r}, {text!r})" if "." in name else text)
     for kind, title, text in blocks(page):
@@ -75,6 +75,7 @@ def script_of(page: str, not_run: Iterable[str], shorter: Mapping[str, str], giv
         text = "\n".join([first, *(line for line in others if not any(part in line for part in not_run))])
         for pattern, replacement in shorter.items():
             text = re.sub(pattern, replacement, text, flags=re.MULTILINE)
+        parts += [f"provide({name!r})" for name in re.findall(r"[\w./-]+\.safetensors", text)]
         if title is not None:
             parts.append(f"write({title!r}, {text!r})\nimport {Path(title).stem}")
         else:
@@ -88,15 +89,18 @@ def write(name: str, text: str) -> None:
     Path(name).write_text(text, encoding="utf-8")
 
 
+def provide(name: str) -> None:
+    """Let the reader have a policy file: a shipped one."""
+    if not Path(name).exists():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(SHIPPED / ("targets/evader.safetensors" if "target" in name else "learned-smart.safetensors"), name)
+
+
 def sh(program: str, *words: str) -> None:
-    """Run a command of a page; a policy file that the reader should have is a shipped one."""
-    for path in re.findall(r"[\w./-]+\.safetensors", " ".join(words)):
-        if not Path(path).exists():
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(SHIPPED / "learned-smart.safetensors", path)
+    """Run a command of a page; make only says what it would do, since it installs everything."""
     commands = {
+        "make": ["make", "--dry-run", "--directory", str(ROOT), *words],
         "posse": [sys.executable, "-c", _POSSE, *words],
-        "python": [sys.executable, str(ROOT / words[0]), *words[1:]],
-        "make": ["make", "--dry-run", "--directory", str(ROOT), *words],  # it would install everything
+        "python": [sys.executable, *(str(ROOT / word) if word.endswith(".py") else word for word in words)],
     }
     subprocess.run(commands[program], check=True)
