@@ -30,7 +30,8 @@ LINES = (
     ("posse_baselines.tuned",),
     ("posse_baselines.ddcs",),
     ("posse_baselines.laws",),
-    ("posse.adapters", "posse.rendering"),
+    ("posse.adapters",),
+    ("posse.rendering",),
     ("posse.engine",),
     ("posse.signals",),
     ("posse.rules",),
@@ -103,8 +104,7 @@ def draw() -> None:
                     linewidth=0.9,
                 )
             )
-            purpose = textwrap.shorten(purpose_of(room), int(width * 26), placeholder=" ...")
-            purpose = textwrap.fill(purpose, int(width * 13.5))
+            purpose = textwrap.fill(purpose_of(room), int(width * 13.5), max_lines=2, placeholder=" ...")
             axes.text(x + 0.1, y + HEIGHT - 0.1, name, va="top", fontsize=10, fontweight="bold")
             axes.text(
                 x + width - 0.1, y + HEIGHT - 0.12, size_of(room), ha="right", va="top", fontsize=7.5, color="#445566"

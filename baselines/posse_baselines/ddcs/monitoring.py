@@ -15,7 +15,7 @@ from posse_baselines.ddcs.memory import Team, pair
 from posse_baselines.laws.geometry import angle_of, clip, dot, length, scaled, vector, wrap
 
 MESSAGE_SIZE: Final = 5
-"""Task, leader, term, pulse, slot: five small whole numbers."""
+"""Task, leader, term, pulse, slot: five small whole numbers; where poses drift, with the target as seen beside them."""
 COUNT: Final = 256
 """Terms and pulses count modulo this."""
 
@@ -32,7 +32,10 @@ _UNSEEN_MEMORY: Final = 2.5  # s; timeout of team-mates that may have had no pla
 
 @compiled
 def encode(value: int, part: float = 0.0) -> float:
-    """Return a whole number, -1 (nothing) to 510, and a measure in [-1, 1] as a number in [0, 1); 0 is nothing."""
+    """Return a whole number, -1 (nothing) to 510, and a measure in [-1, 1] as a number in (-0.001, 1).
+
+    Nothing without a measure is 0, as is the message of a robot that has not been heard.
+    """
     return (value + 1 + _PART * part) * _MESSAGE_STEP
 
 
@@ -75,9 +78,10 @@ def write_message(team: Team, me: Record, row: FloatArray, action: FloatArray) -
 
 @compiled
 def align(team: Team, me: Record, mate: Record, row: FloatArray, m: int) -> None:
-    """Measure the offset of a team-mate's frame by the target that both see, and correct the mate's pose (m: message).
+    """Measure the offset of a team-mate's frame by the target that both see, and correct the mate's pose.
 
-    The message was written one control step before the pose was sent, so that both are taken back to that moment.
+    Its message begins at ``row[m]``. It was written one control step before the pose was sent, so that both the target
+    and the pose are taken back to that moment.
     """
     at, dt = team.at, float(team.world.dt)
     if part_of(row[m]) > 0.5 and row[at.target_seen] > 0.0:

@@ -109,7 +109,7 @@ class TeamEnv(WorldEnv, gymnasium.Env[Any, Any]):
         """Return the info of the last step or reset."""
         own = self._own
         terms = own.terms.copy() if own.terms.ndim == 2 else own.terms.tolist()
-        info = self._infos.build(own.scores.item(), self._metrics() if self.batch._over else None, terms)
+        info = self._infos.build(own.scores.item(), self._metrics(), terms)
         if self._breakable:
             working = self.batch.working[0, self._rows]
             info["working"] = working if working.ndim else bool(working)
