@@ -83,6 +83,11 @@ class HangsWithPid(SleepsInC):
         return super().act(observations, memory)
 
 
+class HangsWhileLoading(_Still):
+    def __init__(self) -> None:
+        time.sleep(600)
+
+
 class Slow(_Still):
     """Takes too long in total, but not in a single step."""
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from posse_baselines import PolicyError
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
@@ -100,6 +101,19 @@ def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
     assert len(found.failed) == 3
     assert all("exceeded the time limit of 12 s" in row["why"] for row in found.failed)
+
+
+@pytest.mark.long
+def test_a_policy_that_hangs_while_it_loads_costs_its_own_rows(tmp_path: Path) -> None:
+    found = compare(settings_for(tmp_path, "HangsWhileLoading", limit=10.0))
+    assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
+    assert [row["policy"] for row in found.failed] == [f"{BAD}HangsWhileLoading"]
+
+
+def test_code_that_is_no_policy_is_refused_before_anything_is_played(tmp_path: Path) -> None:
+    with pytest.raises(PolicyError, match="has no 'Typo'"):
+        compare(settings_for(tmp_path, "Typo"))
+    assert not (tmp_path / "out").exists()
 
 
 HANG = """

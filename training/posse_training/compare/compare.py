@@ -116,7 +116,7 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
         RunFolderError: The folder is not empty.
     """
     scenarios = _checked(settings)
-    contenders = read_contenders(settings.policies)
+    contenders = read_contenders(settings.policies, settings.time_limit)
     if settings.planner_episodes > 0 and PLANNER not in settings.policies:
         contenders += read_contenders((PLANNER,))
     for policy in (policy for contender in contenders for policy in contender.policies):

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from posse_baselines import Policy, PolicyError, load
 from posse_baselines.registry import is_code, is_file
+from posse_training.errors import PlayError, TimeLimitError
+from posse_training.parallel import apart
 
 LONGEST_LABEL: Final = 100
 """Characters of a label, at most."""
+LOADING: Final = 60.0
+"""Time that code may take until it is a policy, s, at most."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +32,11 @@ class Contender:
     policies: tuple[Policy | str, ...]
 
 
-def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
+def read_contenders(texts: Sequence[str], limit: float = LOADING) -> tuple[Contender, ...]:
     """Return the contenders of names, files, ``package.module:Class`` or ``LABEL=FILE,FILE,...``.
 
-    The label of a file is the name on its card, unless another contender has it.
+    The label of a file is the name on its card, unless another contender has it. Code is loaded in a process of its
+    own, for at most ``limit`` seconds or :data:`LOADING`; code that hangs there fails later, where it is to play.
 
     Raises:
         PolicyError: No contender, a policy that cannot be loaded, a group without files, a label
@@ -48,14 +54,37 @@ def read_contenders(texts: Sequence[str]) -> tuple[Contender, ...]:
         if label in taken:
             raise PolicyError(f"two policies have the label {label!r:.120}: give one another label, LABEL=...")
         names = members.split(",") if sign else [text]
-        loaded = [load(name) for name in names]
-        policies = tuple(name if is_code(name) else policy for name, policy in zip(names, loaded, strict=True))
-        if not sign and is_file(text):
-            name = loaded[0].name
+        policies = tuple(_checked_code(name, limit) if is_code(name) else load(name) for name in names)
+        if not sign and not isinstance(policies[0], str) and is_file(text):
+            name = policies[0].name
             label = name if name not in taken | stated else label
         _check_label(label)
         found.append(Contender(label, policies))
     return tuple(found)
+
+
+def check_code(name: str, limit: float) -> None:
+    """Load ``package.module:Class`` in a process of its own.
+
+    Raises:
+        PolicyError: It is no policy.
+        TimeLimitError: It took longer than the limit or :data:`LOADING`, s.
+        PlayError: The process died.
+    """
+    apart(min(limit, LOADING), _load, name)
+
+
+def _load(name: str) -> None:
+    try:
+        load(name)
+    except PolicyError as error:
+        raise PolicyError(str(error)) from None  # its cause, an error of the code, may not survive pickling
+
+
+def _checked_code(name: str, limit: float) -> str:
+    with contextlib.suppress(PlayError, TimeLimitError):
+        check_code(name, limit)
+    return name
 
 
 def _check_label(label: str) -> None:

@@ -14,9 +14,9 @@ from typing import Any
 
 from posse import Scenario
 from posse_baselines import Policy, PolicyError, load
-from posse_training.compare.contenders import Contender
+from posse_training.compare.contenders import Contender, check_code
 from posse_training.compare.plays import Plays
-from posse_training.errors import PlayError, describe
+from posse_training.errors import PlayError, TimeLimitError, describe
 from posse_training.evaluation.evaluation import Evaluation, evaluate, gathered_results, played_errors, prepare
 from posse_training.evaluation.results import Results
 from posse_training.parallel import apart
@@ -88,9 +88,11 @@ def played_on_ray(
         for k, policy in enumerate(contender.policies):
             key = scenario.name, contender.label, k
             try:
+                if isinstance(policy, str):
+                    check_code(policy, game.limit)
                 with played_errors():
                     ready[key] = prepare(policy, scenario, episodes, game.seed, **game.options)
-            except (PolicyError, PlayError) as error:
+            except (PolicyError, PlayError, TimeLimitError) as error:
                 found[key] = error
     total, done = sum(len(one.shards) for one in ready.values()), itertools.count(1)
     with gathered_results(list(ready.values()), ray, lambda: progress(next(done), total)) as results:
