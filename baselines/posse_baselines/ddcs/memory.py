@@ -23,6 +23,8 @@ from posse_baselines.laws.safeguard import DISC, PLAYS
 
 _F, _I, _C = np.float32, np.int32, np.complex64
 _MOST_DISCS: Final = 32
+MOST_WAITING: Final = 10
+"""A delay of more control steps than this is not foreseen."""
 _UNLIMITED: Final = 1e4  # m/s² or rad/s²: what stands for no limit
 
 
@@ -125,6 +127,11 @@ MIND, MIND_AT_START = _fields(
     ("wish", np.complex128, 0),  # wanted velocity
     ("wish_speed", np.float64, 0),  # its command: m/s, rad/s
     ("wish_omega", np.float64, 0),
+    # commands that wait for their execution, m/s and rad/s, by own step modulo the delay
+    ("waiting", (np.complex128, (MOST_WAITING,)), 0),
+    ("lead", np.float64, 0),  # s; how far position, heading and target are ahead of the observation
+    ("moved", np.complex128, 0),  # by then, m
+    ("turned", np.complex128, 1),  # by then, as a rotation
     # leadership
     ("leader", _I, -1),  # -1: none yet
     ("term", _I, 0),  # how often the lead has passed, modulo 256; the higher claim wins

@@ -242,4 +242,4 @@ def mate_now(team: Team, me: Record, mate: Record) -> tuple[complex, complex]:
     age = silence(team, me, mate)
     if age > patience(team, me):
         return mate.position, 0j
-    return mate.position + scaled(mate.velocity, age), mate.velocity
+    return mate.position + scaled(mate.velocity, age + me.lead), mate.velocity

@@ -141,8 +141,9 @@ class DDCS(OwnArrays, BasePolicy):
         """Return internal values of each tracker, (E, N) each; ``estimate`` is (E, N, 3).
 
         ``task`` (its index in ``TASKS``), ``slot`` (-1: none), ``estimate`` (x, y, θ of the target,
-        common frame), ``estimate_age`` (s; -1: there is no estimate). Of the centralized model also
-        ``leader`` (-1: none yet), ``term`` and ``exchanges`` (number of leader changes).
+        common frame; with a command delay, when the command will be executed), ``estimate_age`` (s;
+        -1: there is no estimate). Of the centralized model also ``leader`` (-1: none yet), ``term``
+        and ``exchanges`` (number of leader changes).
         """
         me = memory.minds.me
         names = ["task", "slot"]

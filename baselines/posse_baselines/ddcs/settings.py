@@ -162,6 +162,10 @@ class Settings:
     point_offset: float = tuned(0.15, "m", 0.05, 0.5)
     """d, how far ahead of its axle the point lies that a follower controls by l-φ or l-l."""
 
+    look_ahead: float = tuned(1.0, "", 0.0, 1.0)
+    """Where robots obey late (``actuator_lag``, ``command_delay``): share of the lag that commands make up for, up to
+    the limits; with more than 0, decisions are for the pose at which the command is executed. 0: neither."""
+
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)
     """Clearance to robots and walls."""

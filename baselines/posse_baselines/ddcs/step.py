@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.detour import detour
+from posse_baselines.ddcs.foresight import foresee, make_up, surround_then
 from posse_baselines.ddcs.memory import Team, Work, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
 from posse_baselines.ddcs.roles import choose_slot, settle_lead
 from posse_baselines.ddcs.searching import begin_search, look_around, wander
 from posse_baselines.ddcs.settings import CENTRALIZED, FLOCKING, SEARCHING
-from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.guidance import regulate, write_motion
 from posse_baselines.laws.safeguard import safe_velocity
@@ -31,6 +31,7 @@ def plan(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16], r
     watch_target(team, me, row)
     update_mates(team, me, mates, row)
     look_around(team, me, mates, seen)
+    foresee(team, me)
     # Tracking
     if team.settings.model == CENTRALIZED:
         settle_lead(team, me, mates)
@@ -70,7 +71,7 @@ def correct(me: Record, correction: complex) -> None:
 @compiled
 def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
     """Actuate: write the action (2 + m,) of one tracker that realises its wanted velocity."""
-    discs = work.discs[: surround(team, me, mates, row, work.discs)]
+    discs = work.discs[: surround_then(team, me, mates, row, work.discs)]
     velocity, speed, omega = me.wish, me.wish_speed, me.wish_omega
     if team.settings.detour > 0.0 and me.task != FLOCKING:
         velocity = detour(team, me, discs, velocity)
@@ -78,6 +79,7 @@ def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Wor
     velocity, evades = safe_velocity(me, discs, velocity, work.plays)
     if turned or evades:
         speed, omega = regulate(me, velocity, 0.0)
+    speed, omega = make_up(team, me, speed, omega)
     write_motion(action, speed, omega, me.max_speed, me.max_omega)
     write_message(team, me, row, action)
     me.step += 1

@@ -49,6 +49,8 @@ CONSTANTS: Final[np.dtype[Any]] = np.dtype(
         np.dtype(
             [
                 ("dt", np.float32),  # control step, s
+                ("delay", np.int32),  # control steps after which a command is executed
+                ("followed", np.float64),  # share of a wanted change of the motion that a step brings; 1: no lag
                 ("sonar_range", np.float32),  # reading that means "nothing near", m
                 ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
                 ("radius", np.float32),  # of a robot's disc, m
@@ -81,6 +83,10 @@ def constants_of(scenario: Scenario) -> Records:
     """Return an array of one :data:`CONSTANTS`."""
     record = np.zeros(1, CONSTANTS)
     record["dt"] = scenario.control_step
+    lag = scenario.actuator_lag
+    record["delay"], record["followed"] = scenario.command_delay, 1.0
+    if lag > 0:
+        record["followed"] = 1 - math.exp(-scenario.control_step / lag)
     record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
     record["sonar_range"] = scenario.sonar_range
     record["radius"] = scenario.robot_radius
