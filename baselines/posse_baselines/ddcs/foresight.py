@@ -5,14 +5,19 @@ from __future__ import annotations
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import MOST_WAITING, Team
 from posse_baselines.ddcs.monitoring import target_after
+from posse_baselines.ddcs.settings import PNGL
 from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.laws.geometry import clip, scaled, vector
 
 
 @compiled
 def delay_of(team: Team) -> int:
-    """Return the delay that is foreseen, in control steps."""
-    return int(team.world.delay) if team.settings.look_ahead > 0.0 and team.world.delay <= MOST_WAITING else 0
+    """Return the delay that is foreseen, in control steps.
+
+    Not under PNGL: with foresight over 2 steps, PNGL + l-φ touched in 26 of 100 worlds of ``smart``, without in 5.
+    """
+    settings, delay = team.settings, int(team.world.delay)
+    return delay if settings.look_ahead > 0.0 and settings.guidance != PNGL and delay <= MOST_WAITING else 0
 
 
 @compiled

@@ -164,7 +164,8 @@ class Settings:
 
     look_ahead: float = tuned(1.0, "", 0.0, 1.0)
     """Where robots obey late (``actuator_lag``, ``command_delay``): share of the lag that commands make up for, up to
-    the limits; with more than 0, decisions are for the pose at which the command is executed. 0: neither."""
+    the limits; with more than 0, a team guided by ``"slot"`` also decides for the pose at which its command is executed,
+    up to 10 steps ahead. 0: neither."""
 
     # safeguard
     margin: float = tuned(0.15, "m", 0.0, 0.6)
