@@ -49,7 +49,7 @@ def foresee(team: Team, me: Record) -> None:
 
 
 @compiled
-def surround_then(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
+def surround_ahead(team: Team, me: Record, mates: Records, row: FloatArray, discs: Records) -> int:
     """List the discs that will be near when the command is executed; return their number.
 
     The sonar measures from the present pose, so that the list is made there and taken along.

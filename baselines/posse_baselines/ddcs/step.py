@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.detour import detour
-from posse_baselines.ddcs.foresight import foresee, make_up, surround_then
+from posse_baselines.ddcs.foresight import foresee, make_up, surround_ahead
 from posse_baselines.ddcs.memory import Team, Work, read_body
 from posse_baselines.ddcs.monitoring import update_mates, watch_target, write_message
 from posse_baselines.ddcs.motion import move, next_task, want
@@ -71,7 +71,7 @@ def correct(me: Record, correction: complex) -> None:
 @compiled
 def carry_out(team: Team, me: Record, mates: Records, row: FloatArray, work: Work, action: FloatArray) -> None:
     """Actuate: write the action (2 + m,) of one tracker that realises its wanted velocity."""
-    discs = work.discs[: surround_then(team, me, mates, row, work.discs)]
+    discs = work.discs[: surround_ahead(team, me, mates, row, work.discs)]
     velocity, speed, omega = me.wish, me.wish_speed, me.wish_omega
     if team.settings.detour > 0.0 and me.task != FLOCKING:
         velocity = detour(team, me, discs, velocity)
