@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from posse import TARGET_MOTIONS, Scenario, TargetPolicy
 from posse_baselines.learned import LearnedPolicy
+from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.policies.scripted import SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuned import from_file
@@ -71,8 +72,8 @@ def shipped() -> dict[str, Path]:
 
 
 def target_names() -> tuple[str, ...]:
-    """Return the names of all targets: the motions that are declared, then the learned ones."""
-    return (*(name for name in TARGET_MOTIONS if name != AGENT), *shipped_targets())
+    """Return the names of all targets: the motions that are declared, those that read nothing, the learned ones."""
+    return (*(name for name in TARGET_MOTIONS if name != AGENT), *OPEN_LOOP, *shipped_targets())
 
 
 def shipped_targets() -> dict[str, Path]:
@@ -133,6 +134,8 @@ def load_target(target: str | Path | Target) -> Target:
     text = str(target)
     if text in TARGET_MOTIONS and text != AGENT:
         return Target(text, text)
+    if text in OPEN_LOOP:
+        return Target(text, AGENT, OPEN_LOOP[text])
     path = shipped_targets().get(text, Path(text))
     if path.suffix == ".safetensors" or is_file(path):
         policy = LearnedPolicy.from_file(path)

@@ -21,6 +21,7 @@ from posse import get_scenario
 from posse_baselines import load, load_target
 from posse_baselines.fields import number
 from posse_baselines.files import replacing, write_atomically
+from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_training.errors import SettingsError, check_settings, require
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
@@ -61,8 +62,8 @@ class LeagueSettings:
     that is harder for the present policy gets more."""
     teams: tuple[str, ...] = ("ddcs-tuned",)
     """Teams at the beginning: names or files."""
-    targets: tuple[str, ...] = ("smart",)
-    """Targets at the beginning: names or files."""
+    targets: tuple[str, ...] = ("smart", "constant", *OPEN_LOOP)
+    """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
     target_steps: int = number(2_000_000, "", *_STEPS)
     """Steps of each target's training."""
     team_steps: int = number(4_000_000, "", *_STEPS)

@@ -1,0 +1,89 @@
+"""Targets that read nothing: they drive by the clock, whatever the team does.
+
+A target that learns must cost a team more than the most harmful of these, else the team loses to a motion, not to a policy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import ObservationLayout
+from posse.numeric import BoolArray, FloatArray
+
+Shares = tuple[npt.ArrayLike, npt.ArrayLike]
+"""Speed, in [0, 1], and turn rate, in [-1, 1], of a target as shares of its greatest."""
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """A target's policy that is a function of time.
+
+    Attributes:
+        name: Its name.
+        motion: Times (E,) in s since the start of each episode → shares, (E,) each or the same for all.
+    """
+
+    name: str
+    motion: Callable[[FloatArray], Shares]
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> tuple[float, FloatArray]:
+        """Return the control step and the times (E,) of the first step."""
+        return layout.scenario.control_step, np.zeros(num_worlds, np.float32)
+
+    def act(
+        self, observations: FloatArray, memory: tuple[float, FloatArray]
+    ) -> tuple[FloatArray, tuple[float, FloatArray]]:
+        """Return the actions (E, 1, 2) at the times of the memory."""
+        step, times = memory
+        actions = np.empty((len(observations), 1, 2), np.float32)
+        speed, turn = self.motion(times)
+        actions[:, 0, 0], actions[:, 0, 1] = 2.0 * np.asarray(speed) - 1.0, turn
+        return actions, (step, times + np.float32(step))
+
+    def restart(self, memory: tuple[float, FloatArray], mask: BoolArray) -> tuple[float, FloatArray]:
+        """Return the memory with the time 0 in the worlds of a mask (E,)."""
+        step, times = memory
+        return step, np.where(mask, np.float32(0.0), times)
+
+
+def _left_circle(_: FloatArray) -> Shares:
+    return 1.0, 1.0
+
+
+def _right_circle(_: FloatArray) -> Shares:
+    return 1.0, -1.0
+
+
+def _wide_circle(_: FloatArray) -> Shares:
+    return 1.0, 0.5
+
+
+def _stop_and_go(times: FloatArray) -> Shares:
+    return (times // 1.5) % 2.0, 0.0
+
+
+def _spiral(times: FloatArray) -> Shares:
+    return 1.0, 1.0 - times % 30.0 / 30.0
+
+
+def _eight(times: FloatArray) -> Shares:
+    return 1.0, np.where((times // 6.0) % 2.0 > 0.0, 1.0, -1.0)
+
+
+OPEN_LOOP: Final[dict[str, OpenLoop]] = {
+    name: OpenLoop(name, motion)
+    for name, motion in {
+        "left-circle": _left_circle,
+        "right-circle": _right_circle,
+        "wide-circle": _wide_circle,
+        "stop-and-go": _stop_and_go,
+        "spiral": _spiral,
+        "eight": _eight,
+    }.items()
+}
+"""By name. The scenario's motion ``constant`` is the one that drives straight ahead."""
