@@ -1,13 +1,14 @@
 """Targets that read nothing: they drive by the clock, whatever the team does.
 
-A target that learns must cost a team more than the most harmful of these, else the team loses to a motion, not to a policy.
+A target that learns must cost a team more than the most harmful of these, else a team loses to a motion that needs no
+policy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,13 @@ from posse.numeric import BoolArray, FloatArray
 
 Shares = tuple[npt.ArrayLike, npt.ArrayLike]
 """Speed, in [0, 1], and turn rate, in [-1, 1], of a target as shares of its greatest."""
+
+
+class Clock(NamedTuple):
+    """Memory: the control step in s, and the times (E,) in s since the start of each episode."""
+
+    step: float
+    times: FloatArray
 
 
 @dataclass(frozen=True)
@@ -31,24 +39,24 @@ class OpenLoop:
     name: str
     motion: Callable[[FloatArray], Shares]
 
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> tuple[float, FloatArray]:
-        """Return the control step and the times (E,) of the first step."""
-        return layout.scenario.control_step, np.zeros(num_worlds, np.float32)
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Clock:
+        """Return the clock at the start."""
+        return Clock(layout.scenario.control_step, np.zeros(num_worlds, np.float32))
 
-    def act(
-        self, observations: FloatArray, memory: tuple[float, FloatArray]
-    ) -> tuple[FloatArray, tuple[float, FloatArray]]:
-        """Return the actions (E, 1, 2) at the times of the memory."""
-        step, times = memory
+    def act(self, observations: FloatArray, memory: Clock) -> tuple[FloatArray, Clock]:
+        """Return the actions (E, 1, 2) at the times of the clock."""
         actions = np.empty((len(observations), 1, 2), np.float32)
-        speed, turn = self.motion(times)
+        speed, turn = self.motion(memory.times)
         actions[:, 0, 0], actions[:, 0, 1] = 2.0 * np.asarray(speed) - 1.0, turn
-        return actions, (step, times + np.float32(step))
+        return actions, memory._replace(times=memory.times + np.float32(memory.step))
 
-    def restart(self, memory: tuple[float, FloatArray], mask: BoolArray) -> tuple[float, FloatArray]:
-        """Return the memory with the time 0 in the worlds of a mask (E,)."""
-        step, times = memory
-        return step, np.where(mask, np.float32(0.0), times)
+    def restart(self, memory: Clock, mask: BoolArray) -> Clock:
+        """Return the clock at the start in the worlds of a mask (E,)."""
+        return memory._replace(times=np.where(mask, np.float32(0.0), memory.times))
+
+    def arrays(self, memory: Clock) -> dict[str, npt.NDArray[Any]]:
+        """Return the memory as arrays (E, ...) by name; views, not copies."""
+        return {"times": memory.times}
 
 
 def _left_circle(_: FloatArray) -> Shares:

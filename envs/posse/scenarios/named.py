@@ -105,7 +105,7 @@ SCENARIOS: Final[dict[str, dict[str, Any]]] = {
     },
     "duel": {
         "version": 3,
-        "meaning": "Two sides that both can learn; by itself the target is smart. It drives at 0.8 of the trackers' speed and turns at 0.75 of their rate.",
+        "meaning": "Two sides that both can learn; the target has 4/5 of the trackers' speed, 3/4 of their turn rate.",
         "target_speed": 0.8,
         "target_motion": "smart",
         "tracker_turn_rate": 2.0,
