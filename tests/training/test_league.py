@@ -33,6 +33,7 @@ def tiny(folder: Path, **changes: Any) -> LeagueSettings:
         scenario="smart",
         generations=2,
         teams=("idle",),
+        targets=("smart",),
         target_steps=160,
         team_steps=320,
         response_steps=160,
