@@ -22,7 +22,7 @@ VERSIONS = {
     "radio": 2,
     "leader-loss": 2,
     "field": 3,
-    "duel": 2,
+    "duel": 3,
     "paper-centralized": 1,
     "paper-distributed": 1,
 }
