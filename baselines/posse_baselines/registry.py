@@ -11,9 +11,9 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar, cast
 
-from posse import TARGET_MOTIONS, Scenario, TargetPolicy
+from posse import TARGET_MOTIONS, Family, Scenario, TargetPolicy
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
 from posse_baselines.policies.scripted import SCRIPTED
@@ -30,6 +30,7 @@ LEARNED: Final = "learned-"
 """Prefix of the names of learned policies."""
 AGENT: Final = "agent"
 """The motion of a target that a policy moves."""
+Worlds = TypeVar("Worlds", bound=Scenario | Family)
 _MODULE: Final = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
@@ -52,13 +53,13 @@ class Target:
         """Splits whose worlds it was trained on."""
         return tuple(getattr(self.policy, "trained_splits", ()))
 
-    def fit(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with this target.
+    def fit(self, scenario: Worlds) -> Worlds:
+        """Return a scenario or a family with this target.
 
         Raises:
             ScenarioError: The scenario's settings do not fit the motion.
         """
-        return scenario.replace(target_motion=self.motion)
+        return cast("Worlds", scenario.replace(target_motion=self.motion))
 
 
 def policy_names() -> tuple[str, ...]:

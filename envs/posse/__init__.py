@@ -26,7 +26,8 @@ from posse.declarations import (
 from posse.engine.batch import Batch, Snapshot
 from posse.engine.opponent import PairedBatch, TargetPolicy, batch_with
 from posse.registry import DeclarationError
-from posse.scenarios import Scenario, ScenarioError, get_scenario, scenario_names
+from posse.scenarios import Family, Scenario, ScenarioError, family, family_names, get_scenario, scenario_names
+from posse.scenarios.family import scenario_or_family
 from posse.signals.generate import declarations_for, source_of
 from posse.signals.layout import ObservationLayout
 
@@ -74,6 +75,34 @@ def batch(
     )
 
 
+def batches(
+    scenario: str | Scenario | Family,
+    num_worlds: int,
+    *,
+    scenarios: int = 16,
+    seed: int = 0,
+    split: str = "train",
+    first_world: int = 0,
+    **settings: Any,
+) -> list[Batch]:
+    """Return batches that hold so many worlds together: of a family one for each of ``scenarios`` drawn scenarios.
+
+    A world depends on seed, split and its number alone; so does scenario k on seed, split and k. The other settings
+    are those of :func:`batch`.
+    """
+    given = scenario_or_family(scenario)
+    drawn = [given.draw(k, seed, split) for k in range(scenarios)] if isinstance(given, Family) else [given]
+    if num_worlds < len(drawn):
+        raise ScenarioError(
+            f"num_worlds={num_worlds} is refused: it must be at least {len(drawn)}, one for each scenario"
+        )
+    ends = [num_worlds * k // len(drawn) for k in range(len(drawn) + 1)]
+    return [
+        batch(one, end - start, seed=seed, split=split, first_world=first_world + start, **settings)
+        for one, start, end in zip(drawn, ends[:-1], ends[1:], strict=True)
+    ]
+
+
 def observation_fields(scenario: str | Scenario = "constant", **overrides: Any) -> tuple[Field, ...]:
     """Return the fields of a scenario's observation, in order: name, size, unit, range, ..."""
     return ObservationLayout(get_scenario(scenario, **overrides)).fields
@@ -96,6 +125,7 @@ __all__ = [
     "Batch",
     "Command",
     "DeclarationError",
+    "Family",
     "Field",
     "Heard",
     "Memory",
@@ -112,7 +142,10 @@ __all__ = [
     "TargetMotion",
     "TargetPolicy",
     "batch",
+    "batches",
     "env",
+    "family",
+    "family_names",
     "field",
     "get_scenario",
     "kernel_source",

@@ -20,13 +20,15 @@ import tyro
 from rich.console import Console
 
 import posse
-from posse import Scenario, get_scenario
-from posse_baselines import Policy, PolicyError, Tunable, load, play
+from posse import Family, Scenario
+from posse.scenarios.family import scenario_or_family
+from posse_baselines import Policy, PolicyError, Tunable, load
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import number, optional, tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError, check_settings, require
+from posse_training.evaluation.episodes import play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
 from posse_training.files import LOCK, hold_settings, locked, read_json
@@ -57,7 +59,7 @@ class TuneSettings:
     policy: Annotated[str, tyro.conf.Positional]
     """Policy with tunable settings: a name, or package.module:Class."""
     scenario: str = "smart"
-    """Scenario to tune for."""
+    """Scenario or family to tune for."""
     minutes: float = number(3.0, "", 0.001, 10_000.0)
     """When to stop: after the generation in which this time is over, resumed parts included."""
     seed: int = number(1, "", 0, 2**31 - 1)
@@ -185,8 +187,8 @@ class _Run:
         check_settings(settings)
         self.settings, self.console = settings, console
         self.policy, self.tunables = _tunable_policy(settings.policy)
-        found = get_scenario(settings.scenario)
-        self.scenario: Scenario = found.replace(message_size=max(found.message_size, self.policy.message_size))
+        found = scenario_or_family(settings.scenario)
+        self.scenario: Scenario | Family = found.replace(message_size=max(found.message_size, self.policy.message_size))
         known = [t.name for t in self.tunables]
         for name in settings.only:
             if name not in known:
@@ -351,10 +353,10 @@ class _Run:
         }
 
 
-def _played(policy: Policy, scenario: Scenario, worlds: _Worlds, threads: int | None) -> dict[str, Point]:
+def _played(policy: Policy, scenario: Scenario | Family, worlds: _Worlds, threads: int | None) -> dict[str, Point]:
     """Return the metrics of a policy, (worlds,) each."""
     seed, split, first, number = worlds
-    return play(posse.Batch(scenario, number, seed=seed, split=split, first_world=first, num_threads=threads), policy)
+    return play_shard(policy, scenario, seed, split, threads, lambda steps: None, range(first, first + number))
 
 
 def _mean(cma: CMA) -> Point:

@@ -6,8 +6,8 @@ import gymnasium
 import pettingzoo
 
 _GYMNASIUM = {
-    "posse/Team-v0": ("posse.adapters.gymnasium_env:TeamEnv", "posse.adapters.vector_env:TeamVectorEnv"),
-    "posse/Solo-v0": ("posse.adapters.gymnasium_env:SoloEnv", "posse.adapters.vector_env:SoloVectorEnv"),
+    "posse/Team-v0": ("posse.adapters.gymnasium_env:TeamEnv", "posse.adapters.side_by_side:team_vector"),
+    "posse/Solo-v0": ("posse.adapters.gymnasium_env:SoloEnv", "posse.adapters.side_by_side:solo_vector"),
 }
 _PETTINGZOO = "posse/track-v0"
 

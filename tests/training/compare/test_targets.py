@@ -43,7 +43,7 @@ def test_an_evaluation_names_the_target_and_is_the_same_alone(file: Path, tmp_pa
     assert not np.array_equal(many["tracking_error"], scripted["tracking_error"])
     assert many.target == "evading"
     assert scripted.target is None
-    assert many.scenario.target_motion == "agent"
+    assert many.scenario.to_dict()["target_motion"] == "agent"
     many.write(tmp_path / "rows.csv")
     text = (tmp_path / "rows.csv").read_text(encoding="utf-8")
     rows = list(csv.DictReader(text.splitlines()))

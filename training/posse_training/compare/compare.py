@@ -16,7 +16,8 @@ import tyro
 from rich.console import Console
 
 import posse
-from posse import Batch, Scenario, get_scenario, scenario_names
+from posse import Batch, Family, Scenario, scenario_names
+from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import PolicyError, load_target
 from posse_baselines.fields import number
 from posse_training.compare.contenders import Contender, read_contenders
@@ -143,12 +144,13 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     return run.found
 
 
-def _checked(settings: Settings) -> list[Scenario]:
+def _checked(settings: Settings) -> list[Scenario | Family]:
     check_settings(settings)
     names = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
-    found = [get_scenario(name) for name in dict.fromkeys(names)]
+    found = [scenario_or_family(name) for name in dict.fromkeys(names)]
     for scenario in found:
-        Batch(scenario, 1, seed=settings.seed, split=settings.split)
+        first, _ = next(blocks(scenario, range(1), 0, "train"))
+        Batch(first, 1, seed=settings.seed, split=settings.split)
     return found
 
 
@@ -167,7 +169,7 @@ class _Run:
     """One comparison while it is played and written."""
 
     settings: Settings
-    scenarios: Sequence[Scenario]
+    scenarios: Sequence[Scenario | Family]
     contenders: Sequence[Contender]
     found: Comparison
     stopped: dict[str, str] = field(default_factory=dict)
@@ -188,7 +190,7 @@ class _Run:
         is_reference = contender.label == PLANNER and PLANNER not in s.policies
         return min(s.episodes, s.planner_episodes) if is_reference else s.episodes
 
-    def play(self, scenario: Scenario, report: Callable[[str], object]) -> None:
+    def play(self, scenario: Scenario | Family, report: Callable[[str], object]) -> None:
         """Play one scenario with every contender, and write the rows."""
         found, name = self.found, scenario.name
         for contender in self.contenders:
@@ -222,7 +224,7 @@ class _Run:
         about |= {"comparison": rows, "left_out": found.left_out, "failed": found.failed}
         (found.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
-    def _attempt(self, contender: Contender, scenario: Scenario) -> Plays | None:
+    def _attempt(self, contender: Contender, scenario: Scenario | Family) -> Plays | None:
         """Play; return ``None`` and note why if the contender cannot or fails."""
         label = contender.label
         why = {"policy": label, "what": scenario.name}
@@ -270,10 +272,11 @@ class _Run:
     def _record(self, one: Any) -> tuple[str, str]:
         """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""
         by_label = {each.label: each for each in self.contenders}
-        scenario = get_scenario(one.scenario)
+        given, game = scenario_or_family(one.scenario), self.game
+        scenario, _ = next(blocks(given, range(one.world, one.world + 1), game.seed, game.split))
         try:
             replays = [
-                replay(by_label[label], seed, scenario, one.world, self.game)
+                replay(by_label[label], seed, scenario, one.world, game)
                 for label, seed in ((self.found.reference, 0), (one.policy, one.seed))
             ]
             name = f"{self._stem(f'replay-{one.scenario}-{one.policy}-{one.world}')}.html"

@@ -12,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from posse import Scenario
 from posse_training.compare.contenders import Contender
 from posse_training.compare.plays import Plays
 from posse_training.evaluation.statistics import over_seeds, share
@@ -129,6 +130,7 @@ def recovery(losses: Sequence[Plays], looks: Looks) -> Figure:
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     axis = figure.subplots()
     scenario = losses[0].scenario
+    assert isinstance(scenario, Scenario)
     # After this time, an episode may end before a recovery counts.
     latest = scenario.duration * (1 - scenario.break_window[1]) - scenario.settle_time
     times = np.arange(0, latest + 1e-9, scenario.control_step)

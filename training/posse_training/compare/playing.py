@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from posse import Scenario
+from posse import Family, Scenario
 from posse_baselines import Policy, PolicyError, load
 from posse_training.compare.contenders import Contender, check_code
 from posse_training.compare.plays import Plays
@@ -45,7 +45,9 @@ class Game:
         return {"target": self.target, "split": self.split, "time_limit": self.limit}
 
 
-def play(contender: Contender, scenario: Scenario, episodes: int, game: Game, found: Mapping[Key, Played]) -> Plays:
+def play(
+    contender: Contender, scenario: Scenario | Family, episodes: int, game: Game, found: Mapping[Key, Played]
+) -> Plays:
     """Play the same worlds with every policy of a contender, but for those that are ``found`` already.
 
     Raises:
@@ -67,7 +69,7 @@ def play(contender: Contender, scenario: Scenario, episodes: int, game: Game, fo
 
 @contextmanager
 def played_on_ray(
-    contenders: Sequence[tuple[Contender, Scenario, int]],
+    contenders: Sequence[tuple[Contender, Scenario | Family, int]],
     game: Game,
     ray: bool | str,
     progress: Callable[[int, int], object],
@@ -113,7 +115,7 @@ def replay(contender: Contender, member: int, scenario: Scenario, world: int, ga
     return found
 
 
-def _evaluate(policy: str | Policy, scenario: Scenario, episodes: int, game: Game) -> Results:
+def _evaluate(policy: str | Policy, scenario: Scenario | Family, episodes: int, game: Game) -> Results:
     with played_errors():
         return evaluate(policy, scenario, episodes, game.seed, progress=False, **game.options)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from posse import Scenario
+from posse import Family, Scenario
 from posse_training.evaluation.results import Results
 
 
@@ -19,8 +19,8 @@ class Plays:
     results: tuple[Results, ...]
 
     @property
-    def scenario(self) -> Scenario:
-        """The scenario."""
+    def scenario(self) -> Scenario | Family:
+        """The scenario or family."""
         return self.results[0].scenario
 
     def __getitem__(self, metric: str) -> npt.NDArray[np.float64]:

@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse import Scenario
+from posse import Family, Scenario
+from posse.scenarios.family import blocks
 from posse_baselines import Played, Policy, Target, rollout
 from posse_training.errors import TimeLimitError, TrainedSplitError
 from posse_training.evaluation.results import Column
+from posse_training.parallel import joined
 
 
 def refuse_trained_split(policy: Policy | Target, split: str) -> None:
@@ -43,7 +45,7 @@ def limited(advance: Callable[[int], object], time_limit: float | None) -> Calla
 
 def play_shard(
     policy: Policy,
-    scenario: Scenario,
+    scenario: Scenario | Family,
     seed: int,
     split: str,
     num_threads: int | None,
@@ -51,8 +53,11 @@ def play_shard(
     shard: range,
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
-    batch = posse.Batch(scenario, len(shard), seed=seed, split=split, first_world=shard.start, num_threads=num_threads)
-    return play_episode(batch, policy, advance)
+    played = []
+    for one, worlds in blocks(scenario, shard, seed, split):
+        batch = posse.Batch(one, len(worlds), seed=seed, split=split, first_world=worlds.start, num_threads=num_threads)
+        played.append(play_episode(batch, policy, advance))
+    return joined(played)
 
 
 def play_episode(

@@ -15,7 +15,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import posse
-from posse import Scenario, ScenarioError, get_scenario
+from posse import Family, Scenario, ScenarioError
+from posse.scenarios.family import blocks, scenario_or_family
 from posse_baselines import Policy, PolicyError, Target, against, load, load_target, policy_names
 from posse_baselines.registry import is_code
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, TrainedSplitError, describe
@@ -29,7 +30,7 @@ WORLDS: Final = 500
 
 def evaluate(
     policy: str | Policy,
-    scenario: str | Scenario,
+    scenario: str | Scenario | Family,
     episodes: int = 1000,
     seed: int = 7,
     *,
@@ -46,7 +47,8 @@ def evaluate(
 
     Args:
         policy: A policy, or an argument of :func:`posse_baselines.load`.
-        scenario: A scenario or its name.
+        scenario: A scenario, a family (:func:`posse.family`), or the name of one; ten worlds in a row of a family
+            play the same drawn scenario.
         episodes: Number of episodes; episode i is world i of the seed.
         seed: Seed of the worlds.
         target: A target, or an argument of :func:`posse_baselines.load_target`; default: the
@@ -72,11 +74,11 @@ def evaluate(
         ClusterError: There is no such cluster, or one of its nodes has other versions.
         PlayError: The policy failed on the cluster, or its workers died again and again.
     """
-    given = get_scenario(scenario, **overrides)
+    given = scenario_or_family(scenario, **overrides)
     one = prepare(policy, given, episodes, seed, target=target, split=split, time_limit=time_limit, worlds=worlds)
-    settings, total = one.scenario, len(one.shards) * one.scenario.horizon
+    settings = one.scenario
     with progress_bar(disable=progress is not True) as bar:
-        task = bar.add_task(escape(f"{one.policy.name} on {settings.name}"), total=total)
+        task = bar.add_task(escape(f"{one.policy.name} on {settings.name}"), total=one.steps)
 
         def advance(steps: int) -> None:
             bar.advance(task, steps)
@@ -86,7 +88,7 @@ def evaluate(
             report = limited(report, time_limit)
             played = (settings, seed, split, num_threads, report)
             return one.results(joined([play_shard(one.policy, *played, shard) for shard in one.shards]))
-        with gathered_results([one], ray, lambda: report(settings.horizon)) as (found,):
+        with gathered_results([one], ray, lambda: report(one.steps // len(one.shards))) as (found,):
             if isinstance(found, Exception):
                 raise found
             return found
@@ -99,7 +101,7 @@ class Evaluation:
     policy: Policy
     sent: str | Policy
     """What a worker of a cluster gets: a name that it can load itself, else the policy."""
-    scenario: Scenario
+    scenario: Scenario | Family
     shards: Sequence[range]
     seed: int
     split: str
@@ -111,6 +113,12 @@ class Evaluation:
         """The evaluation for a cluster."""
         return Job(_play_on_worker, (self.sent, self.scenario, self.seed, self.split, self.time_limit), self.shards)
 
+    @property
+    def steps(self) -> int:
+        """Control steps of all batches."""
+        parts = (blocks(self.scenario, shard, self.seed, self.split) for shard in self.shards)
+        return self.scenario.horizon * sum(1 for part in parts for _ in part)
+
     def results(self, columns: Arrays) -> Results:
         """Return the results, given the metrics of all worlds."""
         named = None if self.target is None else self.target.name
@@ -119,7 +127,7 @@ class Evaluation:
 
 def prepare(
     policy: str | Policy,
-    scenario: Scenario,
+    scenario: Scenario | Family,
     episodes: int,
     seed: int,
     *,
@@ -138,7 +146,8 @@ def prepare(
         scenario, loaded = opponent.fit(scenario), against(loaded, opponent)
     refuse_trained_split(loaded, split)
     scenario = scenario.replace(message_size=max(scenario.message_size, loaded.message_size))
-    posse.Batch(scenario, 1, seed=seed, split=split)  # raises here what is invalid
+    first, _ = next(blocks(scenario, range(1), 0, "train"))
+    posse.Batch(first, 1, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
     sent = policy if is_name and opponent is None else loaded
     return Evaluation(loaded, sent, scenario, cut(episodes, worlds), seed, split, opponent, time_limit)
@@ -159,7 +168,7 @@ def gathered_results(
 
 
 def _play_on_worker(
-    policy: str | Policy, scenario: Scenario, seed: int, split: str, time_limit: float | None, shard: range
+    policy: str | Policy, scenario: Scenario | Family, seed: int, split: str, time_limit: float | None, shard: range
 ) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
     if isinstance(policy, str) and is_code(policy) and time_limit is not None:
@@ -169,7 +178,7 @@ def _play_on_worker(
 
 
 def _play_here(
-    policy: str | Policy, scenario: Scenario, seed: int, split: str, time_limit: float | None, shard: range
+    policy: str | Policy, scenario: Scenario | Family, seed: int, split: str, time_limit: float | None, shard: range
 ) -> Arrays:
     with played_errors():
         loaded = load(policy) if isinstance(policy, str) else policy

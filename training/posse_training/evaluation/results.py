@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from posse import Scenario
+from posse import Family, Scenario
 from posse_baselines.files import write_atomically
 from posse_training.evaluation.statistics import Estimate, mean
 
@@ -25,7 +25,7 @@ class Results:
 
     Attributes:
         policy: The policy's name.
-        scenario: The scenario with all its settings.
+        scenario: The scenario or family with all its settings.
         seed: Seed of the worlds.
         split: Split of the worlds.
         columns: Every metric by name, (episodes,) float64; ``nan`` means "never".
@@ -33,7 +33,7 @@ class Results:
     """
 
     policy: str
-    scenario: Scenario
+    scenario: Scenario | Family
     seed: int
     split: str
     columns: dict[str, Column] = field(repr=False)

@@ -57,11 +57,10 @@ def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
 
 def make_card(settings: TrainSettings, *, steps: int, curve: list[dict[str, float]]) -> dict[str, Any]:
     """Return a policy's card: its training scenarios, settings, software and scores."""
-    scenarios = settings.scenarios
     return {
         "name": settings.name,
         "side": settings.side,
-        "scenarios": [scenario.to_dict() for scenario in scenarios],
+        "scenarios": [scenario.to_dict() for scenario in settings.given],
         "trained_splits": ["train"],
         "chosen_on": "validation",
         "message_size": settings.message_size,

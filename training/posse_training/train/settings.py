@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
 
-from posse import Scenario, ScenarioError, get_scenario
+from posse import Family, Scenario, ScenarioError
+from posse.scenarios.family import scenario_or_family
 from posse_baselines import PolicyError, load
 from posse_baselines.fields import check, number, optional
 from posse_training.errors import SettingsError
@@ -59,6 +60,8 @@ class TrainSettings:
     # The worlds
     num_worlds: int = number(256, "", 1, 10**6)
     """Worlds stepped together, over all scenarios and team sizes."""
+    family_scenarios: int = number(32, "", 1, 10**5)
+    """Drawn scenarios of a family that are trained on, each in a share of the worlds."""
     team_sizes: tuple[int, ...] = ()
     """Numbers of trackers to train with; default: the scenario's own."""
     num_neighbours: int | None = optional(0, 4096, whole=True)
@@ -153,7 +156,20 @@ class TrainSettings:
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
-        """Every scenario and team size to train on, with messages and reward weights set."""
+        """Every scenario and team size to train on, and the drawn scenarios of families."""
+        return tuple(
+            one
+            for given in self.given
+            for one in (
+                [given.draw(k, self.seed) for k in range(self.family_scenarios)]
+                if isinstance(given, Family)
+                else [given]
+            )
+        )
+
+    @property
+    def given(self) -> tuple[Scenario | Family, ...]:
+        """Every scenario or family and team size, with messages and reward weights set."""
         overrides: dict[str, Any] = {**self.overrides, "message_size": self.message_size}
         if self.advise is not None:
             overrides["message_size"] = load(self.advise).message_size
@@ -164,7 +180,7 @@ class TrainSettings:
         for name in self.scenario.split(","):
             for size in self.team_sizes or (None,):
                 team: dict[str, Any] = {} if size is None else {"num_trackers": size}
-                found.append(get_scenario(name.strip(), **overrides, **team))
+                found.append(scenario_or_family(name.strip(), **overrides, **team))
         return tuple(found)
 
     @property

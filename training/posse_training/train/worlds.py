@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import posse
-from posse import ObservationLayout, Scenario
+from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
 from posse_baselines.learned.advice import Adviser, Advising, check_adviser
@@ -20,7 +20,7 @@ TARGET = "target"
 class Pairing(NamedTuple):
     """A scenario and an opponent."""
 
-    scenario: Scenario
+    scenario: Scenario | Family
     """With the opponent's target, or messages."""
     opponent: Policy | Target | None
     """A team's policy where the target learns, else a target; ``None``: the scenario's own target."""
@@ -51,7 +51,7 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
         PolicyError: An unknown opponent, or one that does not move the other side.
     """
     found: list[Pairing] = []
-    for scenario in settings.scenarios:
+    for scenario in settings.given:
         if settings.against is None:
             found.append(Pairing(scenario, None))
         for name, share in opponents_of(settings.against).items():
@@ -110,7 +110,7 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
         raise SettingsError(
             f"num_worlds={settings.num_worlds} is less than one for each of {len(pairs)} scenarios and opponents"
         )
-    batches = []
+    batches: list[posse.Batch] = []
     for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
         scenario, inside = pair.scenario, dict[str, Any]()
         if settings.end_on_contact:
@@ -119,16 +119,15 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
             inside = {"team_policy": pair.opponent}
         elif isinstance(pair.opponent, Target) and pair.opponent.policy is not None:
             inside = {"target_policy": pair.opponent.policy}
-        batches.append(
-            posse.batch(
-                scenario,
-                last - first,
-                seed=settings.seed,
-                first_world=first,
-                autoreset="disabled",
-                num_threads=num_threads,
-                **inside,
-            )
+        batches += posse.batches(
+            scenario,
+            last - first,
+            scenarios=settings.family_scenarios,
+            seed=settings.seed,
+            first_world=first,
+            autoreset="disabled",
+            num_threads=num_threads,
+            **inside,
         )
     return batches
 

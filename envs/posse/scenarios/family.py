@@ -1,0 +1,228 @@
+"""Families: scenarios that differ in some settings, each drawn from its range."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from posse.registry import unknown
+from posse.scenarios.named import SCENARIOS, get_scenario
+from posse.scenarios.scenario import Scenario
+from posse.scenarios.setting import ScenarioError, UnknownSettingError, fail
+
+Range = tuple[float, float]
+"""Least and greatest value of a setting, both included."""
+
+BLOCK: Final = 10
+"""Worlds in a row of the same drawn scenario: world i of a family plays scenario i // BLOCK."""
+_FIXED: Final = {
+    "version": "which numbers a behaviour",
+    "control_step": "which policies are made for",
+    "physics_step": "which policies are made for",
+    "horizon": "since episodes of a family have one length",
+    "sonar_beams": "on which the length of an observation depends",
+    "num_neighbours": "on which the length of an observation depends",
+    "message_size": "on which the length of an observation depends",
+}
+_MOST_CORNERS: Final = 1024
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """Scenarios that are equal but for some settings, each drawn uniformly from its range.
+
+    Made by :func:`posse.family`; accepted wherever worlds of several scenarios can be played: ``posse.batches``,
+    ``gymnasium.make_vec``, and the commands and functions to train, tune, evaluate and compare.
+
+    Attributes:
+        name: Its name in results.
+        base: The scenario that gives all other settings. The drawn ones have its name and version, so that a policy
+            plays the settings that were tuned for it.
+        ranges: Settings and their ranges; whole numbers where the setting is one.
+    """
+
+    name: str
+    base: Scenario
+    ranges: tuple[tuple[str, Range], ...]
+    meaning: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.ranges:
+            raise ScenarioError(f"family {self.name!r} has no ranges: give one, such as target_speed=(0.3, 0.7)")
+        for name, bounds in self.ranges:
+            _check_range(name, bounds)
+        varied = dict(self.ranges)
+        if "num_trackers" in varied and self.base.num_neighbours is None:
+            fail(
+                "num_trackers",
+                varied["num_trackers"],
+                "team sizes of a family need num_neighbours, so that all observations have one length",
+            )
+        corners = itertools.product(*(dict.fromkeys(bounds) for _, bounds in self.ranges))
+        for values in itertools.islice(corners, _MOST_CORNERS):
+            self.base.replace(**dict(zip(varied, values, strict=True)))  # raises what cannot hold
+
+    @property
+    def version(self) -> int:
+        """Version of the base."""
+        return self.base.version
+
+    @property
+    def horizon(self) -> int:
+        """Control steps of an episode."""
+        return self.base.horizon
+
+    @property
+    def message_size(self) -> int:
+        """Numbers of a message."""
+        return self.base.message_size
+
+    def draw(self, index: int, seed: int = 0, split: str = "train") -> Scenario:
+        """Return a scenario of the family; it depends on nothing but index, seed and split.
+
+        Raises:
+            ScenarioError: An index below 0.
+        """
+        if index < 0:
+            fail("index", index, "it must be at least 0")
+        shares = np.random.default_rng([seed, *split.encode(), index]).random(len(self.ranges))
+        values = {
+            name: _within(bounds, float(share)) for (name, bounds), share in zip(self.ranges, shares, strict=True)
+        }
+        return self.base.replace(**values)
+
+    def replace(self, **changes: Any) -> Family:
+        """Return a family with settings changed: a varied one gets another range or one value, any other one value.
+
+        Raises:
+            ScenarioError: An unknown or invalid setting.
+        """
+        ranges = dict(self.ranges)
+        for name in [name for name in changes if name in ranges]:
+            if isinstance(changes[name], (tuple, list)):
+                ranges[name] = _range(name, changes.pop(name))
+            else:
+                del ranges[name]
+        return dataclasses.replace(self, base=self.base.replace(**changes), ranges=tuple(ranges.items()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return name, ranges and the settings of the base as plain values."""
+        ranges = {name: list(bounds) for name, bounds in self.ranges}
+        return {"family": self.name, "ranges": ranges, **self.base.to_dict()}
+
+
+def _range(name: str, bounds: Any) -> Range:
+    if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
+        fail(name, bounds, "a range must be two numbers, (least, greatest)")
+    return tuple(bounds)
+
+
+def _check_range(name: str, bounds: Range) -> None:
+    known = Scenario.settings()
+    if name not in known:
+        raise UnknownSettingError(unknown("setting", name, known))
+    if name in _FIXED:
+        fail(name, bounds, f"a family cannot vary {name}, {_FIXED[name]}: set it on its base")
+    if "int" not in known[name].kind and not known[name].kind.startswith("float"):
+        fail(name, bounds, "a family varies settings that are one number")
+    for value in bounds:
+        known[name].accept(name, value)
+    if bounds[0] > bounds[1]:
+        fail(name, bounds, "the least must not be above the greatest")
+
+
+def _within(bounds: Range, share: float) -> float:
+    """Return the value of a range at a share of it; a whole number between whole numbers."""
+    low, high = bounds
+    if isinstance(low, int) and isinstance(high, int):
+        return low + int(share * (high - low + 1))
+    return low + share * (high - low)
+
+
+def family(base: str | Scenario | Family, /, *, name: str | None = None, **settings: Any) -> Family:
+    """Return a family: ``posse.family("smart", target_speed=(0.3, 0.7), num_obstacles=(0, 6))``.
+
+    A setting given as two numbers is drawn from that range, both included: whole numbers where both are. Any other
+    value is set for all.
+
+    Args:
+        base: A scenario or its name; or a family or its name, whose settings are changed.
+        name: Its name in results; default: that of the base and the varied settings.
+        settings: Ranges and values.
+
+    Raises:
+        ScenarioError: An unknown or invalid setting, an empty range, one whose ends do not go together with the other
+            settings, team sizes without ``num_neighbours``, or a setting that a family cannot vary.
+    """
+    if isinstance(base, str) and base in FAMILIES:
+        base = _named_family(base)
+    if isinstance(base, Family):
+        changed = base.replace(**settings) if settings else base
+        return changed if name is None else dataclasses.replace(changed, name=name)
+    kinds = Scenario.settings()
+    whole_tuple = {n for n in settings if n in kinds and kinds[n].kind.startswith("tuple")}
+    ranges = {n: _range(n, v) for n, v in settings.items() if isinstance(v, (tuple, list)) and n not in whole_tuple}
+    rest = {n: v for n, v in settings.items() if n not in ranges}
+    scenario = get_scenario(base, **rest)
+    given = name or "-".join([scenario.name, "family", *ranges])
+    return Family(name=given, base=scenario, ranges=tuple(ranges.items()))
+
+
+FAMILIES: Final[dict[str, dict[str, Any]]] = {
+    "family-open": {
+        "base": "smart",
+        "meaning": "The open plane of smart, with slow and fast, agile and clumsy targets and trackers.",
+        "target_speed": (0.4, 0.7),
+        "target_turn_rate": (1.0, 2.5),
+        "tracker_turn_rate": (1.0, 2.0),
+    },
+    "family-arena": {
+        "base": "obstacles",
+        "meaning": "Arenas of many sizes with none to eight obstacles, and targets of many speeds.",
+        "arena": (18.0, 28.0),
+        "num_obstacles": (0, 8),
+        "target_speed": (0.3, 0.6),
+    },
+}
+"""Named families: base, sentence, ranges."""
+
+
+def family_names() -> tuple[str, ...]:
+    """Return the names of all families."""
+    return tuple(FAMILIES)
+
+
+def _named_family(name: str) -> Family:
+    settings = dict(FAMILIES[name])
+    base, meaning = settings.pop("base"), settings.pop("meaning")
+    return dataclasses.replace(family(base, name=name, **settings), meaning=meaning)
+
+
+def scenario_or_family(given: str | Scenario | Family, **overrides: Any) -> Scenario | Family:
+    """Return a scenario or a family, given it or its name, with settings changed.
+
+    Raises:
+        ScenarioError: An unknown name, or an unknown or invalid setting.
+    """
+    if isinstance(given, Family) or (isinstance(given, str) and given in FAMILIES):
+        return family(given, **overrides)
+    if isinstance(given, str) and given not in SCENARIOS:
+        raise ScenarioError(unknown("scenario", given, [*SCENARIOS, *FAMILIES]))
+    return get_scenario(given, **overrides)
+
+
+def blocks(given: Scenario | Family, worlds: range, seed: int, split: str) -> Iterator[tuple[Scenario, range]]:
+    """Yield the scenario of each block of worlds: of a scenario one block, of a family its drawn scenarios."""
+    if isinstance(given, Scenario):
+        yield given, worlds
+        return
+    first = worlds.start
+    while first < worlds.stop:
+        end = min((first // BLOCK + 1) * BLOCK, worlds.stop)
+        yield given.draw(first // BLOCK, seed, split), range(first, end)
+        first = end

@@ -1,0 +1,142 @@
+"""Families of scenarios: what is drawn, what is refused, and all that plays them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import posse
+from posse import ScenarioError
+from posse_training import evaluate
+
+SHORT = {"horizon": 40, "settle_time": 1.0}
+OPEN = posse.family("smart", target_speed=(0.3, 0.7), tracker_turn_rate=(1.0, 2.0), **SHORT)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 10**6), st.integers(0, 10**6), st.sampled_from(["train", "validation", "test"]))
+def test_a_draw_is_in_its_ranges_and_depends_on_nothing_else(index: int, seed: int, split: str) -> None:
+    family = posse.family("obstacles", num_obstacles=(0, 3), target_speed=(0.3, 0.5))
+    drawn = family.draw(index, seed, split)
+    assert drawn == family.draw(index, seed, split)
+    assert drawn.num_obstacles in range(4)
+    assert 0.3 <= drawn.target_speed <= 0.5
+    assert (
+        drawn.replace(num_obstacles=8, target_speed=0.6).to_dict()
+        == posse.get_scenario("obstacles", target_speed=0.6).to_dict()
+    )
+
+
+def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
+    speeds = np.array([OPEN.draw(k).target_speed for k in range(400)])
+    assert abs(speeds.mean() - 0.5) < 0.02
+    assert speeds.min() < 0.31
+    assert speeds.max() > 0.69
+    counts = [posse.family("obstacles", num_obstacles=(0, 3)).draw(k).num_obstacles for k in range(200)]
+    assert set(counts) == {0, 1, 2, 3}
+    assert len({OPEN.draw(0, seed, split).target_speed for seed in (0, 1) for split in ("train", "test")}) == 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({}, "has no ranges"),
+        ({"speed": (0, 1)}, "unknown setting 'speed'"),
+        ({"target_speed": (0.7, 0.3)}, "least must not be above the greatest"),
+        ({"target_speed": (0.3, 0.4, 0.5)}, "two numbers"),
+        ({"target_speed": (0.3, 2.0)}, "below tracker_speed"),
+        ({"target_speed": (-1, 0.5)}, "target_speed=-1"),
+        ({"num_trackers": (3, 5)}, "need num_neighbours"),
+        ({"horizon": (100, 200)}, "cannot vary horizon"),
+        ({"target_motion": ("smart", "constant")}, "one number"),
+        ({"num_obstacles": (0, 1.5)}, "whole number"),
+    ],
+)
+def test_what_cannot_hold_is_refused(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        posse.family("smart", **changes)
+
+
+def test_results_do_not_depend_on_how_worlds_are_cut() -> None:
+    whole = evaluate("ddcs-distributed", OPEN, 25, 3, progress=False)
+    parts = evaluate("ddcs-distributed", OPEN, 25, 3, progress=False, worlds=7)
+    for name, column in whole.columns.items():
+        np.testing.assert_array_equal(column, parts[name], name)
+    alone = evaluate("ddcs-distributed", OPEN.draw(1, 3, "test"), 20, 3, progress=False)
+    np.testing.assert_array_equal(whole["score"][10:20], alone["score"][10:20], "worlds 10 to 19 play scenario 1")
+
+
+def test_a_named_family_is_played_by_name() -> None:
+    for name in posse.family_names():
+        found = evaluate("ddcs-tuned", name, 12, progress=False, **SHORT)
+        assert found.episodes == 12
+        assert found.scenario.name == name
+        assert found.scenario.to_dict()["ranges"]
+
+
+def test_other_ranges_are_drawn_from_for_a_test() -> None:
+    outside = OPEN.replace(target_speed=(0.75, 0.9))
+    assert {0.75 <= outside.draw(k).target_speed <= 0.9 for k in range(20)} == {True}
+    fixed = OPEN.replace(target_speed=0.5)
+    assert {fixed.draw(k).target_speed for k in range(5)} == {0.5}
+    assert [name for name, _ in fixed.ranges] == ["tracker_turn_rate"]
+
+
+@pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
+def test_a_vector_environment_holds_worlds_of_all(autoreset: str) -> None:
+    env = gym.make_vec("posse/Solo-v0", num_envs=20, scenario=OPEN, autoreset=autoreset)
+    observations, infos = env.reset(seed=1)
+    assert observations in env.observation_space
+    assert infos["score"].shape == (20,)
+    env.action_space.seed(0)
+    for _ in range(OPEN.horizon):
+        observations, rewards, _, truncated, infos = env.step(env.action_space.sample())
+        assert rewards.shape == (20,)
+    assert truncated.all()
+    assert infos["final_obs" if autoreset == "same_step" else "score"].shape == (20,)
+    if autoreset == "disabled":
+        mask = np.arange(20) % 2 == 0
+        assert env.reset(options={"reset_mask": mask})[0].shape == observations.shape
+    env.close()
+
+
+def test_teams_of_many_sizes_stand_side_by_side() -> None:
+    sizes = posse.family("smart", num_trackers=(3, 7), num_neighbours=2, **SHORT)
+    batches = posse.batches(sizes, 64)
+    assert sum(batch.num_worlds for batch in batches) == 64
+    assert {batch.scenario.num_trackers for batch in batches} == {3, 4, 5, 6, 7}
+    assert {batch.layout.size for batch in batches} == {batches[0].layout.size}
+    env = gym.make_vec("posse/Solo-v0", num_envs=8, scenario=sizes)
+    assert env.reset(seed=0)[0].shape == (8, batches[0].layout.size)
+    with pytest.raises(ScenarioError, match="observations of one length"):
+        gym.make_vec("posse/Team-v0", num_envs=8, scenario=sizes)
+
+
+def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3")
+    from posse_training.train.settings import TrainSettings
+    from posse_training.train.train import train
+    from posse_training.tune import TuneSettings, tune
+
+    small = {"num_worlds": 4, "family_scenarios": 3, "rollout": 8, "minibatch": 32, "evaluate_worlds": 4}
+    train(TrainSettings(scenario="family-open", steps=200, folder=tmp_path / "run", overrides=SHORT, **small))
+    found = evaluate(str(tmp_path / "run/best.safetensors"), "family-open", 4, progress=False, **SHORT)
+    assert found.episodes == 4
+    path = tune(
+        TuneSettings(
+            policy="ddcs-distributed",
+            scenario="family-open",
+            generations=1,
+            population=4,
+            worlds=2,
+            validation_worlds=2,
+            only=("gain",),
+            out=tmp_path / "tuned",
+        )
+    )
+    assert path.is_file()
