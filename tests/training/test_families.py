@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +15,7 @@ import posse
 from posse import ScenarioError
 from posse_training import evaluate
 
-SHORT = {"horizon": 40, "settle_time": 1.0}
+SHORT: dict[str, Any] = {"horizon": 40, "settle_time": 1.0}
 OPEN = posse.family("smart", target_speed=(0.3, 0.7), tracker_turn_rate=(1.0, 2.0), **SHORT)
 
 
@@ -57,7 +58,7 @@ def test_draws_fill_the_ranges_and_differ_by_seed_and_split() -> None:
         ({"num_obstacles": (0, 1.5)}, "whole number"),
     ],
 )
-def test_what_cannot_hold_is_refused(changes: dict[str, object], message: str) -> None:
+def test_what_cannot_hold_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         posse.family("smart", **changes)
 
@@ -123,7 +124,7 @@ def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
     from posse_training.train.train import train
     from posse_training.tune import TuneSettings, tune
 
-    small = {"num_worlds": 4, "family_scenarios": 3, "rollout": 8, "minibatch": 32, "evaluate_worlds": 4}
+    small: dict[str, Any] = {"num_worlds": 4, "family_scenarios": 3, "rollout": 8, "minibatch": 32, "evaluate_worlds": 4}
     train(TrainSettings(scenario="family-open", steps=200, folder=tmp_path / "run", overrides=SHORT, **small))
     found = evaluate(str(tmp_path / "run/best.safetensors"), "family-open", 4, progress=False, **SHORT)
     assert found.episodes == 4
