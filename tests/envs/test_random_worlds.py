@@ -43,7 +43,7 @@ SETTINGS = st.fixed_dictionaries(
         "target_motion": some(*TARGET_MOTIONS),
         "target_speed": st.floats(0.0, 0.69),
         "physics_step": some(0.02, 0.05, 0.1),
-        "arena": st.floats(8.0, 20.0),
+        "arena": st.floats(8.0, 20.0) | st.tuples(st.floats(8.0, 20.0), st.floats(8.0, 20.0)),
         "num_obstacles": st.integers(0, 6),
         "sensing_range": some(math.inf, 2.0, 5.0),
         "field_of_view": st.floats(0.5, 6.28),

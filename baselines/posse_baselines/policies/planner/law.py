@@ -238,7 +238,7 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
         if dot(way, way) < (NEAR + reach) * (NEAR + reach):
             count = put_disc(discs, count, way, 0j, reach, _MARGIN)
     if c.walled:
-        count = put_walls(discs, count, complex(t.x, t.y), c.half_arena, c.robot_radius, _MARGIN)
+        count = put_walls(discs, count, c, complex(t.x, t.y), c.robot_radius, _MARGIN)
     return count
 
 
