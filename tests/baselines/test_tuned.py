@@ -20,7 +20,7 @@ FILES = [(name, path) for name in TUNED for path in tuned_files(name).values()]
 IDS = [f"{name}-{path.stem}" for name, path in FILES]
 SHIPPED = {
     "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field", "duel", "robots"},
-    "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss"},
+    "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss", "robots"},
 }
 
 
