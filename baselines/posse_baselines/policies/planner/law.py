@@ -295,6 +295,9 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         body.max_speed, body.max_omega = t.max_speed, t.max_turn_rate
         velocity, _ = safe_velocity(body, discs, velocity, work.plays)
         v, omega = regulate(body, velocity, 0.0)
+        if c.actuator_lag > 0.0:  # command what the lag leaves of it
+            more = 1.0 / (1.0 - math.exp(-body.dt / c.actuator_lag)) - 1.0
+            v, omega = v + more * (v - body.speed), omega + more * (omega - body.omega)
         write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
 
 
