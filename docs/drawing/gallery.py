@@ -30,6 +30,7 @@ SHOWN: Final = {
     "leader-loss": ("pngl-l-phi", 20.0),
     "field": ("learned-field", 26.0),
     "duel": ("learned-smart", 18.0),
+    "robots": ("ddcs-distributed", 57.0),
 }
 """The team on each scenario, and after how many seconds."""
 

@@ -29,6 +29,7 @@ SUMMARY: Final = {
     "leader-loss": "the only one that sees the target breaks",
     "field": "all of it at once, with noise",
     "duel": "a target that may have learned to escape",
+    "robots": "TurtleBots: poses drift, commands act late",
 }
 
 

@@ -54,6 +54,7 @@ class FieldDeclaration(Declaration):
     low: Bound
     high: Bound
     unknown: float | None
+    when: Callable[[Any], bool] | None = None
 
     def __post_init__(self) -> None:
         """Raise DeclarationError if the size is invalid."""
@@ -80,7 +81,15 @@ class FieldDeclaration(Declaration):
         return Field(self.name, self.size, self.unit, low, high, self.meaning, self.unknown, self.of_mate)
 
 
-def field(unit: str, low: Bound, high: Bound, unknown: float | None = None, *, size: int = 1) -> Decorator:
+def field(
+    unit: str,
+    low: Bound,
+    high: Bound,
+    unknown: float | None = None,
+    *,
+    size: int = 1,
+    when: Callable[[Any], bool] | None = None,
+) -> Decorator:
     """Declare a function as an observation field of its name; its docstring is the meaning.
 
     The parameters of the function determine the field's subject:
@@ -100,8 +109,9 @@ def field(unit: str, low: Bound, high: Bound, unknown: float | None = None, *, s
         high: The greatest, likewise.
         unknown: The value for "unknown"; also in empty places of team-mates (default there: 0).
         size: Number of values that the function returns, at most 256; as a tuple if more than one.
+        when: A function (scenario) -> whether its observation has the field; default: always.
     """
-    return FIELDS.decorator(unit, unit=unit, low=low, high=high, unknown=unknown, size=size)
+    return FIELDS.decorator(unit, unit=unit, low=low, high=high, unknown=unknown, size=size, when=when)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -325,3 +335,9 @@ METRICS: Final = Registry(Metric)
 REWARD_TERMS: Final = Registry(RewardTerm)
 SENSORS: Final = Registry(Sensor)
 TARGET_MOTIONS: Final = Registry(TargetMotion)
+
+
+def fields_of(scenario: Any) -> tuple[FieldDeclaration, ...]:
+    """Return the observation fields of a scenario, except sonar and messages, in order."""
+    declared = FIELDS.with_added(*scenario.extra_fields)
+    return tuple(field for field in declared if field.when is None or field.when(scenario))

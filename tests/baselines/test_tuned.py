@@ -19,8 +19,8 @@ from posse_training import evaluate
 FILES = [(name, path) for name in TUNED for path in tuned_files(name).values()]
 IDS = [f"{name}-{path.stem}" for name, path in FILES]
 SHIPPED = {
-    "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field", "duel"},
-    "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss"},
+    "ddcs-tuned": {"smart", "radio", "leader-loss", "search", "obstacles", "field", "duel", "robots"},
+    "pngl-l-phi-tuned": {"constant", "accelerating", "smart", "leader-loss", "robots"},
 }
 
 

@@ -13,7 +13,7 @@ from tests.support.reference.motion import free_gaps, free_motion, path_gaps
 from tests.support.reference.observation import observation
 from tests.support.reference.score import Episode
 from tests.support.reference.senses import Senses
-from tests.support.reference.state import State, headings, one_world, positions, snapshot
+from tests.support.reference.state import NAMES, State, headings, one_world, positions, snapshot
 
 import posse
 from posse.declarations import TARGET_MOTIONS
@@ -43,7 +43,7 @@ SETTINGS = st.fixed_dictionaries(
         "target_motion": some(*TARGET_MOTIONS),
         "target_speed": st.floats(0.0, 0.69),
         "physics_step": some(0.02, 0.05, 0.1),
-        "arena": st.floats(8.0, 20.0),
+        "arena": st.floats(8.0, 20.0) | st.tuples(st.floats(8.0, 20.0), st.floats(8.0, 20.0)),
         "num_obstacles": st.integers(0, 6),
         "sensing_range": some(math.inf, 2.0, 5.0),
         "field_of_view": st.floats(0.5, 6.28),
@@ -86,7 +86,7 @@ def judge_motion(s: posse.Scenario, before: State, after: State, actions: npt.ND
 
 
 @settings(derandomize=True, database=None, deadline=None, max_examples=60)
-@given(name=some(*posse.scenario_names()), changes=SETTINGS, seed=st.integers(0, 2**63 - 1), chase=st.booleans())
+@given(name=some(*NAMES), changes=SETTINGS, seed=st.integers(0, 2**63 - 1), chase=st.booleans())
 def test_a_world_goes_as_an_independent_computation_says(
     name: str, changes: dict[str, Any], seed: int, chase: bool
 ) -> None:

@@ -26,7 +26,7 @@ with warnings.catch_warnings():
 Settings = dict[str, Any]
 VARIANTS: dict[str, Settings] = {
     **{name: {"scenario": name} for name in posse.scenario_names()},
-    "discrete actions": {"scenario": "obstacles", "discrete_actions": True},
+    "discrete actions, a rectangle": {"scenario": "obstacles", "discrete_actions": True, "arena": (26.0, 16.0)},
     "one tracker": {"scenario": "constant", "num_trackers": 1},
     "messages": {"scenario": "field", "message_size": 2},
     "the target an agent": {"scenario": "smart", "target": "agent"},

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
@@ -32,9 +30,8 @@ def depth(batch: posse.Batch) -> Floats:
     apart = np.abs(robots[:, :, None] - robots[:, None, :])
     apart[:, np.arange(s.num_trackers + 1), np.arange(s.num_trackers + 1)] = np.inf
     deepest = 2 * s.robot_radius - apart.min(axis=(1, 2))
-    if math.isfinite(s.arena):
-        reach = np.maximum(np.abs(robots.real), np.abs(robots.imag)).max(axis=1)
-        deepest = np.maximum(deepest, reach + s.robot_radius - s.arena / 2)
+    for half, at in zip(s.half_sides, (robots.real, robots.imag), strict=True):
+        deepest = np.maximum(deepest, np.abs(at).max(axis=1) + s.robot_radius - half)
     if s.num_obstacles:
         apart = np.abs(robots[:, :, None] - points(batch, "obstacle")[:, None, :])
         widths = batch.state["obstacle_radius"].astype(np.float64)[:, None, :] + s.robot_radius

@@ -118,9 +118,10 @@ def _write_mates(team: Team, me: Record, mates: Records, out: FloatArray) -> Non
 def _write_looks(team: Team, me: Record, seen: npt.NDArray[np.uint16], out: FloatArray) -> None:
     """Write how long ago the team covered the places around; 0 beyond the area."""
     world = team.world
-    scale = GRID / (2.0 * world.area)
+    scale_x, scale_y = GRID / (2.0 * world.area_x), GRID / (2.0 * world.area_y)
     for k in range(LOOKS):
         there = me.position + scaled(vector(1.0, 2.0 * math.pi * k / LOOKS) * me.heading, world.sight) - me.area
-        i, j = math.floor((there.real + world.area) * scale), math.floor((there.imag + world.area) * scale)
+        i = math.floor((there.real + world.area_x) * scale_x)
+        j = math.floor((there.imag + world.area_y) * scale_y)
         if 0 <= i < GRID and 0 <= j < GRID:
             out[k] = age_of(team, me, seen, i, j, False) / team.settings.stale_after

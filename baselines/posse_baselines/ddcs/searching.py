@@ -14,6 +14,8 @@ from posse_baselines.ddcs.monitoring import is_there, mate_now, silence
 from posse_baselines.laws.geometry import clip, dot, length, scaled
 
 _LOOK_TIME: Final = 0.5  # s; between two updates of the map; least time between two goals
+_OFF_WALL: Final = 1.5  # m; of a goal
+_SWATH: Final = 0.7  # times the range of sight, to either side of a goal
 _LOST_SLOPE: Final = 0.3  # what a cell near a lost target is worth less per metre from its predicted position
 
 
@@ -22,15 +24,16 @@ def mark_seen(team: Team, me: Record, seen: npt.NDArray[np.uint16], position: co
     """Mark the cells of a map (GRID²,) covered by a tracker as covered now."""
     world = team.world
     # In cells from the map's corner; the centre of cell i is at i + 0.5.
-    scale = GRID / (2.0 * world.area)
-    x, y = (position.real - me.area.real + world.area) * scale, (position.imag - me.area.imag + world.area) * scale
-    reach = world.sight * scale
+    scale_x, scale_y = GRID / (2.0 * world.area_x), GRID / (2.0 * world.area_y)
+    x = (position.real - me.area.real + world.area_x) * scale_x
+    y = (position.imag - me.area.imag + world.area_y) * scale_y
+    reach, narrower = world.sight * scale_x, scale_y / scale_x
     for i in range(max(0, math.floor(x - reach)), min(GRID, math.floor(x + reach) + 1)):
         # The cells with centres in range are contiguous in each row.
         square = reach * reach - (i + 0.5 - x) ** 2
         if square <= 0.0:
             continue
-        half = math.sqrt(square)
+        half = math.sqrt(square) * narrower
         first = max(0, math.ceil(y - half - 0.5))
         last = min(GRID - 1, math.floor(y + half - 0.5))
         for k in range(i * GRID + first, i * GRID + last + 1):
@@ -90,22 +93,24 @@ def age_of(team: Team, me: Record, seen: npt.NDArray[np.uint16], i: int, j: int,
 
 
 @compiled
-def age_around(team: Team, me: Record, seen: npt.NDArray[np.uint16], i: int, j: int, reach: int) -> float:
-    """Return the mean age (s) of the cells in a square around a cell; outside, age is 0."""
-    total = 0.0
-    for k in range(max(0, i - reach), min(GRID, i + reach + 1)):
-        for m in range(max(0, j - reach), min(GRID, j + reach + 1)):
+def age_around(team: Team, me: Record, seen: npt.NDArray[np.uint16], i: int, j: int) -> float:
+    """Return the mean age (s) of the cells in a square as wide as sight around a cell; outside, age is 0."""
+    world, total = team.world, 0.0
+    wide = max(1, round(_SWATH * world.sight / (2.0 * world.area_x / GRID)))
+    high = max(1, round(_SWATH * world.sight / (2.0 * world.area_y / GRID)))
+    for k in range(max(0, i - wide), min(GRID, i + wide + 1)):
+        for m in range(max(0, j - high), min(GRID, j + high + 1)):
             total += age_of(team, me, seen, k, m, False)
-    return total / (2 * reach + 1) ** 2
+    return float(total / ((2 * wide + 1) * (2 * high + 1)))
 
 
 @compiled
 def choose_goal(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> None:
     """Set the goal: near, long not covered, and nearer to this tracker than to any other."""
     world, settings = team.world, team.settings
-    cell = 2.0 * world.area / GRID
-    inner = world.area - min(1.5, 0.5 * world.area)
-    around = max(1, round(0.7 * world.sight / cell))
+    cell_x, cell_y = 2.0 * world.area_x / GRID, 2.0 * world.area_y / GRID
+    inner_x = world.area_x - min(_OFF_WALL, 0.5 * world.area_x)
+    inner_y = world.area_y - min(_OFF_WALL, 0.5 * world.area_y)
     lost_within = 2.0 + settings.lost_drift * (me.step - me.fix_step) * world.dt
     heard = 0
     for m in range(len(mates)):
@@ -116,7 +121,8 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uin
     for i in range(GRID):
         for j in range(GRID):
             from_middle = complex(
-                clip((i + 0.5) * cell - world.area, -inner, inner), clip((j + 0.5) * cell - world.area, -inner, inner)
+                clip((i + 0.5) * cell_x - world.area_x, -inner_x, inner_x),
+                clip((j + 0.5) * cell_y - world.area_y, -inner_y, inner_y),
             )
             place = me.area + from_middle
             bonus, lost = 0.0, False
@@ -127,7 +133,7 @@ def choose_goal(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uin
                     bonus, lost = settings.lost_worth - _LOST_SLOPE * away, True
             age = age_of(team, me, seen, i, j, lost)
             if settings.swath > 0.0:
-                age += settings.swath * (age_around(team, me, seen, i, j, around) - age)
+                age += settings.swath * (age_around(team, me, seen, i, j) - age)
             # A tracker that hears few others stays near the middle, where a report is likely heard.
             bonus -= settings.middle_weight * deaf * length(place - me.area)
             way = length(place - me.position)

@@ -11,7 +11,7 @@ from posse.numeric import FloatArray, Record, Records, compiled
 from posse_baselines.ddcs.memory import Team
 from posse_baselines.ddcs.monitoring import mate_now, patience, silence
 from posse_baselines.laws.geometry import cross, dot, length, scaled
-from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls
+from posse_baselines.laws.safeguard import NEAR, WALLS, put_disc, put_walls, to_wall
 from posse_baselines.laws.steering import slot_velocity
 
 _SLOT_ECHO: Final = 0.25  # m; how well an echo has to fit a slot
@@ -37,7 +37,7 @@ def is_explained(team: Team, me: Record, robots: Records, beam: complex, reading
             return True
     if world.walled:
         for k in range(4):
-            away, towards = world.extent - dot(WALLS[k], me.position), dot(WALLS[k], beam)
+            away, towards = to_wall(world, k, me.position), dot(WALLS[k], beam)
             if away < NEAR and towards > 0.0:
                 away = away / towards if towards < wide_beam else away
                 if reading >= away - radius - _EXPLAINED:
@@ -87,7 +87,7 @@ def surround(team: Team, me: Record, mates: Records, row: FloatArray, discs: Rec
             count = put_disc(discs, count, way, velocity, two, margin)
     robots = count
     if world.walled:
-        count = put_walls(discs, count, me.position, world.extent, world.radius, settings.margin)
+        count = put_walls(discs, count, world, me.position, world.radius, settings.margin)
     strangers = me.known != 0 and few
     if not strangers or me.step % max(1, round(_TAKEN_TIME / world.dt)) == 0:
         me.taken = np.uint64(0)

@@ -54,11 +54,13 @@ CONSTANTS: Final[np.dtype[Any]] = np.dtype(
                 ("sonar_range", np.float32),  # reading that means "nothing near", m
                 ("wide_beam", np.float32),  # cosine of a little more than half a beam's width
                 ("radius", np.float32),  # of a robot's disc, m
-                ("extent", np.float32),  # greatest coordinate of a place that can be reached, m
                 ("walled", np.int32),
+                ("half_width", np.float32),  # of the arena, m
+                ("half_height", np.float32),
                 ("sight", np.float32),  # how far its target sensor reaches, m
                 ("drifts", np.int32),  # 1: each robot's own pose, as it knows it, drifts
-                ("area", np.float32),  # half the side of the square that is to be searched, m
+                ("area_x", np.float32),  # half the width of the rectangle that is to be searched, m
+                ("area_y", np.float32),  # half its height
             ],
             align=True,
         ),
@@ -90,9 +92,9 @@ def constants_of(scenario: Scenario) -> Records:
     record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
     record["sonar_range"] = scenario.sonar_range
     record["radius"] = scenario.robot_radius
-    record["extent"] = scenario.position_bound
     record["sight"] = min(scenario.sensing_range, _MOST_SIGHT)
-    record["area"] = min(scenario.arena / 2, _OPEN_AREA)
+    record["half_width"], record["half_height"] = scenario.half_sides
+    record["area_x"], record["area_y"] = (min(half, _OPEN_AREA) for half in scenario.half_sides)
     record["drifts"] = scenario.drifts
-    record["walled"] = np.isfinite(scenario.arena)
+    record["walled"] = scenario.walled
     return record

@@ -88,13 +88,19 @@ def put_disc(discs: Records, count: int, place: complex, velocity: complex, reac
 
 
 @compiled
-def put_walls(discs: Records, count: int, position: complex, extent: float, radius: float, margin: float) -> int:
-    """Add those walls of an arena that are near, as very large discs; return the new count.
+def to_wall(arena: Record, k: int, position: complex) -> float:
+    """Return the distance (m) from a position to wall k of :data:`WALLS`.
 
-    A place that can be reached is at most ``extent`` (m) from the arena's middle, along each axis.
+    ``arena`` is any record with ``half_width`` and ``half_height``.
     """
+    return float((arena.half_width if k < 2 else arena.half_height) - dot(WALLS[k], position))
+
+
+@compiled
+def put_walls(discs: Records, count: int, arena: Record, position: complex, radius: float, margin: float) -> int:
+    """Add those walls of an arena (:func:`to_wall`) that are near, as very large discs; return the new count."""
     for k in range(4):
-        away = extent - dot(WALLS[k], position)
+        away = to_wall(arena, k, position)
         if away < NEAR:
             place = scaled(WALLS[k], away - radius + _PLANET)
             count = put_disc(discs, count, place, 0j, _PLANET, margin)

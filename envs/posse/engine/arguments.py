@@ -80,17 +80,17 @@ def in_box(actions: FloatArray, clip: bool, place: Callable[..., str] = "actions
 
 def poses_of(options: Mapping[str, Any], scenario: Scenario, num_worlds: int) -> dict[str, npt.NDArray[np.float64]]:
     """Return the start poses among the options of a reset, (E, N, 3) and (E, 3), or raise ValueError."""
-    poses, most = {}, scenario.start_extent
+    poses, (most_x, most_y) = {}, scenario.start_extent
     for name, shape in (("tracker_pose", (scenario.num_trackers, 3)), ("target_pose", (3,))):
         if options.get(name) is None:
             continue
         array, full = real_numbers(name, options[name]).astype(np.float64), (num_worlds, *shape)
         if array.shape not in (shape, full, (3,) if scenario.num_trackers == 1 else full):
             raise ValueError(f"{name} has shape {array.shape}, wanted {shape} or {full}: (x, y, θ) each")
-        if not (np.isfinite(array).all() and np.abs(array[..., :2]).max() <= most):
+        if not (np.isfinite(array).all() and (np.abs(array[..., :2]) <= scenario.start_extent).all()):
             raise ValueError(
-                f"{name}={reprlib.repr(options[name])} must be finite, with x and y of {scenario.name!r} "
-                f"at most {most:g} m from the origin"
+                f"{name}={reprlib.repr(options[name])} must be finite; in {scenario.name!r} x lies within "
+                f"±{most_x:g} m and y within ±{most_y:g} m"
             )
         poses[name] = np.broadcast_to(array, full)
     return poses

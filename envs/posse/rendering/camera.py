@@ -26,16 +26,16 @@ class Camera:
 
     Args:
         viewport: Left, top, width and height of the rectangle, px.
-        arena: Side of the walled square, m; ``inf``: the open plane.
+        half_sides: Half the width and half the height of the arena, m; ``inf``: the open plane.
 
     Attributes:
         centre: Centre of the view, (2,) m.
         scale: Pixels per metre.
     """
 
-    def __init__(self, viewport: tuple[int, int, int, int], arena: float) -> None:
+    def __init__(self, viewport: tuple[int, int, int, int], half_sides: tuple[float, float]) -> None:
         self.viewport = viewport
-        self._arena = arena
+        self._corner: Points = np.array(half_sides)
         self.centre: Points = np.zeros(2)
         self.scale = 1.0
         self._level: int | None = None
@@ -55,8 +55,8 @@ class Camera:
         if time is None or self._level is None or level > self._level or level < self._level - 1:
             self._level = level
         wanted = least * _LEVEL**self._level
-        if math.isfinite(self._arena):  # nothing outside the arena
-            slack = np.maximum(self._arena / 2 + _MARGIN - pixels * wanted / 2, 0)
+        if np.isfinite(self._corner).all():  # nothing outside the arena
+            slack = np.maximum(self._corner + _MARGIN - pixels * wanted / 2, 0)
             middle = np.clip(middle, -slack, slack)
         if time is None:
             self.centre, self.scale = middle, 1 / wanted
@@ -75,7 +75,7 @@ class Camera:
 
     def floor(self) -> Points:
         """Return the lower left and the upper right corner (2, 2) m of the arena, or of the plane in view."""
-        if math.isfinite(self._arena):
-            return np.array([[-1.0, -1.0], [1.0, 1.0]]) * self._arena / 2
+        if np.isfinite(self._corner).all():
+            return np.stack([-self._corner, self._corner])
         half = np.array(self.viewport[2:], np.float64) / (2 * self.scale)
         return np.stack([self.centre - half, self.centre + half])

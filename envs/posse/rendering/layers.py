@@ -45,7 +45,7 @@ class Drawing:
 def ground(d: Drawing) -> None:
     """Draw the floor, and the walls of an arena around it, outside the reachable area."""
     (left, bottom), (right, top) = d.camera.project(d.camera.floor())
-    if math.isfinite(d.scene.scenario.arena):
+    if d.scene.scenario.walled:
         thick = 3 * d.point
         d.canvas.box(left - thick, top - thick, right - left + 2 * thick, bottom - top + 2 * thick, style.WALL)
     d.canvas.box(left, top, right - left, bottom - top, style.GROUND)
@@ -78,7 +78,8 @@ def area_in_sight(scene: Scene, tracker: int) -> Floats:
         along, across = ray @ towards, ray[:, 0] * towards[1] - ray[:, 1] * towards[0]
         entry = along - np.sqrt(np.maximum(radius**2 - across**2, 0))
         reach = np.where((entry > 0) & (np.abs(across) < radius), np.minimum(reach, entry), reach)
-    rim = np.clip(position + reach[:, None] * ray, -s.arena / 2, s.arena / 2)
+    corner = np.array(s.half_sides)
+    rim = np.clip(position + reach[:, None] * ray, -corner, corner)
     return rim if half == math.pi else np.concatenate([position[None], rim])
 
 

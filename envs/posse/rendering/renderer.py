@@ -68,7 +68,7 @@ class Renderer:
         self._canvas = Canvas((width, height))
         self._point = min(width, height) / DESIGN_SIZE
         above, below = round(HEADER * self._point), round(FOOTER * self._point)
-        self.camera = Camera((0, above, width, height - above - below), scenario.arena)
+        self.camera = Camera((0, above, width, height - above - below), scenario.half_sides)
         self._history = History()
         self.window: Window | None = None
         if mode == "human":

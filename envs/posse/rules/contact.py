@@ -90,16 +90,17 @@ def free_of_surroundings(
         o = obstacles[k]
         share = min(share, free_share(x, y, dx, dy, o.x, o.y, c.robot_radius + o.radius + BLOCKING_GAP))
     if c.walled:
-        bound = c.half_arena - c.robot_radius - BLOCKING_GAP
-        share = min(share, free_share_wall(x, dx, bound), free_share_wall(y, dy, bound))
+        share = min(share, free_share_wall(x, dx, c.half_width - c.robot_radius - BLOCKING_GAP))
+        share = min(share, free_share_wall(y, dy, c.half_height - c.robot_radius - BLOCKING_GAP))
     return share
 
 
 @compiled
 def touches_surroundings(c: Record, robot: Record, obstacles: Records) -> bool:
     """Return whether a robot touches an obstacle or a wall."""
-    inner = c.half_arena - c.robot_radius - TOUCHING_GAP
-    if c.walled and max(abs(robot.x), abs(robot.y)) >= inner:
+    if c.walled and abs(robot.x) >= c.half_width - c.robot_radius - TOUCHING_GAP:
+        return True
+    if c.walled and abs(robot.y) >= c.half_height - c.robot_radius - TOUCHING_GAP:
         return True
     return obstacle_within(obstacles, c.num_obstacles, robot.x, robot.y, c.robot_radius + TOUCHING_GAP)
 
@@ -111,14 +112,15 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
     ``near`` marks robots that could touch something within the next control step; the others move
     without a sweep. Gaps are read from ``s`` (:func:`posse.rules.discs.find_gaps`).
     """
-    inner, touch = c.half_arena - c.robot_radius, c.robot_radius + c.robot_radius + TOUCHING_GAP
+    inner_x, inner_y = c.half_width - c.robot_radius, c.half_height - c.robot_radius
+    touch = c.robot_radius + c.robot_radius + TOUCHING_GAP
     smallest, before = w.least_gap, w.contacts_target
     target_touching, target_near = NO_BITS, False
     for i in range(c.num_trackers):
         t = trackers[i]
         wall = FAR
         if c.walled:
-            wall = inner - max(abs(t.x), abs(t.y))
+            wall = min(inner_x - abs(t.x), inner_y - abs(t.y))
         smallest = min(smallest, s.gap[i], wall)
         wall_near = wall <= t.max_speed * c.control_step + TOUCHING_GAP
         t.near, t.onsets = s.excess[i] <= ZERO or wall_near, 0
@@ -136,7 +138,7 @@ def meet(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record)
         # A scripted target rarely comes so near: after trackers blocked it (steering.way_out), or if it
         # crosses its clearance within a control step.
         way = TOUCHING_GAP + c.target_speed * c.control_step
-        near_wall = inner - max(abs(w.x), abs(w.y)) <= way
+        near_wall = min(inner_x - abs(w.x), inner_y - abs(w.y)) <= way
         near_any = near_wall or obstacle_within(obstacles, c.num_obstacles, w.x, w.y, c.robot_radius + way)
         w.near = c.target_agent != 0 or near_any
     w.least_gap = smallest
@@ -182,9 +184,8 @@ def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s:
         if dx * dx + dy * dy <= reach * reach:
             touching |= BIT << np.uint64(k)
     if c.walled:
-        inner = c.half_arena - c.robot_radius - TOUCHING_GAP
         for k, along in enumerate((t.x, -t.x, t.y, -t.y)):
-            if along >= inner:
+            if along >= (c.half_width if k < 2 else c.half_height) - c.robot_radius - TOUCHING_GAP:
                 touching |= BIT << np.uint64(_FIRST_WALL + k)
     begun = ones(touching & ~t.touching_obstacles)
     t.onsets += begun

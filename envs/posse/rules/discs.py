@@ -64,6 +64,12 @@ def obstacle_within(obstacles: Records, count: int, x: np.float32, y: np.float32
 
 
 @compiled
+def to_wall(c: Record, x: np.float32, y: np.float32) -> np.float32:
+    """Return the distance from a point to the nearest wall of the arena, m."""
+    return np.float32(min(c.half_width - abs(x), c.half_height - abs(y)))
+
+
+@compiled
 def lay_out_constants(c: Record, beams: FloatArray, s: Record) -> None:
     """Write what is the same in all worlds; the directions of the sonar's beams are (2, S)."""
     for k in range(ROBOTS):

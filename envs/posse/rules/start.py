@@ -41,7 +41,9 @@ def is_clear(
     clearance: np.float32 = _CLEARANCE,
 ) -> bool:
     """Return whether a robot at (x, y) is clear of walls, obstacles and the first ``placed`` trackers."""
-    if c.walled and max(abs(x), abs(y)) > c.half_arena - c.robot_radius - clearance:
+    if c.walled and abs(x) > c.half_width - c.robot_radius - clearance:
+        return False
+    if c.walled and abs(y) > c.half_height - c.robot_radius - clearance:
         return False
     if obstacle_within(obstacles, c.num_obstacles, x, y, c.robot_radius + clearance):
         return False
@@ -69,12 +71,13 @@ def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
     for k in range(c.num_obstacles):
         o = obstacles[k]
         o.radius = between(c.obstacle_radius_least, c.obstacle_radius_most, w.key, 0, OBSTACLES, index)
-        room = c.half_arena - o.radius - c.obstacle_gap
+        room_x, room_y = c.half_width - o.radius - c.obstacle_gap, c.half_height - o.radius - c.obstacle_gap
         for _ in range(_TRIES if clear else 0):
-            o.x = between(-room, room, w.key, 0, OBSTACLES, index + 1)
-            o.y = between(-room, room, w.key, 0, OBSTACLES, index + 2)
+            o.x = between(-room_x, room_x, w.key, 0, OBSTACLES, index + 1)
+            o.y = between(-room_y, room_y, w.key, 0, OBSTACLES, index + 2)
             index += 3
-            clear = room > ZERO and not obstacle_within(obstacles, k, o.x, o.y, o.radius + c.obstacle_gap)
+            clear = min(room_x, room_y) > ZERO
+            clear = clear and not obstacle_within(obstacles, k, o.x, o.y, o.radius + c.obstacle_gap)
             if clear:
                 break
     if not clear:
@@ -85,8 +88,8 @@ def draw_obstacles(c: Record, w: Record, obstacles: Records) -> None:
 def draw_target(c: Record, w: Record, obstacles: Records) -> None:
     """Draw the target's pose; a scripted one gets room to turn away from what is near."""
     for k in range(_TRIES):
-        w.x = between(-c.target_extent, c.target_extent, w.key, 0, START, 3 * k)
-        w.y = between(-c.target_extent, c.target_extent, w.key, 0, START, 3 * k + 1)
+        w.x = between(-c.target_extent_x, c.target_extent_x, w.key, 0, START, 3 * k)
+        w.y = between(-c.target_extent_y, c.target_extent_y, w.key, 0, START, 3 * k + 1)
         heading = TWO_PI * uniform(w.key, 0, START, 3 * k + 2)
         w.heading_cos = np.float32(math.cos(heading))
         w.heading_sin = np.float32(math.sin(heading))
@@ -167,7 +170,7 @@ def check_drawn(s: Scenario, world: Records, started: BoolArray, given: Containe
     undrawn = int(np.bitwise_or.reduce(world["undrawn"][started]))
     if undrawn == 0:
         return
-    walls = f" in arena={s.arena:g}" if math.isfinite(s.arena) else ""
+    walls = f" in arena={s.arena}" if s.walled else ""
     enlarge = ", or enlarge arena" if walls else ""
     if undrawn & _OBSTACLES:
         raise ScenarioError(

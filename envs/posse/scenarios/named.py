@@ -22,6 +22,24 @@ _PAPER: Final[dict[str, Any]] = {
     "tolerance": 0.2,
 }
 
+# A TurtleBot3 Waffle Pi in true metres. Speeds, width and wheels: ROBOTIS e-manual, "Specifications". Its 1.82 rad/s on
+# the spot would take wheels of 0.261 m/s. Accelerations, and the 10 Hz that are the default control step:
+# dwa_local_planner_params_waffle_pi.yaml of ROBOTIS.
+_WAFFLE_PI: Final[dict[str, Any]] = {
+    "tracker_speed": 0.26,
+    "tracker_turn_rate": 1.8,
+    "tracker_acceleration": 2.5,
+    "tracker_turn_acceleration": 3.2,
+    "wheel_base": 0.287,
+    "robot_radius": 0.153,  # half of its width of 0.306 m
+    # Assumptions, no data of the maker's.
+    "actuator_lag": 0.2,  # 0.1 to 0.3 s are usual for small wheeled robots
+    "command_delay": 2,  # a step to measure and tell, a step to decide
+    "odometry_drift": 0.02,  # 0.15 m in an episode: 1 to 2 % of the way
+    "heading_drift": 0.005,  # 2.2° in an episode
+    "heading_noise": 0.05,  # 3°: a marker on the target, seen by a camera from some metres
+}
+
 _SHORTEST: Final = 1e-9  # s
 
 # The reasons for these settings are in docs/scenarios.md.
@@ -111,6 +129,17 @@ SCENARIOS: Final[dict[str, dict[str, Any]]] = {
         "tracker_turn_rate": 2.0,
         "target_turn_rate": 1.5,
         "target_reward_weights": {"team": -1.0, "contact": -0.2},
+    },
+    "robots": {
+        "meaning": "Small robots on two wheels, whose poses drift and whose commands act late, and a smart target.",
+        **_WAFFLE_PI,
+        "target_motion": "smart",
+        "target_speed": 0.156,
+        "target_turn_rate": 0.7,
+        "formation_distance": 0.8,
+        "formation_spacing": 0.8,
+        "tolerance": 0.15,
+        "start_distance": (1.0, 2.6),
     },
     "paper-centralized": _PAPER,
     "paper-distributed": _PAPER,

@@ -113,8 +113,14 @@ class Scenario:
     terminate_on_contact: bool = setting(False, "whether the episode ends when any tracker touches anything")
 
     # The arena
-    arena: float = setting(
-        math.inf, "side of the walled square; inf: the open plane", "m", 0, 2 * FARTHEST, above=True, infinite=True
+    arena: float | tuple[float, float] = setting(
+        math.inf,
+        "side of the walled square, or width and height of the walled rectangle, along x and y; inf: the open plane",
+        "m",
+        0,
+        2 * FARTHEST,
+        above=True,
+        infinite=True,
     )
     num_obstacles: int = setting(0, "discs in the arena; require an arena", "1", 0, MAX_OBSTACLES)
     obstacle_radius: tuple[float, float] = setting(
@@ -264,32 +270,46 @@ class Scenario:
         return 2 * self.target_speed / self.target_turn_rate + self.robot_radius + SAFE_MARGIN
 
     @property
-    def start_extent(self) -> float:
-        """Greatest absolute coordinate of any robot at the start, m."""
-        if math.isfinite(self.arena):
-            return self.arena / 2
-        return OPEN_PLANE_EXTENT + self.start_distance[1]
+    def half_sides(self) -> tuple[float, float]:
+        """Half the width and half the height of the arena, along x and y, m; ``inf``: the open plane."""
+        width, height = self.arena if isinstance(self.arena, tuple) else (self.arena, self.arena)
+        return width / 2, height / 2
 
     @property
-    def target_extent(self) -> float:
-        """Greatest absolute coordinate of the target at the start, m."""
-        if not math.isfinite(self.arena):
-            return OPEN_PLANE_EXTENT
-        if self.target_is_agent:
-            return self.arena / 2 - self.robot_radius
-        return self.arena / 2 - self.target_clearance
+    def walled(self) -> bool:
+        """Whether there is an arena."""
+        return self.arena != math.inf
+
+    @property
+    def start_extent(self) -> tuple[float, float]:
+        """Greatest absolute x and y of any robot at the start, m."""
+        if self.walled:
+            return self.half_sides
+        extent = OPEN_PLANE_EXTENT + self.start_distance[1]
+        return extent, extent
+
+    @property
+    def target_extent(self) -> tuple[float, float]:
+        """Greatest absolute x and y of the target at the start, m."""
+        if not self.walled:
+            return OPEN_PLANE_EXTENT, OPEN_PLANE_EXTENT
+        clearance = self.robot_radius if self.target_is_agent else self.target_clearance
+        x, y = self.half_sides
+        return x - clearance, y - clearance
 
     @property
     def position_bound(self) -> float:
         """Greatest absolute coordinate that any robot can reach, m."""
-        if math.isfinite(self.arena):
-            return self.arena / 2
-        return self.start_extent + max(self.tracker_speeds) * self.duration
+        if self.walled:
+            return max(self.half_sides)
+        return max(self.start_extent) + max(self.tracker_speeds) * self.duration
 
     @property
     def range_bound(self) -> float:
         """Greatest distance between any two reachable positions, m."""
-        return 2 * math.sqrt(2) * self.position_bound
+        x, y = self.half_sides if self.walled else (self.position_bound, self.position_bound)
+        # By the ratio of the sides, so that a square's is √2 times its side to the last bit.
+        return 2 * math.hypot(1.0, min(x, y) / max(x, y)) * max(x, y)
 
     @property
     def drifts(self) -> bool:
@@ -401,9 +421,9 @@ def _in_time_and_space(s: Scenario) -> _Conflicts:
         yield "horizon", f"{come} is possible: lower it, {others}, or set an arena"
     if s.start_distance[0] <= 2 * s.robot_radius:
         yield "start_distance", f"trackers must start clear of the target, beyond {2 * s.robot_radius:g} m"
-    if s.num_obstacles and math.isinf(s.arena):
+    if s.num_obstacles and not s.walled:
         yield "num_obstacles", "obstacles need an arena: set arena to its side in m"
-    if s.target_extent <= 0:
+    if min(s.target_extent) <= 0:
         why = f"it is too small for a target that needs {s.target_clearance:.3g} m to turn away from a wall"
         yield "arena", f"{why}: raise arena or target_turn_rate, or lower target_speed"
 

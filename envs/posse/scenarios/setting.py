@@ -65,7 +65,8 @@ class Setting:
         infinite = ", or be inf" if self.infinite else ""
         none = ", or be None" if "None" in self.kind else ""
         each = ", or one for each tracker" if "tuple[float, ...]" in self.kind else ""
-        return interval + infinite + none + each
+        sides = ", or two finite ones" if self.kind == "float | tuple[float, float]" else ""
+        return interval + infinite + none + each + sides
 
     def accept(self, name: str, value: object) -> Any:
         """Return a value as the scenario keeps it: Python's numbers for numpy's, tuples for lists.
@@ -84,6 +85,8 @@ class Setting:
                 return self._number(name, value)
             case "float | tuple[float, ...]":
                 return self._numbers(name, value) if isinstance(value, (tuple, list)) else self._number(name, value)
+            case "float | tuple[float, float]":
+                return self._sides(name, value) if isinstance(value, (tuple, list)) else self._number(name, value)
             case "tuple[float, float]":
                 if not isinstance(value, (tuple, list)) or len(value) != 2:
                     fail(name, value, f"it must be a tuple (least, greatest), both in {self.range}")
@@ -120,6 +123,15 @@ class Setting:
 
     def _numbers(self, name: str, values: Iterable[object]) -> tuple[float, ...]:
         return tuple(self._number(f"{name}[{k}]", each) for k, each in enumerate(values))
+
+    def _sides(self, name: str, values: tuple[object, ...] | list[object]) -> float | tuple[float, float]:
+        """Return width and height; equal ones as one number, so that equal scenarios compare equal."""
+        if len(values) != 2:
+            fail(name, values, f"it must be a number in {self.range}: (width, height)")
+        width, height = self._numbers(name, values)
+        if width != height and math.inf in (width, height):
+            fail(name, values, "width and height must both be finite")
+        return width if width == height else (width, height)
 
     def _text(self, name: str, value: object) -> str:
         if not isinstance(value, str):

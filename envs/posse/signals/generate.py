@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 import posse.signals.metrics
 import posse.signals.own_fields  # noqa: F401  (declare the built-in metrics and fields)
 from posse.declarations import (
-    FIELDS,
     METRICS,
     SENSORS,
     TARGET_MOTIONS,
@@ -24,6 +23,7 @@ from posse.declarations import (
     RewardTerm,
     Sensor,
     TargetMotion,
+    fields_of,
 )
 from posse.numeric import WIDTH
 from posse.registry import Declaration, DeclarationError, Function, parameters_of, place_of
@@ -68,7 +68,7 @@ def declarations_for(scenario: Scenario) -> Declarations:
     """Return the declarations of a scenario: the built-in ones, and those that it names."""
     TARGET_MOTIONS[scenario.target_motion].check(scenario)
     return Declarations(
-        FIELDS.with_added(*scenario.extra_fields),
+        fields_of(scenario),
         TARGET_MOTIONS.with_added(scenario.target_motion),
         SENSORS.with_added(scenario.sensor),
         METRICS.with_added(*scenario.metrics),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from posse.declarations import FIELDS, Field
+from posse.declarations import FIELDS, Field, fields_of
 from posse.numeric import FloatArray
 from posse.scenarios import Scenario
 from posse.scenarios.limits import SLACK
@@ -37,7 +37,7 @@ class ObservationLayout:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        declared = [field.of(scenario) for field in FIELDS.with_added(*scenario.extra_fields)]
+        declared = [field.of(scenario) for field in fields_of(scenario)]
         own = [field for field in declared if not field.of_neighbour]
         if scenario.sonar_beams:
             own.append(Field("sonar", scenario.sonar_beams, "m", 0, scenario.sonar_range * SLACK, _SONAR))

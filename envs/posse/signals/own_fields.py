@@ -149,8 +149,20 @@ def turn_acceleration_time(c: Record, v: View) -> Lanes:
     return v.turn_acceleration_time
 
 
-for _name in ("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range", "arena"):
+for _name in ("tolerance", "robot_radius", "control_step", "sensing_range", "sonar_range"):
     setting(_name)
+
+
+@field("m", lambda s: 0 if s.walled else -1, lambda s: max(1, 2 * s.half_sides[0] * SLACK) if s.walled else 1)
+def arena(c: Record) -> np.float32:
+    """Side of the walled square, or width of the walled rectangle; -1: the open plane."""
+    return np.float32(c.half_width + c.half_width if c.walled else -ONE)
+
+
+@field("m", 0, lambda s: max(1, 2 * s.half_sides[1] * SLACK), when=lambda s: isinstance(s.arena, tuple))
+def arena_height(c: Record) -> np.float32:
+    """Height of the walled rectangle, along y."""
+    return np.float32(c.half_height + c.half_height)
 
 
 @field("s", 0, lambda s: s.duration * SLACK)

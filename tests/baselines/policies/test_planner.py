@@ -28,7 +28,7 @@ def test_it_reaches_nine_tenths_of_the_bound_on_constant() -> None:
     assert metrics["safe_score"].mean() >= 0.9 * metrics["bound"].mean()
 
 
-@pytest.mark.parametrize("name", ["smart", pytest.param("obstacles", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["smart", "robots", pytest.param("obstacles", marks=pytest.mark.long)])
 def test_playing_ahead_is_worth_more_than_the_scripted_team(name: str) -> None:
     planned = play(posse.batch(name, 6, split="validation", horizon=300), load("planner"))
     team = load("ddcs-distributed")

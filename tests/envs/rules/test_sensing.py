@@ -48,10 +48,24 @@ def test_noise_is_unbiased_has_its_deviation_and_is_cut_at_three() -> None:
         assert abs(np.corrcoef(errors[..., 1:].ravel(), errors[..., :-1].ravel())[0, 1]) < 0.03
 
 
+def test_the_sonar_reads_how_far_the_walls_of_a_rectangle_are() -> None:
+    batch = posse.batch("search", 1, num_trackers=2, arena=(30.0, 10.0), sonar_beams=4)
+    poses = [(14.0, 0.0, 0.0), (-3.0, -4.5, math.pi)]  # beams: ahead, to the left, back, to the right
+    observations = batch.reset(options={"tracker_pose": poses, "target_pose": (0, 0, 0)})
+    readings = batch.layout.views(observations)["sonar"][0] + batch.scenario.robot_radius
+    np.testing.assert_allclose(readings, [[1.0, 2.15, 2.15, 2.15], [2.15, 0.5, 2.15, 2.15]], atol=1e-5)
+
+
 @pytest.mark.parametrize("beams", [1, 8, 13, 32])
 def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
     batch = posse.batch(
-        "obstacles", 12, num_trackers=8, sonar_beams=beams, start_distance=(1.0, 10.0), target_motion="agent"
+        "obstacles",
+        12,
+        num_trackers=8,
+        sonar_beams=beams,
+        start_distance=(1.0, 10.0),
+        target_motion="agent",
+        arena=(24.0, 18.0),
     )
     observations = batch.reset(seed=5)
     near = 0

@@ -54,7 +54,7 @@ def scenarios(draw: st.DrawFn) -> posse.Scenario:
             control_step=one_of(2, 1, 4) * physics_step,
             physics_step=physics_step,
             horizon=1000,
-            arena=draw(st.floats(8.0, 18.0)) if walled else math.inf,
+            arena=(draw(st.floats(8.0, 18.0)), one_of(8.0, 12.0, 18.0)) if walled else math.inf,
             num_obstacles=one_of(8, 5, 0) if walled else 0,
             obstacle_radius=(least, least + one_of(0.3, 0.0)),
             obstacle_gap=one_of(0.5, 0.0, 1.0),
@@ -131,7 +131,7 @@ def tight_spots(batch: posse.Batch, rng: np.random.Generator) -> Complexes:
         away = np.take_along_axis(radii, k, 1) + rng.uniform(0.001, 0.05, k.shape)
         bearing = np.exp(2j * np.pi * rng.uniform(size=k.shape))
         place = np.take_along_axis(centres, k, 1) + away * bearing
-        wall = s.arena / 2 - s.robot_radius - np.maximum(np.abs(place.real), np.abs(place.imag))
+        wall = s.position_bound - s.robot_radius - np.maximum(np.abs(place.real), np.abs(place.imag))  # a square
         gaps = np.sort(np.concatenate([np.abs(centres - place) - radii, wall], axis=1), axis=1)
         tight = (gaps[:, 0] > 0.0005) & (gaps[:, 1] < 0.2)
         spots[tight] = place[tight, 0]

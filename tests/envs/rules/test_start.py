@@ -24,7 +24,7 @@ import posse
     ids=["", "sixty-four", "one", "agent"],
 )
 def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(name: str, overrides: dict[str, Any]) -> None:
-    if overrides.get("num_trackers") == 64 and math.isinf(posse.get_scenario(name).arena):
+    if overrides.get("num_trackers") == 64 and not posse.get_scenario(name).walled:
         overrides = {**overrides, "start_distance": (1.5, 12.0)}
     batch = posse.batch(name, 60, **overrides)
     s = batch.scenario
@@ -39,7 +39,8 @@ def test_everyone_starts_clear_of_everything_at_the_distance_asked_for(name: str
         away = np.hypot(world["tracker_x"] - world["world_x"], world["tracker_y"] - world["world_y"])
         assert away.min() >= least - 1e-4
         assert away.max() <= most + 1e-4
-        assert max(abs(world["world_x"]), abs(world["world_y"])) <= s.target_extent
+        assert abs(world["world_x"]) <= s.target_extent[0]
+        assert abs(world["world_y"]) <= s.target_extent[1]
 
 
 def test_distance_bearing_and_heading_are_uniform() -> None:
@@ -61,9 +62,9 @@ def test_distance_bearing_and_heading_are_uniform() -> None:
     assert abs(np.corrcoef(np.angle(heading).ravel(), np.angle(offset).ravel())[0, 1]) < 0.05
 
 
-@pytest.mark.parametrize("name", ["obstacles", "field"])
-def test_obstacles_leave_their_gap_between_them_and_to_the_walls(name: str) -> None:
-    batch = posse.batch(name, 200)
+@pytest.mark.parametrize(("name", "arena"), [("obstacles", (30.0, 15.0)), ("field", 24.0)])
+def test_obstacles_leave_their_gap_between_them_and_to_the_walls(name: str, arena: Any) -> None:
+    batch = posse.batch(name, 200, arena=arena)
     s = batch.scenario
     batch.reset(seed=3)
     state = snapshot(batch)
@@ -73,8 +74,8 @@ def test_obstacles_leave_their_gap_between_them_and_to_the_walls(name: str) -> N
     gaps = np.abs(centres[:, :, None] - centres[:, None]) - radii[:, :, None] - radii[:, None]
     gaps[:, np.arange(count), np.arange(count)] = np.inf
     assert gaps.min() >= s.obstacle_gap - 1e-4
-    farthest = np.maximum(np.abs(centres.real), np.abs(centres.imag)) + radii
-    assert farthest.max() <= s.arena / 2 - s.obstacle_gap + 1e-4
+    for half, along in zip(s.half_sides, (centres.real, centres.imag), strict=True):
+        assert half - s.obstacle_gap - 0.5 < (np.abs(along) + radii).max() <= half - s.obstacle_gap + 1e-4
     assert radii.min() >= s.obstacle_radius[0]
     assert radii.max() <= s.obstacle_radius[1]
     assert stats.kstest((radii.ravel() - 0.4) / 0.4, "uniform").pvalue > 1e-3

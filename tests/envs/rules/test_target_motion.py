@@ -82,13 +82,13 @@ def test_what_the_accelerating_motion_is_drawn_of_walks_within_its_range(
 
 
 @pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
-@pytest.mark.parametrize("name", ["search", "obstacles", "field"])
-def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, motion: str) -> None:
-    batch = posse.batch(name, 300, target_motion=motion, horizon=600, num_trackers=2, breaks=0)
+@pytest.mark.parametrize(("name", "arena"), [("search", 20.0), ("obstacles", (30.0, 15.0)), ("field", 24.0)])
+def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, arena: Any, motion: str) -> None:
+    batch = posse.batch(name, 300, target_motion=motion, horizon=600, num_trackers=2, breaks=0, arena=arena)
     batch.reset(seed=4)
     places, courses, turns = follow(batch, 595)
     s = batch.scenario
-    room = s.arena / 2 - np.maximum(np.abs(places.real), np.abs(places.imag))
+    room = np.minimum(s.half_sides[0] - np.abs(places.real), s.half_sides[1] - np.abs(places.imag))
     if s.num_obstacles:
         gaps = np.abs(places[..., None] - points(batch, "obstacle")) - batch.state["obstacle_radius"]
         room = np.minimum(room, gaps.min(axis=-1))

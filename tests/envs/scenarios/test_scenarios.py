@@ -23,6 +23,7 @@ VERSIONS = {
     "leader-loss": 2,
     "field": 3,
     "duel": 3,
+    "robots": 1,
     "paper-centralized": 1,
     "paper-distributed": 1,
 }
@@ -93,3 +94,9 @@ def test_the_paper_is_one_set_up_under_two_names() -> None:
     centralized, distributed = get_scenario("paper-centralized"), get_scenario("paper-distributed")
     assert centralized.replace(name="paper-distributed") == distributed
     assert (centralized.num_trackers, centralized.target_motion) == (5, "constant")
+
+
+def test_in_robots_the_target_is_another_of_them() -> None:
+    s = get_scenario("robots")
+    wheel = s.target_speed + s.target_turn_rate * s.wheel_base / 2
+    assert 0.98 * s.tracker_speeds[0] < wheel <= s.tracker_speeds[0], "as fast as its wheels can"

@@ -77,6 +77,18 @@ def test_the_target_agent_feels_a_wall() -> None:
     assert batch.layout.views(observations)["touching"][0].tolist() == [0.0, 1.0]
 
 
+def test_only_a_rectangle_has_a_height() -> None:
+    square, wide = (posse.batch("search", 1, arena=arena) for arena in ((20.0, 20.0), (28.0, 14.0)))
+    assert square.scenario == posse.get_scenario("search"), "equal sides are one"
+    assert "arena_height" not in square.layout.offsets
+    assert wide.layout.offsets["arena_height"] == wide.layout.offsets["arena"] + 1
+    views = wide.layout.views(wide.reset())
+    assert (views["arena"] == 28.0).all()
+    assert (views["arena_height"] == 14.0).all()
+    with pytest.raises(ValueError, match=r"x lies within ±14 m and y within ±7 m"):
+        wide.reset(options={"target_pose": (0.0, 8.0, 0.0)})
+
+
 EXTREMES = st.sampled_from(
     [
         {},
@@ -87,6 +99,7 @@ EXTREMES = st.sampled_from(
         {"tracker_speed": 50.0, "horizon": 30},
         {"forget_after": 0.17, "radio_delay": 1},
         {"target_motion": "agent"},
+        {"arena": (24.0, 16.0)},
         {"sonar_beams": 0},
         {"velocity_smoothing": 2.0},
         {"breaks": 1, "break_choice": "drawn", "break_window": (0.0, 1.0)},

@@ -64,9 +64,9 @@ def free_gaps(s: posse.Scenario, state: State) -> Array:
     mates[np.arange(n), np.arange(n)] = np.inf
     centres, radii = obstacles(state)
     discs = np.abs(p[:n, None] - centres[None, :]) - radii - s.robot_radius
-    inner = s.arena / 2 - s.robot_radius
+    inner_x, inner_y = (half - s.robot_radius for half in s.half_sides)
     x, y = p[:n].real, p[:n].imag
-    walls = np.stack([inner - x, inner + x, inner - y, inner + y], axis=1)
+    walls = np.stack([inner_x - x, inner_x + x, inner_y - y, inner_y + y], axis=1)
     return np.concatenate([mates, discs, walls], axis=1)
 
 
@@ -85,6 +85,6 @@ def path_gaps(s: posse.Scenario, before: State, after: State, freely: Complexes)
         if len(radii):
             gaps = np.abs(start[i] - centres) - way[i] - radii - s.robot_radius
             least[i] = min(least[i], float(gaps.min()))
-        inner = s.arena / 2 - s.robot_radius
-        least[i] = min(least[i], inner - max(abs(start[i].real), abs(start[i].imag)) - way[i])
+        for half, at in zip(s.half_sides, (start[i].real, start[i].imag), strict=True):
+            least[i] = min(least[i], half - s.robot_radius - abs(at) - way[i])
     return least

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from tests.support.reference.score import slots
-from tests.support.reference.state import State, headings, one_world, positions, snapshot
+from tests.support.reference.state import NAMES, State, headings, one_world, positions, snapshot
 
 import posse
 
@@ -39,7 +39,7 @@ def _case(name: str, **settings: Any) -> Case:
 
 
 CASES: tuple[Case, ...] = (
-    *map(_case, posse.scenario_names()),
+    *map(_case, NAMES),
     # A ring so tight that trackers run into the target.
     _case("constant", num_trackers=12, num_neighbours=3, message_size=2, formation="ring", formation_spacing=0.65),
     _case("constant", num_trackers=3, num_neighbours=8, message_size=1),

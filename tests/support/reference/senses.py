@@ -139,7 +139,7 @@ def sonar(s: posse.Scenario, state: State, i: int) -> Array:
     centres, radii = obstacles(state)
     discs = [(p[j], s.robot_radius) for j in range(s.num_trackers + 1) if j != i]
     discs += list(zip(centres, radii, strict=True))
-    half, r = s.arena / 2, s.robot_radius
+    r = s.robot_radius
     readings = np.full(s.sonar_beams, s.sonar_range)
     for k in range(s.sonar_beams):
         axis = h[i] * np.exp(2j * math.pi * k / s.sonar_beams)
@@ -150,8 +150,8 @@ def sonar(s: posse.Scenario, state: State, i: int) -> Array:
                 found.append(abs(offset) - radius - r)
             elif abs(offset.imag) < radius and offset.real > 0:
                 found.append(offset.real - math.sqrt(radius**2 - offset.imag**2) - r)
-        if math.isfinite(half):
-            for normal in (1, 1j, -1, -1j):
+        if s.walled:
+            for normal, half in zip((1, 1j, -1, -1j), s.half_sides * 2, strict=True):
                 away = half - (p[i] * np.conj(normal)).real
                 towards = (axis * np.conj(normal)).real
                 if towards >= math.cos(math.pi / s.sonar_beams) - 1e-7:

@@ -336,6 +336,7 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
         ["ddcs-distributed"],
         "obstacles",
         seed=2,
+        arena=(26.0, 16.0),
         num_obstacles=12,
         obstacle_gap=0.8,
         field_of_view=view,

@@ -238,7 +238,7 @@ def surround(scene: Scene, i: int, discs: Records) -> int:
         if dot(way, way) < (NEAR + reach) * (NEAR + reach):
             count = put_disc(discs, count, way, 0j, reach, _MARGIN)
     if c.walled:
-        count = put_walls(discs, count, complex(t.x, t.y), c.half_arena, c.robot_radius, _MARGIN)
+        count = put_walls(discs, count, c, complex(t.x, t.y), c.robot_radius, _MARGIN)
     return count
 
 
@@ -295,6 +295,9 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         body.max_speed, body.max_omega = t.max_speed, t.max_turn_rate
         velocity, _ = safe_velocity(body, discs, velocity, work.plays)
         v, omega = regulate(body, velocity, 0.0)
+        if c.actuator_lag > 0.0:  # command what the lag leaves of it
+            more = 1.0 / (1.0 - math.exp(-body.dt / c.actuator_lag)) - 1.0
+            v, omega = v + more * (v - body.speed), omega + more * (omega - body.omega)
         write_motion(actions[i], v, omega, t.max_speed, t.max_turn_rate)
 
 

@@ -84,6 +84,7 @@ class Search(OwnArrays):
         self._steps, self._keep = (max(1, round(time / dt)) for time in (settings.look_ahead, settings.keep))
         self.teams = teams_of(batch.scenario, np.full((batch.num_worlds, n), _STANDARD[0]), self._steps + 1)
         self._copies: Batch | None = None
+        self._later: Batch | None = None
         # Variations are drawn once, so that what is tried in a world does not depend on the others.
         rng = np.random.default_rng(settings.seed)
         shape = (_REPEAT, settings.rounds, _TRIES - 1, n)
@@ -101,23 +102,34 @@ class Search(OwnArrays):
 
     def actions(self) -> FloatArray:
         """Plan in the worlds where it is due; return the trackers' actions (E, N, 2 + m) for the present state."""
-        step = self.batch.worlds["step"]
+        step, worlds = self.batch.worlds["step"], self._when_obeyed()
         due = np.asarray(step % self._keep == 0)
         if due.any():
-            self._plan(due, np.asarray(step // self._keep, np.int64))
+            self._plan(worlds, due, np.asarray(step // self._keep, np.int64))
         scenario = self.batch.scenario
         actions = np.zeros((len(step), scenario.num_trackers, 2 + scenario.message_size), np.float32)
-        drive(self.teams, self.batch, np.ones(len(step), np.bool_), actions)
+        drive(self.teams, worlds, np.ones(len(step), np.bool_), actions)
         return actions
 
-    def _plan(self, due: BoolArray, planning: npt.NDArray[np.int64]) -> None:
-        """Try ways to play, and keep the best in the worlds that are ``due``."""
+    def _when_obeyed(self) -> Batch:
+        """Return the worlds as they will be when a command given now is executed, after ``command_delay``."""
+        delay = self.batch.scenario.command_delay
+        if delay == 0:
+            return self.batch
+        self._later = self.batch.copies(1, seed=self.settings.seed, into=self._later)
+        unread = _actions_of_target(self._later)
+        for _ in range(delay):
+            self._later.step(unread)
+        return self._later
+
+    def _plan(self, worlds: Batch, due: BoolArray, planning: npt.NDArray[np.int64]) -> None:
+        """Try ways to play from the state of the worlds, and keep the best in those that are ``due``."""
         teams, num_worlds = self.teams, self.batch.num_worlds
         standard = np.broadcast_to(_STANDARD[:, None], (num_worlds, _TRIES - 1, teams.ways.shape[1]))
         tries = np.concatenate([standard, teams.ways[:, None]], axis=1)
         everyone = np.arange(num_worlds)
         for turn in range(self.settings.rounds + 1):
-            self._copies = self.batch.copies(_TRIES, seed=self.settings.seed, alike=True, into=self._copies)
+            self._copies = worlds.copies(_TRIES, seed=self.settings.seed, alike=True, into=self._copies)
             plans = np.repeat(teams.plans, _TRIES, axis=0)
             trying = teams._replace(ways=np.ascontiguousarray(tries.reshape(-1, tries.shape[2])), plans=plans)
             worth, paths = play_ahead(trying, self._copies, self._steps, self.settings.distance_cost)
@@ -127,7 +139,7 @@ class Search(OwnArrays):
                 tries = self._vary(ways, planning, turn)
         teams.ways[due] = ways[due]
         teams.paths[due] = paths[everyone * _TRIES + best][due]
-        teams.begun[due] = self.batch.worlds["step"][due]
+        teams.begun[due] = worlds.worlds["step"][due]
 
     def _vary(self, best: Records, planning: npt.NDArray[np.int64], turn: int) -> Records:
         """Return the best ways (E, N) and variations on them, (E, tries, N).
@@ -147,8 +159,9 @@ class Search(OwnArrays):
 def play_ahead(
     teams: Teams, copies: Batch, steps: int, distance_cost: float
 ) -> tuple[npt.NDArray[np.float64], FloatArray]:
-    """Play copies ahead; return what each is worth, (C,), and the target's path, (C, steps + 1, 4).
+    """Play copies ahead, with commands that act at once; return the worth of each, (C,), and the target's path.
 
+    The path is (C, steps + 1, 4).
     The worth is the sum of the scores up to the first contact from now on, less a price for that
     contact that no score outweighs, less ``distance_cost`` for each metre of the trackers' mean
     distance from free slots in the end.
@@ -159,14 +172,14 @@ def play_ahead(
         world[name] = 0  # those before now are the same for all
     worth = np.zeros(copies.num_worlds)
     paths = np.empty((copies.num_worlds, steps + 1, 4), np.float32)
-    actions = np.zeros(copies.action_shape, np.float32)
-    if s.num_agents > s.num_trackers:  # a target that is an agent goes on as it moves now
-        actions[:, -1, 0] = np.clip(2.0 * world["speed"] / s.target_speed - 1.0, -1.0, 1.0)
-        actions[:, -1, 1] = np.clip(world["turn_rate"] / s.target_turn_rate, -1.0, 1.0)
+    actions = _actions_of_target(copies)
     going = np.asarray(world["over"] == 0)
     paths[:, 0] = _pose_of_target(world)
     for step in range(1, steps + 1):
         drive(teams, copies, going, actions)
+        if s.command_delay:  # in the place of the command that is due
+            due = world["step"] % s.command_delay
+            copies.arrays.command[np.arange(len(world)), due] = actions[:, : s.num_trackers, :2]
         _, _, terminated, truncated, infos = copies.step(actions)
         paths[:, step] = _pose_of_target(world)
         touched = going & (world[_CONTACTS[0]] + world[_CONTACTS[1]] + world[_CONTACTS[2]] > 0)
@@ -175,6 +188,16 @@ def play_ahead(
         going &= ~(terminated | truncated)
     away = copies.arrays.tracker["slot_distance"].mean(axis=1)
     return worth - np.where(going, distance_cost * away, 0.0), paths
+
+
+def _actions_of_target(batch: Batch) -> FloatArray:
+    """Return actions (E, rows, 2 + m) in which a target that is an agent goes on as it moves now."""
+    s, world = batch.scenario, batch.arrays.world
+    actions = np.zeros(batch.action_shape, np.float32)
+    if s.target_is_agent:
+        actions[:, -1, 0] = np.clip(2.0 * world["speed"] / s.target_speed - 1.0, -1.0, 1.0)
+        actions[:, -1, 1] = np.clip(world["turn_rate"] / s.target_turn_rate, -1.0, 1.0)
+    return actions
 
 
 def _pose_of_target(world: Records) -> FloatArray:

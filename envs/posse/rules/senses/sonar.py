@@ -24,7 +24,7 @@ from posse.numeric import (
     root,
     store,
 )
-from posse.rules.discs import FAR, blocks, nonnegative, num_discs
+from posse.rules.discs import FAR, blocks, nonnegative, num_discs, to_wall
 
 _A_LITTLE_MORE: Final = np.float32(1.0001)  # far more than rounding
 
@@ -67,7 +67,8 @@ def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
     x, y, hc, hs = robot
     for normal_x, normal_y in ((ONE, ZERO), (-ONE, ZERO), (ZERO, ONE), (ZERO, -ONE)):  # outward
-        distance = c.half_arena - (normal_x * x + normal_y * y)
+        half = c.half_width if normal_y == ZERO else c.half_height
+        distance = half - (normal_x * x + normal_y * y)
         if distance >= c.sonar_range + c.robot_radius:
             continue
         nearest = max(distance - c.robot_radius, ZERO)
@@ -99,7 +100,7 @@ def ping(c: Record, robot: Place, number: int, s: Record, o: FloatArray, first: 
             if disc != number:
                 echo_of_disc(c, robot, disc, s)
             near &= near - 1
-    if c.walled and c.half_arena - max(abs(x), abs(y)) < c.sonar_range + c.robot_radius:
+    if c.walled and to_wall(c, x, y) < c.sonar_range + c.robot_radius:
         echo_of_walls(c, robot, s)
     for k in range(nonnegative(c.sonar_beams)):
         o[nonnegative(first + k)] = s.reading[k]

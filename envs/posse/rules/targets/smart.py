@@ -167,9 +167,10 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
 def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
-    inner = c.half_arena - c.safe_distance
+    inner = c.half_width - c.safe_distance
     if abs(ux) > TINY:
         far = min(far, (inner - w.x) / ux if ux > ZERO else (-inner - w.x) / ux)
+    inner = c.half_height - c.safe_distance
     if abs(uy) > TINY:
         far = min(far, (inner - w.y) / uy if uy > ZERO else (-inner - w.y) / uy)
     for k in range(c.num_obstacles):

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse.numeric import HALF, ONE, ZERO, Record, Records, compiled
-from posse.rules.discs import obstacle_within
+from posse.rules.discs import obstacle_within, to_wall
 from posse.rules.kinematics import arc, turn_towards
 
 _ROUNDING: Final = np.float32(1e-3)  # m, far more than the accumulated rounding of an episode
@@ -38,9 +38,10 @@ def target_turn_rate(
 @compiled(out_of_line=True)
 def mirror_at_walls(c: Record, w: Record) -> None:
     """Mirror the goal heading at a wall that is near and ahead."""
-    inner = max(c.half_arena - _SOFT_WALL, c.half_arena * HALF)
+    inner = max(c.half_width - _SOFT_WALL, c.half_width * HALF)
     if (w.x > inner and w.goal_cos > ZERO) or (w.x < -inner and w.goal_cos < ZERO):
         w.goal_cos = -w.goal_cos
+    inner = max(c.half_height - _SOFT_WALL, c.half_height * HALF)
     if (w.y > inner and w.goal_sin > ZERO) or (w.y < -inner and w.goal_sin < ZERO):
         w.goal_sin = -w.goal_sin
 
@@ -48,7 +49,7 @@ def mirror_at_walls(c: Record, w: Record) -> None:
 @compiled
 def disc_is_free(c: Record, obstacles: Records, x: np.float32, y: np.float32, radius: np.float32) -> bool:
     """Return whether a disc is clear of walls and obstacles; one that contains an obstacle is not."""
-    if abs(x) + radius > c.half_arena or abs(y) + radius > c.half_arena:
+    if abs(x) + radius > c.half_width or abs(y) + radius > c.half_height:
         return False
     return not obstacle_within(obstacles, c.num_obstacles, x, y, radius)
 
@@ -112,7 +113,7 @@ def way_out(c: Record, w: Record, obstacles: Records) -> np.float32:
 @compiled
 def width_around(c: Record, obstacles: Records, x: np.float32, y: np.float32) -> np.float32:
     """Return the distance from a point to the nearest obstacle or wall, m."""
-    width = c.half_arena - max(abs(x), abs(y))
+    width = to_wall(c, x, y)
     for k in range(c.num_obstacles):
         o = obstacles[k]
         dx, dy = o.x - x, o.y - y

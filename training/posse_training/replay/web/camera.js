@@ -1,6 +1,6 @@
 // Where each view looks: world metres to pixels.
 // What it shows by itself is a function of the moment alone, so that seeking and playing agree.
-import { app } from "./state.js";
+import { app, halfSides } from "./state.js";
 
 const MARGIN = 0.7; // m, between the outermost robot and the edge
 const WALL = 0.3; // m, shown outside the walls
@@ -24,7 +24,8 @@ function envelope(values, reach) {
 // The box that holds the working robots, frame by frame: [-left, -bottom, right, top].
 // It reaches no farther than the walls.
 function boxes({ columns, frames }) {
-  const { num_trackers: n, arena, control_step: step } = app.world.settings;
+  const { num_trackers: n, control_step: step } = app.world.settings;
+  const half = halfSides(app.world.settings);
   const edges = [[], [], [], []];
   for (let frame = 0; frame < frames; frame++) {
     const places = [[columns.get("target_x").at(frame), columns.get("target_y").at(frame)]];
@@ -34,7 +35,7 @@ function boxes({ columns, frames }) {
     }
     edges.forEach((edge, k) => {
       const reach = Math.max(...places.map((place) => (k < 2 ? -1 : 1) * place[k % 2]));
-      edge.push(Math.min(reach + MARGIN, arena / 2 + WALL));
+      edge.push(Math.min(reach + MARGIN, half[k % 2] + WALL));
     });
   }
   return edges.map((values) => envelope(values, Math.round(CALM / step)));

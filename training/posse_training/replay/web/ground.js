@@ -1,6 +1,7 @@
 // The ground that a view shows: floor, grid, walls, obstacles, slots, scale.
 import { FOOT } from "./camera.js";
 import { colours, disc, line, pen, write } from "./drawing.js";
+import { halfSides } from "./state.js";
 
 const GRID = 2; // m
 
@@ -14,26 +15,26 @@ export function slotPlaces(d) {
 }
 
 export function floor({ ctx, look, settings }) {
-  const half = settings.arena / 2;
-  const walled = Number.isFinite(half);
+  const [halfWidth, halfHeight] = halfSides(settings);
+  const walled = Number.isFinite(halfWidth);
   ctx.fillStyle = walled ? colours.PAPER : colours.GROUND;
   ctx.fillRect(0, 0, look.width, look.height);
   if (!walled) return;
   ctx.fillStyle = colours.GROUND;
-  ctx.fillRect(...look.project(-half, half), settings.arena * look.scale, settings.arena * look.scale);
+  ctx.fillRect(...look.project(-halfWidth, halfHeight), 2 * halfWidth * look.scale, 2 * halfHeight * look.scale);
 }
 
 // Crosses every two metres (more when zoomed out): how far and how fast, without lines in the way.
 export function grid({ ctx, look, settings }) {
   let step = GRID;
   while (step * look.scale < 24) step *= 2;
-  const half = settings.arena / 2;
+  const [halfWidth, halfHeight] = halfSides(settings);
   const [left, top] = look.unproject(0, 0);
   const [right, bottom] = look.unproject(look.width, look.height);
-  const first = (value) => Math.ceil(Math.max(value, -half) / step) * step;
+  const first = (value, half) => Math.ceil(Math.max(value, -half) / step) * step;
   pen(ctx, colours.GRID, 1);
-  for (let x = first(left); x <= Math.min(right, half); x += step) {
-    for (let y = first(bottom); y <= Math.min(top, half); y += step) {
+  for (let x = first(left, halfWidth); x <= Math.min(right, halfWidth); x += step) {
+    for (let y = first(bottom, halfHeight); y <= Math.min(top, halfHeight); y += step) {
       const [px, py] = look.project(x, y);
       line(ctx, px - 4, py, px + 4, py);
       line(ctx, px, py - 4, px, py + 4);
@@ -65,11 +66,11 @@ export function obstacles({ ctx, look, world, settings }) {
     ctx.fill();
     ctx.stroke();
   }
-  if (!Number.isFinite(settings.arena)) return;
-  const [left, top] = look.project(-settings.arena / 2, settings.arena / 2);
-  const side = settings.arena * look.scale;
+  const [halfWidth, halfHeight] = halfSides(settings);
+  if (!Number.isFinite(halfWidth)) return;
+  const [left, top] = look.project(-halfWidth, halfHeight);
   pen(ctx, colours.WALL, 3);
-  ctx.strokeRect(left - 1.5, top - 1.5, side + 3, side + 3);
+  ctx.strokeRect(left - 1.5, top - 1.5, 2 * halfWidth * look.scale + 3, 2 * halfHeight * look.scale + 3);
 }
 
 export function scaleBar({ ctx, look }) {

@@ -1,6 +1,7 @@
 // What the selected robot senses and hears, and where it takes the target to be.
 import { colours, faded, label, line, pen, robot } from "./drawing.js";
 import { slotPlaces } from "./ground.js";
+import { halfSides } from "./state.js";
 
 const STEP = Math.PI / 90; // rad, between two rays
 const GRAZE = 1e-5; // rad, to either side of an obstacle's rim
@@ -24,11 +25,11 @@ function untilWall(at, direction, half) {
 // The area that a tracker's target sensor covers, with the shadows of obstacles: its corners,
 // [x, y] each; null: it is without limit.
 export function sightOf(settings, obstacles, x, y, heading) {
-  const { field_of_view: view, arena, sensing_range: limit } = settings;
-  const half = arena / 2;
+  const { field_of_view: view, sensing_range: limit } = settings;
+  const [halfWidth, halfHeight] = halfSides(settings);
   const allRound = view >= 2 * Math.PI - 1e-9;
   if (!Number.isFinite(limit) && allRound && obstacles.length === 0) return null;
-  const range = Number.isFinite(limit) || Number.isFinite(half) ? limit : VIEW_SHOWN;
+  const range = Number.isFinite(limit) || Number.isFinite(halfWidth) ? limit : VIEW_SHOWN;
   const edge = allRound ? Math.PI : view / 2;
   const angles = [-edge, edge];
   for (let angle = Math.ceil(-edge / STEP) * STEP; angle < edge; angle += STEP) angles.push(angle);
@@ -42,8 +43,9 @@ export function sightOf(settings, obstacles, x, y, heading) {
     for (const rim of [-spread, spread]) extra.push(middle + rim - GRAZE, middle + rim + GRAZE);
     extra.push(middle);
   }
-  if (Number.isFinite(half)) {
-    for (const cx of [-half, half]) for (const cy of [-half, half]) extra.push(Math.atan2(cy - y, cx - x));
+  if (Number.isFinite(halfWidth)) {
+    for (const cx of [-halfWidth, halfWidth])
+      for (const cy of [-halfHeight, halfHeight]) extra.push(Math.atan2(cy - y, cx - x));
   }
   for (const bearing of extra) {
     const angle = bearing - heading - 2 * Math.PI * Math.round((bearing - heading) / (2 * Math.PI));
@@ -53,7 +55,7 @@ export function sightOf(settings, obstacles, x, y, heading) {
   const corners = angles.map((angle) => {
     const [cosine, sine] = [Math.cos(heading + angle), Math.sin(heading + angle)];
     const discs = obstacles.map((disc) => untilDisc(x, y, cosine, sine, disc));
-    const reach = Math.min(range, untilWall(x, cosine, half), untilWall(y, sine, half), ...discs);
+    const reach = Math.min(range, untilWall(x, cosine, halfWidth), untilWall(y, sine, halfHeight), ...discs);
     return [x + reach * cosine, y + reach * sine];
   });
   return allRound ? corners : [[x, y], ...corners];

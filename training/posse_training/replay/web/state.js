@@ -32,6 +32,11 @@ export function seconds(frames = app.position) {
   return frames * app.world.settings.control_step;
 }
 
+// Half the width and half the height of the arena, m; Infinity: the open plane.
+export function halfSides({ arena }) {
+  return [arena, arena].map((side, k) => (side[k] ?? side) / 2);
+}
+
 // The frame that a player is in; one whose episode has ended stays in its last.
 export function frameOf(player, position = app.position) {
   return Math.min(Math.floor(position + 1e-6), player.last);
