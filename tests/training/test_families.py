@@ -124,7 +124,13 @@ def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
     from posse_training.train.train import train
     from posse_training.tune import TuneSettings, tune
 
-    small: dict[str, Any] = {"num_worlds": 4, "family_scenarios": 3, "rollout": 8, "minibatch": 32, "evaluate_worlds": 4}
+    small: dict[str, Any] = {
+        "num_worlds": 4,
+        "family_scenarios": 3,
+        "rollout": 8,
+        "minibatch": 32,
+        "evaluate_worlds": 4,
+    }
     train(TrainSettings(scenario="family-open", steps=200, folder=tmp_path / "run", overrides=SHORT, **small))
     found = evaluate(str(tmp_path / "run/best.safetensors"), "family-open", 4, progress=False, **SHORT)
     assert found.episodes == 4

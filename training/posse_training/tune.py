@@ -21,18 +21,17 @@ from rich.console import Console
 
 import posse
 from posse import Family, Scenario
-from posse.scenarios.family import scenario_or_family
-from posse_baselines import Policy, PolicyError, Tunable, load
+from posse.scenarios.family import blocks, scenario_or_family
+from posse_baselines import Policy, PolicyError, Tunable, load, play
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import number, optional, tunables
 from posse_baselines.files import write_atomically
 from posse_baselines.tuned import FORMAT, SHIPPED_TUNED, TUNED
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError, check_settings, require
-from posse_training.evaluation.episodes import play_shard
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
 from posse_training.files import LOCK, hold_settings, locked, read_json
-from posse_training.parallel import RayOption, address_of, connected, on_ray
+from posse_training.parallel import RayOption, address_of, connected, joined, on_ray
 from posse_training.provenance import commit
 
 if TYPE_CHECKING:
@@ -356,7 +355,12 @@ class _Run:
 def _played(policy: Policy, scenario: Scenario | Family, worlds: _Worlds, threads: int | None) -> dict[str, Point]:
     """Return the metrics of a policy, (worlds,) each."""
     seed, split, first, number = worlds
-    return play_shard(policy, scenario, seed, split, threads, lambda steps: None, range(first, first + number))
+    parts = blocks(scenario, range(first, first + number), seed, split)
+    batches = (
+        posse.Batch(one, len(part), seed=seed, split=split, first_world=part.start, num_threads=threads)
+        for one, part in parts
+    )
+    return joined([play(batch, policy) for batch in batches])
 
 
 def _mean(cma: CMA) -> Point:
