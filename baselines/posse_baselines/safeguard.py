@@ -38,6 +38,7 @@ from posse_baselines.ddcs.monitoring import update_mates, watch_target
 from posse_baselines.ddcs.surroundings import surround
 from posse_baselines.laws.geometry import length, scaled
 from posse_baselines.laws.guidance import regulate, write_motion
+from posse_baselines.laws.offsets import in_units
 from posse_baselines.laws.safeguard import safe_velocity
 from posse_baselines.policy import PolicyError
 from posse_baselines.tuned import TunedDDCS
@@ -53,7 +54,7 @@ class Guard(OwnArrays):
     """
 
     def __init__(self, layout: ObservationLayout, num_worlds: int, robots: int | None = None) -> None:
-        scenario = layout.scenario
+        self._layout, scenario = layout, layout.scenario
         n = scenario.num_trackers
         robots = n if robots is None else robots
         self._minds = Minds(
@@ -67,7 +68,7 @@ class Guard(OwnArrays):
 
     def follow(self, observations: FloatArray) -> None:
         """Take the observations (E, R, F) of a control step, before :meth:`actions`."""
-        self._observed[...] = observations
+        self._observed[...] = in_units(self._layout, observations)
 
     def restart(self, mask: BoolArray) -> None:
         """Forget the surroundings in the worlds of a mask (E,), whose episodes restart."""

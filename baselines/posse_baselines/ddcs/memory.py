@@ -2,7 +2,8 @@
 
 Functions of the DDCS take ``team`` (:class:`Team`), ``me`` (:data:`MIND`, the tracker that decides), ``mates``
 ((N,) :data:`MATE`, by number) and, where they read the observation, its ``row`` (F,). Positions (m), velocities (m/s)
-and headings are complex numbers (:mod:`~posse_baselines.laws.geometry`), in common axes unless said otherwise.
+and headings are complex numbers (:mod:`~posse_baselines.laws.geometry`), in common axes unless said otherwise. A metre
+(m) is that of robots of 0.15 m radius, :func:`~posse_baselines.laws.offsets.unit_of`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from posse.rules import beam_directions
 from posse_baselines.ddcs.settings import Settings, settings_record
 from posse_baselines.laws.assignment import WORK_ROWS
 from posse_baselines.laws.guidance import BODY
-from posse_baselines.laws.offsets import constants_of, offsets_of
+from posse_baselines.laws.offsets import constants_of, offsets_of, unit_of
 from posse_baselines.laws.safeguard import DISC, PLAYS
 
 _F, _I, _C = np.float32, np.int32, np.complex64
@@ -48,7 +49,7 @@ class Team(NamedTuple):
 def team_of(layout: ObservationLayout, settings: Settings) -> Team:
     """Return what a team has in common; ``at``, ``world`` and ``settings`` are arrays of one record."""
     scenario = layout.scenario
-    slots = [complex(*slot) for slot in scenario.slot_offsets]
+    slots = [complex(*slot) / unit_of(scenario) for slot in scenario.slot_offsets]
     cosines, sines = beam_directions(scenario)
     return Team(
         offsets_of(layout),

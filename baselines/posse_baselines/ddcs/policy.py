@@ -27,6 +27,7 @@ from posse_baselines.ddcs.memory import (
 from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.ddcs.step import carry_out, correct, plan
+from posse_baselines.laws.offsets import in_units, unit_of
 from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations
 
 
@@ -115,7 +116,7 @@ class DDCS(OwnArrays, BasePolicy):
         """Return what a kernel writes for each tracker, (E, N, size), over the numbers that are ``given``, if any."""
         minds: Minds = memory.minds
         num_worlds, n = minds.me.shape
-        observations = check_observations(self, observations, num_worlds, memory.layout)
+        observations = in_units(memory.layout, check_observations(self, observations, num_worlds, memory.layout))
         out = np.zeros((num_worlds, n, size), np.float32)
         if given is not None:
             out[..., : given.shape[-1]] = given
@@ -145,12 +146,12 @@ class DDCS(OwnArrays, BasePolicy):
         -1: there is no estimate). Of the centralized model also ``leader`` (-1: none yet), ``term``
         and ``exchanges`` (number of leader changes).
         """
-        me = memory.minds.me
+        me, unit = memory.minds.me, np.float32(unit_of(memory.layout.scenario))
         names = ["task", "slot"]
         if self.settings.model == "centralized":
             names += ["leader", "term", "exchanges"]
         notes: Annotations = {name: me[name].copy() for name in names}
-        notes["estimate"] = np.stack([me["target"].real, me["target"].imag, me["target_theta"]], axis=-1)
+        notes["estimate"] = np.stack([me["target"].real * unit, me["target"].imag * unit, me["target_theta"]], axis=-1)
         notes["estimate_age"] = np.where(me["known"] != 0, me["fix_age"], np.float32(-1.0))
         return notes
 

@@ -35,6 +35,8 @@ NO_EXCHANGE: Final = ("converging>exchange", "flocking>exchange")
 class Settings:
     """Settings of a team. Units, ranges and use in tuning are in each field's metadata.
 
+    Lengths and speeds are those of robots of 0.15 m radius; for others they scale with ``robot_radius``. Times do not.
+
     Raises:
         ValueError: An unknown model, law or transition, or a number out of its range.
     """

@@ -1,4 +1,8 @@
-"""Offsets of observation fields, and constants of a scenario, for kernels."""
+"""Offsets of observation fields, and constants of a scenario, for kernels.
+
+Laws and settings give lengths and speeds for robots of 0.15 m radius. Smaller and larger robots are taken for those:
+what they observe, and the constants of their scenario, are converted once, to a unit of :func:`unit_of` metres.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from posse import ObservationLayout, Scenario
-from posse.numeric import Records
+from posse.numeric import FloatArray, Records
 from posse.scenarios.limits import OPEN_PLANE_EXTENT
 
 _FIELDS: Final = (
@@ -19,8 +23,9 @@ _FIELDS: Final = (
     *("neighbour_number", "neighbour_age", "neighbour_range", "neighbour_bearing"),
     *("neighbour_heading", "neighbour_speed", "neighbour_turn_rate", "neighbour_message"),
 )
+_RADIUS: Final = 0.15  # m; of the robots that laws and settings are given for
 _WIDER: Final = 1.2
-_MOST_SIGHT: Final = 8.0  # m; obstacles hide more the farther one looks
+_MOST_SIGHT: Final = 8.0  # units; obstacles hide more the farther one looks
 _OPEN_AREA: Final = 1.4 * OPEN_PLANE_EXTENT
 
 OFFSETS: Final[np.dtype[Any]] = np.dtype(
@@ -66,7 +71,25 @@ CONSTANTS: Final[np.dtype[Any]] = np.dtype(
         ),
     )
 )
-"""Of a scenario: constants of robots and arena."""
+"""Of a scenario: constants of robots and arena; a metre is a unit of :func:`unit_of`."""
+
+
+def unit_of(scenario: Scenario) -> float:
+    """Return the length (m) that the robots of a scenario take for a metre: 1 at a radius of 0.15 m."""
+    return scenario.robot_radius / _RADIUS
+
+
+def in_units(layout: ObservationLayout, observations: FloatArray) -> FloatArray:
+    """Return observations (E, R, F) whose lengths and speeds are in units of :func:`unit_of`."""
+    unit = unit_of(layout.scenario)
+    if unit == 1.0:
+        return observations
+    converted = observations.copy()
+    views = layout.views(converted)
+    for field in layout.fields:
+        if field.unit in ("m", "m/s"):
+            views[field.name] /= unit
+    return converted
 
 
 def offsets_of(layout: ObservationLayout) -> Records:
@@ -83,18 +106,19 @@ def offsets_of(layout: ObservationLayout) -> Records:
 
 def constants_of(scenario: Scenario) -> Records:
     """Return an array of one :data:`CONSTANTS`."""
-    record = np.zeros(1, CONSTANTS)
+    record, unit = np.zeros(1, CONSTANTS), unit_of(scenario)
     record["dt"] = scenario.control_step
     lag = scenario.actuator_lag
     record["delay"], record["followed"] = scenario.command_delay, 1.0
     if lag > 0:
         record["followed"] = 1 - math.exp(-scenario.control_step / lag)
     record["wide_beam"] = math.cos(_WIDER * math.pi / max(1, scenario.sonar_beams))
-    record["sonar_range"] = scenario.sonar_range
-    record["radius"] = scenario.robot_radius
-    record["sight"] = min(scenario.sensing_range, _MOST_SIGHT)
-    record["half_width"], record["half_height"] = scenario.half_sides
-    record["area_x"], record["area_y"] = (min(half, _OPEN_AREA) for half in scenario.half_sides)
+    record["sonar_range"] = scenario.sonar_range / unit
+    record["radius"] = scenario.robot_radius / unit
+    record["sight"] = min(scenario.sensing_range / unit, _MOST_SIGHT)
+    half_width, half_height = (half / unit for half in scenario.half_sides)
+    record["half_width"], record["half_height"] = half_width, half_height
+    record["area_x"], record["area_y"] = min(half_width, _OPEN_AREA), min(half_height, _OPEN_AREA)
     record["drifts"] = scenario.drifts
     record["walled"] = scenario.walled
     return record

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import posse
-from posse_baselines import PolicyError, play, settings_of, tunable, with_settings
+from posse_baselines import PolicyError, begin, load, play, settings_of, tunable, with_settings
 from posse_baselines.ddcs import Settings
 from posse_baselines.ddcs.baseline import FAMILY
 
@@ -53,3 +53,27 @@ def test_only_the_family_has_settings() -> None:
         tunable("idle")
     with pytest.raises(TypeError, match="gian"):
         with_settings("pngl", gian=1.0)
+
+
+@pytest.mark.parametrize("scenario", ["smart", "field"])
+@pytest.mark.parametrize("name", ["pngl-l-phi", "ddcs-distributed"])
+def test_small_robots_do_in_a_small_world_what_large_ones_do_in_a_large_one(scenario: str, name: str) -> None:
+    policy, share = load(name), 0.4
+    large = posse.get_scenario(scenario, message_size=policy.message_size)
+    lengths = {
+        key: np.asarray(v) * share for key, v in large.to_dict().items() if large.settings()[key].unit[:1] == "m"
+    }
+    small = large.replace(**{key: v.tolist() for key, v in lengths.items() if key != "odometry_drift"})
+    batch = posse.batch(large, 3, seed=3)
+    layout = posse.ObservationLayout(small)
+    observations, memory, of_small = batch.reset(), begin(policy, batch), policy.begin(layout, 3)
+    for _ in range(200):
+        shrunk = observations.copy()
+        for field in layout.fields:
+            layout.views(shrunk)[field.name][...] *= share if field.unit in ("m", "m/s") else 1.0
+        actions, memory = policy.act(observations, memory)
+        same, of_small = policy.act(shrunk, of_small)
+        np.testing.assert_allclose(same, actions, atol=1e-4)
+        observations = batch.step(actions)[0]
+    estimate, other = (policy.annotations(m)["estimate"][..., :2] for m in (memory, of_small))
+    np.testing.assert_allclose(other, estimate * share, atol=1e-4)
