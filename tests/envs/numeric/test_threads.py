@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import os
 import signal
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -39,12 +38,6 @@ def test_every_world_is_done_once(worlds: int, threads: int) -> None:
 
 def check() -> None:
     test_every_world_is_done_once(3000, 3)
-
-
-@threaded
-def test_few_worlds_are_done_by_the_caller() -> None:
-    here = threading.current_thread()
-    assert over_worlds(lambda thread, first, end: threading.current_thread(), (), 100, 4) == [here]
 
 
 def test_results_do_not_depend_on_the_number_of_threads() -> None:
