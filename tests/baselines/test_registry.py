@@ -11,8 +11,6 @@ from tests.support.learned import any_policy, target_for
 
 import posse
 from posse_baselines import Match, Policy, PolicyError, against, load, load_target, play, policy_names, target_names
-from posse_baselines.ddcs import DDCS
-from posse_baselines.registry import is_code, ships_or_is_file
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 
@@ -23,11 +21,6 @@ def test_a_name_loads_the_policy_that_bears_it(name: str) -> None:
     assert isinstance(policy, Policy)
     assert policy.name == name
     assert policy.reads_state == (name == "planner")
-
-
-def test_a_class_is_loaded_by_where_it_is() -> None:
-    policy = load("posse_baselines.ddcs:DDCS")
-    assert isinstance(policy, DDCS)
 
 
 @pytest.mark.parametrize(
@@ -65,27 +58,17 @@ class Asking(Whole):
 def test_code_that_makes_no_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "made_up_policies.py").write_text(MODULE)
     (tmp_path / "failing_policies.py").write_text("1 / 0")
+    (tmp_path / "a:b").touch()
     monkeypatch.syspath_prepend(str(tmp_path))
     assert load("made_up_policies:Whole").name == "whole"
     for name, message in (
         ("made_up_policies:Failing", "cannot be created without arguments: LookupError: no weights"),
         ("made_up_policies:Asking", "cannot be created without arguments: TypeError"),
         ("failing_policies:Any", "cannot import 'failing_policies': ZeroDivisionError"),
+        (str(tmp_path / "a:b"), "is not a policy file"),
     ):
         with pytest.raises(PolicyError, match=message):
             load(name)
-
-
-def test_what_counts_as_code(tmp_path: Path) -> None:
-    (tmp_path / "a:b").touch()
-    for text in (*policy_names(), "x.safetensors", "a:b.safetensors"):
-        assert ships_or_is_file(text)
-        assert not is_code(text)
-    for text in ("a:b", "a.b:C", ":x"):
-        assert is_code(text)
-        assert not ships_or_is_file(text)
-    assert not is_code(str(tmp_path / "a:b"))
-    assert not any(map(ships_or_is_file, ("nobody", 3, None, ["pursuit"])))
 
 
 # --- targets -------------------------------------------------------------------------------------

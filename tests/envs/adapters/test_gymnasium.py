@@ -76,17 +76,6 @@ def test_without_a_seed_environments_differ() -> None:
     assert np.array_equal(gymnasium.make(TEAM, seed=4).reset()[0], second.reset(seed=4)[0])
 
 
-def test_the_end_is_told_with_every_metric() -> None:
-    for name in (TEAM, SOLO):
-        env = gymnasium.make(name, horizon=5, settle_time=0.3)
-        env.reset(seed=0)
-        *before, (_, _, terminated, truncated, info) = play(env, 5)
-        assert all(set(part(step[-1], "metrics/").values()) == {0.0} for step in before)
-        assert (terminated, truncated) == (False, True)
-        assert list(part(info, "metrics/")) == [metric.name for metric in posse.METRICS]
-        assert info["metrics/duration"] == pytest.approx(0.5)
-
-
 def test_contact_terminates_where_it_is_asked_for() -> None:
     for name, action in ((TEAM, f32([[1, 0]])), (SOLO, f32([1, 0]))):
         settings: dict[str, Any] = {"num_trackers": 1, "target_speed": 0.0}

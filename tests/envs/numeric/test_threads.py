@@ -5,16 +5,13 @@ from __future__ import annotations
 import gc
 import os
 import signal
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
-import posse
 from posse.numeric import UNCOMPILED, kernel, over_worlds
 
 threaded = pytest.mark.skipif(UNCOMPILED, reason="plain Python runs in one thread")
@@ -39,26 +36,6 @@ def test_every_world_is_done_once(worlds: int, threads: int) -> None:
 
 def check() -> None:
     test_every_world_is_done_once(3000, 3)
-
-
-@threaded
-def test_few_worlds_are_done_by_the_caller() -> None:
-    here = threading.current_thread()
-    assert over_worlds(lambda thread, first, end: threading.current_thread(), (), 100, 4) == [here]
-
-
-def test_results_do_not_depend_on_the_number_of_threads() -> None:
-    batches = [posse.batch("smart", 700, num_threads=threads) for threads in (1, 2, 5)]
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1, 1, (3, *batches[0].action_shape)).astype(np.float32)
-    results: list[list[npt.NDArray[Any]]] = []
-    for batch in batches:
-        results.append([batch.reset(seed=1)])
-        for action in actions:
-            results[-1] += batch.step(action)[:4]
-    for result in results[1:]:
-        for mine, theirs in zip(results[0], result, strict=True):
-            np.testing.assert_array_equal(mine, theirs)
 
 
 @threaded

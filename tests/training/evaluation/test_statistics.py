@@ -42,14 +42,10 @@ def test_a_paired_difference_is_sharper_than_two_means() -> None:
     paired = difference(first, worlds)
     assert paired.low > 0.09
     assert paired.high < 0.11
-    with pytest.raises(ValueError, match="same worlds"):
-        difference(first, worlds[:-1])
 
 
 def test_improvement_counts_ties_half() -> None:
     assert improvement([1, 2, 3, 4], [1, 1, 3, 5]).value == pytest.approx(0.5)
-    with pytest.raises(ValueError, match="same worlds"):
-        improvement([1, 2], [1, 2, 3])
 
 
 def test_a_share_has_wilsons_interval() -> None:
@@ -128,5 +124,7 @@ class TestTrainingSeeds:
     def test_worlds_that_do_not_match_are_refused(self) -> None:
         with pytest.raises(ValueError, match="same worlds"):
             difference(np.zeros((3, 5)), np.zeros(4))
+        with pytest.raises(ValueError, match="same worlds"):
+            improvement([1, 2], [1, 2, 3])
         with pytest.raises(ValueError, match="numbers"):
             over_seeds([[np.nan, 1.0]])

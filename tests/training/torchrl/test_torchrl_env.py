@@ -31,9 +31,11 @@ def act(carried: TensorDictBase, actions: npt.NDArray[np.float32]) -> TensorDict
     return carried.set(("agents", "action"), torch.from_numpy(actions))
 
 
-@pytest.mark.parametrize("scenario", ["constant", "field"])
-def test_specs_hold(scenario: str) -> None:
-    check_env_specs(PosseEnv(scenario, WORLDS, **SHORT), seed=1)
+@pytest.mark.parametrize(("scenario", "size"), [("constant", 3), ("field", 0)])
+def test_specs_hold(scenario: str, size: int) -> None:
+    env = PosseEnv(scenario, WORLDS, message_size=size, **SHORT)
+    check_env_specs(env, seed=1)
+    assert env.full_action_spec["agents", "action"].shape == (WORLDS, 5, 2 + size)
 
 
 def test_specs_hold_where_the_target_is_an_agent() -> None:
@@ -56,11 +58,6 @@ def test_the_state_and_discrete_actions() -> None:
     np.testing.assert_array_equal(carried["state"].numpy(), layout.vector(batch.arrays))
     with pytest.raises(posse.ScenarioError, match="discrete_actions=True cannot encode messages"):
         PosseEnv("field", WORLDS, discrete_actions=True, message_size=1)
-
-
-def test_the_action_spec_has_room_for_the_message() -> None:
-    env = PosseEnv("constant", WORLDS, message_size=3)
-    assert env.full_action_spec["agents", "action"].shape == (WORLDS, 5, 5)
 
 
 def test_steps_equal_those_of_the_batch() -> None:
