@@ -40,8 +40,8 @@ def tiny(folder: Path, **changes: Any) -> LeagueSettings:
         episodes=3,
         overrides={"horizon": HORIZON, "settle_time": 1.0, "num_trackers": 2},
         training={
-            "num_worlds": 4,
-            "rollout": 20,
+            "num_worlds": 16,
+            "rollout": 5,
             "minibatch": 32,
             "epochs": 1,
             "evaluate_worlds": 2,
@@ -142,7 +142,6 @@ def test_what_is_impossible_is_refused_before_anything_is_made(
 
 
 def test_harder_opponents_get_more_of_the_worlds() -> None:
-    parts = shares({"easy": 0.0, "hard": 0.9, "middle": 0.3}, "easy")
-    assert parts == {"easy": 1, "hard": 6, "middle": 2}
-    assert shares({"a": 0.0, "b": 0.0}, "b") == {"b": 1}
+    assert shares({"easy": 0.0, "hard": 0.9, "middle": 0.3}) == {"easy": 1, "hard": 7, "middle": 3}
+    assert shares({"a": 0.0, "b": 0.0}) == {"a": 1, "b": 1}
     assert against({"a": 2, "b": 1}) == "a,a,b"

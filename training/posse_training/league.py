@@ -39,7 +39,7 @@ OTHER: Final = {TEAM: TARGET, TARGET: TEAM}
 TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
 """Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
-_SHARES: Final = 8  # parts that the worlds are divided into among the opponents, about
+_SHARES: Final = 8  # parts of the worlds that go to the opponents by their difficulty, about
 _FREE: Final = ("generations", "responses", "response_steps", "episodes", "folder")
 """Settings that the command that resumes a league may change."""
 _STEPS: Final = (1, 10**12)
@@ -198,7 +198,7 @@ class League:
         if s.opponents == "fictitious" or len(others) == 1:
             parts = dict.fromkeys((other.policy for other in others), 1)
         else:
-            parts = shares(self._difficulties(side, own[-1], others), others[-1].policy)
+            parts = shares(self._difficulties(side, own[-1], others))
         steps = s.target_steps if side == TARGET else s.team_steps
         self._train(side, trained, against(parts), steps, own)
 
@@ -256,14 +256,14 @@ class League:
     def _difficulties(self, side: str, own: Member, others: Sequence[Member]) -> dict[str, float]:
         """Return how hard each opponent is for a member, in [0, 1], by what loads it.
 
-        For a team 1 less its score; for a target the team's score.
+        For a team 1 less its safe score; for a target the team's score.
         """
         seed, worlds = CHOICE
         found = {}
         for other in others:
             pair = (other, own) if side == TARGET else (own, other)
-            score = float(self._play(pair, worlds, seed, "validation")["score"].mean())
-            found[other.policy] = score if side == TARGET else 1 - score
+            played = self._play(pair, worlds, seed, "validation")
+            found[other.policy] = played["score"].mean() if side == TARGET else 1 - played["safe_score"].mean()
         return found
 
     def _cell(self, pair: Pair) -> Cell:
@@ -310,15 +310,13 @@ def label_of(name: str) -> str:
     return Path(name).stem if Path(name).suffix else name
 
 
-def shares(difficulties: Mapping[str, float], latest: str) -> dict[str, int]:
-    """Return how many of about eight parts of the worlds each opponent gets.
+def shares(difficulties: Mapping[str, float]) -> dict[str, int]:
+    """Return how many parts of the worlds each opponent gets: one, and about eight by their difficulties in [0, 1].
 
-    In proportion to its difficulty, in [0, 1]; the latest opponent gets one at least.
+    None is left out: a member that no longer meets an easy opponent forgets how to play it without contact.
     """
     total = sum(difficulties.values()) or 1.0
-    parts = {name: round(_SHARES * d / total) for name, d in difficulties.items()}
-    parts[latest] = max(1, parts[latest])
-    return {name: part for name, part in parts.items() if part}
+    return {name: 1 + round(_SHARES * d / total) for name, d in difficulties.items()}
 
 
 def against(parts: Mapping[str, int]) -> str:

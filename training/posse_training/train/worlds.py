@@ -106,9 +106,9 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
     for pair in pairs:
         ends.append(ends[-1] + pair.share)
     edges = [settings.num_worlds * end // ends[-1] for end in ends]
-    if settings.num_worlds < len(pairs):
+    if any(first == last for first, last in zip(edges[:-1], edges[1:], strict=True)):
         raise SettingsError(
-            f"num_worlds={settings.num_worlds} is less than one for each of {len(pairs)} scenarios and opponents"
+            f"num_worlds={settings.num_worlds} is less than one for each share of {len(pairs)} scenarios and opponents"
         )
     batches: list[posse.Batch] = []
     for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
