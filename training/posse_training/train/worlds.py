@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import posse
@@ -106,12 +107,12 @@ def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[poss
     for pair in pairs:
         ends.append(ends[-1] + pair.share)
     edges = [settings.num_worlds * end // ends[-1] for end in ends]
-    if any(first == last for first, last in zip(edges[:-1], edges[1:], strict=True)):
+    if any(first == last for first, last in pairwise(edges)):
         raise SettingsError(
             f"num_worlds={settings.num_worlds} is less than one for each share of {len(pairs)} scenarios and opponents"
         )
     batches: list[posse.Batch] = []
-    for pair, first, last in zip(pairs, edges[:-1], edges[1:], strict=True):
+    for pair, (first, last) in zip(pairs, pairwise(edges), strict=True):
         scenario, inside = pair.scenario, dict[str, Any]()
         if settings.end_on_contact:
             scenario = scenario.replace(terminate_on_contact=True)
