@@ -117,7 +117,7 @@ $(RECIPES)/recipes.stamp: constraints-recipes.txt $(FULL)
 	$(call BESIDE,$(RECIPES))
 	grep -viE '^(gymnasium|tensordict|torchrl)==' constraints.txt > $(RECIPES)/constraints.txt
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) $(RECIPES)/constraints.txt \
-		--constraint constraints-recipes.txt 'ray[rllib]' benchmarl skrl
+		--constraint constraints-recipes.txt 'ray[rllib]' benchmarl skrl onnx onnxruntime
 	$(PIP) --python $(RECIPES)/bin/python $(INSTALL) constraints-recipes.txt --no-deps \
 		pufferlib gym gym-notices robotarium-python-simulator
 	rm -rf $(RECIPES)/lib/python3*/site-packages/tests  # PufferLib's, which would hide ours

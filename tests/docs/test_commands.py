@@ -25,6 +25,7 @@ NOT_RUN = {
     "10.0.0.1": "the address of another machine",
     "...": "what the dots stand for is elsewhere on the page",
     "scripts/ship.py": "it writes to the package: tests/training/test_ship.py",
+    "posse export": "onnx is in the recipes' environment: tests/training/test_export.py",
     "class Tracker(Node)": "a listing for ROS 2, which is no Python package",
 }
 """Parts of commands and Python that are not run, and why not."""

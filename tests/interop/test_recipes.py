@@ -13,14 +13,23 @@ import pytest
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
 OWN_ENVIRONMENT = dict.fromkeys(
-    ("benchmarl_mappo", "benchmarl_qmix", "pufferlib_vector", "rllib_shared", "robotarium", "skrl_ippo", "skrl_mappo"),
+    (
+        "benchmarl_mappo",
+        "benchmarl_qmix",
+        "onnx_policy",
+        "pufferlib_vector",
+        "rllib_shared",
+        "robotarium",
+        "skrl_ippo",
+        "skrl_mappo",
+    ),
     "recipes",
 ) | {"agilerl_ippo": "agilerl"}
 """Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
 LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
 """Recipes that train, which takes long."""
 LONGEST = 15
-LONGER = {"robotarium": 50}
+LONGER = {"onnx_policy": 20, "robotarium": 50}
 
 
 def run(name: str, folder: Path, python: Path | str = sys.executable, arguments: Sequence[str] = ()) -> str:

@@ -18,6 +18,7 @@ EXTRA = (
     "moviepy",
     "wandb",
     "minari",
+    "onnx",
 )
 BLOCKED = f"""
 import sys
@@ -79,9 +80,14 @@ def test_all_else_works_without_extras(tmp_path: Path, arguments: list[str]) -> 
     assert "Traceback" not in done.stderr
 
 
-def test_recording_says_what_to_install(tmp_path: Path) -> None:
-    assert run(MAIN, "record", "--help", cwd=tmp_path).returncode == 0
-    done = run(MAIN, "record", "idle", "--scenario", "constant", "--out", "here", cwd=tmp_path)
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [("datasets", "record idle --scenario constant --out here"), ("export", "export evader --out here.onnx")],
+)
+def test_other_commands_say_what_to_install(tmp_path: Path, extra: str, words: str) -> None:
+    command, *rest = words.split()
+    assert run(MAIN, command, "--help", cwd=tmp_path).returncode == 0
+    done = run(MAIN, command, *rest, cwd=tmp_path)
     assert done.returncode == 2
-    assert "pip install '.[datasets]'" in done.stderr
+    assert f"pip install '.[{extra}]'" in done.stderr
     assert list(tmp_path.iterdir()) == []

@@ -25,6 +25,7 @@ COMMANDS: Final = {
     "submit": ("play for the leaderboard and write the claim", "leaderboard:submit_command"),
     "verify": ("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
     "record": ("record episodes as a data set for offline learning", "datasets"),
+    "export": ("write the network of a learned policy as ONNX", "commands.export"),
     "reproduce": ("repeat the paper's experiments", "reproduce.reproduce"),
     "scenarios": ("list the scenarios", "commands.scenarios"),
 }

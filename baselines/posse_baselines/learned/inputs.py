@@ -119,6 +119,24 @@ class Encoding:
         )
         return cls(str(values["kind"]), int(values["neighbours"]), fields)
 
+    def _in_order(self) -> list[tuple[EncodedField, int]]:
+        """Return the fields in the order in which they are read, those of a team-mate with its place."""
+        own = [(f, 0) for f in self.fields if not f.of_neighbour]
+        return own + [(f, place) for place in range(self.neighbours) for f in self.fields if f.of_neighbour]
+
+    def names(self) -> list[str]:
+        """Return the name of each number that is read of an observation, in order.
+
+        As the indices of :meth:`posse.ObservationLayout.views`: ``neighbour_bearing[1, 0]`` is the first number of
+        that field of the second-nearest team-mate.
+        """
+        names = []
+        for field, place in self._in_order():
+            for k in range(field.size):
+                at = [str(place)] * field.of_neighbour + [str(k)] * (field.size > 1)
+                names.append(f"{field.name}[{', '.join(at)}]" if at else field.name)
+        return names
+
     def columns(self, layout: ObservationLayout) -> tuple[npt.NDArray[np.int64], FloatArray]:
         """Return the column of each number in an observation, -1 where it is missing, and its value there.
 
@@ -139,11 +157,9 @@ class Encoding:
                 f"reads {mine.name!r:.80} as {mine.size} x {mine.unit!r:.80}, the scenario has "
                 f"{found}; play it with the settings on its card"
             )
-        own = [(f, 0) for f in self.fields if not f.of_neighbour]
-        mates = [(f, place) for place in range(self.neighbours) for f in self.fields if f.of_neighbour]
         columns: list[int] = []
         unknown: list[float] = []
-        for field, place in own + mates:
+        for field, place in self._in_order():
             start = layout.offsets[field.name] + place * layout.stride
             there = not field.of_neighbour or place < layout.neighbours
             columns += range(start, start + field.size) if there else [-1] * field.size

@@ -176,13 +176,9 @@ class LearnedPolicy(OwnArrays, BasePolicy):
         """Return the adviser's annotations."""
         return {} if self.adviser is None else self.adviser.annotations(memory.adviser)
 
-    def save(self, path: Path) -> None:
-        """Write the policy and its card as one file, which replaces an old one atomically.
-
-        Raises:
-            OSError: It could not be written; an old file of that name is unchanged.
-        """
-        description = {
+    def description(self) -> dict[str, Any]:
+        """Return what its file says beside the tensors, as plain values."""
+        return {
             "format": FORMAT,
             "limit": self.network.limit,
             "activation": self.network.activation,
@@ -193,8 +189,15 @@ class LearnedPolicy(OwnArrays, BasePolicy):
             "correction": "motion" if self._advising is None else self._advising.correction,
             "safeguard": self.safeguard,
         }
+
+    def save(self, path: Path) -> None:
+        """Write the policy and its card as one file, which replaces an old one atomically.
+
+        Raises:
+            OSError: It could not be written; an old file of that name is unchanged.
+        """
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_policy_file(path, self.network.tensors(), description)
+        write_policy_file(path, self.network.tensors(), self.description())
 
     @classmethod
     def from_file(cls, path: str | Path) -> LearnedPolicy:

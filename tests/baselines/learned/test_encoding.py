@@ -66,6 +66,16 @@ def test_the_plain_encoding_is_the_observation() -> None:
     np.testing.assert_array_equal(rows, observations.reshape(rows.shape))
 
 
+def test_names_are_those_of_views() -> None:
+    batch, observations = observations_of("radio")
+    encoding = Encoding.of(batch.layout, neighbours=3)
+    views, columns = batch.layout.views(observations), encoding.columns(batch.layout)[0]
+    for name, column in zip(encoding.names(), columns, strict=True):
+        field, _, at = name.rstrip("]").partition("[")
+        index = tuple(int(i) for i in at.split(", ") if i)
+        np.testing.assert_array_equal(views[field][(..., *index)], observations[..., column])
+
+
 def test_unknown_kinds() -> None:
     layout = posse.ObservationLayout(posse.get_scenario("smart"))
     with pytest.raises(PolicyError, match="plain, slots"):

@@ -1,0 +1,127 @@
+"""A network as ONNX computes what posse's own forward pass does, in the virtual environment that has onnxruntime."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.support.learned import network_for, observations_of
+
+from posse.numeric import FloatArray
+from posse_baselines import load
+from posse_baselines.ddcs import DDCS
+from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
+from posse_baselines.learned.network import forward
+from posse_baselines.registry import shipped, shipped_targets
+from posse_baselines.safeguard import Guard
+from posse_training.cli import main
+from posse_training.commands.export import export
+
+ROOT = Path(__file__).parents[2]
+ELSEWHERE = ROOT / ".venv-recipes" / "bin" / "python"
+HERE = importlib.util.find_spec("onnxruntime") is not None
+needs_onnx = pytest.mark.skipif(not HERE, reason="run elsewhere, by the test that says so")
+SHIPPED = shipped() | shipped_targets()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(HERE, reason="they run here")
+def test_they_run_where_onnx_is(tmp_path: Path) -> None:
+    if not ELSEWHERE.exists():
+        pytest.skip("needs .venv-recipes: make recipes")
+    paths = [str(ROOT), *(str(ROOT / root) for root in ("envs", "baselines", "training"))]
+    words = f"-W ignore -m pytest -q -p no:cacheprovider -n 0 -W ignore --basetemp {tmp_path / 'cases'} {__file__}"
+    done = subprocess.run(
+        [ELSEWHERE, *words.split()],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
+    assert ", 1 skipped" in done.stdout
+
+
+def outputs_of(policy: LearnedPolicy, rows: FloatArray, folder: Path) -> Any:
+    """What onnxruntime computes from the network's inputs (rows, inputs)."""
+    import onnxruntime
+
+    export(policy, folder / "network.onnx")
+    session = onnxruntime.InferenceSession(folder / "network.onnx")
+    named = json.loads(session.get_modelmeta().custom_metadata_map["columns"])
+    *inputs, output = named
+    assert [each.name for each in session.get_outputs()] == [output]
+    parts = np.split(rows, np.cumsum([len(named[name]) for name in inputs])[:-1], axis=1)
+    return session.run([output], dict(zip(inputs, parts, strict=True)))[0]
+
+
+@needs_onnx
+@pytest.mark.parametrize("name", SHIPPED)
+def test_what_ships(name: str, tmp_path: Path) -> None:
+    policy = LearnedPolicy.from_file(SHIPPED[name])
+    network = policy.network
+    drawn = np.random.default_rng(0).normal(0, 3, (200, network.inputs))
+    rows = (network.mean + drawn / np.where(network.scale, network.scale, 1)).astype(np.float32)
+    ours = forward(network.flat(), rows)
+    assert ours.std() > 0.01  # it says something
+    np.testing.assert_allclose(outputs_of(policy, rows, tmp_path), ours, rtol=0, atol=1e-5)
+
+
+@needs_onnx
+@pytest.mark.parametrize(("activation", "output", "safeguard"), [("tanh", "clip", True), ("relu", "tanh", False)])
+def test_the_network_is_the_policy_but_for_the_safeguard(
+    activation: str, output: str, safeguard: bool, tmp_path: Path
+) -> None:
+    batch, observations = observations_of("smart", message_size=2)
+    encoding = Encoding.of(batch.layout, "slots")
+    network = network_for(encoding.size, 4, activation=activation, output=output)
+    policy = LearnedPolicy(network, encoding, {}, safeguard=safeguard)
+    wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))
+    rows = Encoder(encoding, batch.layout).encode(observations)
+    actions = outputs_of(policy, rows, tmp_path).reshape(wanted.shape)
+    if safeguard:
+        guard = Guard(batch.layout, 6)
+        guard.follow(observations)
+        actions = guard.actions(actions)
+    np.testing.assert_allclose(actions, wanted, rtol=0, atol=1e-5)
+
+
+@needs_onnx
+@pytest.mark.parametrize("correction", ["motion", "velocity"])
+def test_twice_a_correction_is_added_to_what_the_script_proposes(correction: str, tmp_path: Path) -> None:
+    script = DDCS()
+    batch, observations = observations_of("smart", message_size=script.message_size)
+    memory = script.begin(batch.layout, 6)
+    if correction == "velocity":
+        encoding = Encoding.of(batch.layout, "belief")
+        proposal, memory = script.propose(observations, memory)
+        further = np.concatenate([proposal, script.belief(observations, memory)], axis=-1)
+    else:
+        encoding = Encoding.of(batch.layout)
+        action, memory = script.act(observations, memory)
+        further = action[..., :2]
+    network = network_for(encoding.size + further.shape[-1])
+    policy = LearnedPolicy(network, encoding, {}, load("ddcs-distributed"), correction)
+    wanted, _ = policy.act(observations, policy.begin(batch.layout, 6))
+    encoded = Encoder(encoding, batch.layout).encode(observations)
+    rows = np.concatenate([encoded, further.reshape(len(encoded), -1)], axis=1)
+    change = 2 * outputs_of(policy, rows, tmp_path).reshape(6, -1, 2)
+    if correction == "velocity":
+        action, _ = script.carry_out(observations, memory, change)
+    else:
+        action[..., :2] += change
+    np.testing.assert_allclose(np.clip(action, -1, 1), wanted, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(("words", "found"), [("pursuit --out x.onnx", "pursuit"), ("evader --out x.pb", "x.pb")])
+def test_what_cannot_be_exported(words: str, found: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", *words.split()]) == 2
+    assert found in capsys.readouterr().err
