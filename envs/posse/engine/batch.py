@@ -9,7 +9,7 @@ import os
 import reprlib
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -58,8 +58,6 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
-    fingerprints: Mapping[str, str] = field(default_factory=dict)
-    """Hashes of the declarations of users' modules that the scenario names."""
 
 
 class Batch:
@@ -143,11 +141,9 @@ class Batch:
         self._infos = Infos(self.scenario, zeros)
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
-        return {**state, "fingerprints": self._declared.fingerprints()}
+        return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        declarations_for(state["scenario"]).check_fingerprints(state.pop("fingerprints"))
         self.__dict__.update(state)
         self._prepare()
 
@@ -206,7 +202,7 @@ class Batch:
             ResetNeeded: Before the first :meth:`reset`.
         """
         self.check_started("save")
-        return Snapshot(self.scenario, self._arrays.copy(), self._declared.fingerprints())
+        return Snapshot(self.scenario, self._arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Restore a snapshot and return its observations.
@@ -214,12 +210,10 @@ class Batch:
         Raises:
             ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
                 changed.
-            DeclarationError: A declaration that the scenario names has changed.
         """
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
         self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
-        self._declared.check_fingerprints(snapshot.fingerprints)
         self._arrays.write(snapshot.arrays)
         self._started = True
         return self.observe()
@@ -262,7 +256,6 @@ class Batch:
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
-        into._declared.check_fingerprints(self._declared.fingerprints())
         for mine, theirs in zip(self._arrays, into._arrays, strict=True):
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
