@@ -25,12 +25,13 @@ from posse.engine.kernels import (
     START_FROM_POSES,
     STEP,
     Results,
+    direct,
     draw_anew,
     first_bad_start,
     kernel_of,
     tables_of,
 )
-from posse.numeric import BoolArray, FloatArray, Records, direct, over_worlds, threads_for
+from posse.numeric import BoolArray, FloatArray, Records, over_worlds, threads_for
 from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays

@@ -11,12 +11,25 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import ONE, ZERO, BoolArray, FloatArray, Record, Records, compiled, fetch, kernel, stamp
+from posse.numeric import (
+    ONE,
+    UNCOMPILED,
+    ZERO,
+    BoolArray,
+    FloatArray,
+    Record,
+    Records,
+    compiled,
+    fetch,
+    kernel,
+    out_of_line,
+    stamp,
+)
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
 from posse.rules.faults import apply_faults, draw_coming_faults
@@ -34,6 +47,8 @@ from posse.signals.reward import weights_for
 from posse.signals.rows import TOGETHER, observe_sonar, observe_together
 from posse.signals.user_functions import check_functions
 from posse.signals.views import OBSERVING
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
@@ -85,7 +100,7 @@ def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Reco
         hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def begin(c: Record, worlds: WorldArrays, e: int, made: Generated) -> None:
     """Initialise an episode of world e, whose poses are set, except for sensing."""
     w = worlds.world[e]
@@ -274,6 +289,19 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
         return over
 
     return advance
+
+
+def direct(function: F) -> F:
+    """Return the machine code of a kernel, which does not check the types of its arguments.
+
+    numba's dispatch looks up the type of every argument, which takes longer than a world's step. Callers must pass
+    arguments of the types of the kernel's first call. A kernel that has not been called yet, or with several types, is
+    returned unchanged. Uncompiled kernels do not warn of overflow, since compiled code does not.
+    """
+    if UNCOMPILED:
+        return np.errstate(over="ignore", under="ignore")(function)
+    forms = list(getattr(function, "overloads", {}).values())
+    return cast("F", forms[0].entry_point) if len(forms) == 1 else function
 
 
 _COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes

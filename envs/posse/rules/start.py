@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled
+from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled, out_of_line
 from posse.rules.discs import obstacle_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
@@ -149,7 +149,7 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
         t.start_x, t.start_y = t.x, t.y
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)

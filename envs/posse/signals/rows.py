@@ -33,6 +33,7 @@ from posse.numeric import (
     lesser,
     load,
     load_fields,
+    out_of_line,
     root,
     store,
     transpose,
@@ -167,7 +168,7 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lan
     return load_fields(worlds.heard[e, nonnegative(observers.i), j], MESSAGE)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def _write_messages(
     c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
 ) -> None:
