@@ -135,7 +135,7 @@ class Batch:
         self._kernel: Callable[..., int] = direct(self._dispatcher)
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
-        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
+        self._scratch = new_scratch(SCRATCH, threads)
         self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
@@ -434,22 +434,17 @@ class Batch:
         """
         if orders is None:
             orders = self._orders
-        scratch = self._scratch
-        if len(scratch) == 1:
-            over = self._kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self.num_worlds)
+        tables, arrays, scratch = self._tables, self._arrays, self._scratch
+        threads = scratch.size
+        if threads == 1:
+            over = self._kernel(tables, arrays, actions, results, orders, scratch, 0, 0, self.num_worlds)
         else:
-            arguments = actions, results, orders
-            over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, len(scratch)))
+            arguments = tables, arrays, actions, results, orders, scratch
+            over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
         return over
-
-    def _work(
-        self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8], thread: int, first: int, end: int
-    ) -> int:
-        """Execute the orders of worlds ``first`` to ``end``; return how many of their episodes are over."""
-        return self._kernel(self._tables, self._arrays, actions, results, orders, self._scratch[thread], first, end)
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds, uninitialised."""

@@ -39,6 +39,16 @@ def share_fixes(c: Record, trackers: Records) -> None:
             take_fix(c, t, b)
 
 
+@compiled
+def keep_messages(c: Record, w: Record, trackers: Records, actions: FloatArray, message: FloatArray) -> None:
+    """Store the messages in the actions (rows, 2 + m) of working trackers, to be heard after the delay."""
+    slot = w.step % (c.radio_delay + 1)
+    for i in range(c.num_trackers):
+        works = trackers[i].broken_at == NEVER
+        for k in range(c.message_size):
+            message[slot, i, k] = actions[i, 2 + k] if works else ZERO
+
+
 @out_of_line
 def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: Records) -> None:
     """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
