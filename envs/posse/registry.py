@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 import inspect
 import math
@@ -15,7 +14,7 @@ from typing import Any, ClassVar, Final, TypeVar
 
 import numpy as np
 
-from posse.numeric import compiled, stamp
+from posse.numeric import compiled
 
 Function = Callable[..., Any]
 Parameters = tuple[str, ...]
@@ -102,10 +101,6 @@ class Declaration:
     def parameters(self) -> Parameters:
         """Names of the function's parameters."""
         return parameters_of(self.function)
-
-    def fingerprint(self) -> str:
-        """Return a hash of the options and of all that its functions reach."""
-        return stamp(*(getattr(self, field.name) for field in dataclasses.fields(self)))
 
     def bounds(self, low: Bound, high: Bound, scenario: Any, of: str = "") -> list[float]:
         """Return the bounds ``of`` a value in a scenario; raise unless they are finite and in order."""

@@ -1,4 +1,4 @@
-"""Declarations of users' modules: mistakes, declaring again, saved worlds, the generated source."""
+"""Declarations of users' modules: mistakes, declaring again, the generated source."""
 
 from __future__ import annotations
 
@@ -114,31 +114,17 @@ def made():
     batch.reset(seed=0)
     return batch
 
-def refused(call):
-    try:
-        call()
-    except posse.DeclarationError as error:
-        assert "reward term 'steady' is not the one that these worlds were saved with" in str(error), error
-    else:
-        raise AssertionError("taken")
-
 old = made()
-pickled, snapshot = pickle.dumps(old), old.save()
+pickled = pickle.dumps(old)
 assert value(old) == 1.0
 assert value(pickle.loads(pickled)) == 1.0
 open("steady.py", "w").write(STEADY.replace("gain(1)", "gain(2)"))
 importlib.reload(steady)
 assert value(made()) == 2.0, "a new batch uses the new declaration"
 assert value(old) == 1.0, "a running one keeps its own"
-refused(lambda: pickle.loads(pickled))
-refused(lambda: made().restore(snapshot))
-refused(lambda: old.copies(2))
-old.restore(snapshot)
-open("steady.py", "w").write(STEADY)
-importlib.reload(steady)
-assert value(pickle.loads(pickled)) == 1.0, "the same code again"
+assert value(pickle.loads(pickled)) == 2.0
 steady.gains.GAIN = 3.0
-refused(lambda: pickle.loads(pickled))
+assert value(made()) == 6.0, "also what its function reaches"
 print("done")
 """
 STEADY = '''
@@ -157,7 +143,7 @@ def steady(c, w, t):
 '''
 
 
-def test_a_declaration_is_replaced_and_saved_worlds_of_the_old_one_are_refused(tmp_path: Path) -> None:
+def test_a_declaration_is_replaced_for_batches_made_or_unpickled_afterwards(tmp_path: Path) -> None:
     code = f"STEADY = {STEADY!r}\n{AGAIN}"
     done = run(tmp_path, code, steady=STEADY, gains="GAIN = 1.0\n")
     assert done.stdout.endswith("done\n"), done.stderr

@@ -24,7 +24,7 @@ from typing import Final
 
 import numpy as np
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import Team, Work
 from posse_baselines.ddcs.monitoring import COUNT, is_newer, is_there, mate_now, patience
 from posse_baselines.ddcs.settings import CENTRALIZED, EXCHANGING, SEARCHING
@@ -78,7 +78,7 @@ def nearest_tracker(team: Team, me: Record, mates: Records, barred: int) -> tupl
     return best, least
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def central_tracker(team: Team, me: Record, mates: Records) -> tuple[int, int]:
     """Return the tracker with the least sum of distances to all heard, and their number."""
     n, others = len(mates), 0
@@ -148,7 +148,7 @@ def course_of(team: Team, me: Record) -> Course:
     return Course(me.target_velocity, me.target_mean, team.settings.weave_time, me.psi_rate)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def choose_slot(team: Team, me: Record, mates: Records, work: Work) -> None:
     """Set the own slot by the assignment of least total arrival time."""
     settings, n, cost = team.settings, len(team.slots), work.cost

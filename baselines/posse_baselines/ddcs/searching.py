@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import Record, Records, compiled
+from posse.numeric import Record, Records, compiled, out_of_line
 from posse_baselines.ddcs.memory import GRID, Team
 from posse_baselines.ddcs.monitoring import is_there, mate_now, silence
 from posse_baselines.laws.geometry import clip, dot, length, scaled
@@ -40,7 +40,7 @@ def mark_seen(team: Team, me: Record, seen: npt.NDArray[np.uint16], position: co
             seen[k] = me.step + 1
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def begin_search(team: Team, me: Record, seen: npt.NDArray[np.uint16]) -> None:
     """Mark the target as lost; on the open plane, search around its predicted position."""
     me.lost_step, me.goal_step = me.step, -1
@@ -61,7 +61,7 @@ def look_around(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uin
             mark_seen(team, me, seen, mates[j].position)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def wander(team: Team, me: Record, mates: Records, seen: npt.NDArray[np.uint16]) -> complex:
     """Return the velocity (m/s) of a tracker that searches."""
     settings = team.settings

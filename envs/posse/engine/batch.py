@@ -9,7 +9,7 @@ import os
 import reprlib
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -25,12 +25,13 @@ from posse.engine.kernels import (
     START_FROM_POSES,
     STEP,
     Results,
+    direct,
     draw_anew,
     first_bad_start,
     kernel_of,
     tables_of,
 )
-from posse.numeric import BoolArray, FloatArray, Records, direct, over_worlds, threads_for
+from posse.numeric import BoolArray, FloatArray, Records, over_worlds, threads_for
 from posse.rules.scratch import new_scratch
 from posse.rules.start import check_drawn
 from posse.rules.state import NEVER, SPLITS, WorldArrays
@@ -58,8 +59,6 @@ class Snapshot:
 
     scenario: Scenario
     arrays: WorldArrays
-    fingerprints: Mapping[str, str] = field(default_factory=dict)
-    """Hashes of the declarations of users' modules that the scenario names."""
 
 
 class Batch:
@@ -136,18 +135,16 @@ class Batch:
         self._kernel: Callable[..., int] = direct(self._dispatcher)
         self._orders = np.full(self.num_worlds, STEP, np.uint8)
         threads = threads_for(self.num_worlds, self.scenario.num_agents, self.num_threads)
-        self._scratch = [new_scratch(SCRATCH) for _ in range(threads)]
+        self._scratch = new_scratch(SCRATCH, threads)
         self._returned: tuple[list[FloatArray], ...] = ([], [], [])
         zeros = np.zeros(self.num_worlds)
         zeros.flags.writeable = False
         self._infos = Infos(self.scenario, zeros)
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
-        return {**state, "fingerprints": self._declared.fingerprints()}
+        return {name: value for name, value in self.__dict__.items() if name not in _DERIVED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        declarations_for(state["scenario"]).check_fingerprints(state.pop("fingerprints"))
         self.__dict__.update(state)
         self._prepare()
 
@@ -206,7 +203,7 @@ class Batch:
             ResetNeeded: Before the first :meth:`reset`.
         """
         self.check_started("save")
-        return Snapshot(self.scenario, self._arrays.copy(), self._declared.fingerprints())
+        return Snapshot(self.scenario, self._arrays.copy())
 
     def restore(self, snapshot: Snapshot) -> FloatArray:
         """Restore a snapshot and return its observations.
@@ -214,12 +211,10 @@ class Batch:
         Raises:
             ValueError: Not a snapshot, or one of another scenario or number of worlds; nothing is
                 changed.
-            DeclarationError: A declaration that the scenario names has changed.
         """
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"restore takes what save() returned, got {reprlib.repr(snapshot)}")
         self._check_fit("a snapshot", len(snapshot.arrays.world), snapshot.scenario, self.num_worlds)
-        self._declared.check_fingerprints(snapshot.fingerprints)
         self._arrays.write(snapshot.arrays)
         self._started = True
         return self.observe()
@@ -262,7 +257,6 @@ class Batch:
         elif type(into) is not Batch or into is self:
             raise ValueError(f"copies go into another Batch, got {reprlib.repr(into)}")
         self._check_fit("a batch for the copies", into.num_worlds, into.scenario, self.num_worlds * count)
-        into._declared.check_fingerprints(self._declared.fingerprints())
         for mine, theirs in zip(self._arrays, into._arrays, strict=True):
             if mine.size:  # as plain bytes, which are copied fastest
                 by_world = mine.view(np.uint8).reshape(self.num_worlds, 1, -1)
@@ -440,22 +434,17 @@ class Batch:
         """
         if orders is None:
             orders = self._orders
-        scratch = self._scratch
-        if len(scratch) == 1:
-            over = self._kernel(self._tables, self._arrays, actions, results, orders, scratch[0], 0, self.num_worlds)
+        tables, arrays, scratch = self._tables, self._arrays, self._scratch
+        threads = scratch.size
+        if threads == 1:
+            over = self._kernel(tables, arrays, actions, results, orders, scratch, 0, 0, self.num_worlds)
         else:
-            arguments = actions, results, orders
-            over = sum(over_worlds(self._work, arguments, self.num_worlds, self.scenario.num_agents, len(scratch)))
+            arguments = tables, arrays, actions, results, orders, scratch
+            over = sum(over_worlds(self._kernel, arguments, self.num_worlds, self.scenario.num_agents, threads))
         self._over = over
         if self._own_terms:
             check_terms(self._declared.reward_terms, results.rewards, results.terms)
         return over
-
-    def _work(
-        self, actions: FloatArray, results: Results, orders: npt.NDArray[np.uint8], thread: int, first: int, end: int
-    ) -> int:
-        """Execute the orders of worlds ``first`` to ``end``; return how many of their episodes are over."""
-        return self._kernel(self._tables, self._arrays, actions, results, orders, self._scratch[thread], first, end)
 
     def _new_results(self) -> Results:
         """Return output arrays for a pass over the worlds, uninitialised."""

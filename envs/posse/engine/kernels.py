@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from posse.numeric import ONE, ZERO, BoolArray, FloatArray, Record, Records, compiled, fetch, kernel, stamp
+from posse.numeric import ONE, UNCOMPILED, ZERO, BoolArray, FloatArray, Record, Records, compiled, fetch, kernel, stamp
 from posse.rules.contact import meet
 from posse.rules.discs import find_gaps, lay_out, lay_out_constants, nonnegative
 from posse.rules.faults import apply_faults, draw_coming_faults
@@ -24,16 +24,18 @@ from posse.rules.motion import drift, motion
 from posse.rules.randomness import mix
 from posse.rules.score import occupy, settle
 from posse.rules.scratch import RULES, scratch_record
-from posse.rules.senses.radio import hear, send, share_fixes
+from posse.rules.senses.radio import hear, keep_messages, send, share_fixes
 from posse.rules.senses.sensing import look
-from posse.rules.start import draw_start, is_clear, rest, target_can_turn
-from posse.rules.state import NEVER, WorldArrays, beam_directions, config_record, slot_records
+from posse.rules.start import begin, draw_start, is_clear, target_can_turn
+from posse.rules.state import WorldArrays, beam_directions, config_record, slot_records
 from posse.scenarios import Scenario
 from posse.signals.generate import Declarations, Generated, generated_for
 from posse.signals.reward import weights_for
 from posse.signals.rows import TOGETHER, observe_sonar, observe_together
 from posse.signals.user_functions import check_functions
 from posse.signals.views import OBSERVING
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 SCRATCH: Final = scratch_record(("prepared", 8), *RULES, *OBSERVING)
 """Scratch memory of a thread; ``prepared`` is not 0 once the values common to all worlds are written."""
@@ -85,24 +87,6 @@ def sense(c: Record, worlds: WorldArrays, e: int, made: Generated, scratch: Reco
         hear(c, w, trackers, worlds.heard[e], broadcast, worlds.heard_message[e], message)
 
 
-@compiled(out_of_line=True)
-def begin(c: Record, worlds: WorldArrays, e: int, made: Generated) -> None:
-    """Initialise an episode of world e, whose poses are set, except for sensing."""
-    w = worlds.world[e]
-    rest(c, w, worlds.tracker[e])
-    made.clear_sums(w)
-    worlds.heard[e]["step"][:] = -1
-    worlds.heard_message[e][:] = ZERO
-    worlds.message[e][:] = ZERO
-    worlds.broadcast[e]["sent"][:] = 0
-    worlds.command[e][:, :, 0] = -ONE
-    worlds.command[e][:, :, 1] = ZERO
-    if c.drifts != 0:
-        for i in range(c.num_trackers):
-            o = worlds.odometry[e, i]
-            o.x, o.y, o.heading, o.cos, o.sin = ZERO, ZERO, ZERO, ONE, ZERO
-
-
 @compiled
 def reward(
     c: Record, w: Record, trackers: Records, tables: Tables, made: Generated, rewards: FloatArray, terms: FloatArray
@@ -113,22 +97,6 @@ def reward(
     if c.target_agent != 0:
         n = c.num_trackers
         rewards[n] = made.target_reward(c, w, tables.target_weights, terms[n])
-
-
-@compiled
-def act(c: Record, worlds: WorldArrays, e: int, actions: FloatArray, made: Generated, scratch: Record) -> None:
-    """Move all robots of world e by a control step, and store the messages."""
-    w, trackers, message = worlds.world[e], worlds.tracker[e], worlds.message[e]
-    apply_faults(c, w, trackers)
-    motion(c, w, trackers, worlds.obstacle[e], actions, worlds.command[e], made.set_goal, scratch)
-    w.step += 1
-    if c.drifts != 0:
-        drift(c, w, worlds.odometry[e])
-    slot = w.step % (c.radio_delay + 1)
-    for i in range(c.num_trackers):
-        works = trackers[i].broken_at == NEVER
-        for k in range(c.message_size):
-            message[slot, i, k] = actions[i, 2 + k] if works else ZERO
 
 
 @compiled
@@ -196,11 +164,17 @@ def advance_worlds(
             w.episode += 1
             order = START
         if order == STEP:
-            act(c, worlds, e, actions[e], made, scratch)
+            apply_faults(c, w, trackers)
+            motion(c, w, trackers, obstacles, actions[e], worlds.command[e], made.set_goal, scratch)
+            w.step += 1
+            if c.drifts != 0:
+                drift(c, w, worlds.odometry[e])
+            keep_messages(c, w, trackers, actions[e], worlds.message[e])
         elif order != LOOK:
             if order == START:
                 draw_start(c, w, trackers, obstacles, made.draw_motion)
-            begin(c, worlds, e, made)
+            begin(c, worlds, e)
+            made.clear_sums(w)
         lay_out(c, w, trackers, obstacles, scratch)
         find_gaps(c, scratch)
         if order != LOOK:
@@ -238,8 +212,9 @@ def tables_of(scenario: Scenario) -> Tables:
 def kernel_of(declarations: Declarations) -> Callable[..., int]:
     """Return the kernel that steps worlds of any scenario with these declarations.
 
-    It executes the orders of worlds ``first`` to ``end`` (:func:`advance_worlds`), and returns the number of those
-    whose episodes are over. It is compiled again when a value that a user's function reaches has changed.
+    As thread ``thread`` it executes the orders of worlds ``first`` to ``end`` (:func:`advance_worlds`), and returns the
+    number of those whose episodes are over. It is compiled again when a value that a user's function reaches has
+    changed.
 
     Raises:
         DeclarationError: A user's function cannot be compiled.
@@ -260,10 +235,11 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
         results: Results,
         orders: npt.NDArray[np.uint8],
         scratch: Records,
+        thread: int,
         first: int,
         end: int,
     ) -> int:
-        s = scratch[0]
+        s = scratch[nonnegative(thread)]
         if s.prepared[0] == ZERO:
             lay_out_constants(tables.config[0], tables.beams, s)
             s.prepared[0] = ONE
@@ -274,6 +250,19 @@ def _kernel_of(declarations: Declarations, state: str) -> Callable[..., int]:
         return over
 
     return advance
+
+
+def direct(function: F) -> F:
+    """Return the machine code of a kernel, which does not check the types of its arguments.
+
+    numba's dispatch looks up the type of every argument, which takes longer than a world's step. Callers must pass
+    arguments of the types of the kernel's first call. A kernel that has not been called yet, or with several types, is
+    returned unchanged. Uncompiled kernels do not warn of overflow, since compiled code does not.
+    """
+    if UNCOMPILED:
+        return np.errstate(over="ignore", under="ignore")(function)
+    forms = list(getattr(function, "overloads", {}).values())
+    return cast("F", forms[0].entry_point) if len(forms) == 1 else function
 
 
 _COPIES: Final = np.uint64(0x636F70696573)  # distinguishes keys of copies from those of episodes

@@ -5,7 +5,7 @@ distribution of work over threads. It depends on no other room, and every room m
 """
 
 from posse.numeric.arrays import HALF, ONE, TINY, ZERO, BoolArray, FloatArray, OwnArrays, Record, Records
-from posse.numeric.compile import UNCOMPILED, compiled, direct, kernel, stamp
+from posse.numeric.compile import UNCOMPILED, compiled, kernel, out_of_line, stamp
 from posse.numeric.lanes import (
     WIDTH,
     Lanes,
@@ -47,7 +47,6 @@ __all__ = [
     "choose",
     "compiled",
     "counts",
-    "direct",
     "eight",
     "fetch",
     "greater",
@@ -57,6 +56,7 @@ __all__ = [
     "load",
     "load_fields",
     "lowest_bit",
+    "out_of_line",
     "over_worlds",
     "root",
     "stamp",

@@ -1,26 +1,24 @@
 """Compile functions to machine code, and keep kernels on disk.
 
-:func:`compiled` is for functions of one robot or one world, :func:`kernel` for the few that are called from Python,
-each compiled together with all that it calls. There is no fast-math, since a result must not depend on a world's
-position in its batch. With ``NUMBA_DISABLE_JIT=1`` both return the plain function, for debugging.
-
-Three of numba's inner parts are overridden; the classes at the end say what each gains.
-``tests/envs/numeric/test_compile.py`` fails if a new numba lacks what is used of them.
+:func:`compiled` and :func:`out_of_line` are for functions of one robot or one world, :func:`kernel` for the few that
+Python calls. There is no fast-math, since a result must not depend on a world's place in its batch. With
+``NUMBA_DISABLE_JIT=1`` they return the plain function, for debugging. Three of numba's inner parts are overridden; the
+classes at the end say what each gains, and ``tests/envs/numeric/test_compile.py`` fails if a new numba lacks them.
 """
 
 from __future__ import annotations
 
 import contextlib
-import dis
 import functools
 import hashlib
+import io
 import os
 import pickle
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
-from typing import Any, Final, TypeVar, cast, overload
+from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
@@ -41,23 +39,17 @@ UNCOMPILED: Final = bool(_CONFIG.DISABLE_JIT)
 _OPTIONS: Final[dict[str, Any]] = {"nopython": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 
 
-@overload
-def compiled(function: F) -> F: ...
-
-
-@overload
-def compiled(*, out_of_line: bool = ...) -> Callable[[F], F]: ...
-
-
-def compiled(function: F | None = None, *, out_of_line: bool = False) -> F | Callable[[F], F]:
+def compiled(function: F) -> F:
     """Compile a function that kernels and other compiled functions call.
 
-    ``@compiled`` inlines it into its callers, since passing arrays takes longer than most functions.
-    ``out_of_line=True`` never does: long and rarely called functions would crowd the instruction cache.
+    It is inlined into its callers, since passing arrays takes longer than most functions.
     """
-    if function is None:
-        return functools.partial(compiled, out_of_line=out_of_line)
-    return function if UNCOMPILED else cast("F", _Function(function, out_of_line))
+    return function if UNCOMPILED else cast("F", _Function(function, {"forceinline": True}))
+
+
+def out_of_line(function: F) -> F:
+    """Do as :func:`compiled` without inlining: long and rarely called functions would crowd the instruction cache."""
+    return function if UNCOMPILED else cast("F", _Function(function, {}))
 
 
 def kernel(function: F) -> F:
@@ -73,26 +65,9 @@ def kernel(function: F) -> F:
     return cast("F", dispatcher)
 
 
-def direct(function: F) -> F:
-    """Return the machine code of a kernel, which does not check the types of its arguments.
-
-    numba's dispatch looks up the type of every argument, which takes longer than a world's step. Callers must pass
-    arguments of the types of the kernel's first call. A kernel that has not been called yet, or with several types, is
-    returned unchanged. Uncompiled kernels do not warn of overflow, since compiled code does not.
-    """
-    if UNCOMPILED:
-        return np.errstate(over="ignore", under="ignore")(function)
-    forms = list(getattr(function, "overloads", {}).values())
-    return cast("F", forms[0].entry_point) if len(forms) == 1 else function
-
-
-# What a kernel depends on.
-
 _POSSE: Final = Path(__file__).resolve().parents[1]
-_SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).hexdigest()
-_VERSIONS: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__)
-_DEBUGGING: Final = (_CONFIG.OPT, _CONFIG.BOUNDSCHECK)  # options that change the machine code
-_PROCESS: Final = os.urandom(16)
+_SOURCES: Final = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_POSSE.rglob("*.py")))).digest()
+_BUILD: Final = (sys.version, numba.__version__, llvmlite_version, np.__version__, _CONFIG.OPT, _CONFIG.BOUNDSCHECK)
 _known: dict[FunctionType, bytes] = {}  # hashes of functions at the last stamp
 _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
 
@@ -100,69 +75,69 @@ _compiled_with: dict[Any, bytes] = {}  # hashes of users' own numba functions
 def stamp(*values: Any) -> str:
     """Return a hash of functions with all that they reach, and of other values, as they are now.
 
-    Functions of posse count by its sources; others by their code, defaults, closures, and the globals and attributes
-    of modules that they name, recursively.
+    Functions of posse count by its sources and their closures; others by their code, defaults, closures, and the
+    globals and attributes of modules that they name, recursively.
     """
     _known.clear()
-    return _hash(_VERSIONS, _DEBUGGING, _SOURCES, list(map(_digest, values))).hex()
+    return _digest((_BUILD, _SOURCES, values)).hex()
 
 
-def _hash(*parts: object) -> bytes:
-    return hashlib.sha256(repr(parts).encode()).digest()
+def _digest(value: Any) -> bytes:
+    pickler = _Reached(file := io.BytesIO())
+    pickler.fast = True  # equal objects are written alike, whether they are one or two
+    pickler.dump(value)
+    return hashlib.sha256(file.getvalue()).digest()
 
 
-def _digest(value: Any, names: frozenset[str] = frozenset()) -> bytes:
-    """Return a hash of a value that compiled code may hold; of a module, only what has one of the names."""
-    function = getattr(value, "py_func", value)
-    if isinstance(function, FunctionType):
-        found = _digest_function(function)
-        if type(value) is CPUDispatcher and _compiled_with.get(value) != found:
-            value.recompile()
-            _compiled_with[value] = found
-        return found
-    if isinstance(value, ModuleType):
-        inside = () if value.__name__.partition(".")[0] in ("numba", "numpy") else sorted(names)
-        reached = [(n, _digest(getattr(value, n), names - {n})) for n in inside if hasattr(value, n)]
-        return _hash(value.__name__, reached)
-    if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
-        return _hash(str(value), _digest(getattr(value, "instance_class", None)), _digest(getattr(value, "types", ())))
-    if isinstance(value, type):
-        return _hash(
-            value.__qualname__, getattr(value, "_fields", ()), list(getattr(value, "__members__", {}).values())
-        )
-    if isinstance(value, tuple | list):
-        return _hash(_digest(type(value)), list(map(_digest, value)))
-    try:
-        return _hash(pickle.dumps(value))
-    except Exception:  # pickle may raise anything; unknown values make a kernel that this process alone uses
-        return _hash(_PROCESS, id(value))
+class _Reached(pickle.Pickler):
+    """Writes functions with all that they reach, and classes by what compiled code sees of them."""
+
+    def reducer_override(self, value: Any) -> Any:
+        function = getattr(value, "py_func", value)
+        if isinstance(function, FunctionType):
+            if function not in _known:
+                _known[function] = b"itself"  # if it is recursive
+                _known[function] = _digest(_parts_of(function))
+            if type(value) is CPUDispatcher and _compiled_with.get(value) != _known[function]:
+                value.recompile()
+                _compiled_with[value] = _known[function]
+            return bytes, (_known[function],)
+        if isinstance(value, CodeType):  # without places in its file
+            return tuple, ((value.co_code, value.co_consts, value.co_names, value.co_varnames, value.co_freevars),)
+        if isinstance(value, ModuleType):
+            return str, (value.__name__,)
+        if isinstance(value, types.Type):  # the name of a named tuple's type lacks its fields
+            return tuple, ((str(value), getattr(value, "instance_class", None), getattr(value, "types", ())),)
+        if isinstance(value, type) and value.__module__ != "builtins":
+            inside = getattr(value, "_fields", ()), repr(getattr(value, "__members__", ""))
+            return tuple, ((value.__qualname__, *inside),)
+        try:
+            pickle.dumps(value)
+        except Exception:  # pickle may raise anything; such a value makes a kernel for this process alone
+            return tuple, ((os.getpid(), id(value)),)
+        return NotImplemented
 
 
-def _digest_function(function: FunctionType) -> bytes:
-    if function not in _known:
-        _known[function] = b"itself"  # if it is recursive
-        text, read, names = _parts_of(function.__code__)
-        cells = [cell.cell_contents for cell in function.__closure__ or ()]
-        kept = (*cells, function.__defaults__, sorted((function.__kwdefaults__ or {}).items()))
-        reached: list[Any] = [_digest(each, names) for each in kept]
-        if not function.__code__.co_filename.startswith(f"{_POSSE}{os.sep}"):
-            scope = function.__globals__
-            reached += [text, *((name, _digest(scope[name], names)) for name in read if name in scope)]
-        _known[function] = _hash(function.__name__, reached)
-    return _known[function]
+def _parts_of(function: FunctionType) -> tuple[Any, ...]:
+    """Return what a function says, and what it reaches."""
+    code, cells = function.__code__, function.__closure__ or ()
+    scope = dict(zip(code.co_freevars, (cell.cell_contents for cell in cells), strict=True))
+    if not code.co_filename.startswith(f"{_POSSE}{os.sep}"):
+        scope = {**function.__globals__, **scope}
+    return function.__name__, code, function.__defaults__, function.__kwdefaults__, _found(scope, _names_in(code))
+
+
+def _found(scope: Mapping[str, Any], names: frozenset[str]) -> list[Any]:
+    """Return the values of names in a scope, and in modules within it."""
+    values = [(name, scope[name]) for name in sorted(names) if name in scope]
+    inside = [(k, v) for k, v in values if isinstance(v, ModuleType) and v.__name__ not in ("numba", "numpy")]
+    return [*values, *(_found(vars(module), names - {name}) for name, module in inside)]
 
 
 @functools.cache
-def _parts_of(code: CodeType) -> tuple[str, list[str], frozenset[str]]:
-    """Return what code says, with functions inside it; the globals that it reads; and all names in it."""
-    codes = [code]
-    for each in codes:
-        codes += (constant for constant in each.co_consts if isinstance(constant, CodeType))
-    constants = [constant for each in codes for constant in each.co_consts if not isinstance(constant, CodeType)]
-    text = repr(([(c.co_code, c.co_names, c.co_varnames, c.co_freevars) for c in codes], constants))
-    steps = (step for each in codes for step in dis.get_instructions(each))
-    read = {step.argval for step in steps if step.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
-    return text, sorted(read), frozenset(name for each in codes for name in each.co_names)
+def _names_in(code: CodeType) -> frozenset[str]:
+    within = (each for each in code.co_consts if isinstance(each, CodeType))
+    return frozenset((*code.co_names, *code.co_freevars)).union(*map(_names_in, within))
 
 
 class _Cache(caching.NullCache):
@@ -175,13 +150,13 @@ class _Cache(caching.NullCache):
         user = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
         folder = Path(os.environ.get("POSSE_CACHE_DIR") or Path(user).expanduser() / "posse").absolute()
         f = self._function
-        return folder / f"{f.__name__}-{_hash(stamp(f, tuple(sig)), f.__module__, f.__qualname__, target).hex()}.kernel"
+        return folder / f"{f.__name__}-{stamp(f, tuple(sig), f.__module__, f.__qualname__, target)}.kernel"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with contextlib.suppress(Exception):  # what cannot be read is compiled
             path = self._path(sig, target_context.codegen().magic_tuple())
             written = path.read_bytes()
-            if written[:32] == _hash(path.name, written[32:]):  # numba would run flipped bits
+            if written[:32] == _digest((path.name, written[32:])):  # numba would run flipped bits
                 return compiler.CompileResult._rebuild(target_context, *pickle.loads(written[32:]))  # noqa: S301
         _announce()
         return None
@@ -192,7 +167,7 @@ class _Cache(caching.NullCache):
                 path, content = self._path(sig, data.codegen.magic_tuple()), serialize.dumps(data._reduce())
                 path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
                 unfinished = path.with_suffix(f".{os.getpid()}")
-                unfinished.write_bytes(_hash(path.name, content) + content)
+                unfinished.write_bytes(_digest((path.name, content)) + content)
                 unfinished.replace(path)
 
 
@@ -200,9 +175,6 @@ class _Cache(caching.NullCache):
 def _announce() -> None:
     again = "if it does so at every start, set POSSE_CACHE_DIR to a folder that can be written to"
     sys.stderr.write(f"posse: compiling kernels, which takes some seconds; {again}\n")
-
-
-# numba's inner parts.
 
 
 class _Library(codegen.JITCodeLibrary):
@@ -264,10 +236,9 @@ imputils.lower_constant(_FunctionType)(lambda context, builder, kind, function: 
 class _Function(CPUDispatcher):
     """A function that Python can call, with a form to link into kernels for each state of what it reaches."""
 
-    def __init__(self, function: Callable[..., Any], out_of_line: bool) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function, {}, _OPTIONS)
-        wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self.inner_options = {**_OPTIONS, **wrappers, "forceinline": not out_of_line}
+        self.inner_options = {**_OPTIONS, **options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         self.inner: dict[bytes, CPUDispatcher] = {}
 
     @property

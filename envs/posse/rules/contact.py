@@ -26,6 +26,7 @@ from posse.numeric import (
     least,
     lesser,
     load,
+    out_of_line,
     root,
 )
 from posse.rules.discs import FAR, TOUCHING_GAP, blocks, obstacle_within
@@ -154,7 +155,7 @@ def ones(mask: np.uint64) -> int:
     return count
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def meet_closely(c: Record, w: Record, t: Record, obstacles: Records, i: int, s: Record) -> bool:
     """Find the contacts of tracker i with something near; return whether it touches the target."""
     bit, touch = BIT << np.uint64(i), c.robot_radius + c.robot_radius + TOUCHING_GAP

@@ -25,6 +25,7 @@ from posse.numeric import (
     greater,
     lesser,
     load,
+    out_of_line,
     store,
     store_fields,
 )
@@ -58,7 +59,7 @@ def move_swept(c: Record, robot: Record, place: int, count: int, obstacles: Reco
     s.near_x[place], s.near_y[place] = robot.x, robot.y
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def move_in_parts(c: Record, w: Record, trackers: Records, obstacles: Records, s: Record) -> None:
     """Move the robots with something near in physics steps, the target first.
 
@@ -197,7 +198,7 @@ def motion(
     )
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def drift(c: Record, w: Record, odometry: Records) -> None:
     """Let each tracker's own pose, as it knows it, take a step of its random walk."""
     for i in range(c.num_trackers):

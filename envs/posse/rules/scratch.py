@@ -22,6 +22,7 @@ ROBOTS: Final = TEAM + WIDTH
 DISCS: Final = ROBOTS + -(-MAX_OBSTACLES // WIDTH) * WIDTH
 """Length of rows of robots, obstacles and padding."""
 BEAMS: Final = 64
+_LINE: Final = 16  # float32 of a cache line
 
 RULES: Final[Fields] = (
     # Discs: trackers, the target, obstacles.
@@ -52,12 +53,13 @@ RULES: Final[Fields] = (
 
 
 def scratch_record(*fields: tuple[str, int]) -> np.dtype[Any]:
-    """Return the record of scratch memory."""
-    return np.dtype((np.record, [(name, np.float32, (length,)) for name, length in fields]))
+    """Return the record of scratch memory, of whole cache lines, so that no two threads write to one."""
+    padding = -sum(length for _, length in fields) % _LINE
+    return np.dtype((np.record, [(name, np.float32, (length,)) for name, length in (*fields, ("padding", padding))]))
 
 
-def new_scratch(record: np.dtype[Any]) -> Records:
-    """Return zeroed scratch memory for one thread and one scenario, an array of one record."""
-    memory = np.zeros(record.itemsize + 64, np.uint8)
-    start = -memory.ctypes.data % 64  # bytes of a cache line
-    return memory[start : start + record.itemsize].view(record)
+def new_scratch(record: np.dtype[Any], threads: int) -> Records:
+    """Return zeroed scratch memory for one scenario, a record for each thread."""
+    memory = np.zeros(threads * record.itemsize + 4 * _LINE, np.uint8)
+    start = -memory.ctypes.data % (4 * _LINE)
+    return memory[start : start + threads * record.itemsize].view(record)

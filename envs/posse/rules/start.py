@@ -12,10 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled
+from posse.numeric import ONE, ZERO, BoolArray, Record, Records, compiled, out_of_line
 from posse.rules.discs import obstacle_within
 from posse.rules.faults import draw_faults
 from posse.rules.randomness import OBSTACLES, START, TWO_PI, between, episode_key, uniform
+from posse.rules.state import WorldArrays
 from posse.rules.targets.steering import free_circles
 from posse.scenarios import Scenario, ScenarioError
 from posse.scenarios.limits import START_CLEARANCE
@@ -122,9 +123,20 @@ def draw_trackers(c: Record, w: Record, trackers: Records, obstacles: Records) -
         w.undrawn |= _TRACKERS
 
 
-@compiled
-def rest(c: Record, w: Record, trackers: Records) -> None:
-    """Reset the robots and the world to the start of an episode, but for poses, faults and sums of metrics."""
+@out_of_line
+def begin(c: Record, worlds: WorldArrays, e: int) -> None:
+    """Reset world e to the start of an episode, but for poses, faults and sums of metrics."""
+    w, trackers = worlds.world[e], worlds.tracker[e]
+    worlds.heard[e]["step"][:] = -1
+    worlds.heard_message[e][:] = ZERO
+    worlds.message[e][:] = ZERO
+    worlds.broadcast[e]["sent"][:] = 0
+    worlds.command[e][:, :, 0] = -ONE
+    worlds.command[e][:, :, 1] = ZERO
+    if c.drifts != 0:
+        for i in range(c.num_trackers):
+            o = worlds.odometry[e, i]
+            o.x, o.y, o.heading, o.cos, o.sin = ZERO, ZERO, ZERO, ONE, ZERO
     w.step, w.over, w.terminated, w.held = 0, 0, 0, 0
     w.speed = c.target_speed if c.target_agent == 0 else ZERO
     w.turn_rate = ZERO
@@ -149,7 +161,7 @@ def rest(c: Record, w: Record, trackers: Records) -> None:
         t.start_x, t.start_y = t.x, t.y
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def draw_start(c: Record, w: Record, trackers: Records, obstacles: Records, draw_motion: Any) -> None:
     """Draw the next episode of a world: place, poses, motion, faults."""
     w.key = episode_key(w.seed, w.split, w.index, w.episode)

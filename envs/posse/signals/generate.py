@@ -26,7 +26,7 @@ from posse.declarations import (
     fields_of,
 )
 from posse.numeric import WIDTH
-from posse.registry import Declaration, DeclarationError, Function, parameters_of, place_of
+from posse.registry import Declaration, Function, parameters_of, place_of
 from posse.scenarios import Scenario
 from posse.signals.reward import terms_for
 
@@ -49,19 +49,6 @@ class Declarations(NamedTuple):
     def added(self) -> list[Declaration]:
         """Return the declarations of users' modules."""
         return [each for group in self for each in group if not each.built_in]
-
-    def fingerprints(self) -> dict[str, str]:
-        """Return a hash of each declaration of a user's module, by kind and name."""
-        return {f"{each.kind} {each.name!r}": each.fingerprint() for each in self.added()}
-
-    def check_fingerprints(self, others: Mapping[str, str]) -> None:
-        """Raise DeclarationError if saved worlds were made with other declarations than these."""
-        for name, mine in self.fingerprints().items():
-            if others.get(name, mine) != mine:
-                raise DeclarationError(
-                    f"{name} is not the one that these worlds were saved with, as its code or what it uses "
-                    "has changed: declare it as it was, or start the worlds anew"
-                )
 
 
 def declarations_for(scenario: Scenario) -> Declarations:

@@ -33,6 +33,7 @@ from posse.numeric import (
     lesser,
     load,
     load_fields,
+    out_of_line,
     root,
     store,
     transpose,
@@ -41,7 +42,7 @@ from posse.rules.discs import FAR, nonnegative
 from posse.rules.senses.sonar import ping
 from posse.rules.state import MESSAGE, POSE, Heard, Pose, WorldArrays
 from posse.signals.generate import Generated
-from posse.signals.views import Mate, Observers, Rows, View, columns, ego, lay_out_observers, view_of, world_of
+from posse.signals.views import Mate, Observers, Rows, View, ego, lay_out_observers, of_worlds, view_of, world_of
 
 TOGETHER: Final = WIDTH
 """Worlds processed together."""
@@ -115,7 +116,7 @@ def _list_nearest(c: Record, worlds: WorldArrays, observers: Observers, v: View,
 @compiled
 def _heard(c: Record, worlds: WorldArrays, observers: Observers, v: View, j: int) -> tuple[Lanes, Lanes, Mask]:
     """Return where mate j was when last heard, and whether that is not forgotten."""
-    heard = Heard(*columns(worlds.heard[:, nonnegative(observers.i)], observers, j, MESSAGE))
+    heard = Heard(*of_worlds(worlds.heard[:, nonnegative(observers.i), nonnegative(j)], observers, MESSAGE))
     sent = counts(heard.step)
     return heard.x, heard.y, (sent >= ZERO) & (v.step - sent <= np.float32(c.forget_steps))
 
@@ -167,7 +168,7 @@ def _fields_of(worlds: WorldArrays, observers: Observers, p: int, now: bool, lan
     return load_fields(worlds.heard[e, nonnegative(observers.i), j], MESSAGE)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def _write_messages(
     c: Record, worlds: WorldArrays, observers: Observers, made: Generated, s: Record, observations: FloatArray
 ) -> None:

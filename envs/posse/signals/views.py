@@ -24,13 +24,11 @@ from posse.numeric import (
     counts,
     eight,
     load,
-    load_fields,
     root,
     store,
-    transpose,
 )
 from posse.rules.contact import touches_surroundings
-from posse.rules.discs import nonnegative
+from posse.rules.discs import columns, nonnegative
 from posse.rules.kinematics import turned
 from posse.rules.scratch import TEAM, Fields
 from posse.rules.state import (
@@ -87,22 +85,9 @@ def world_of(observers: Observers, lane: int) -> int:
 
 
 @compiled
-def columns(records: Records, observers: Observers, j: int, at: int) -> tuple[Lanes, ...]:
-    """Return a block of fields, ``at`` bytes into record j of the observers' worlds, field by field.
-
-    ``records`` is (E, N); see :func:`posse.rules.state.block_at`.
-    """
-    k = nonnegative(j)
-    return transpose(
-        load_fields(records[world_of(observers, 0), k], at),
-        load_fields(records[world_of(observers, 1), k], at),
-        load_fields(records[world_of(observers, 2), k], at),
-        load_fields(records[world_of(observers, 3), k], at),
-        load_fields(records[world_of(observers, 4), k], at),
-        load_fields(records[world_of(observers, 5), k], at),
-        load_fields(records[world_of(observers, 6), k], at),
-        load_fields(records[world_of(observers, 7), k], at),
-    )
+def of_worlds(records: Records, observers: Observers, at: int) -> tuple[Lanes, ...]:
+    """Return a block of fields, ``at`` bytes into the record (E,) of each observer's world, field by field."""
+    return columns(records, observers.e, observers.e + observers.number, at)
 
 
 class View(NamedTuple):
@@ -191,7 +176,7 @@ def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s:
     n = nonnegative(c.num_trackers)
     observers = Observers(first, n, count)
     for i in range(n):
-        pose = Pose(*columns(worlds.tracker, observers, i, POSE))
+        pose = Pose(*of_worlds(worlds.tracker[:, i], observers, POSE))
         store(s.team_x, WIDTH * i, pose.x)
         store(s.team_y, WIDTH * i, pose.y)
     for lane in range(WIDTH):
@@ -207,22 +192,23 @@ def lay_out_observers(c: Record, worlds: WorldArrays, first: int, count: int, s:
 @compiled
 def view_of(c: Record, worlds: WorldArrays, observers: Observers, s: Record) -> View:
     """Return the view of a robot of eight worlds; requires :func:`lay_out_observers`."""
-    if observers.i < c.num_trackers:
-        number = eight(np.float32(observers.i))
-        own = Pose(*columns(worlds.tracker, observers, observers.i, POSE))
+    i = nonnegative(observers.i)
+    if i < c.num_trackers:
+        number = eight(np.float32(i))
+        own = Pose(*of_worlds(worlds.tracker[:, i], observers, POSE))
         if c.drifts != 0:  # its pose as it knows it
-            error = Odometry(*columns(worlds.odometry, observers, observers.i, 0))
+            error = Odometry(*of_worlds(worlds.odometry[:, i], observers, 0))
             cos, sin = turned(own.heading_cos, own.heading_sin, error.cos, error.sin)
             x, y = own.x + error.x, own.y + error.y
             own = Pose(x, y, cos, sin, own.speed, own.turn_rate, own.max_speed, own.max_turn_rate)
-        fix = Fix(*columns(worlds.tracker, observers, observers.i, FIX))
-        condition = Condition(*columns(worlds.tracker, observers, observers.i, CONDITION))
+        fix = Fix(*of_worlds(worlds.tracker[:, i], observers, FIX))
+        condition = Condition(*of_worlds(worlds.tracker[:, i], observers, CONDITION))
         touching, sees, fixed_at = counts(condition.touching), counts(condition.sees), counts(condition.fix_step)
         working = choose(counts(condition.broken_at) == np.float32(NEVER), ONE, ZERO)
         per_acceleration, per_turn_acceleration = c.per_acceleration, c.per_turn_acceleration
     else:  # a target agent: its limits act at once, and it has no target
         zero, number = eight(ZERO), eight(-ONE)
-        x, y, cos, sin, speed, turn_rate, _, _ = columns(worlds.world.reshape(-1, 1), observers, 0, TARGET_POSE)
+        x, y, cos, sin, speed, turn_rate, _, _ = of_worlds(worlds.world, observers, TARGET_POSE)
         own = Pose(x, y, cos, sin, speed, turn_rate, eight(c.target_speed), eight(c.target_turn_rate))
         fix = Fix(zero, zero, zero, zero, zero, zero, zero, zero)
         touching, sees, fixed_at = load(s.target_touching, 0), zero, number

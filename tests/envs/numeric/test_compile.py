@@ -13,7 +13,7 @@ import numba
 import pytest
 from tests.support.forks import forks_of
 
-from posse.numeric import UNCOMPILED, compiled, kernel
+from posse.numeric import UNCOMPILED, compiled, kernel, out_of_line
 
 pytestmark = pytest.mark.skipif(UNCOMPILED, reason="nothing is compiled")
 
@@ -43,7 +43,7 @@ def test_numba_has_the_inner_parts_that_are_used() -> None:
             assert part is not None, f"numba {numba.__version__} lacks {module}.{name}, which posse.numeric uses"
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def apart(x: float) -> float:
     """A function that is not inlined."""
     return x + 12345.5

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posse.numeric import ZERO, FloatArray, Record, Records, compiled
+from posse.numeric import ZERO, FloatArray, Record, Records, compiled, out_of_line
 from posse.rules.kinematics import turned
 from posse.rules.randomness import RADIO_LOSS, uniform
 from posse.rules.senses.sensing import take_fix
@@ -39,7 +39,17 @@ def share_fixes(c: Record, trackers: Records) -> None:
             take_fix(c, t, b)
 
 
-@compiled(out_of_line=True)
+@compiled
+def keep_messages(c: Record, w: Record, trackers: Records, actions: FloatArray, message: FloatArray) -> None:
+    """Store the messages in the actions (rows, 2 + m) of working trackers, to be heard after the delay."""
+    slot = w.step % (c.radio_delay + 1)
+    for i in range(c.num_trackers):
+        works = trackers[i].broken_at == NEVER
+        for k in range(c.message_size):
+            message[slot, i, k] = actions[i, 2 + k] if works else ZERO
+
+
+@out_of_line
 def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: Records) -> None:
     """Write the broadcasts of all trackers to the ring buffer (D + 1, N)."""
     slot = w.step % (c.radio_delay + 1)
@@ -53,7 +63,7 @@ def send(c: Record, w: Record, trackers: Records, odometry: Records, broadcast: 
             b.odometry = odometry[i]
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def hear(
     c: Record,
     w: Record,
@@ -97,7 +107,7 @@ def hear(
                 take_fix(c, t, b)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def connected(c: Record, w: Record, trackers: Records) -> bool:
     """Return whether the radio graph of the working trackers is connected.
 

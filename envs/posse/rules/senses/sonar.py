@@ -21,6 +21,7 @@ from posse.numeric import (
     lesser,
     load,
     lowest_bit,
+    out_of_line,
     root,
     store,
 )
@@ -62,7 +63,7 @@ def echo_of_disc(c: Record, robot: Place, j: int, s: Record) -> None:
         store(s.reading, k, reading)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def echo_of_walls(c: Record, robot: Place, s: Record) -> None:
     """Update the sonar readings with the walls of the arena."""
     x, y, hc, hs = robot

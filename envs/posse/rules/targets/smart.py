@@ -25,6 +25,7 @@ from posse.numeric import (
     eight,
     lesser,
     load,
+    out_of_line,
     root,
     store,
 )
@@ -163,7 +164,7 @@ def plan_escape(c: Record, w: Record, trackers: Records, obstacles: Records, s: 
                 w.goal_cos, w.goal_sin = ux, uy
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.float32) -> np.float32:
     """Return for how long, at most ``_LOOKOUT``, a direction is free of obstacles and walls, s."""
     far = c.target_speed * _LOOKOUT
@@ -183,7 +184,7 @@ def free_time(c: Record, w: Record, obstacles: Records, ux: np.float32, uy: np.f
     return np.float32(far / c.target_speed)
 
 
-@compiled(out_of_line=True)
+@out_of_line
 def plan_dart(c: Record, w: Record, trackers: Records, obstacles: Records) -> None:
     """Set the goal heading whose turn disrupts the formation most.
 
