@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from posse_baselines.deploy import Deployed, deploy
 from posse_baselines.fields import Tunable
-from posse_baselines.playing import (
-    Match,
-    Played,
-    Recorder,
-    Trajectory,
-    against,
-    play,
-    rollout,
-    split_agents,
-    stack_agents,
-)
+from posse_baselines.playing import Played, Recorder, Trajectory, batch_for, play, rollout, split_agents, stack_agents
 from posse_baselines.policies.scripted import settings_of, tunable, with_settings
 from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin, from_function
 from posse_baselines.registry import Target, load, load_target, policy_names, target_names
@@ -26,7 +16,6 @@ register()
 __all__ = [
     "BasePolicy",
     "Deployed",
-    "Match",
     "Memory",
     "Played",
     "Policy",
@@ -37,7 +26,7 @@ __all__ = [
     "Target",
     "Trajectory",
     "Tunable",
-    "against",
+    "batch_for",
     "begin",
     "deploy",
     "from_function",
