@@ -48,9 +48,10 @@ def play_shard(
     scenario: Scenario | Family,
     seed: int,
     split: str,
+    shard: range,
+    *,
     num_threads: int | None,
     advance: Callable[[int], object],
-    shard: range,
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
     played = []

@@ -85,8 +85,9 @@ def evaluate(
         report = progress if callable(progress) else advance
         if ray is False:
             report = limited(report, time_limit)
-            played = (one.policy, one.target, settings, seed, split, num_threads, report)
-            return one.results(joined([play_shard(*played, shard) for shard in one.shards]))
+            game = (one.policy, one.target, settings, seed, split)
+            how: dict[str, Any] = {"num_threads": num_threads, "advance": report}
+            return one.results(joined([play_shard(*game, shard, **how) for shard in one.shards]))
         with gathered_results([one], ray, lambda: report(one.steps // len(one.shards))) as (found,):
             if isinstance(found, Exception):
                 raise found
@@ -195,7 +196,8 @@ def _play_here(
 ) -> Arrays:
     with played_errors():
         loaded = load(policy) if isinstance(policy, str) else policy
-        return play_shard(loaded, target, scenario, seed, split, 1, limited(lambda steps: None, time_limit), shard)
+        advance = limited(lambda steps: None, time_limit)
+        return play_shard(loaded, target, scenario, seed, split, shard, num_threads=1, advance=advance)
 
 
 @contextmanager
