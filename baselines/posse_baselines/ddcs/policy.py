@@ -135,13 +135,8 @@ class DDCS(OwnArrays, BasePolicy):
         over_worlds(kernel, (minds, work_for(n), observations, out), num_worlds, n)
         return out
 
-    @property
-    def belief_size(self) -> int:
-        """Numbers in a belief."""
-        return BELIEF_SIZE
-
-    def belief(self, observations: FloatArray, memory: Memory) -> FloatArray:
-        """Return what each tracker believes after :meth:`propose`, (E, N, belief_size).
+    def belief(self, memory: Memory) -> FloatArray:
+        """Return what each tracker believes after :meth:`propose`, (E, N, BELIEF_SIZE).
 
         The order is that of :mod:`posse_baselines.ddcs.belief`.
         """
