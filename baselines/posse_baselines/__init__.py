@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
+from posse_baselines.ddcs import DDCS
 from posse_baselines.deploy import Deployed, deploy
-from posse_baselines.fields import Tunable
-from posse_baselines.playing import (
-    Match,
-    Played,
-    Recorder,
-    Trajectory,
-    against,
-    play,
-    rollout,
-    split_agents,
-    stack_agents,
-)
-from posse_baselines.policies.scripted import settings_of, tunable, with_settings
+from posse_baselines.fields import Tunable, tunables
+from posse_baselines.playing import Played, Recorder, Trajectory, batch_for, play, rollout, split_agents, stack_agents
 from posse_baselines.policy import BasePolicy, Memory, Policy, PolicyError, StateReader, begin, from_function
 from posse_baselines.registry import Target, load, load_target, policy_names, target_names
 from posse_baselines.safeguard import Safeguard
@@ -24,9 +14,9 @@ from posse_baselines.tracker_env import register
 register()
 
 __all__ = [
+    "DDCS",
     "BasePolicy",
     "Deployed",
-    "Match",
     "Memory",
     "Played",
     "Policy",
@@ -37,7 +27,7 @@ __all__ = [
     "Target",
     "Trajectory",
     "Tunable",
-    "against",
+    "batch_for",
     "begin",
     "deploy",
     "from_function",
@@ -46,10 +36,8 @@ __all__ = [
     "play",
     "policy_names",
     "rollout",
-    "settings_of",
     "split_agents",
     "stack_agents",
     "target_names",
-    "tunable",
-    "with_settings",
+    "tunables",
 ]

@@ -9,9 +9,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from posse import Batch, ObservationLayout, Scenario
+import posse
+from posse import Batch, ObservationLayout, PairedBatch, Scenario
 from posse.numeric import BoolArray, FloatArray
-from posse_baselines.policy import Annotations, BasePolicy, Memory, Policy, PolicyError, StateReader, begin
+from posse_baselines.policy import Annotations, Memory, Policy, PolicyError, begin
 from posse_baselines.registry import Target
 
 Array = npt.NDArray[Any]
@@ -24,7 +25,8 @@ _FRAMES: Final = ("observations", "tracker_pose", "target_pose")
 class Trajectory:
     """What E worlds did in T steps, as arrays by name: ``trajectory["tracker_pose"]``.
 
-    A *frame* is the worlds at a control step: frame 0 is the start, step t leads from frame t to frame t + 1.
+    A *frame* is the worlds at a control step: frame 0 is the start, step t leads from frame t to frame t + 1. Rows are
+    the trackers, then the target if a policy moves it, from without or within the batch.
 
     ====================== ============================ ====================================================
     name to record         shape                        what it holds
@@ -124,7 +126,7 @@ class Recorder:
         """Start an episode in every world (see :meth:`posse.Batch.reset`) and record from here."""
         observations = self.batch.reset(seed=seed, options=options)
         self._clear()
-        self._keep_frame(observations)
+        self._keep_frame(self.batch.everyone[1].observations if isinstance(self.batch, PairedBatch) else observations)
         return observations
 
     def step(
@@ -144,9 +146,15 @@ class Recorder:
             self.over |= ended
         if "annotations" in self._names:
             self._keep(noted)
+        terms = {f"reward/{term}": infos[f"reward/{term}"] for term in self.batch.term_names}
+        actions = np.array(actions, np.float32)
+        if isinstance(self.batch, PairedBatch):
+            actions, every = self.batch.everyone
+            observations, rewards = every.observations, every.rewards
+            terms = dict(zip(terms, np.moveaxis(every.terms, -1, 0), strict=True))
         if "terms" in self._names:
-            self._keep({name: infos[name] for name in (f"reward/{term}" for term in self.batch.term_names)})
-        told = {"actions": np.array(actions, np.float32), "rewards": rewards, "score": infos["score"]}
+            self._keep(terms)
+        told = {"actions": actions, "rewards": rewards, "score": infos["score"]}
         told |= {"terminated": terminated, "truncated": truncated}
         self._keep({name: array for name, array in told.items() if name in self._names})
         self._keep_frame(observations)
@@ -194,16 +202,45 @@ class Played:
     memory: Memory
 
 
-def check_moves_all(policy: Policy, scenario: Scenario) -> None:
-    """Raise if the target of a scenario is an agent that the policy does not move.
+def batch_for(
+    policy: Policy, scenario: Scenario, num_worlds: int = 1, target: Target | None = None, **settings: Any
+) -> Batch:
+    """Return worlds for a policy that moves the trackers, against a target.
+
+    Args:
+        policy: Their ``message_size`` is raised to that of this policy.
+        scenario: Settings of the worlds.
+        num_worlds: E, at least 1.
+        target: Default: the scenario's own motion.
+        settings: Further arguments of :func:`posse.batch`.
+
+    Raises:
+        PolicyError: The target is an agent that nothing moves, or the policy plans ahead in copies of the worlds, which
+            have no target's policy.
+    """
+    scenario = scenario if target is None else target.fit(scenario)
+    moved = None if target is None else target.policy
+    if moved is None:
+        check_trackers_only(policy, scenario)
+    elif policy.reads_state:
+        raise PolicyError(
+            f"{policy.name!r} reads the state and plays the target's motion ahead: it cannot play against a target "
+            "that is moved by a policy"
+        )
+    size = max(scenario.message_size, policy.message_size)
+    return posse.batch(scenario.replace(message_size=size), num_worlds, target_policy=moved, **settings)
+
+
+def check_trackers_only(policy: Policy, scenario: Scenario) -> None:
+    """Raise if the target of a scenario is an agent, which no policy of trackers moves.
 
     Raises:
         PolicyError: The message says how to pair the policy with one of a target.
     """
-    if scenario.num_agents != scenario.num_trackers and not isinstance(policy, Match):
+    if scenario.num_agents != scenario.num_trackers:
         raise PolicyError(
-            f"the target of {scenario.name!r} is an agent, and policy {policy.name!r} drives "
-            "trackers only: give a target too, target=, or play it with posse play"
+            f"the target of {scenario.name!r} is an agent, and policy {policy.name!r} drives trackers only: give a "
+            "target too, target=, or play it with posse play"
         )
 
 
@@ -221,7 +258,7 @@ def rollout(
 
     Args:
         batch: The worlds.
-        policy: Moves the trackers; a :class:`Match` moves the target too.
+        policy: Moves the trackers; what moves the target is inside the batch (:func:`batch_for`).
         record: Names of arrays, listed in :class:`Trajectory`; its metrics are always there.
         steps: How many to play, through the ends of episodes; default: until the first episode of every world has
             ended. With autoreset disabled, it ends there in any case.
@@ -230,14 +267,14 @@ def rollout(
         after_step: Called after each step.
 
     Raises:
-        PolicyError: The policy does not fit the batch, the target is an agent that it does not move, or episodes end
-            at different steps with autoreset disabled.
+        PolicyError: The policy does not fit the batch, the target is an agent that nothing moves, or episodes end at
+            different steps with autoreset disabled.
         ValueError: An unknown name to record, or ``steps`` below 1.
     """
     if steps is not None and steps < 1:
         raise ValueError(f"steps={steps} must be at least 1")
     if batch.observation_shape[1] == batch.scenario.num_agents:
-        check_moves_all(policy, batch.scenario)
+        check_trackers_only(policy, batch.scenario)
     recorder = Recorder(batch, record)
     memory = begin(policy, batch)
     observations = recorder.reset(seed=seed, options=options)
@@ -267,89 +304,6 @@ def play(batch: Batch, policy: Policy, *, seed: int | None = None) -> dict[str, 
         PolicyError: As :func:`rollout`.
     """
     return rollout(batch, policy, seed=seed).metrics
-
-
-class Match(BasePolicy):
-    """Moves the trackers by one policy and the target by another.
-
-    It plays worlds whose target is an agent: observations (E, N + 1, F), actions (E, N + 1, 2 + m),
-    the target's row last. All else is as in the policy of the trackers.
-
-    Args:
-        policy: Moves the trackers.
-        target: Moves the target; one with a policy.
-
-    Attributes:
-        trained_splits: Splits that either was trained on.
-
-    Raises:
-        PolicyError: The target has no policy, or the trackers' one plans ahead in copies of the
-            worlds, which have no target's policy.
-    """
-
-    def __init__(self, policy: Policy, target: Target) -> None:
-        if target.policy is None:
-            raise PolicyError(f"target {target.name!r} is a motion of the scenario, not a policy")
-        if policy.reads_state:
-            raise PolicyError(
-                f"{policy.name!r} reads the state and plays the target's motion ahead: it cannot "
-                f"play against {target.name!r}, which is moved by a policy"
-            )
-        self.name = policy.name
-        self.message_size = policy.message_size
-        splits = (*getattr(policy, "trained_splits", ()), *target.trained_splits)
-        self.trained_splits = tuple(dict.fromkeys(splits))
-        self.policy, self.target = policy, target.policy
-        self.reads_state = isinstance(self.target, StateReader) and self.target.reads_state  # of the team: False
-        self._target_name = target.name
-
-    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
-        """Return the memories of both.
-
-        Raises:
-            PolicyError: Either does not fit the layout.
-        """
-        return self.policy.begin(layout, num_worlds), self.target.begin(layout, num_worlds)
-
-    def watch(self, batch: Batch) -> None:
-        """Set the batch of a target that reads the state."""
-        if isinstance(self.target, StateReader):
-            self.target.watch(batch)
-
-    def act(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return actions (E, N + 1, 2 + m) for observations (E, N + 1, F)."""
-        mine, theirs = memory
-        actions, mine = self.policy.act(np.ascontiguousarray(observations[:, :-1]), mine)
-        moves, theirs = self.target.act(np.ascontiguousarray(observations[:, -1:]), theirs)
-        moves = np.asarray(moves)
-        if moves.shape[:2] != (len(actions), 1) or moves.shape[-1] < 2:
-            raise PolicyError(
-                f"target {self._target_name!r} returned actions of shape {moves.shape}, wanted {(len(actions), 1, 2)}"
-            )
-        whole = np.zeros((len(actions), observations.shape[1], actions.shape[2]), np.float32)
-        whole[:, :-1] = actions
-        whole[:, -1, :2] = moves[:, 0, :2]
-        return whole, (mine, theirs)
-
-    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
-        """Return the memories with the worlds of a mask (E,) restarted."""
-        return self.policy.restart(memory[0], mask), self.target.restart(memory[1], mask)
-
-    def annotations(self, memory: Memory) -> Annotations:
-        """Return those of the trackers' policy."""
-        return self.policy.annotations(memory[0])
-
-
-def against(policy: Policy, target: Target | None) -> Policy:
-    """Return what plays a policy against a target, in ``target.fit(scenario)``.
-
-    That is the policy itself where the target is a scripted motion, or ``None``, the scenario's
-    own.
-
-    Raises:
-        PolicyError: As :class:`Match`.
-    """
-    return policy if target is None or target.policy is None else Match(policy, target)
 
 
 def stack_agents(observations: Mapping[str, npt.ArrayLike]) -> FloatArray:

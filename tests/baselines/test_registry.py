@@ -10,7 +10,7 @@ import pytest
 from tests.support.learned import any_policy, target_for
 
 import posse
-from posse_baselines import Match, Policy, PolicyError, against, load, load_target, play, policy_names, target_names
+from posse_baselines import Policy, PolicyError, batch_for, begin, load, load_target, play, policy_names, target_names
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
 
@@ -101,8 +101,6 @@ def test_a_scripted_target_is_the_scenarios_motion() -> None:
     target = load_target("accelerating")
     assert target.fit(SHORT) == SHORT.replace(target_motion="accelerating")
     assert load_target(target) is target
-    policy = load("pursuit")
-    assert against(policy, target) is policy
 
 
 @pytest.fixture
@@ -112,16 +110,22 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_target_plays_the_same_inside_a_batch_and_in_a_match(file: Path) -> None:
+def test_a_target_plays_inside_the_worlds_as_beside_them(file: Path) -> None:
     for text in (str(file), CODE):
         target = load_target(text)
         assert target.policy is not None
-        inside = posse.batch(SHORT, 4, seed=2, target_policy=target.policy)
-        match = against(load("pursuit"), target)
-        beside = play(posse.Batch(target.fit(SHORT), 4, seed=2), match)
-        for name, column in play(inside, load("pursuit")).items():
-            np.testing.assert_array_equal(column, beside[name], name)
-    assert match.name == "pursuit"
+        team = load("pursuit")
+        inside = play(batch_for(team, SHORT, 4, target, seed=2), team)
+        batch = posse.Batch(target.fit(SHORT), 4, seed=2, autoreset="disabled")
+        observations = batch.reset()
+        memories = begin(team, batch), target.policy.begin(batch.layout, 4)
+        while not batch.truncated.all():
+            mine, first = team.act(np.ascontiguousarray(observations[:, :-1]), memories[0])
+            theirs, second = target.policy.act(np.ascontiguousarray(observations[:, -1:]), memories[1])
+            memories = first, second
+            observations, *_ = batch.step(np.concatenate([mine, theirs[..., :2]], axis=1))
+        for name, column in batch.metrics().items():
+            np.testing.assert_array_equal(column, inside[name], name)
 
 
 def test_the_sides_are_not_mixed_up(file: Path, tmp_path: Path) -> None:
@@ -133,17 +137,16 @@ def test_the_sides_are_not_mixed_up(file: Path, tmp_path: Path) -> None:
         load_target(team)
     evader = load_target(file)
     with pytest.raises(PolicyError, match="plays the target's motion ahead"):
-        Match(load("planner"), evader)
-    with pytest.raises(PolicyError, match="a motion of the scenario"):
-        Match(load("pursuit"), load_target("smart"))
+        batch_for(load("planner"), SHORT, 1, evader)
     with pytest.raises(PolicyError, match="give a target too"):
         play(posse.Batch(evader.fit(SHORT), 1), load("pursuit"))
 
 
 def test_wrong_actions_of_a_target_are_named() -> None:
     target = load_target(f"{__name__}:Broken")
-    with pytest.raises(PolicyError, match=r"Broken.*shape \(1, 1\)"):
-        play(posse.Batch(target.fit(SHORT), 2), against(load("idle"), target))
+    team = load("idle")
+    with pytest.raises(ValueError, match=r"target's policy returned actions of shape \(1, 1\)"):
+        play(batch_for(team, SHORT, 2, target), team)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.support.tunable import BEST, POLICY, quiet, small
 
-from posse_baselines import Tunable, settings_of, tunable
+from posse_baselines import DDCS, Tunable, tunables
 from posse_training.cli import main
 from posse_training.errors import CheckpointError, RunFolderError, SettingsError
 from posse_training.files import locked
@@ -154,25 +154,26 @@ def test_the_result_ships_where_the_tuned_policy_finds_it(tmp_path: Path, monkey
 
 
 def test_every_point_is_a_setting_that_can_be_played() -> None:
-    tunables = tunable("ddcs-distributed")
-    space = Space(tunables)
+    found = tunables(DDCS.of("ddcs-distributed").settings)
+    space = Space(found)
     rng = np.random.default_rng(1)
-    for point in [*rng.random((200, len(tunables))), np.zeros(len(tunables)), np.ones(len(tunables))]:
-        settings_of("ddcs-distributed").replace(**space.values(point))
+    for point in [*rng.random((200, len(found))), np.zeros(len(found)), np.ones(len(found))]:
+        DDCS.of("ddcs-distributed").settings.replace(**space.values(point))
 
 
 def test_a_setting_that_must_exceed_one_that_is_not_searched() -> None:
     for name in ("near", "far"):
-        found = tunable("ddcs-distributed")
+        found = tunables(DDCS.of("ddcs-distributed").settings)
         space = Space(tuple(t for t in found if t.name == name), tuple(t for t in found if t.name != name))
         for end in (0.0, 1.0):
-            settings_of("ddcs-distributed").replace(**space.values(np.array([end])))
+            DDCS.of("ddcs-distributed").settings.replace(**space.values(np.array([end])))
 
 
 def test_the_start_is_the_default_and_wide_ranges_are_logarithmic() -> None:
-    for t in tunable("pngl-l-phi"):
+    found = tunables(DDCS.of("pngl-l-phi").settings)
+    for t in found:
         space = Space((t,), ())
-        values = Space((t,), tuple(o for o in tunable("pngl-l-phi") if o is not t)).values(space.start)
+        values = Space((t,), tuple(o for o in found if o is not t)).values(space.start)
         assert values[t.name] == pytest.approx(t.default, rel=1e-5, abs=1e-9)
     wide = Space((Tunable("x", 1.0, 0.1, 10.0, "s"),))
     assert wide.values(np.array([0.25]))["x"] == pytest.approx(10**-0.5, rel=1e-5)

@@ -13,13 +13,14 @@ from typing import Any, Final
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from posse import Batch, Scenario, get_scenario
+from posse import Scenario, get_scenario
 from posse.rendering import style
 from posse.rendering.renderer import LEAST_SIZE, Renderer
 from posse_baselines.ddcs import TASKS
 from posse_baselines.files import write_atomically
-from posse_baselines.playing import check_moves_all
+from posse_baselines.playing import batch_for
 from posse_baselines.policy import Annotations, Policy, begin
+from posse_baselines.registry import Target
 from posse_training.errors import SettingsError, require
 from posse_training.replay.page import PLAYERS, TASK_COLOURS
 
@@ -30,17 +31,18 @@ _FLAT: Final = [c for c in vars(style).values() if isinstance(c, tuple)] + [*TAS
 
 
 class Team:
-    """A policy as it plays one world.
+    """A policy as it plays one world against a target, or the scenario's own.
 
     Raises:
         PolicyError: The policy does not fit the scenario.
     """
 
-    def __init__(self, policy: Policy, scenario: Scenario, seed: int, world: int, split: str) -> None:
-        check_moves_all(policy, scenario)
-        scenario = scenario.replace(message_size=max(scenario.message_size, policy.message_size))
+    def __init__(
+        self, policy: Policy, scenario: Scenario, seed: int, world: int, split: str, target: Target | None = None
+    ) -> None:
         self.policy = policy
-        self.batch = Batch(scenario, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
+        place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
+        self.batch = batch_for(policy, scenario, 1, target, **place, autoreset="disabled")
         self.scores: list[float] = []  # of each step
         self._memory, self._observations = begin(policy, self.batch), self.batch.reset()
         self.told: Annotations = {}
@@ -74,6 +76,7 @@ def film(
     scenario: str | Scenario,
     *,
     path: str | Path,
+    target: Target | None = None,
     seed: int = 0,
     world: int = 0,
     split: str = "test",
@@ -92,6 +95,7 @@ def film(
         scenario: A scenario or its name; its messages are made as long as each policy needs.
         path: File to write, ending in ``.gif`` or ``.mp4`` (which needs the extra ``video``);
             folders are created, an old file is replaced.
+        target: Default: the scenario's own motion.
         seed: Seed of the world.
         world: Index of the world.
         split: ``"train"``, ``"validation"`` or ``"test"``.
@@ -129,7 +133,7 @@ def film(
     if write is _gif and width * len(policies) * height * (last - first) // every > _MOST_FRAMES:
         raise SettingsError("this GIF is too large: make it shorter (--seconds) or smaller (--size), or write an .mp4")
 
-    teams = [(label, Team(policy, settings, seed, world, split)) for label, policy in policies]
+    teams = [(label, Team(policy, settings, seed, world, split, target)) for label, policy in policies]
     drawn = _frames(teams, (width, height), first, max(last, first + 1), every, speed)
     frames = (_with_curves(frame, teams, first, last) if scores else frame for frame in drawn)
     opening = next(frames, None)

@@ -59,7 +59,15 @@ def from_sb3(
     Raises:
         PolicyError: Spaces that no environment of posse has.
     """
-    return ModelPolicy(model, name or type(model).__name__, message_size, encoding, normalize, safeguard, deterministic)
+    return ModelPolicy(
+        model,
+        name=name or type(model).__name__,
+        message_size=message_size,
+        encoding=encoding,
+        normalize=normalize,
+        safeguard=safeguard,
+        deterministic=deterministic,
+    )
 
 
 class ModelPolicy(BasePolicy):
@@ -68,6 +76,7 @@ class ModelPolicy(BasePolicy):
     def __init__(
         self,
         model: BaseAlgorithm,
+        *,
         name: str,
         message_size: int,
         encoding: Encoding | None,

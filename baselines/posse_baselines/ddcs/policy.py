@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from posse import ObservationLayout, Scenario
 from posse.numeric import BoolArray, FloatArray, OwnArrays, kernel, over_worlds
+from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.ddcs.belief import BELIEF_SIZE, write_belief
 from posse_baselines.ddcs.memory import (
     GRID,
@@ -28,7 +29,7 @@ from posse_baselines.ddcs.monitoring import MESSAGE_SIZE
 from posse_baselines.ddcs.settings import Settings
 from posse_baselines.ddcs.step import carry_out, correct, plan
 from posse_baselines.laws.offsets import in_units, unit_of
-from posse_baselines.policy import Annotations, BasePolicy, Memory, check_fits, check_observations
+from posse_baselines.policy import Annotations, BasePolicy, Memory, PolicyError, check_fits, check_observations
 
 
 @dataclass
@@ -50,6 +51,17 @@ class DDCS(OwnArrays, BasePolicy):
     def __init__(self, settings: Settings | None = None, name: str | None = None) -> None:
         self.settings = settings or Settings()
         self.name = name or f"ddcs-{self.settings.model}"
+
+    @classmethod
+    def of(cls, name: str) -> DDCS:
+        """Return a member of the DDCS family by name, such as ``"pngl-l-phi"``.
+
+        Raises:
+            PolicyError: No member of that name.
+        """
+        if name not in FAMILY:
+            raise PolicyError(f"policy {name!r} has no settings; those that have: {', '.join(FAMILY)}")
+        return DDCS(FAMILY[name], name)
 
     def settings_for(self, scenario: Scenario) -> Settings:
         """Return the settings that are played on a scenario."""
@@ -123,13 +135,8 @@ class DDCS(OwnArrays, BasePolicy):
         over_worlds(kernel, (minds, work_for(n), observations, out), num_worlds, n)
         return out
 
-    @property
-    def belief_size(self) -> int:
-        """Numbers in a belief."""
-        return BELIEF_SIZE
-
-    def belief(self, observations: FloatArray, memory: Memory) -> FloatArray:
-        """Return what each tracker believes after :meth:`propose`, (E, N, belief_size).
+    def belief(self, memory: Memory) -> FloatArray:
+        """Return what each tracker believes after :meth:`propose`, (E, N, BELIEF_SIZE).
 
         The order is that of :mod:`posse_baselines.ddcs.belief`.
         """

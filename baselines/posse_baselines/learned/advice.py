@@ -6,8 +6,8 @@ observation, and its output corrects the proposal. Two things can be corrected:
 ``motion``: the adviser's action. The action is the proposal plus twice the output, clipped to
 [-1, 1].
 
-``velocity``: the velocity that the adviser wants, before its safeguard against contact
-(:class:`GuardedAdviser`). Whatever the network does, the safeguard comes after it.
+``velocity``: the velocity that the adviser wants, before its safeguard against contact. Whatever the
+network does, the safeguard comes after it.
 
 An output of zero reproduces the adviser, and every motion stays reachable. The adviser's messages
 are sent unchanged, and its memory is its own, so the network needs no memory. With ``believes`` the
@@ -17,13 +17,15 @@ Alshiekh et al. 2018 (safeguard).
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol, cast, runtime_checkable
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from posse import Batch
 from posse.numeric import BoolArray, FloatArray
+from posse_baselines.ddcs import DDCS
+from posse_baselines.ddcs.belief import BELIEF_SIZE
 from posse_baselines.policy import Memory, Policy, PolicyError, begin
 
 REACH: Final = np.float32(2.0)
@@ -34,88 +36,30 @@ CORRECTIONS: Final = ("motion", "velocity")
 """What the output corrects."""
 
 
-@runtime_checkable
-class Adviser(Policy, Protocol):
-    """A policy whose memory can be saved, as resuming a training run requires."""
-
-    def arrays(self, memory: Memory) -> dict[str, npt.NDArray[Any]]:
-        """Return the memory as arrays (E, ...) by name; views, not copies."""
-        ...
-
-
-@runtime_checkable
-class GuardedAdviser(Adviser, Protocol):
-    """An adviser whose control step has two halves, with its safeguard in the second, and which tells its belief."""
-
-    @property
-    def belief_size(self) -> int:
-        """Numbers in a belief."""
-        ...
-
-    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
-        """Return wanted velocities (E, N, 2) for observations (E, N, F), and the memory.
-
-        Ahead and to the left, as shares of the greatest speed.
-        """
-        ...
-
-    def belief(self, observations: FloatArray, memory: Memory) -> FloatArray:
-        """Return what each tracker believes, (E, N, belief_size), after ``propose``."""
-        ...
-
-    def carry_out(self, observations: FloatArray, memory: Memory, corrections: FloatArray) -> tuple[FloatArray, Memory]:
-        """Return actions (E, N, 2 + m) for wanted velocities plus corrections (E, N, 2)."""
-        ...
-
-
-def check_adviser(name: str, policy: Policy, correction: str = "motion", *, believes: bool = False) -> Adviser:
-    """Return a policy as an adviser.
-
-    Args:
-        name: Its name in messages.
-        policy: The policy.
-        correction: One of :data:`CORRECTIONS`.
-        believes: Whether the network reads its belief, as only one that corrects a velocity can.
-
-    Raises:
-        PolicyError: It reads the state of the worlds, its memory cannot be saved, or it lacks what
-            the correction or the belief needs.
-    """
-    if correction not in CORRECTIONS:
-        raise PolicyError(f"correction={correction!r:.80} is unknown; corrections are: {', '.join(CORRECTIONS)}")
-    if policy.reads_state:
-        raise PolicyError(f"{name!r} cannot be an adviser: it reads the state of the worlds, which no tracker observes")
-    if not isinstance(policy, Adviser):
-        raise PolicyError(f"{name!r} cannot be an adviser: it has no method arrays(memory)")
-    if believes and correction == "motion":
-        raise PolicyError('the encoding "belief" goes with correction="velocity": use that, or another encoding')
-    if correction == "velocity" and not isinstance(policy, GuardedAdviser):
-        raise PolicyError(
-            f"{name!r} has no methods propose, belief and carry_out, so that its velocity cannot be "
-            'corrected before its safeguard: use correction="motion", or a policy of the DDCS'
-        )
-    return policy
-
-
 class Advising:
     """How a network and its adviser make actions together; without any memory of its own.
 
     Args:
-        adviser: The policy that proposes, by :func:`check_adviser`.
+        adviser: The policy that proposes, one of the DDCS.
         correction: One of :data:`CORRECTIONS`.
-        believes: Whether the network reads the adviser's belief.
+        believes: Whether the network reads the adviser's belief, as only one that corrects a velocity can.
 
     Attributes:
         inputs: How many numbers the network reads in addition to its encoding.
 
     Raises:
-        PolicyError: An adviser without what the correction or the belief needs.
+        PolicyError: Another policy or correction, or a belief beside a correction of the motion.
     """
 
     def __init__(self, adviser: Policy, correction: str = "motion", *, believes: bool = False) -> None:
-        self.adviser = cast("GuardedAdviser", check_adviser(adviser.name, adviser, correction, believes=believes))
-        self.correction = correction
-        self.inputs = MOTION + (self.adviser.belief_size if believes else 0)
+        if correction not in CORRECTIONS:
+            raise PolicyError(f"correction={correction!r:.80} is unknown; corrections are: {', '.join(CORRECTIONS)}")
+        if not isinstance(adviser, DDCS):
+            raise PolicyError(f"{adviser.name!r} cannot be an adviser: use a policy of the DDCS, such as ddcs-tuned")
+        if believes and correction == "motion":
+            raise PolicyError('the encoding "belief" goes with correction="velocity": use that, or another encoding')
+        self.adviser, self.correction = adviser, correction
+        self.inputs = MOTION + (BELIEF_SIZE if believes else 0)
         self._believes = believes
 
     def ask(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, FloatArray, Memory]:
@@ -125,7 +69,7 @@ class Advising:
             return actions[..., :MOTION], actions, memory
         proposals, memory = self.adviser.propose(observations, memory)
         if self._believes:
-            proposals = np.concatenate([proposals, self.adviser.belief(observations, memory)], axis=-1)
+            proposals = np.concatenate([proposals, self.adviser.belief(memory)], axis=-1)
         return proposals, observations, memory
 
     def answer(self, asked: FloatArray, outputs: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:

@@ -57,6 +57,8 @@ class PairedBatch(Batch):
 
     Attributes:
         memory: Memory of the policy inside.
+        everyone: Actions of all robots in the last step, and what came of them (:class:`Results`), the target's row
+            last.
         observation_shape: (E, rows, F).
         action_shape: (E, rows, 2 + message_size); (E, 1, 2) for the target, which sends no messages.
     """
@@ -99,6 +101,7 @@ class PairedBatch(Batch):
             terms=np.empty((*self._all_actions[:2], len(self.term_names)), np.float32),
         )
         over = super()._advance(whole, every, orders)
+        self.everyone = whole, every
         for mine, array in zip(results[:3], every[:3], strict=True):
             mine[...] = array[:, self._mine]
         self._seen = every.observations[:, self._theirs].copy()

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 import posse
 from posse_baselines.ddcs import DDCS, FLOCKING, SEARCHING
-from posse_baselines.ddcs.belief import LOOKS_AT, MATES_AT, SEARCH_AT, SLOT_AT, TARGET_AT, TASK_AT
+from posse_baselines.ddcs.belief import BELIEF_SIZE, LOOKS_AT, MATES_AT, SEARCH_AT, SLOT_AT, TARGET_AT, TASK_AT
 
 Complexes = npt.NDArray[np.complex128]
 
@@ -24,10 +24,10 @@ def test_a_team_in_formation_believes_what_is_so() -> None:
     observations, memory = batch.reset(seed=2), ddcs.begin(batch.layout, 8)
     for _ in range(250):
         proposals, memory = ddcs.propose(observations, memory)
-        belief, state = ddcs.belief(observations, memory), {k: v.copy() for k, v in batch.state.items()}
+        belief, state = ddcs.belief(memory), {k: v.copy() for k, v in batch.state.items()}
         actions, memory = ddcs.carry_out(observations, memory, np.zeros_like(proposals))
         observations = batch.step(actions)[0]
-    assert belief.shape == (8, 5, ddcs.belief_size)
+    assert belief.shape == (8, 5, BELIEF_SIZE)
     x = {who: state[f"{who}_x"] + 1j * state[f"{who}_y"] for who in ("tracker", "world")}
     ahead = {who: state[f"{who}_heading_cos"] + 1j * state[f"{who}_heading_sin"] for who in x}
     to_target = (x["world"][:, None] - x["tracker"]) / ahead["tracker"]
@@ -55,7 +55,7 @@ def test_who_searches_believes_nothing_of_the_target() -> None:
     lost = []
     for _ in range(20):
         proposals, memory = ddcs.propose(observations, memory)
-        belief = ddcs.belief(observations, memory)
+        belief = ddcs.belief(memory)
         searching = belief[..., TASK_AT + SEARCHING] == 1.0
         assert searching.any()
         assert not belief[searching][:, TARGET_AT : TARGET_AT + 9].any()

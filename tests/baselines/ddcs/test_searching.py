@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 import posse
-from posse_baselines import play, with_settings
+from posse_baselines import DDCS, play
 
 
 def detection(scenario: str, arena: Any = 20.0, **settings: Any) -> npt.NDArray[np.float64]:
     batch = posse.batch(scenario, 200, seed=4, split="train", message_size=5, horizon=300, arena=arena)
-    times = play(batch, with_settings("ddcs-distributed", **settings))["detection_time"]
+    times = play(batch, DDCS.of("ddcs-distributed").with_settings(**settings))["detection_time"]
     return np.where(np.isnan(times), 30.0, times)
 
 

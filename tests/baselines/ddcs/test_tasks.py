@@ -10,7 +10,7 @@ import pytest
 from tests.support.drive import complex_of, drive
 
 import posse
-from posse_baselines import play, settings_of, with_settings
+from posse_baselines import DDCS, play
 from posse_baselines.ddcs import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.ddcs.settings import NO_EXCHANGE, TRANSITIONS
 
@@ -19,7 +19,7 @@ NO_RETURN = ("exchange>converging", "exchange>flocking")
 
 
 def metrics(name: str, scenario: str, *forbidden: str, worlds: int = 60) -> dict[str, Any]:
-    policy = with_settings(name, forbidden=forbidden)
+    policy = DDCS.of(name).with_settings(forbidden=forbidden)
     batch = posse.batch(scenario, worlds, seed=3, split="train", message_size=5)
     return play(batch, policy)
 
@@ -39,7 +39,7 @@ def test_searching_lasts_until_the_target_is_seen_or_reported() -> None:
 
 
 def test_converging_and_flocking_change_with_hysteresis() -> None:
-    settings = settings_of("ddcs-distributed")
+    settings = DDCS.of("ddcs-distributed").settings
     wing = 1.2 * math.sqrt(0.5)
     wings = [-1.2 - k * wing + 1j * side * k * wing for k in (1, 2) for side in (1, -1)]
     wedge = np.array([-1.2, *wings])
@@ -153,7 +153,7 @@ def test_without_searching_a_lost_target_is_not_found_again() -> None:
     for forbidden in ((), LOSS):
         searched = False
         for now in drive(
-            with_settings("ddcs-distributed", forbidden=forbidden),
+            DDCS.of("ddcs-distributed").with_settings(forbidden=forbidden),
             "constant",
             40,
             700,
@@ -176,6 +176,6 @@ def test_without_searching_a_lost_target_is_not_found_again() -> None:
 
 def test_every_change_can_be_forbidden() -> None:
     for change in TRANSITIONS:
-        assert settings_of("pngl-l-phi").replace(forbidden=(change,)).forbidden == (change,)
+        assert DDCS.of("pngl-l-phi").settings.replace(forbidden=(change,)).forbidden == (change,)
     with pytest.raises(ValueError, match="forbidden='flocking>flocking' is unknown"):
-        settings_of("pngl-l-phi").replace(forbidden=("flocking>flocking",))
+        DDCS.of("pngl-l-phi").settings.replace(forbidden=("flocking>flocking",))

@@ -9,9 +9,9 @@ import pytest
 from tests.support.learned import network_for, policy_for
 
 import posse
-from posse_baselines import Policy, PolicyError, load, play
+from posse_baselines import PolicyError, load, play
 from posse_baselines.learned import Encoding, LearnedPolicy
-from posse_baselines.learned.advice import Advice, Advising, check_adviser
+from posse_baselines.learned.advice import Advice, Advising
 
 DDCS = "ddcs-distributed"
 SAID = load(DDCS).message_size
@@ -95,21 +95,13 @@ def test_worlds_that_begin_anew_leave_the_advice_in_the_others_as_it_was(correct
 
 
 def test_who_cannot_advise() -> None:
-    class Mute:
-        name, message_size, reads_state = "mute", 0, False
-        begin = act = restart = annotations = None
-
-    mute: Policy = Mute()  # type: ignore[assignment]
-    pursuit = load("pursuit")
-    check_adviser("pursuit", pursuit)
-    for policy, settings, message in (
-        (load("planner"), {}, "no tracker observes"),
-        (mute, {}, "arrays"),
-        (pursuit, {"correction": "velocity"}, "propose, belief and carry_out"),
-        (pursuit, {"believes": True}, '"belief" goes with correction="velocity"'),
-        (pursuit, {"correction": "speed"}, "motion, velocity"),
+    for name, settings, message in (
+        ("planner", {}, "use a policy of the DDCS"),
+        ("pursuit", {"correction": "velocity"}, "use a policy of the DDCS"),
+        (DDCS, {"believes": True}, '"belief" goes with correction="velocity"'),
+        (DDCS, {"correction": "speed"}, "motion, velocity"),
     ):
         with pytest.raises(PolicyError, match=message):
-            check_adviser(policy.name, policy, **settings)
+            Advising(load(name), **settings)
     with pytest.raises(PolicyError, match="needs an adviser"):
         policy_for(worlds().layout, "belief")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.support.drive import Instant, complex_of, drive
 
-from posse_baselines import Policy, load, with_settings
+from posse_baselines import DDCS, Policy, load
 from posse_baselines.ddcs import FLOCKING
 
 OFFSET = 0.15  # m, of the control point
@@ -67,7 +67,7 @@ def control_point(now: Instant) -> tuple[complex, float]:
 def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
     wanted = PLACE + OFFSET
     for error in (0.3 + 0.2j, -0.3 + 0.2j, -0.3j, -0.4 + 0j, 0.2 + 0.3j):
-        seen = team(with_settings("pngl-l-phi", follower_frame=frame), error, dt)
+        seen = team(DDCS.of("pngl-l-phi").with_settings(follower_frame=frame), error, dt)
         assert all((now.notes["task"] == FLOCKING).all() for now in seen)
         arms = [control_point(now)[0] for now in seen]
         decay = np.exp(-ALPHA * np.array([now.time for now in seen]))
@@ -80,7 +80,7 @@ def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float)
 @pytest.mark.parametrize(("frame", "rate"), [("leader", 0.25), ("slot-frame", 0.15)])
 def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(frame: str, rate: float) -> None:
     # Figure 6: on a circle the formation turns with its frame, and the follower's centre keeps to its place in it.
-    policy = with_settings("pngl-l-phi" if frame == "slot-frame" else "ddcs-centralized", follower_frame=frame)
+    policy = DDCS.of("pngl-l-phi" if frame == "slot-frame" else "ddcs-centralized").with_settings(follower_frame=frame)
     for now in team(policy, 0j, seconds=20.0, target=lambda _: (0.8, rate))[-50:]:
         place = complex_of(now.tracker)[0]
         axis = now.psi[0] if frame == "slot-frame" else now.tracker[0, 0, 2]

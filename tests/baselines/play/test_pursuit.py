@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from tests.support.drive import Floats, Instant, complex_of, drive
 
-from posse_baselines import Policy, load, with_settings
+from posse_baselines import DDCS, Policy, load
 from posse_baselines.ddcs import CONVERGING, FLOCKING
 
 ASPECTS = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
@@ -76,7 +76,7 @@ def test_velocity_pursuit_meets_its_target_when_the_closed_form_says(dt: float, 
 
 @pytest.mark.parametrize("general", [0.9, 1.1])
 def test_pngl_as_printed_meets_its_target_when_its_equations_say(general: float) -> None:
-    policy = with_settings("velocity-pursuit", navigation_constant=general)
+    policy = DDCS.of("velocity-pursuit").with_settings(navigation_constant=general)
     for k in (1.5, 3.0):
         times = intercept_times(policy, k, 0.1, general)
         exact = [exact_time(k, aspect, general) for aspect in ASPECTS]
@@ -114,7 +114,7 @@ def test_the_range_rests_whatever_the_target_s_angle() -> None:
     ranges = [
         abs(now.line_of_sight[0, 0])
         for now in drive(
-            with_settings("velocity-pursuit", range_gain=0.1),
+            DDCS.of("velocity-pursuit").with_settings(range_gain=0.1),
             "constant",
             1,
             100,
@@ -195,7 +195,7 @@ def test_without_a_deviation_the_bearing_settles_at_the_heading_over_k() -> None
     bearings = []
     for k in (0.9, 1.0, 1.1):
         *_, last = drive(
-            with_settings("velocity-pursuit", navigation_constant=k),
+            DDCS.of("velocity-pursuit").with_settings(navigation_constant=k),
             "constant",
             1,
             400,
@@ -215,7 +215,7 @@ def test_the_bearing_converges_at_the_stated_rate() -> None:
             [
                 np.angle(now.line_of_sight[0, 0])
                 for now in drive(
-                    with_settings("pngl", navigation_constant=k),
+                    DDCS.of("pngl").with_settings(navigation_constant=k),
                     "constant",
                     1,
                     60,

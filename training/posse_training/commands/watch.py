@@ -78,7 +78,7 @@ def main(arguments: Sequence[str]) -> None:
     size = which.size or (960, 720)
 
     from posse import get_scenario
-    from posse_baselines import against, load, load_target
+    from posse_baselines import load, load_target
 
     scenario = get_scenario(which.scenario)
     if which.num_trackers is not None:
@@ -87,13 +87,13 @@ def main(arguments: Sequence[str]) -> None:
     if target is not None:
         scenario = target.fit(scenario)
     policies = [load(name) for name in which.policies]
-    world: dict[str, Any] = {"seed": which.seed, "world": which.world, "split": which.split}
+    world: dict[str, Any] = {"seed": which.seed, "world": which.world, "split": which.split, "target": target}
     if which.film is not None:
         from posse_training.film import film
 
         print(
             film(
-                [(p.name, against(p, target)) for p in policies],
+                [(p.name, p) for p in policies],
                 scenario,
                 path=which.film,
                 start=0.0 if which.start is None else which.start,
@@ -107,11 +107,11 @@ def main(arguments: Sequence[str]) -> None:
         from posse_training.replay import record, write_replay
 
         _PAGE.parent.mkdir(parents=True, exist_ok=True)
-        path = write_replay(record(policies, scenario, target=target, seconds=which.seconds, **world), _PAGE)
+        path = write_replay(record(policies, scenario, seconds=which.seconds, **world), _PAGE)
         print(f"{path}: open it in a browser")
         webbrowser.open(path.resolve().as_uri())
     else:
-        watch([against(p, target) for p in policies], scenario, size, **world)
+        watch(policies, scenario, size, **world)
 
 
 def watch(policies: Sequence[Policy], scenario: Scenario, size: tuple[int, int], world: int, **worlds: Any) -> None:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import posse
-from posse import Family, Scenario
+from posse import Batch, Family, Scenario
 from posse.scenarios.family import blocks
-from posse_baselines import Played, Policy, Target, rollout
+from posse_baselines import Played, Policy, Target, batch_for, rollout
 from posse_training.errors import TimeLimitError, TrainedSplitError
 from posse_training.evaluation.results import Column
 from posse_training.parallel import joined
@@ -45,23 +44,26 @@ def limited(advance: Callable[[int], object], time_limit: float | None) -> Calla
 
 def play_shard(
     policy: Policy,
+    target: Target | None,
     scenario: Scenario | Family,
     seed: int,
     split: str,
+    shard: range,
+    *,
     num_threads: int | None,
     advance: Callable[[int], object],
-    shard: range,
 ) -> dict[str, Column]:
     """Play one episode in every world of a shard; return every metric by name, (worlds,)."""
     played = []
     for one, worlds in blocks(scenario, shard, seed, split):
-        batch = posse.Batch(one, len(worlds), seed=seed, split=split, first_world=worlds.start, num_threads=num_threads)
+        world = {"seed": seed, "split": split, "first_world": worlds.start}
+        batch = batch_for(policy, one, len(worlds), target, **world, num_threads=num_threads)
         played.append(play_episode(batch, policy, advance))
     return joined(played)
 
 
 def play_episode(
-    batch: posse.Batch, policy: Policy, advance: Callable[[int], object] = lambda steps: None
+    batch: Batch, policy: Policy, advance: Callable[[int], object] = lambda steps: None
 ) -> dict[str, Column]:
     """Play one episode in every world of a batch; return every metric by name, (E,).
 

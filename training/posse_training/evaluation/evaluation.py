@@ -14,10 +14,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-import posse
 from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import blocks, scenario_or_family
-from posse_baselines import Policy, PolicyError, Target, against, load, load_target, policy_names
+from posse_baselines import Policy, PolicyError, Target, batch_for, load, load_target, policy_names
 from posse_baselines.registry import is_code
 from posse_training.errors import PlayError, SettingsError, TimeLimitError, TrainedSplitError, describe
 from posse_training.evaluation.episodes import limited, play_shard, refuse_trained_split
@@ -86,8 +85,9 @@ def evaluate(
         report = progress if callable(progress) else advance
         if ray is False:
             report = limited(report, time_limit)
-            played = (settings, seed, split, num_threads, report)
-            return one.results(joined([play_shard(one.policy, *played, shard) for shard in one.shards]))
+            game = (one.policy, one.target, settings, seed, split)
+            how: dict[str, Any] = {"num_threads": num_threads, "advance": report}
+            return one.results(joined([play_shard(*game, shard, **how) for shard in one.shards]))
         with gathered_results([one], ray, lambda: report(one.steps // len(one.shards))) as (found,):
             if isinstance(found, Exception):
                 raise found
@@ -111,7 +111,8 @@ class Evaluation:
     @property
     def job(self) -> Job:
         """The evaluation for a cluster."""
-        return Job(_play_on_worker, (self.sent, self.scenario, self.seed, self.split, self.time_limit), self.shards)
+        played = (self.sent, self.target, self.scenario, self.seed, self.split, self.time_limit)
+        return Job(_play_on_worker, played, self.shards)
 
     @property
     def steps(self) -> int:
@@ -142,14 +143,15 @@ def prepare(
             raise SettingsError(f"{name}={value} must be at least 1")
     loaded = load(policy) if isinstance(policy, str) else policy
     opponent = None if target is None else load_target(target)
-    if opponent is not None:
-        scenario, loaded = opponent.fit(scenario), against(loaded, opponent)
-    refuse_trained_split(loaded, split)
+    for player in (loaded, opponent):
+        if player is not None:
+            refuse_trained_split(player, split)
+    scenario = scenario if opponent is None else opponent.fit(scenario)
     scenario = scenario.replace(message_size=max(scenario.message_size, loaded.message_size))
     first, _ = next(blocks(scenario, range(1), 0, "train"))
-    posse.Batch(first, 1, seed=seed, split=split)  # raises here what is invalid
+    batch_for(loaded, first, 1, opponent, seed=seed, split=split)  # raises here what is invalid
     is_name = isinstance(policy, str) and (policy in policy_names() or is_code(policy))
-    sent = policy if is_name and opponent is None else loaded
+    sent = policy if is_name else loaded
     return Evaluation(loaded, sent, scenario, cut(episodes, worlds), seed, split, opponent, time_limit)
 
 
@@ -168,21 +170,34 @@ def gathered_results(
 
 
 def _play_on_worker(
-    policy: str | Policy, scenario: Scenario | Family, seed: int, split: str, time_limit: float | None, shard: range
+    policy: str | Policy,
+    target: Target | None,
+    scenario: Scenario | Family,
+    seed: int,
+    split: str,
+    time_limit: float | None,
+    shard: range,
 ) -> Arrays:
     """Play the worlds of a shard; with a time limit, code that a name stands for plays in a process of its own."""
     if isinstance(policy, str) and is_code(policy) and time_limit is not None:
-        found: Arrays = apart(time_limit, _play_here, policy, scenario, seed, split, time_limit, shard)
+        found: Arrays = apart(time_limit, _play_here, policy, target, scenario, seed, split, time_limit, shard)
         return found
-    return _play_here(policy, scenario, seed, split, time_limit, shard)
+    return _play_here(policy, target, scenario, seed, split, time_limit, shard)
 
 
 def _play_here(
-    policy: str | Policy, scenario: Scenario | Family, seed: int, split: str, time_limit: float | None, shard: range
+    policy: str | Policy,
+    target: Target | None,
+    scenario: Scenario | Family,
+    seed: int,
+    split: str,
+    time_limit: float | None,
+    shard: range,
 ) -> Arrays:
     with played_errors():
         loaded = load(policy) if isinstance(policy, str) else policy
-        return play_shard(loaded, scenario, seed, split, 1, limited(lambda steps: None, time_limit), shard)
+        advance = limited(lambda steps: None, time_limit)
+        return play_shard(loaded, target, scenario, seed, split, shard, num_threads=1, advance=advance)
 
 
 @contextmanager

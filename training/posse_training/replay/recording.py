@@ -8,10 +8,9 @@ from typing import Any, Final
 import numpy.typing as npt
 
 import posse
-from posse import REWARD_TERMS, Batch, Field, Scenario, get_scenario, scenario_names
-from posse_baselines import Policy, Target, Trajectory, against, load, load_target, rollout
+from posse import REWARD_TERMS, Field, Scenario, get_scenario, scenario_names
+from posse_baselines import Policy, Target, Trajectory, batch_for, load, load_target, rollout
 from posse_baselines.ddcs import TASKS
-from posse_baselines.playing import check_moves_all
 from posse_training.errors import SettingsError
 from posse_training.provenance import commit
 from posse_training.replay.columns import STATES, columns_of
@@ -58,8 +57,6 @@ def record(
     """
     settings = get_scenario(scenario, **overrides)
     opponent = None if target is None else load_target(target)
-    if opponent is not None:
-        settings = opponent.fit(settings)
     if not 1 <= len(policies) <= MOST_PLAYERS:
         raise SettingsError(f"a replay shows 1 to {MOST_PLAYERS} players, got {len(policies)} policies")
     if seconds is not None and not seconds > 0:
@@ -70,11 +67,9 @@ def record(
         label, policy = given if isinstance(given, tuple) else (None, given)
         if isinstance(policy, str):
             policy = load(policy)
-        player = against(policy, opponent)
-        check_moves_all(player, settings)
-        fitting = settings.replace(message_size=max(settings.message_size, policy.message_size))
-        batch = Batch(fitting, 1, seed=seed, split=split, first_world=world, autoreset="disabled")
-        played = rollout(batch, player, RECORD, steps=steps)
+        place: dict[str, Any] = {"seed": seed, "split": split, "first_world": world}
+        batch = batch_for(policy, settings, 1, opponent, **place, autoreset="disabled")
+        played = rollout(batch, policy, RECORD, steps=steps)
         replays.append(replay_of(played, label or policy.name, observations=observations, about=_about(policy)))
     return join(replays)
 

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 
 import posse
-from posse_baselines import Trajectory, with_settings
+from posse_baselines import DDCS, Trajectory
 from posse_baselines.ddcs import TASKS
 from posse_training.reproduce import runs
 from posse_training.reproduce.runs import relative, slot_error, times, told
@@ -155,7 +155,7 @@ def tracks(seed: int) -> Figure:
     start = {"tracker_pose": [(6.0, -1.5, 3.0)], "target_pose": (0.0, 0.0, _HEADING)}
     for column, name in ((0, "velocity-pursuit"), (1, "pngl")):
         for number, k in enumerate((0.9, 1.0, 1.1)):
-            policy = with_settings(name, navigation_constant=k)
+            policy = DDCS.of(name).with_settings(navigation_constant=k)
             run = runs.run_of(policy, alone, 1, seed, start)
             _track(axes[0, column], run, 0, number)
             _bearing(axes[1, column], run, 0, number, f"K = {k:g}")

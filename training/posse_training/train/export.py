@@ -20,7 +20,7 @@ from posse_training.provenance import commit
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.networks import LIMIT, Normaliser
 from posse_training.train.settings import TrainSettings
-from posse_training.train.worlds import make_adviser
+from posse_training.train.worlds import make_advising
 
 
 def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, card: Mapping[str, Any]) -> LearnedPolicy:
@@ -48,7 +48,9 @@ def export(model: BaseAlgorithm, settings: TrainSettings, encoding: Encoding, ca
         activation=settings.activation,
         output=algorithm.bound,
     )
-    return LearnedPolicy(network, encoding, card, make_adviser(settings), settings.correction, settings.safeguard)
+    advising = make_advising(settings)
+    adviser = None if advising is None else advising.adviser
+    return LearnedPolicy(network, encoding, card, adviser, settings.correction, settings.safeguard)
 
 
 def _numbers(tensor: torch.Tensor) -> npt.NDArray[np.float32]:

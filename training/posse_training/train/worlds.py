@@ -9,7 +9,7 @@ import posse
 from posse import Family, ObservationLayout, Scenario
 from posse_baselines import Policy, PolicyError, Target, load, load_target
 from posse_baselines.learned import Encoding
-from posse_baselines.learned.advice import Adviser, Advising, check_adviser
+from posse_baselines.learned.advice import Advising
 from posse_training.errors import SettingsError
 from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.settings import TrainSettings, opponents_of
@@ -78,26 +78,24 @@ def make_env(settings: TrainSettings, num_threads: int | None = None) -> TeamVec
     if settings.side == TARGET:  # it hears no messages
         layout = ObservationLayout(layout.scenario.replace(message_size=0))
     encoding = Encoding.of(layout, settings.encoding, settings.num_neighbours)
-    adviser = make_adviser(settings)
     return TeamVecEnv(
         batches,
         encoding,
-        advising=(Advising(adviser, settings.correction, believes=encoding.believes) if adviser else None),
+        advising=make_advising(settings),
         safeguard=settings.safeguard,
         see_state=ALGORITHMS[settings.algorithm].reads_state,
     )
 
 
-def make_adviser(settings: TrainSettings) -> Adviser | None:
-    """Return the adviser of a run, if any.
+def make_advising(settings: TrainSettings) -> Advising | None:
+    """Return how a run's network is advised, if it is.
 
     Raises:
         PolicyError: A policy that cannot be an adviser.
     """
     if settings.advise is None:
         return None
-    policy, believes = load(settings.advise), settings.encoding == "belief"
-    return check_adviser(settings.advise, policy, settings.correction, believes=believes)
+    return Advising(load(settings.advise), settings.correction, believes=settings.encoding == "belief")
 
 
 def _make_batches(settings: TrainSettings, num_threads: int | None) -> list[posse.Batch]:
