@@ -86,21 +86,6 @@ def test_a_lane_is_what_a_number_alone_would_be(
 
 
 @kernel
-def calculate_alone(x: np.float32, y: np.float32) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """The functions that take plain numbers, too."""
-    return lanes.lesser(x, y), lanes.greater(x, y), lanes.root(x * x), lanes.choose(x < y, x, y)
-
-
-@forms(calculate_alone)
-@settings(derandomize=True, max_examples=100, deadline=None)
-@given(x=sensible.map(np.float32), y=sensible.map(np.float32))
-def test_functions_that_only_calculate_take_plain_numbers_too(
-    function: Callable[..., Any], x: np.float32, y: np.float32
-) -> None:
-    assert function(x, y) == (min(x, y), max(x, y), abs(x), min(x, y))
-
-
-@kernel
 def move(numbers: Numbers, out: Numbers, index: npt.NDArray[np.int64], limit: np.float32) -> np.float32:
     """Transpose eight times eight numbers; write the places of those of the first eight above a limit."""
     x, y, z = lanes.load(numbers, 0), lanes.load(numbers, 8), lanes.load(numbers, 16)
