@@ -80,7 +80,7 @@ def drive(batch: posse.Batch, rng: np.random.Generator) -> npt.NDArray[np.float3
     return actions
 
 
-@hypothesis.settings(derandomize=True, max_examples=40, deadline=None)
+@hypothesis.settings(derandomize=True, max_examples=25, deadline=None)
 @given(
     name=st.sampled_from(posse.scenario_names()),
     target_motion=st.sampled_from(["constant", "accelerating", "smart", "smart", "agent"]),
