@@ -53,6 +53,7 @@ def test_a_file_says_where_it_is_from(name: str, path: Path) -> None:
     assert not re.search(r"(?<![\w.])/(tmp|home|root|work|Users)/", json.dumps(card))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
 def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None:
     check = read_tuned(path).card["check"]
@@ -62,7 +63,7 @@ def test_a_tuned_policy_scores_what_its_card_says(name: str, path: Path) -> None
     assert scores.mean() == pytest.approx(check["safe_score"], abs=sampled)
 
 
-@pytest.mark.parametrize(("name", "path"), FILES, ids=IDS)
+@pytest.mark.parametrize(("name", "path"), FILES[:: len(FILES) - 1])  # one of each policy
 def test_a_tuned_policy_plays_the_settings_of_its_scenario(name: str, path: Path) -> None:
     values = json.loads(path.read_text())["settings"]
     tuned = play(batch_of(path.stem), load(name))["score"]

@@ -62,7 +62,7 @@ def control_point(now: Instant) -> tuple[complex, float]:
     return complex(place[1] + cmath.rect(OFFSET, theta[1]) - place[0]), float(theta[0])
 
 
-@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004), (0.005, 0.001)])
+@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004)])
 @pytest.mark.parametrize("frame", ["leader", "slot-frame"])
 def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
     wanted = PLACE + OFFSET
