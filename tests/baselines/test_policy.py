@@ -160,37 +160,6 @@ def test_rollout_restarts_memories_when_episodes_begin(autoreset: str) -> None:
     assert all(mask.all() for _, mask in restarted)
 
 
-def test_a_trajectory_holds_what_was_asked_for() -> None:
-    def fresh() -> posse.Batch:
-        return posse.batch("radio", 3, horizon=30, settle_time=0.5, message_size=load("ddcs-tuned").message_size)
-
-    batch, policy = fresh(), load("ddcs-tuned")
-    record = ("observations", "tracker_pose", "target_pose", "heard_step", "actions", "rewards", "terms", "score")
-    found = rollout(fresh(), policy, (*record, "terminated", "truncated", "annotations"), seed=4)
-    memory, observations = begin(policy, batch), batch.reset(seed=4)
-    for t in range(30):
-        state = batch.state
-        np.testing.assert_array_equal(found["observations"][t], observations)
-        np.testing.assert_array_equal(found["tracker_pose"][t, ..., 0], state["tracker_x"])
-        np.testing.assert_array_equal(
-            np.cos(found["target_pose"][t, :, 2]),
-            np.cos(np.arctan2(state["world_heading_sin"], state["world_heading_cos"])),
-        )
-        np.testing.assert_array_equal(found["heard_step"][t], state["heard_step"])
-        actions, memory = policy.act(observations, memory)
-        np.testing.assert_array_equal(found["actions"][t], actions)
-        for name, value in policy.annotations(memory).items():
-            np.testing.assert_array_equal(found[f"annotation/{name}"][t], value)
-        observations, rewards, terminated, truncated, infos = batch.step(actions)
-        for name, value in {"rewards": rewards, "terminated": terminated, "truncated": truncated}.items():
-            np.testing.assert_array_equal(found[name][t], value)
-        np.testing.assert_array_equal(found["score"][t], infos["score"])
-        assert set(found.named("reward")) == set(batch.term_names)
-    assert (found.steps, found["observations"].shape[0], found.lengths.tolist()) == (30, 31, [30] * 3)
-    for name, values in batch.metrics().items():
-        np.testing.assert_array_equal(found.metrics[name], values)
-
-
 def test_an_episode_of_a_trajectory_ends_where_its_world_did() -> None:
     settings: dict[str, Any] = {"terminate_on_contact": True, "start_distance": (0.6, 1.5), "seed": 3}
     names = ("tracker_x", "actions", "terminated")

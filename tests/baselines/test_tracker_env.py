@@ -46,16 +46,6 @@ def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
     assert same(env.reset(seed=1), twin.reset(seed=1))
 
 
-def test_a_silent_learner_says_zeros() -> None:
-    env = TrackerEnv("constant", number=0, teammates="ddcs-distributed", seed=3, **SHORT)
-    assert env.action_space.shape == (2,)
-    env.reset()
-    for _ in range(5):
-        env.step(np.zeros(2, np.float32))
-    views = env.layout.views(env.batch.observe()[0, 1])
-    np.testing.assert_array_equal(views["neighbour_message"][views["neighbour_number"] == 0], 0)
-
-
 def vector(**settings: Any) -> Any:
     return gymnasium.make_vec(NAME, E, vectorization_mode="vector_entry_point", **settings)
 

@@ -107,22 +107,3 @@ def write(path: Path, **changes: Any) -> Path:
 def test_a_damaged_file_is_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(PolicyError, match=message):
         load(write(tmp_path / "x.json", **changes))
-
-
-@pytest.mark.parametrize("content", [b"{", b"[" * 100_000, b"\xff\xfe", b"null"])
-def test_what_is_no_json_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "x.json"
-    path.write_bytes(content)
-    with pytest.raises(PolicyError, match=r"x\.json"):
-        load(path)
-    with pytest.raises(PolicyError, match="there is no policy file"):
-        load(tmp_path / "none.json")
-
-
-def test_a_damaged_shipped_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "ddcs-tuned").mkdir()
-    (tmp_path / "ddcs-tuned/smart.json").write_text("{}")
-    monkeypatch.setattr("posse_baselines.tuned.SHIPPED_TUNED", tmp_path)
-    batch = batch_of("smart")
-    with pytest.raises(PolicyError, match=r"smart\.json holds no tuned settings"):
-        load("ddcs-tuned").begin(batch.layout, 6)
