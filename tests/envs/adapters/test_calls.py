@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 from tests.support.adapters import out_of_band, same
-from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject, unchanged
+from tests.support.attack import BAD_OPTIONS, BAD_SEEDS, MAKERS, Subject
 
 SEEDS = st.integers(0, 2**63 - 1)
 
@@ -33,7 +33,7 @@ class Calls(RuleBasedStateMachine):
         with pytest.raises((ValueError, ResetNeeded)) as caught:
             call()
         assert 0 < len(str(caught.value)) <= 1000
-        assert unchanged(before, self.one.held())
+        assert same(before, self.one.held())
 
     @rule(seed=st.none() | SEEDS)
     def reset(self, seed: int | None) -> None:
@@ -69,7 +69,7 @@ class Calls(RuleBasedStateMachine):
                 subject.step(subject.good_action(np.random.default_rng(draw)))
             except ResetNeeded:
                 assert subject.batch.worlds["over"].any()
-        assert unchanged(self.one.held(), self.twin.held())
+        assert same(self.one.held(), self.twin.held())
 
 
 @pytest.mark.parametrize("kind", MAKERS)

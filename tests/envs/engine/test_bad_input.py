@@ -12,8 +12,8 @@ import pytest
 from gymnasium.error import ResetNeeded
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.adapters import f32
-from tests.support.attack import LONG_NAME, MAKERS, Subject, unchanged
+from tests.support.adapters import f32, same
+from tests.support.attack import LONG_NAME, MAKERS, Subject
 
 import posse
 
@@ -146,7 +146,7 @@ def refused(subject: Subject, call: Any, *errors: type[Exception]) -> str:
     before = subject.held()
     with pytest.raises(errors or ValueError) as caught:
         call()
-    assert unchanged(before, subject.held())
+    assert same(before, subject.held())
     assert 0 < len(str(caught.value)) <= 1000
     return str(caught.value)
 
