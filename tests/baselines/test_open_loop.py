@@ -19,6 +19,7 @@ def safe_score(target: str) -> float:
     return float(play(batch, team)["safe_score"].mean())
 
 
+@pytest.mark.long
 def test_none_costs_the_tuned_script_more_than_a_tenth() -> None:
     own = safe_score("smart")
     for name in ("constant", *OPEN_LOOP):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,7 +10,7 @@ import pytest
 from tests.support.learned import network_for
 
 import posse
-from posse_baselines import PolicyError, Safeguard, load, rollout
+from posse_baselines import PolicyError, Safeguard, rollout
 from posse_baselines.learned import Encoding, LearnedPolicy
 from posse_baselines.safeguard import Guard
 
@@ -64,15 +63,6 @@ def test_it_keeps_robots_apart_that_want_the_same_place() -> None:
     assert bare == 1.0
     assert safe <= 0.1
     assert way > 0.2 * far
-
-
-def test_a_policy_file_plays_behind_the_layer_it_was_trained_behind(tmp_path: Path) -> None:
-    policy = guarded("smart")
-    policy.save(tmp_path / "policy.safetensors")
-    again = load(tmp_path / "policy.safetensors")
-    assert again.safeguard  # type: ignore[attr-defined]
-    mine, its = (rollout(posse.batch("smart", 3, seed=1), p, ["actions"], steps=20)["actions"] for p in (policy, again))
-    np.testing.assert_array_equal(mine, its)
 
 
 def test_environments_do_as_the_batch_does() -> None:

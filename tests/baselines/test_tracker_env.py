@@ -8,7 +8,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from tests.support.adapters import out_of_band, same
 
@@ -18,13 +17,6 @@ from posse_baselines.tracker_env import TrackerEnv
 
 NAME, E = "posse/Tracker-v0", 3
 SHORT: dict[str, Any] = {"horizon": 40}
-
-
-@pytest.mark.parametrize("scenario", ["constant", "field"])
-@pytest.mark.parametrize("discrete", [False, True])
-def test_it_passes_gymnasiums_check(scenario: str, discrete: bool) -> None:
-    env = gymnasium.make(NAME, scenario=scenario, discrete_actions=discrete, teammates="pursuit", **SHORT)
-    check_env(env.unwrapped, skip_render_check=True)
 
 
 def test_a_learner_that_acts_as_the_policy_would_changes_nothing() -> None:
@@ -52,26 +44,6 @@ def test_one_that_was_pickled_out_of_band_goes_on_alike() -> None:
         action = env.action_space.sample()
         assert same(env.step(action), twin.step(action))
     assert same(env.reset(seed=1), twin.reset(seed=1))
-
-
-def test_the_learners_action_moves_its_tracker_and_no_other() -> None:
-    env = TrackerEnv("constant", number=1, teammates="idle", seed=3, **SHORT)
-    env.reset()
-    before = env.layout.views(env.batch.observe())["position"].copy()
-    for _ in range(10):
-        env.step(np.array([1.0, 0.0], np.float32))
-    moved = np.linalg.norm(env.layout.views(env.batch.observe())["position"] - before, axis=-1)[0]
-    assert moved == pytest.approx([0, 1, 0, 0, 0], abs=1e-4)
-
-
-def test_a_silent_learner_says_zeros() -> None:
-    env = TrackerEnv("constant", number=0, teammates="ddcs-distributed", seed=3, **SHORT)
-    assert env.action_space.shape == (2,)
-    env.reset()
-    for _ in range(5):
-        env.step(np.zeros(2, np.float32))
-    views = env.layout.views(env.batch.observe()[0, 1])
-    np.testing.assert_array_equal(views["neighbour_message"][views["neighbour_number"] == 0], 0)
 
 
 def vector(**settings: Any) -> Any:

@@ -101,11 +101,6 @@ def test_no_page_loads_anything_from_another_host(site: Path) -> None:
         assert re.findall(r"(?:url\(|@import)\s*[\"']?(?:https?:)?//", text) == [], style
 
 
-def test_equations_are_typeset(site: Path) -> None:
-    for page in pages(site):
-        assert 'class="arithmatex"' not in page.read_text(encoding="utf-8"), page
-
-
 def test_the_repository_has_one_address() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")

@@ -12,7 +12,6 @@ from types import ModuleType
 
 import pytest
 
-import posse
 from posse_training.leaderboard import Standing, standings_text
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -79,8 +78,3 @@ def test_at_most_eight_replays_each_shown_on_a_page(hooks: tuple[ModuleType, Mod
     text = "\n".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
     assert len(replays) <= 8
     assert set(re.findall(r"\{\{ replay (\S+) \}\}", text)) == set(replays)
-
-
-@pytest.mark.parametrize("name", posse.scenario_names())
-def test_each_scenario_has_a_page(name: str) -> None:
-    assert (DOCS / "scenarios" / f"{'paper' if name.startswith('paper') else name}.md").is_file()

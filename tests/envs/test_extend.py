@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.support.user_modules import examples, lines_of, run, snippets
+from tests.support.user_modules import examples, lines_of, run
 
 EXAMPLES = {**examples("extend.md"), **examples("extend_targets.md")}
 MOST_LINES = {"walls": 8, "closing": 10, "steady": 6, "spiral": 15, "bearing": 25, "distance": 8}
@@ -14,12 +14,6 @@ MOST_LINES = {"walls": 8, "closing": 10, "steady": 6, "spiral": 15, "bearing": 2
 @pytest.mark.parametrize("name", MOST_LINES)
 def test_an_example_is_short(name: str) -> None:
     assert lines_of(EXAMPLES[name]) <= MOST_LINES[name]
-
-
-def test_the_other_pieces_of_code_run(tmp_path: Path) -> None:
-    for code in snippets("extend.md"):
-        done = run(tmp_path, code, **EXAMPLES)
-        assert done.returncode == 0, done.stderr
 
 
 TWICE = """

@@ -26,8 +26,19 @@ OWN_ENVIRONMENT = dict.fromkeys(
     "recipes",
 ) | {"agilerl_ippo": "agilerl"}
 """Recipes with libraries that pin other versions than ours, or that are not ours: the virtual environment of each."""
-LEARN = {"minari_clone", "sb3_recurrent", "sb3_shared", "sb3_solo", "sb3_team", "torchrl_batch", "torchrl_gym"}
-"""Recipes that train, which takes long."""
+LONG = {
+    "record_video",
+    "supersuit_vector",
+    "gymnasium_vector",
+    "minari_clone",
+    "sb3_recurrent",
+    "sb3_shared",
+    "sb3_solo",
+    "sb3_team",
+    "torchrl_batch",
+    "torchrl_gym",
+}
+"""Recipes that train, film or start processes."""
 LONGEST = 15
 LONGER = {"onnx_policy": 20, "robotarium": 50}
 
@@ -54,7 +65,7 @@ def names() -> list[str]:
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=[pytest.mark.long] if name in LEARN else [])
+        pytest.param(name, marks=[pytest.mark.long] if name in LONG else [])
         for name in names()
         if name not in OWN_ENVIRONMENT
     ],

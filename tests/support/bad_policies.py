@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-import posse
 from posse_baselines import BasePolicy
 
 
@@ -83,11 +82,6 @@ class HangsWithPid(SleepsInC):
         return super().act(observations, memory)
 
 
-class HangsWhileLoading(_Still):
-    def __init__(self) -> None:
-        time.sleep(600)
-
-
 class Slow(_Still):
     """Takes too long in total, but not in a single step."""
 
@@ -104,15 +98,6 @@ class Exits(_Still):
 class Crashes(_Still):
     def act(self, observations: Any, memory: Any) -> tuple[Any, Any]:
         os._exit(9)
-
-
-class FailsOnSmart(_Still):
-    """Fails in one scenario only."""
-
-    def begin(self, layout: posse.ObservationLayout, num_worlds: int) -> Any:
-        if layout.scenario.name == "smart":
-            raise RuntimeError("not this one")
-        return super().begin(layout, num_worlds)
 
 
 class RaisesOnLoad(_Still):

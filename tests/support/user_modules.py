@@ -17,12 +17,6 @@ def examples(chapter: str) -> dict[str, str]:
     return dict(re.findall(r'```python title="(\w+)\.py"\n(.*?)```', text, re.DOTALL))
 
 
-def snippets(chapter: str) -> list[str]:
-    """Return the other pieces of code of a chapter, in order."""
-    text = (DOCS / chapter).read_text(encoding="utf-8")
-    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-
-
 def run(folder: Path, code: str, **modules: str) -> subprocess.CompletedProcess[str]:
     """Run code with a user's modules in a new process."""
     for name, source in {**modules, "main": code}.items():

@@ -72,22 +72,6 @@ def test_results_do_not_depend_on_how_worlds_are_cut() -> None:
     np.testing.assert_array_equal(whole["score"][10:20], alone["score"][10:20], "worlds 10 to 19 play scenario 1")
 
 
-def test_a_named_family_is_played_by_name() -> None:
-    for name in posse.family_names():
-        found = evaluate("ddcs-tuned", name, 12, progress=False, **SHORT)
-        assert found.episodes == 12
-        assert found.scenario.name == name
-        assert found.scenario.to_dict()["ranges"]
-
-
-def test_other_ranges_are_drawn_from_for_a_test() -> None:
-    outside = OPEN.replace(target_speed=(0.75, 0.9))
-    assert {0.75 <= outside.draw(k).target_speed <= 0.9 for k in range(20)} == {True}
-    fixed = OPEN.replace(target_speed=0.5)
-    assert {fixed.draw(k).target_speed for k in range(5)} == {0.5}
-    assert [name for name, _ in fixed.ranges] == ["tracker_turn_rate"]
-
-
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step", "disabled"])
 def test_a_vector_environment_holds_worlds_of_all(autoreset: str) -> None:
     env = gym.make_vec("posse/Solo-v0", num_envs=20, scenario=OPEN, autoreset=autoreset)
@@ -147,3 +131,11 @@ def test_a_policy_is_trained_and_tuned_on_a_family(tmp_path: Path) -> None:
         )
     )
     assert path.is_file()
+
+
+def test_other_ranges_are_drawn_from_for_a_test() -> None:
+    outside = OPEN.replace(target_speed=(0.75, 0.9))
+    assert {0.75 <= outside.draw(k).target_speed <= 0.9 for k in range(20)} == {True}
+    fixed = OPEN.replace(target_speed=0.5)
+    assert {fixed.draw(k).target_speed for k in range(5)} == {0.5}
+    assert [name for name, _ in fixed.ranges] == ["tracker_turn_rate"]

@@ -54,15 +54,6 @@ def test_frames_may_be_left_out_and_a_film_may_begin_later(tmp_path: Path) -> No
     np.testing.assert_array_equal(part, whole[10::5])
 
 
-def test_a_film_ends_with_the_episode_and_has_curves_below(tmp_path: Path) -> None:
-    settings: dict[str, Any] = {"horizon": 50, "settle_time": 1.0, "seconds": 60, "every": 10, "size": 200}
-    frames, _ = read(film([PURSUIT], "constant", path=tmp_path / "a.gif", scores=True, **settings))
-    assert frames.shape == (6, 300, 200, 3)
-    drawn = [(np.abs(frame[200:].astype(int) - (0, 114, 178)).max(axis=-1) <= 30).sum() for frame in frames]
-    assert drawn == sorted(drawn)
-    assert drawn[-1] > drawn[0] + 50
-
-
 def test_an_mp4_has_the_frames_and_the_length_asked_for(tmp_path: Path) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     path = film([PURSUIT], "smart", path=tmp_path / "a.mp4", seconds=2.0, size=301, speed=1.5)
@@ -98,3 +89,12 @@ def test_what_cannot_be_filmed_is_named(
     with pytest.raises((ValueError, MissingExtraError), match=message):
         film(**settings)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_film_ends_with_the_episode_and_has_curves_below(tmp_path: Path) -> None:
+    settings: dict[str, Any] = {"horizon": 50, "settle_time": 1.0, "seconds": 60, "every": 10, "size": 200}
+    frames, _ = read(film([PURSUIT], "constant", path=tmp_path / "a.gif", scores=True, **settings))
+    assert frames.shape == (6, 300, 200, 3)
+    drawn = [(np.abs(frame[200:].astype(int) - (0, 114, 178)).max(axis=-1) <= 30).sum() for frame in frames]
+    assert drawn == sorted(drawn)
+    assert drawn[-1] > drawn[0] + 50

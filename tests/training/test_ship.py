@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import shutil
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -14,8 +13,6 @@ import pytest
 import tyro
 from rich.console import Console
 from scripts.ship import CHOICE_SEED, Settings, command_of, replay, ship
-from scripts.train_shipped import ALGORITHMS, all_runs
-from scripts.train_shipped import Settings as Runs
 from scripts.tune_shipped import repeat_all
 from tests.support.runs import HORIZON, quiet, small
 from tests.support.tunable import small as small_tuning
@@ -96,19 +93,6 @@ def test_the_best_seed_is_shipped_and_all_are_on_record(runs: tuple[Path, ...], 
     assert path.stat().st_mode & 0o044 == 0o044
 
 
-def test_a_run_that_learned_nothing_is_not_shipped(runs: tuple[Path, ...], tmp_path: Path) -> None:
-    """Its best policy is that of step 0; it stays on record."""
-    first = ship(Settings(runs, "learned-trial", worlds=10, out=tmp_path))
-    best = LearnedPolicy.from_file(first).card["seed"]
-    copies = tuple(Path(shutil.copytree(run, tmp_path / f"run-{run.name}")) for run in runs)
-    path = copies[best - 1] / "best.safetensors"
-    policy = LearnedPolicy.from_file(path)
-    policy.with_card({**policy.card, "steps": 0}).save(path)
-    card = LearnedPolicy.from_file(ship(Settings(copies, "learned-trial", worlds=10, out=tmp_path))).card
-    assert card["seed"] != best
-    assert [run["steps"] for run in card["training_seeds"]][best - 1] == 0
-
-
 def test_runs_that_are_not_of_one_training(runs: tuple[Path, ...], tmp_path: Path) -> None:
     def refused(*folders: Path, name: str = "learned-x") -> str:
         with pytest.raises(SettingsError) as caught:
@@ -175,16 +159,6 @@ def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pyt
     assert str(tmp_path) not in str(card)
     assert card["comparison"]["cost"]["count"] == 4
     assert card["check"]["score"] >= 0
-
-
-def test_every_scenario_has_its_own_training() -> None:
-    runs = all_runs(Runs(folder=Path("x")))
-    assert {(run.scenario, run.algorithm) for run in runs} == set(ALGORITHMS.items())
-    assert [run.seed for run in runs if run.scenario == "smart"] == [1, 2, 3, 4, 5]
-    assert [run.seed for run in runs if run.scenario == "radio"] == [1, 2, 3]
-    for run in runs:
-        # The corrections of a tuned team, before its safeguard.
-        assert (run.advise, run.correction, run.encoding) == ("ddcs-tuned", "velocity", "belief")
 
 
 def test_tuning_runs_are_repeated_by_their_own_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

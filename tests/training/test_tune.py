@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,28 +58,11 @@ def test_a_killed_run_resumes_to_the_same_result(tmp_path: Path, monkeypatch: py
     assert card_of(small(tmp_path / "killed")) == whole
 
 
-def test_a_run_that_ended_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
-    card_of(small(tmp_path / "run", generations=3))  # off the schedule of the validation
-    assert card_of(small(tmp_path / "run")) == card_of(small(tmp_path / "whole"))
-
-
 def test_time_stops_a_run_after_a_whole_generation(tmp_path: Path) -> None:
     card = card_of(small(tmp_path / "run", generations=None, minutes=0.001))
     generations = int(card["command"].split("--generations ")[1].split()[0])
     assert generations >= 1
     assert card_of(small(tmp_path / "again", generations=generations)) == card
-
-
-def test_progress_is_lines_where_there_is_no_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = "--generations 2 --population 4 --worlds 2 --validation-worlds 3 --every 1"
-    assert (
-        main(["tune", POLICY, "--scenario", "paper-distributed", *words.split(), "--out", str(tmp_path / "run")]) == 0
-    )
-    out = capsys.readouterr().out
-    assert "searching 1 settings: bias" in out
-    assert "generation    2  safe score" in out
-    assert " tuned: safe score" in out
-    assert str(tmp_path / "run/tuned.json") in out.replace("\n", "")
 
 
 @pytest.mark.parametrize(
@@ -107,16 +89,11 @@ def test_what_cannot_be_is_refused_before_anything_is_made(
     assert not out.exists()
 
 
-def test_a_folder_that_is_not_its_own(tmp_path: Path) -> None:
+def test_a_folder_of_something_else_or_of_another_run_or_in_use(tmp_path: Path) -> None:
     (tmp_path / "diary.txt").write_text("mine")
     with pytest.raises(RunFolderError, match=r"is not the folder of a tuning run.*diary.txt"):
         tune(small(tmp_path), console=quiet())
     assert [path.name for path in tmp_path.iterdir()] == ["diary.txt"]
-    with pytest.raises(RunFolderError, match=r"is a file\. Choose another"):
-        tune(small(tmp_path / "diary.txt"), console=quiet())
-
-
-def test_a_folder_of_another_run_or_in_use(tmp_path: Path) -> None:
     run = tmp_path / "run"
     tune(small(run, generations=1), console=quiet())
     with pytest.raises(RunFolderError, match="holds a run with seed=3, not 4"):
@@ -133,24 +110,9 @@ def test_a_damaged_state_is_named(tmp_path: Path) -> None:
         tune(small(tmp_path / "run"), console=quiet())
 
 
-def test_only_names_the_searched_settings(tmp_path: Path) -> None:
-    card = card_of(small(tmp_path / "run", policy="ddcs-distributed", only=("gain",), generations=1))
-    assert card["searched"] == ["gain"]
-    assert set(card["settings"]) <= {"gain"}
-    assert card["command"].endswith("--only gain")
-    assert "--only bias" in card_of(small(tmp_path / "all", generations=1))["command"]
-
-
 def test_nothing_has_an_effect(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"no setting of .* has an effect on"):
         tune(small(tmp_path, policy="tests.support.tunable:WithoutEffect"), console=quiet())
-
-
-def test_the_result_ships_where_the_tuned_policy_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("posse_training.tune.SHIPPED_TUNED", tmp_path / "shipped")
-    settings = small(tmp_path / "run", policy="pngl-l-phi", only=("gain", "near"), generations=1)
-    card = json.loads(tune(replace(settings, ship=True), console=quiet()).read_text())
-    assert json.loads((tmp_path / "shipped/pngl-l-phi-tuned/paper-distributed.json").read_text()) == card
 
 
 def test_every_point_is_a_setting_that_can_be_played() -> None:
@@ -159,14 +121,6 @@ def test_every_point_is_a_setting_that_can_be_played() -> None:
     rng = np.random.default_rng(1)
     for point in [*rng.random((200, len(found))), np.zeros(len(found)), np.ones(len(found))]:
         DDCS.of("ddcs-distributed").settings.replace(**space.values(point))
-
-
-def test_a_setting_that_must_exceed_one_that_is_not_searched() -> None:
-    for name in ("near", "far"):
-        found = tunables(DDCS.of("ddcs-distributed").settings)
-        space = Space(tuple(t for t in found if t.name == name), tuple(t for t in found if t.name != name))
-        for end in (0.0, 1.0):
-            DDCS.of("ddcs-distributed").settings.replace(**space.values(np.array([end])))
 
 
 def test_the_start_is_the_default_and_wide_ranges_are_logarithmic() -> None:

@@ -14,11 +14,10 @@ from posse_baselines import DDCS, play
 from posse_baselines.ddcs import CONVERGING, EXCHANGING, FLOCKING, SEARCHING
 from posse_baselines.ddcs.settings import NO_EXCHANGE, TRANSITIONS
 
-LOSS = ("converging>searching", "flocking>searching")
 NO_RETURN = ("exchange>converging", "exchange>flocking")
 
 
-def metrics(name: str, scenario: str, *forbidden: str, worlds: int = 60) -> dict[str, Any]:
+def metrics(name: str, scenario: str, *forbidden: str, worlds: int = 24) -> dict[str, Any]:
     policy = DDCS.of(name).with_settings(forbidden=forbidden)
     batch = posse.batch(scenario, worlds, seed=3, split="train", message_size=5)
     return play(batch, policy)
@@ -117,7 +116,6 @@ def test_who_hears_of_another_leader_holds_the_flock_s_course() -> None:
     ("name", "scenario", "metric", "forbidden"),
     [
         ("ddcs-distributed", "search", "settling_time", ("searching>converging",)),
-        ("pngl", "constant", "settling_time", ("converging>flocking",)),
         ("pngl-l-phi", "constant", "settling_time", ("converging>flocking",)),
         ("pngl-l-phi", "leader-loss", "recovery_time", NO_EXCHANGE),
         ("pngl-l-phi", "leader-loss", "recovery_time", NO_RETURN),
@@ -126,52 +124,6 @@ def test_who_hears_of_another_leader_holds_the_flock_s_course() -> None:
 def test_without_a_transition_the_team_fails(name: str, scenario: str, metric: str, forbidden: tuple[str, ...]) -> None:
     assert np.isfinite(metrics(name, scenario)[metric]).mean() > 0.9
     assert np.isfinite(metrics(name, scenario, *forbidden)[metric]).mean() < 0.5
-
-
-def test_without_converging_anew_followers_run_into_each_other() -> None:
-    free = []
-    for forbidden in ((), ("flocking>converging",)):
-        found = metrics("ddcs-centralized", "obstacles", *forbidden)
-        free.append((found["tracker_contacts"] + found["obstacle_contacts"] == 0).mean())
-    assert free[1] < free[0] - 0.1
-
-
-def swerve(t: float) -> tuple[float, float]:
-    """Straight on, a right angle once out of sight, at last rounds on the spot."""
-    if t < 3.0:
-        return 0.95, 0.0
-    if t < 3.0 + math.pi / 2:
-        return 0.95, 1.0
-    return (0.95, 0.0) if t < 11.0 else (0.3, 1.0)
-
-
-def test_without_searching_a_lost_target_is_not_found_again() -> None:
-    rng = np.random.default_rng(3)
-    places = [(-6.0 - 2.5 * math.cos(b), -6.0 + 2.5 * math.sin(b)) for b in (0.5, -0.5)]
-    pose = [[(*p, math.pi + rng.uniform(-0.5, 0.5)) for p in places] for _ in range(40)]
-    found = []
-    for forbidden in ((), LOSS):
-        searched = False
-        for now in drive(
-            DDCS.of("ddcs-distributed").with_settings(forbidden=forbidden),
-            "constant",
-            40,
-            700,
-            tracker_pose=pose,
-            target_pose=(-6.0, -6.0, 0.0),
-            target=swerve,
-            num_trackers=2,
-            target_speed=0.95,
-            sensing_range=3.0,
-            arena=24.0,
-            tracker_turn_rate=0.5,
-            start_distance=(2.0, 4.0),
-        ):
-            searched |= bool((now.notes["task"] == SEARCHING).any())
-        found.append((np.abs(now.line_of_sight) < 3.0).any(axis=1).mean())
-        assert searched == (forbidden == ())
-    assert found[0] > 0.8
-    assert found[1] < 0.4
 
 
 def test_every_change_can_be_forbidden() -> None:

@@ -71,12 +71,6 @@ def test_the_way_round_keeps_clear_and_arrives(start: float, away: float, end: f
     assert least > 0.82 * 0.75  # the cosine of the least turn
 
 
-def test_a_way_that_is_clear_is_left_alone() -> None:
-    assert way_round(-3 + 1j, 3 + 1j, 0.75) == 3 + 1j
-    assert way_round(-3 + 0j, -1.2 + 0j, 0.75) == -1.2
-    assert way_round(-3 + 0.1j, 3 + 0.1j, 0.75).imag > 0.0  # round the side that is nearer
-
-
 def test_a_slot_moves_on_a_circle_of_its_own() -> None:
     arm, speed, rate, step = 0.8 - 1.1j, 0.5 + 0.2j, 0.4, 1e-6
     turned = speed * step + arm * cmath.exp(1j * rate * step)
@@ -106,9 +100,3 @@ def test_the_slot_law_adds_an_approach_along_the_offset(offset: complex, slot: c
         assert abs(limited) == pytest.approx(1.0)
         assert share.imag == pytest.approx(0.0, abs=1e-9)
         assert -1e-9 <= share.real <= gain
-
-
-def test_the_slot_law_behind_a_faster_slot_follows_its_direction() -> None:
-    velocity = approach_velocity(0.5 + 0j, 2j, 1.0, 1.0, math.inf)
-    assert velocity == pytest.approx(cmath.rect(1.0, math.atan2(2.0, 0.5)))
-    assert approach_velocity(0j, 0j, 1.0, 1.0, 1.0) == 0j

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from tests.support.learned import network_for, policy_for
@@ -61,18 +59,6 @@ def test_the_safeguard_comes_after_a_corrected_velocity() -> None:
 
     # Always faster, come what may: without the safeguard, most teams touch something.
     assert contacts("velocity") < 0.5 * contacts("motion")
-
-
-@KINDS
-def test_a_file_keeps_the_adviser(tmp_path: Path, correction: str, kind: str) -> None:
-    policy = listener((0.1, -0.2), correction, kind)
-    policy.save(tmp_path / "mine.safetensors")
-    again = LearnedPolicy.from_file(tmp_path / "mine.safetensors")
-    assert again.adviser is not None
-    assert again.adviser.name == DDCS
-    assert again.message_size == SAID
-    first, second = play(worlds(), policy, seed=1), play(worlds(), again, seed=1)
-    np.testing.assert_array_equal(first["score"], second["score"])
 
 
 @pytest.mark.parametrize(("correction", "believes"), [("motion", False), ("velocity", True)])

@@ -7,7 +7,7 @@ import pytest
 from tests.support.learned import network_for, observations_of, policy_for
 
 import posse
-from posse_baselines import PolicyError, play
+from posse_baselines import PolicyError
 from posse_baselines.learned import Encoder, Encoding, LearnedPolicy
 
 
@@ -36,13 +36,6 @@ def test_longer_messages_than_it_uses_change_nothing() -> None:
     assert not theirs[:, :, 2:].any()
 
 
-@pytest.mark.parametrize("trackers", [1, 2, 3, 12])
-def test_teams_of_another_size(trackers: int) -> None:
-    policy = policy_for(posse.ObservationLayout(posse.get_scenario("smart")))
-    batch = posse.batch("smart", 3, num_trackers=trackers, horizon=30)
-    assert np.isfinite(play(batch, policy)["score"]).all()
-
-
 def test_places_that_a_small_team_lacks_are_unknown() -> None:
     full = posse.ObservationLayout(posse.get_scenario("smart"))
     batch = posse.batch("smart", 1, num_trackers=2)
@@ -58,12 +51,6 @@ def test_fewer_places_keep_the_nearest() -> None:
     observations = batch.reset()
     rows = Encoder(Encoding.of(batch.layout, neighbours=2), batch.layout).encode(observations)
     np.testing.assert_array_equal(rows, observations.reshape(10, -1)[:, : rows.shape[1]])
-
-
-def test_the_plain_encoding_is_the_observation() -> None:
-    batch, observations = observations_of("radio")
-    rows = Encoder(Encoding.of(batch.layout), batch.layout).encode(observations)
-    np.testing.assert_array_equal(rows, observations.reshape(rows.shape))
 
 
 def test_names_are_those_of_views() -> None:

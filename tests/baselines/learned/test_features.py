@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.support.learned import observations_of
 
 import posse
-from posse.scenarios.formation import FORMATIONS
 from posse_baselines.learned import Encoder, Encoding
 from posse_baselines.learned.features import NUM_FEATURES, match_slots
 
@@ -61,11 +59,3 @@ def test_no_swap_shortens_an_assignment(robots: int, slots: int, seed: int) -> N
                 other = chosen.astype(int)
                 other[[i, j]] = other[[j, i]]
                 assert ways[np.arange(robots), other].sum() >= total - 1e-3
-
-
-@pytest.mark.parametrize("formation", FORMATIONS)
-def test_finite_for_every_formation(formation: str) -> None:
-    batch, observations = observations_of("constant", formation=formation, formation_distance=1.0, num_trackers=12)
-    rows = Encoder(Encoding.of(batch.layout, "slots"), batch.layout).encode(observations)
-    assert np.isfinite(rows).all()
-    assert np.abs(rows[:, :NUM_FEATURES]).max() <= 4

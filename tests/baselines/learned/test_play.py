@@ -33,13 +33,3 @@ def test_actions_are_the_networks_output(kind: str, activation: str, output: str
     np.testing.assert_allclose(actions, expected, rtol=1e-4, atol=1e-4)
     assert np.abs(actions).max() <= 1
     assert np.ptp(actions) > 0.5  # the networks say something
-
-
-def test_returned_actions_are_never_overwritten() -> None:
-    batch, observations = observations_of("smart")
-    policy = policy_for(batch.layout)
-    memory = policy.begin(batch.layout, 6)
-    first, memory = policy.act(observations, memory)
-    kept = first.copy()
-    policy.act(observations + np.float32(0.1), memory)
-    np.testing.assert_array_equal(first, kept)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import pickle
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -68,18 +67,6 @@ def test_a_file_gives_back_the_policy(tmp_path: Path, whole: bytes) -> None:
     assert (again.name, again.trained_splits, again.card) == ("mine", ("train",), POLICY.card)
     assert again.encoding == POLICY.encoding
     np.testing.assert_array_equal(actions_of(again), actions_of(POLICY))
-
-
-def test_playing_a_file_needs_no_torch(tmp_path: Path, whole: bytes) -> None:
-    path = tmp_path / "policy.safetensors"
-    path.write_bytes(whole)
-    code = (
-        "import sys, posse; from posse_baselines.learned import LearnedPolicy;"
-        f"p = LearnedPolicy.from_file({str(path)!r}); b = posse.batch('smart', 2);"
-        "p.act(b.reset(), p.begin(b.layout, 2)); print('torch' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "False", done.stderr
 
 
 def read(content: bytes) -> Policy | None:

@@ -63,11 +63,8 @@ def test_a_shipped_team_says_how_it_was_made(path: Path) -> None:
         evaluate(policy, "constant", 1, split="train", progress=False)
 
 
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(path, marks=() if path.stem == "learned-smart" else pytest.mark.long) for path in TEAMS],
-    ids=lambda path: path.stem,
-)
+@pytest.mark.long
+@pytest.mark.parametrize("path", TEAMS, ids=lambda path: path.stem)
 def test_a_shipped_team_scores_what_its_card_says(path: Path) -> None:
     policy = LearnedPolicy.from_file(path)
     check = policy.card["check"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.support.drive import Instant, complex_of, drive
 
-from posse_baselines import DDCS, Policy, load
+from posse_baselines import Policy
 from posse_baselines.ddcs import FLOCKING
 
 OFFSET = 0.15  # m, of the control point
@@ -62,7 +62,7 @@ def control_point(now: Instant) -> tuple[complex, float]:
     return complex(place[1] + cmath.rect(OFFSET, theta[1]) - place[0]), float(theta[0])
 
 
-@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004), (0.005, 0.001)])
+@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.02), (0.02, 0.004)])
 @pytest.mark.parametrize("frame", ["leader", "slot-frame"])
 def test_l_decays_as_the_exponential_says(frame: str, dt: float, allowed: float) -> None:
     wanted = PLACE + OFFSET
@@ -85,13 +85,6 @@ def test_phi_is_kept_from_the_leader_s_heading_or_the_slot_frame_while_it_turns(
         place = complex_of(now.tracker)[0]
         axis = now.psi[0] if frame == "slot-frame" else now.tracker[0, 0, 2]
         assert abs((place[1] - place[0]) * cmath.exp(-1j * axis) - PLACE) < 0.01
-
-
-def test_a_follower_never_reverses() -> None:
-    seen = team("pngl-l-phi", 0.5 - 0.1j, theta=2.0)
-    assert min(now.commands[..., 0].min() for now in seen) >= -1e-6
-    *_, last = team("pngl-l-phi", 0.5 - 0.1j, theta=2.0, seconds=8.0)
-    assert abs(control_point(last)[0] - PLACE - OFFSET) < 0.02
 
 
 # --- l-l -----------------------------------------------------------------------------------------
@@ -133,11 +126,3 @@ def test_l_l_closes_the_distances_to_two_robots(dt: float, allowed: float) -> No
         off = np.abs(arms) - abs(PLACE.conjugate() + OFFSET - place)
         # In the first step it is not known which robots are in their places: l-φ is used.
         np.testing.assert_allclose(off[2:], off[2] * decay[2:] / decay[2], atol=allowed)
-
-
-def test_in_rows_the_first_row_is_in_line_and_keeps_l_phi() -> None:
-    notes = []
-    for name in ("ddcs-centralized-l-l", "ddcs-centralized"):
-        *_, last = drive(load(name), "constant", 10, 400, formation="rows", num_trackers=6)
-        notes.append((last.notes["task"] == FLOCKING).mean())
-    assert min(notes) > 0.95

@@ -66,7 +66,7 @@ def intercept_times(policy: str | Policy, k: float, dt: float, general: float = 
     return dt * (after - 1 + (before - LAST) / (before - ranges[after, column]))
 
 
-@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.025), (0.05, 0.010), (0.01, 0.002)])
+@pytest.mark.parametrize(("dt", "allowed"), [(0.1, 0.025), (0.02, 0.004)])
 def test_velocity_pursuit_meets_its_target_when_the_closed_form_says(dt: float, allowed: float) -> None:
     for k in RATIOS:
         times = intercept_times("velocity-pursuit", k, dt)
@@ -107,25 +107,6 @@ def test_a_tracker_that_keeps_its_range_goes_round_on_a_concentric_circle() -> N
     np.testing.assert_allclose(radii, 1.6, rtol=0.005)
     speeds = [now.commands[0, 0, 0] for now in last]
     np.testing.assert_allclose(speeds, 0.6 * 1.6 / 2.0, rtol=0.005)
-
-
-def test_the_range_rests_whatever_the_target_s_angle() -> None:
-    # (13): the target swerves in front of a tracker in place; the range is kept.
-    ranges = [
-        abs(now.line_of_sight[0, 0])
-        for now in drive(
-            DDCS.of("velocity-pursuit").with_settings(range_gain=0.1),
-            "constant",
-            1,
-            100,
-            num_trackers=1,
-            tracker_pose=[(-1.2, 0.0, 0.0)],
-            target_pose=(0.0, 0.0, 0.0),
-            target=lambda t: (0.6, 0.5 * math.sin(2.0 * t)),
-            tracker_turn_rate=4.0,
-        )
-    ]
-    np.testing.assert_allclose(ranges, 1.2, atol=0.02)
 
 
 def test_chase_and_maintenance_change_with_hysteresis() -> None:
@@ -189,41 +170,3 @@ def test_each_tracker_holds_a_slot_of_its_own_at_any_heading(name: str, theta: f
     distance = np.abs(places[:, :, None] - np.array(wedge))
     assert distance.min(axis=1).max() < 0.05
     assert (np.sort(distance.argmin(axis=2), axis=1) == np.arange(5)).all()
-
-
-def test_without_a_deviation_the_bearing_settles_at_the_heading_over_k() -> None:
-    bearings = []
-    for k in (0.9, 1.0, 1.1):
-        *_, last = drive(
-            DDCS.of("velocity-pursuit").with_settings(navigation_constant=k),
-            "constant",
-            1,
-            400,
-            num_trackers=1,
-            tracker_pose=[(4.0, -1.0, 3.0)],
-            target_pose=(0.0, 0.0, 2.6),
-        )
-        bearings.append(np.angle(last.line_of_sight[0, 0]))
-        assert abs(last.line_of_sight[0, 0]) == pytest.approx(1.2, abs=0.01)
-    np.testing.assert_allclose(bearings, [2.6 / 0.9, 2.6, 2.6 / 1.1], atol=0.01)
-
-
-def test_the_bearing_converges_at_the_stated_rate() -> None:
-    # K v_t / (r cos δ), with δ = 0 in the slot: behind a target that goes straight.
-    for k in (0.9, 1.1):
-        errors = np.array(
-            [
-                np.angle(now.line_of_sight[0, 0])
-                for now in drive(
-                    DDCS.of("pngl").with_settings(navigation_constant=k),
-                    "constant",
-                    1,
-                    60,
-                    num_trackers=1,
-                    target_pose=(0.0, 0.0, 0.0),
-                    tracker_pose=[(-1.2 * math.cos(0.2), -1.2 * math.sin(0.2), k * 0.2)],
-                )
-            ]
-        )
-        rate = np.log(errors[10] / errors[50]) / 4.0
-        assert rate == pytest.approx(k * 0.6 / 1.2, rel=0.03)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.support.reference.state import snapshot
 
 import posse
 from posse_baselines import PolicyError, begin, load, play, rollout
@@ -67,15 +66,6 @@ def test_worlds_whose_episodes_begin_at_different_steps_are_played_as_alone() ->
     np.testing.assert_array_equal(actions[1:], other[-1])
 
 
-def test_it_changes_nothing_in_the_worlds_that_it_reads() -> None:
-    planner, batch = Planner(QUICK), posse.batch("field", 3)
-    memory, observations = begin(planner, batch), batch.reset()
-    before = snapshot(batch)
-    planner.act(observations, memory)
-    for name, array in snapshot(batch).items():
-        np.testing.assert_array_equal(array, before[name], err_msg=name)
-
-
 def test_it_does_not_know_the_faults_to_come() -> None:
     """Worlds that differ only in the future break of a tracker are played equally."""
     planned = []
@@ -97,15 +87,6 @@ def test_it_plays_beside_a_target_that_is_an_agent() -> None:
         assert actions.shape == (2, 5, 2)
         target = np.full((2, 1, 2), 0.5, np.float32)
         observations = batch.step(np.concatenate([actions, target], axis=1))[0][:, :5]
-
-
-def test_it_sends_every_tracker_to_a_slot_of_its_own() -> None:
-    batch, planner = posse.batch("leader-loss", 4, num_trackers=3), Planner(QUICK)
-    memory, observations = begin(planner, batch), batch.reset()
-    assert (planner.annotations(memory)["slot"] == -1).all()
-    _, memory = planner.act(observations, memory)
-    slots = planner.annotations(memory)["slot"]
-    assert np.sort(slots, axis=1).tolist() == [[0, 1, 2]] * 4
 
 
 def test_it_reads_only_the_batch_that_it_was_shown() -> None:

@@ -21,19 +21,6 @@ def _no_window(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
 
-def play(env: gymnasium.Env[Any, Any], steps: int, seed: int = 3) -> list[Any]:
-    env.action_space.seed(seed)
-    returned: list[Any] = []
-    over = False
-    for _ in range(steps):
-        if over:
-            returned.append(env.reset())
-        step = env.step(env.action_space.sample())
-        returned.append(step)
-        over = step[2] or step[3]
-    return returned
-
-
 @pytest.mark.parametrize("name", [TEAM, SOLO])
 def test_gymnasium_finds_the_drawing_sound(name: str) -> None:
     check_env(gymnasium.make(name, scenario="smart").unwrapped)
@@ -85,21 +72,8 @@ def test_contact_terminates_where_it_is_asked_for() -> None:
         assert ends == [(False, False)] * 6 + [(True, False)]
 
 
-def test_info_says_who_is_broken() -> None:
-    env = gymnasium.make(TEAM, scenario="leader-loss", horizon=10, settle_time=0.5, break_window=(0.4, 0.4))
-    env.reset(seed=0)
-    working = [int(info["working"].sum()) for *_, info in play(env, 10)]
-    assert working == [5, 5, 5, 5, 4, 4, 4, 4, 4, 4]
-
-
 @pytest.mark.parametrize("scenario", BREAKING)
 def test_solo_says_why_it_cannot_play(scenario: str) -> None:
     with pytest.raises(posse.ScenarioError, match=rf"{scenario!r} does not fit posse/Solo-v0.*"):
         gymnasium.make(SOLO, scenario=scenario)
     gymnasium.make(SOLO, scenario=scenario, breaks=0).reset(seed=0)
-
-
-def test_an_unknown_keyword_is_a_type_error_too() -> None:
-    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'") as caught:
-        gymnasium.make(TEAM, frameskip=1)
-    assert isinstance(caught.value, posse.ScenarioError)

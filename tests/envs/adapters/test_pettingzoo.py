@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pettingzoo
 import pytest
@@ -12,22 +10,7 @@ from tests.support.adapters import f32, part
 
 import posse
 from posse.adapters.actions import MOTIONS
-from posse.adapters.gymnasium_env import TeamEnv
 from posse.adapters.pettingzoo_env import TeamParallelEnv
-from posse.adapters.vector_env import TeamVectorEnv
-from posse_baselines import load_target
-
-
-def play(env: TeamParallelEnv, steps: int, seed: int = 3) -> list[Any]:
-    """Play with actions drawn from a seed; return all results."""
-    rng = np.random.default_rng(seed)
-    returned: list[Any] = []
-    for _ in range(steps):
-        if not env.agents:
-            returned.append(env.reset())
-        actions = {agent: rng.uniform(-1, 1, env.action_space(agent).shape).astype(np.float32) for agent in env.agents}
-        returned.append(env.step(actions))
-    return returned
 
 
 def test_max_cycles_is_the_length_of_an_episode() -> None:
@@ -44,25 +27,6 @@ def test_pettingzoo_can_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     assert env.render() is None
     env.close()
     env.close()
-
-
-def test_a_target_that_is_an_agent_goes_where_it_wants() -> None:
-    ahead, circling = f32([1, 0]), f32([1, 1])
-    rest = {f"tracker_{i}": f32([-1, 0]) for i in range(5)}
-    places = []
-    for action in (ahead, circling):
-        env = posse.parallel_env("constant", target="agent")
-        env.reset(seed=1)
-        before = env.state_layout.views(env.state())
-        start = np.array([before["target_x"], before["target_y"]])
-        for _ in range(50):
-            _, rewards, *_ = env.step({**rest, "target_0": action})
-        after = env.state_layout.views(env.state())
-        places.append(np.hypot(*(np.array([after["target_x"], after["target_y"]]) - start)))
-        assert rewards["target_0"] == 0.0  # nobody holds a slot
-    assert places[0] == pytest.approx(0.6 * 5, rel=1e-4)
-    # ω = 1 rad/s at 0.6 m/s for 5 s: the chord of a circle of 0.6 m.
-    assert places[1] == pytest.approx(2 * 0.6 * abs(np.sin(2.5)), rel=1e-3)
 
 
 def test_an_environment_is_the_first_world_of_a_batch() -> None:
@@ -83,24 +47,6 @@ def test_an_environment_is_the_first_world_of_a_batch() -> None:
                 assert info["score"] == batch_infos["score"][0]
                 for name, values in part(batch_infos, "reward/").items():
                     assert info[f"reward/{name}"] == values[0, i]
-
-
-def test_the_end_is_told_once_with_every_metric() -> None:
-    env = posse.parallel_env(horizon=6, settle_time=0.3)
-    env.reset(seed=0)
-    *before, last = play(env, 6)
-    for _, _, terminations, truncations, infos in before:
-        assert not any(terminations.values())
-        assert not any(truncations.values())
-        assert all(set(part(info, "metrics/").values()) == {0.0} for info in infos.values())
-    _, _, terminations, truncations, infos = last
-    assert not any(terminations.values())
-    assert all(truncations.values())
-    assert env.agents == []
-    for info in infos.values():
-        assert list(part(info, "metrics/")) == [metric.name for metric in posse.METRICS]
-        scores = [step[-1]["tracker_0"]["score"] for step in (*before, last)]
-        assert info["metrics/score"] == pytest.approx(np.mean(scores))
 
 
 def test_a_discrete_action_is_one_of_the_motions() -> None:
@@ -150,25 +96,3 @@ def test_turns_check_all_actions_when_the_last_has_acted() -> None:
     with pytest.raises(ValueError, match=r"tracker_0: speed = 2\.0 .*clip_actions=True"):
         env.step(f32([1, 0]))
     assert np.array_equal(env.state(), before)
-
-
-def test_the_target_is_an_agent_by_one_name() -> None:
-    wanted = posse.parallel_env("smart", target="agent").scenario
-    assert posse.batch("smart", target="agent").scenario == posse.get_scenario("smart", target="agent") == wanted
-    for made in (TeamEnv, TeamVectorEnv):
-        with pytest.raises(posse.ScenarioError, match="target"):
-            made("smart", target="agent")
-    with pytest.raises(posse.ScenarioError, match="the one choice is 'agent'"):
-        posse.parallel_env("smart", target="evader")
-
-
-def test_a_policy_moves_the_target_as_in_a_batch() -> None:
-    env = posse.parallel_env("duel", target_policy=load_target("evader").policy)
-    batch = posse.batch("duel", target_policy=load_target("evader").policy)
-    env.reset(seed=0)
-    batch.reset(seed=0)
-    assert env.agents == env.possible_agents == [f"tracker_{i}" for i in range(5)]
-    for _ in range(5):
-        actions = np.full((1, 5, 2), 0.5, np.float32)
-        seen = env.step(dict(zip(env.agents, actions[0], strict=True)))[0]
-        np.testing.assert_array_equal(list(seen.values()), batch.step(actions)[0][0])

@@ -122,33 +122,22 @@ class Wrong(Weaver):
 def test_a_refused_step_leaves_worlds_and_memory(returned: Any, message: str) -> None:
     """Whether it is the caller's action that is refused, or that of the policy inside."""
     policy = Wrong(returned)
-    made: dict[str, Any] = {
-        "batch": posse.batch(SHORT, WORLDS, seed=1, target_policy=policy),
-        "environment": gym.make("posse/Team-v0", scenario=SHORT, seed=1, target_policy=policy).unwrapped,
-        "vector": gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy),
-    }
-    for kind, env in made.items():
-        batch = env if kind == "batch" else env.batch
-        action = actions_of(0, batch.action_shape)
-        action = action[0] if kind == "environment" else action
-        for refused in (action * 2, None, action * 1j):
-            env.reset(seed=1)
-            policy.returned = np.zeros((batch.num_worlds, 1, 2))
-            env.step(action)
-            before, memory = {k: v.copy() for k, v in batch.state.items()}, batch.memory
-            with pytest.raises(ValueError, match="action"):
-                env.step(refused)
-            assert batch.memory is memory
+    batch = posse.batch(SHORT, WORLDS, seed=1, target_policy=policy)
+    vector: Any = gym.make_vec("posse/Team-v0", WORLDS, scenario=SHORT, seed=1, target_policy=policy)
+    action = actions_of(0)
+    for env, inner in ((batch, batch), (vector, vector.batch)):
+        env.reset(seed=1)
+        policy.returned = np.zeros((WORLDS, 1, 2))
         env.step(action)
-        policy.returned, memory = returned, batch.memory
-        before = {name: array.copy() for name, array in batch.state.items()}
-        if kind == "environment" and isinstance(returned, np.ndarray):
-            continue  # of another number of worlds
-        with pytest.raises(ValueError, match=f"target's policy.*{message}"):
-            env.step(action)
-        assert batch.memory is memory
-        for name, array in batch.state.items():
-            np.testing.assert_array_equal(array, before[name])
+        for wrong, words in ((action * 2, "action"), (None, "action"), (action, f"target's policy.*{message}")):
+            if wrong is action:
+                env.step(action)
+                policy.returned = returned
+            before, memory = inner.arrays.copy(), inner.memory
+            with pytest.raises(ValueError, match=words):
+                env.step(wrong)
+            assert inner.memory is memory
+            assert all(np.array_equal(*both) for both in zip(before, inner.arrays, strict=True))
 
 
 def test_clipping_is_for_both_sides() -> None:

@@ -182,30 +182,3 @@ def test_a_folder_that_cannot_be_written_costs_time_only(tmp_path: Path) -> None
     printed, said = play(tmp_path, tmp_path / "file" / "cache")
     assert printed[1:] == ["True", "0"]
     assert "set POSSE_CACHE_DIR" in said
-
-
-GAIN = 1.0
-SHIFT = 0.0
-
-
-@numba.njit
-def shifted(x: Any) -> Any:
-    """A function of numba's own."""
-    return x + SHIFT
-
-
-@compiled
-def gained(x: float) -> float:
-    """A function with a global that changes."""
-    return GAIN * shifted(x)  # type: ignore[no-any-return]
-
-
-def test_a_new_kernel_reads_changed_globals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("POSSE_CACHE_DIR", str(tmp_path))
-
-    def once(x: float) -> float:
-        return gained(x)
-
-    for name, value, expected in (("GAIN", 1.0, 2.0), ("GAIN", 3.0, 6.0), ("SHIFT", 4.0, 18.0), ("GAIN", 1.0, 6.0)):
-        monkeypatch.setitem(globals(), name, value)
-        assert kernel(once)(2.0) == expected

@@ -13,7 +13,7 @@ from gymnasium.error import ResetNeeded
 
 import posse
 from posse.rendering.renderer import Renderer
-from posse.rendering.style import GROUND, SENSING, SLOT_FILLED, TARGET, TRACKER, WALL
+from posse.rendering.style import GROUND, SENSING, SLOT_FILLED, TARGET, TRACKER
 
 Frame = npt.NDArray[np.uint8]
 SIZE = (400, 360)
@@ -99,16 +99,6 @@ def test_what_lies_behind_an_obstacle_is_not_in_sight() -> None:
     frame = frame_of(renderer, batch)
     assert_colour(renderer, frame, (1.2, 0.2), SENSING)
     assert_colour(renderer, frame, (3.2, 0.2), GROUND)
-
-
-def test_the_walls_of_a_rectangle_are_drawn_where_they_stop_robots() -> None:
-    batch = posse.batch("obstacles", 1, num_trackers=2, num_obstacles=0, arena=(10.0, 6.0), start_distance=(1, 8))
-    batch.reset(options={"tracker_pose": [(-4.4, 0, 0), (4.4, 0, 0)], "target_pose": (0, 1, 0)})
-    renderer = Renderer(batch.scenario, size=(1200, 1200))
-    frame = frame_of(renderer, batch)
-    for inside, wall in (((4.9, 2.5), (5.03, 2.5)), ((3.0, -2.9), (3.0, -3.03))):
-        assert_colour(renderer, frame, inside, GROUND)
-        assert_colour(renderer, frame, wall, WALL)
 
 
 def test_frames_need_no_display_and_importing_posse_no_pygame() -> None:

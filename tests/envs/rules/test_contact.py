@@ -68,26 +68,3 @@ def test_walls_hold(speed: float) -> None:
     assert (reached < 4.85).all()
     assert state["world_contacts_obstacle"] == 4, "once each, though all kept pushing"
     assert (infos["reward/contact"] == 0).all()
-
-
-def test_contacts_are_counted_at_their_onset_and_by_kind() -> None:
-    batch = posse.batch(num_trackers=2, target_motion="agent", arena=20.0)
-    at(batch, [0.9, 0.0, 0.0], [0.0, 0.0, 0.0], [0.45, 0.0, 0.0])
-    stay = [-1.0, 0.0]
-    counts = []
-    for actions in (
-        [[1.0, 0.0], stay, stay],
-        [[1.0, 0.0], stay, stay],
-        [[1.0, 0.0], stay, stay],
-        [stay, [1.0, 0.0], stay],
-        [stay, [1.0, 0.0], stay],
-        [stay, [1.0, 0.0], stay],
-        [[1.0, 0.0], stay, stay],
-        [[1.0, 0.0], stay, stay],
-        [[1.0, 0.0], stay, stay],
-    ):
-        infos = act(batch, *actions)
-        w = batch.worlds[0]
-        counts.append((int(w.contacts_tracker), int(w.contacts_target), int(w.contacts_obstacle)))
-        assert infos["reward/contact"].shape == (1, 3)
-    assert counts == [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 0), (1, 1, 0), (2, 1, 0), (2, 1, 0)]

@@ -42,12 +42,3 @@ def test_a_heading_stays_a_unit_vector_for_many_steps() -> None:
     for name in ("tracker_heading", "world_heading", "world_frame"):
         length = np.hypot(state[f"{name}_cos"].astype(float), state[f"{name}_sin"])
         np.testing.assert_allclose(length, 1.0, rtol=0, atol=3e-7)
-
-
-def test_each_tracker_moves_within_its_own_limits() -> None:
-    speeds, rates = (1.0, 0.7, 1.4), (2.0, 0.5, 1.1)
-    batch = posse.batch("constant", 4, num_trackers=3, tracker_speed=speeds, tracker_turn_rate=rates)
-    batch.reset(seed=0)
-    batch.step(np.ones(batch.action_shape, np.float32))
-    np.testing.assert_allclose(batch.state["tracker_speed"], [speeds] * 4, rtol=1e-6)
-    np.testing.assert_allclose(batch.state["tracker_turn_rate"], [rates] * 4, rtol=1e-6)

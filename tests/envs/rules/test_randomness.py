@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import pytest
-from tests.support.reference import draws as reference
 
 from posse.rules import randomness
 
@@ -19,17 +17,6 @@ def test_the_mixing_function_is_splitmix64s() -> None:
         outputs.append(int(randomness.mix(np.uint64(state), np.uint64(0))))
         state = (state + golden) % 2**64
     assert outputs == [6457827717110365317, 3203168211198807973, 9817491932198370423]
-
-
-def test_draws_equal_an_independent_working() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        key = int(rng.integers(2**63))
-        step, stream, index = (int(k) for k in rng.integers(0, 1000, 3))
-        mine = randomness.uniform(np.uint64(key), step, np.uint64(stream), index)
-        assert float(mine) == reference.uniform(key, step, stream, index)
-        pair = randomness.normal_pair(np.uint64(key), step, np.uint64(stream), index)
-        assert pair == pytest.approx(reference.normal_pair(key, step, stream, index), rel=1e-4, abs=1e-4)
 
 
 def test_seed_split_world_and_episode_each_make_another_key() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,16 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posse
-from posse import Batch, ScenarioError
-
-ALL: dict[str, Any] = {
-    "actuator_lag": 0.3,
-    "command_delay": 2,
-    "wheel_base": 0.23,
-    "odometry_drift": 0.05,
-    "heading_drift": 0.02,
-    "heading_noise": 0.05,
-}
+from posse import Batch
 
 
 def drive(batch: Batch, steps: int, seed: int = 0) -> npt.NDArray[np.float32]:
@@ -72,11 +61,6 @@ def test_a_robot_that_turns_as_fast_as_its_wheels_can_stands() -> None:
         observations = batch.step(np.ones(batch.action_shape))[0]
         speed = batch.layout.views(observations)["speed"]
         assert ((speed >= 0) & (speed < 1e-6)).all()
-
-
-def test_wheels_that_cannot_turn_on_the_spot_are_refused() -> None:
-    with pytest.raises(ScenarioError, match=r"wheel_base=3.*lower it, or tracker_turn_rate"):
-        posse.get_scenario("smart", wheel_base=3.0)
 
 
 def test_own_poses_drift_as_random_walks() -> None:
@@ -130,33 +114,3 @@ def test_the_measured_heading_of_the_target_is_noisy_and_with_it_the_slot_frame(
     # Trackers share the newest fix, and at the start each has its own.
     assert np.std(error) == pytest.approx(0.1, rel=0.1)
     np.testing.assert_allclose(frame, heading, atol=1e-6)  # ψ is the heading at the start
-
-
-def test_a_world_replays_alone_and_its_state_decides_how_it_goes_on() -> None:
-    many, one = (posse.batch("field", n, first_world=w, seed=3, **ALL) for n, w in ((12, 5), (1, 9)))
-    many.reset(), one.reset()
-    rng = np.random.default_rng(0)
-    low, high = many.layout.bounds()
-    for step in range(60):
-        actions = rng.uniform(-1, 1, many.action_shape).astype(np.float32)
-        observations = many.step(actions)[0]
-        np.testing.assert_array_equal(one.step(actions[4:5])[0], observations[4:5])
-        assert ((observations >= low) & (observations <= high)).all()
-        if step == 30:
-            saved, copy = many.save(), pickle.loads(pickle.dumps(many))  # noqa: S301 (our own)
-    many.restore(saved)
-    np.testing.assert_array_equal(drive(many, 10), drive(copy, 10))
-
-
-def test_the_state_vector_holds_commands_to_come_and_the_errors_of_own_poses() -> None:
-    env = posse.parallel_env("smart", command_delay=2, odometry_drift=0.1, heading_drift=0.1)
-    env.reset(seed=0)
-    rng, given = np.random.default_rng(0), []
-    for _ in range(5):
-        given.append(rng.uniform(-1, 1, (5, 2)).astype(np.float32))
-        observations = env.step(dict(zip(env.agents, given[-1], strict=True)))[0]
-    views = env.state_layout.views(env.state())
-    np.testing.assert_array_equal(views["command"], [given[-1], given[-2]])
-    seen = env.layout.views(np.stack(list(observations.values())))["position"]
-    for k, axis in enumerate("xy"):
-        np.testing.assert_allclose(seen[:, k], views[f"tracker_{axis}"] + views[f"odometry_{axis}"], atol=1e-5)

@@ -7,8 +7,6 @@ import math
 import numpy as np
 import pytest
 from tests.support.crowding import points
-from tests.support.reference.senses import sonar
-from tests.support.reference.state import one_world, snapshot
 
 import posse
 
@@ -46,38 +44,3 @@ def test_noise_is_unbiased_has_its_deviation_and_is_cut_at_three() -> None:
         # Neither successive steps nor neighbouring trackers share a draw.
         assert abs(np.corrcoef(errors[1:].ravel(), errors[:-1].ravel())[0, 1]) < 0.03
         assert abs(np.corrcoef(errors[..., 1:].ravel(), errors[..., :-1].ravel())[0, 1]) < 0.03
-
-
-def test_the_sonar_reads_how_far_the_walls_of_a_rectangle_are() -> None:
-    batch = posse.batch("search", 1, num_trackers=2, arena=(30.0, 10.0), sonar_beams=4)
-    poses = [(14.0, 0.0, 0.0), (-3.0, -4.5, math.pi)]  # beams: ahead, to the left, back, to the right
-    observations = batch.reset(options={"tracker_pose": poses, "target_pose": (0, 0, 0)})
-    readings = batch.layout.views(observations)["sonar"][0] + batch.scenario.robot_radius
-    np.testing.assert_allclose(readings, [[1.0, 2.15, 2.15, 2.15], [2.15, 0.5, 2.15, 2.15]], atol=1e-5)
-
-
-@pytest.mark.parametrize("beams", [1, 8, 13, 32])
-def test_the_sonar_is_what_brute_force_finds(beams: int) -> None:
-    batch = posse.batch(
-        "obstacles",
-        12,
-        num_trackers=8,
-        sonar_beams=beams,
-        start_distance=(1.0, 10.0),
-        target_motion="agent",
-        arena=(24.0, 18.0),
-    )
-    observations = batch.reset(seed=5)
-    near = 0
-    for _ in range(2):
-        readings = batch.layout.views(observations)["sonar"].reshape(12, 9, beams)
-        state = snapshot(batch)
-        for e in range(12):
-            world = one_world(state, e)
-            for i in range(9):
-                found = sonar(batch.scenario, world, i)
-                np.testing.assert_allclose(readings[e, i], found, rtol=1e-4, atol=2e-3)
-                near += int((found < 2.0).sum())
-        for _ in range(30):
-            observations = batch.step(np.full(batch.action_shape, 0.3))[0]
-    assert near > 50

@@ -98,7 +98,7 @@ def test_it_gets_away_from_trackers_that_hold_it_fast() -> None:
 def test_it_holds_off_a_pursuing_team_longer_than_the_others() -> None:
     nearest, times = {}, {}
     for motion in ("smart", "constant", "accelerating"):
-        _, _, nearest[motion] = play(start(200, motion), pursuing, 600)  # from the same starts
+        _, _, nearest[motion] = play(start(60, motion), pursuing, 400)  # from the same starts
         near = nearest[motion] < 0.5
         times[motion] = np.where(near.any(axis=0), near.argmax(axis=0), len(near)) * 0.1
     for other in ("constant", "accelerating"):

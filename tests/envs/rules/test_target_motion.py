@@ -84,7 +84,7 @@ def test_what_the_accelerating_motion_is_drawn_of_walks_within_its_range(
 @pytest.mark.parametrize("motion", ["constant", "accelerating", "smart"])
 @pytest.mark.parametrize(("name", "arena"), [("search", 20.0), ("obstacles", (30.0, 15.0)), ("field", 24.0)])
 def test_a_scripted_target_never_comes_near_a_wall_or_an_obstacle(name: str, arena: Any, motion: str) -> None:
-    batch = posse.batch(name, 300, target_motion=motion, horizon=600, num_trackers=2, breaks=0, arena=arena)
+    batch = posse.batch(name, 100, target_motion=motion, horizon=600, num_trackers=2, breaks=0, arena=arena)
     batch.reset(seed=4)
     places, courses, turns = follow(batch, 595)
     s = batch.scenario

@@ -18,12 +18,9 @@ FIELDS = [field.name for field in dataclasses.fields(Scenario)]
 
 # What is refused, and words that the message must have beside the field's name.
 IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
-    ({"name": 3}, "string"),
     ({"num_trackers": 2.0}, "whole"),
     ({"num_trackers": True}, "whole"),
     ({"tracker_speed": math.nan}, "number"),
-    ({"tracker_speed": math.inf}, "[0.001, 1000]"),
-    ({"tracker_speed": "fast"}, "number"),
     ({"tracker_speed": 10**400}, "number"),
     ({"tracker_speed": (1.0, 2.0)}, "2 values for num_trackers=5: give one number, or one for each"),
     ({"tracker_speed": (1.0,) * 4 + (0.0,)}, "tracker_speed[4]=0.0"),
@@ -34,6 +31,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"target_speed": 1.0}, "0.01 %"),
     ({"target_speed": 1e-300, "target_motion": "smart"}, "constant"),
     ({"target_turn_rate": 21.0}, "physics_step"),
+    ({"wheel_base": 3.0}, "lower it, or tracker_turn_rate"),
     ({"target_least_speed": 0.7}, "at most target_speed=0.6"),
     ({"formation_distance": 0.3}, "target"),
     ({"formation_spacing": 0.6}, "tolerance"),
@@ -41,7 +39,6 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"settle_time": 61.0}, "horizon=600 steps of 0.1 s: set settle_time to at most 60"),
     ({"control_step": 0.12}, "physics_step"),
     ({"horizon": 10**6, "tracker_speed": 9.0}, "at most 500 m"),
-    ({"terminate_on_contact": 1}, "True or False"),
     ({"arena": 2.0}, "too small"),
     ({"arena": (20.0, 2.0)}, "too small"),
     ({"arena": (20.0, math.inf)}, "both be finite"),
@@ -49,9 +46,7 @@ IMPOSSIBLE: list[tuple[dict[str, Any], str]] = [
     ({"arena": (20.0, 1001.0)}, "arena[1]=1001.0"),
     ({"num_obstacles": 3}, "arena"),
     ({"obstacle_radius": (0.8, 0.4)}, "least"),
-    ({"obstacle_radius": "ab"}, "tuple"),
     ({"start_distance": (0.2, 3.0)}, "clear of the target"),
-    ({"start_distance": 4.0}, "tuple"),
     ({"breaks": 5}, "num_trackers - 1"),
     ({"breaks": 2, "break_choice": "given"}, "break_number"),
     ({"break_number": 5, "break_choice": "given", "breaks": 1}, "0 to 4"),
@@ -96,26 +91,13 @@ def test_a_setting_says_what_it_is_and_keeps_to_its_range(name: str) -> None:
 
 
 def test_numbers_of_numpy_are_taken_as_python_s() -> None:
-    scenario = posse.get_scenario(
-        "smart",
-        num_trackers=np.uint8(2),
-        tracker_speed=np.array([1.0, 2.0], np.float32),
-        target_speed=np.float32(0.5),
-        arena=np.int16(20),
-        terminate_on_contact=np.True_,
-        start_distance=np.array([2, 5]),
-        reward_weights={"slot": np.float64(2)},
-    )
-    assert scenario == posse.get_scenario(
-        "smart",
-        num_trackers=2,
-        tracker_speed=[1.0, 2.0],
-        target_speed=0.5,
-        arena=20,
-        terminate_on_contact=True,
-        start_distance=[2, 5],
-        reward_weights=[("slot", 2)],
-    )
+    given: dict[str, Any] = {"num_trackers": np.uint8(2), "tracker_speed": np.array([1.0, 2.0], np.float32)}
+    given |= {"arena": np.int16(20), "terminate_on_contact": np.True_, "start_distance": np.array([2, 5])}
+    given |= {"target_speed": np.float32(0.5), "reward_weights": {"slot": np.float64(2)}}
+    plain: dict[str, Any] = {"num_trackers": 2, "tracker_speed": [1.0, 2.0], "arena": 20, "terminate_on_contact": True}
+    plain |= {"start_distance": [2, 5], "target_speed": 0.5, "reward_weights": [("slot", 2)]}
+    scenario = posse.get_scenario("smart", **given)
+    assert scenario == posse.get_scenario("smart", **plain)
     for name, value in scenario.to_dict().items():
         assert type(value) in (int, float, str, bool, tuple, dict, type(None)), name
     assert {type(each) for each in (*scenario.tracker_speeds, *scenario.start_distance, scenario.arena)} == {float}

@@ -7,7 +7,6 @@ from typing import Any, Final
 import hypothesis
 import numpy as np
 import numpy.typing as npt
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -81,7 +80,7 @@ def drive(batch: posse.Batch, rng: np.random.Generator) -> npt.NDArray[np.float3
     return actions
 
 
-@hypothesis.settings(derandomize=True, max_examples=40, deadline=None)
+@hypothesis.settings(derandomize=True, max_examples=25, deadline=None)
 @given(
     name=st.sampled_from(posse.scenario_names()),
     target_motion=st.sampled_from(["constant", "accelerating", "smart", "smart", "agent"]),
@@ -126,20 +125,3 @@ def test_equal_states_with_equal_draws_go_on_alike(
         actions = drive(one, rng)
         for mine, theirs in zip(one.step(actions)[:4], other.step(actions)[:4], strict=True):
             np.testing.assert_array_equal(mine, theirs)
-
-
-def test_a_smart_target_s_patience_is_in_the_state_within_its_bounds() -> None:
-    """It grows while the team keeps station, up to 3 s; a dart is that of 1.3 π at ω_t, 2 rad/s."""
-    batch = posse.batch("smart", 64, start_distance=(0.7, 3.0))
-    layout = StateLayout(batch.scenario)
-    at = layout.offsets["pressed"]
-    batch.reset(seed=0)
-    rng = np.random.default_rng(0)
-    values = []
-    for _ in range(150):
-        batch.step(drive(batch, rng))
-        vector = layout.vector(batch.arrays)
-        values.append(vector[:, at])
-    assert np.min(values) == pytest.approx(-1.3 * np.pi / 2.0)
-    assert (np.array(values) > 0).any()
-    assert np.max(values) <= 3.0

@@ -2,39 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import hypothesis
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.support.reference.observation import observation
-from tests.support.reference.recordings import CASES, case_name, record
-from tests.support.reference.senses import Senses, sonar
+from tests.support.reference.senses import sonar
 from tests.support.reference.state import headings, one_world, positions, snapshot
 
 import posse
-
-
-@pytest.mark.parametrize("case", CASES, ids=case_name)
-def test_every_field_equals_an_independent_working(case: Any) -> None:
-    recording = record(*case)
-    s, senses = recording.scenario, Senses(recording.scenario)
-    for step, state in enumerate(recording.states):
-        senses.follow(state, recording.actions[step - 1] if step else None)
-        if step % (6 if s.num_trackers < 12 else 24) and step not in (1, 2):
-            continue
-        views = recording.batch.layout.views(recording.observations[step])
-        for i in range(s.num_trackers):
-            told = views["neighbour_number"][0, i]
-            expected = observation(s, state, i, senses, told)
-            assert set(expected) == set(views)
-            for name, value in expected.items():
-                off = 2e-3 if name in ("target_velocity", "sonar") else 2e-4
-                np.testing.assert_allclose(
-                    views[name][0, i], value, atol=off, rtol=1e-4, err_msg=f"{name}, step {step}"
-                )
 
 
 def test_what_the_target_agent_is_given() -> None:
@@ -89,56 +62,6 @@ def test_only_a_rectangle_has_a_height() -> None:
         wide.reset(options={"target_pose": (0.0, 8.0, 0.0)})
 
 
-EXTREMES = st.sampled_from(
-    [
-        {},
-        {"range_noise": 0.3, "bearing_noise": 0.5},
-        {"num_trackers": 1},
-        {"num_trackers": 2, "num_neighbours": 7},
-        {"num_trackers": 14, "num_neighbours": 4, "message_size": 2},
-        {"tracker_speed": 50.0, "horizon": 30},
-        {"forget_after": 0.17, "radio_delay": 1},
-        {"target_motion": "agent"},
-        {"arena": (24.0, 16.0)},
-        {"sonar_beams": 0},
-        {"velocity_smoothing": 2.0},
-        {"breaks": 1, "break_choice": "drawn", "break_window": (0.0, 1.0)},
-        {"field_of_view": 1.0, "sensor_outages": 1.0, "radio_outages": 1.0, "outage_time": 1.0},
-    ]
-)
-
-
-@hypothesis.settings(derandomize=True, max_examples=60, deadline=None)
-@given(
-    name=st.sampled_from(posse.scenario_names()),
-    overrides=EXTREMES,
-    seed=st.integers(0, 2**40),
-    actions=st.sampled_from(["random", "extreme", "straight"]),
-)
-def test_bounds_are_true(name: str, overrides: dict[str, Any], seed: int, actions: str) -> None:
-    settings = {"horizon": 80, "start_distance": (2.0, 8.0), **overrides}
-    if overrides.get("num_trackers") == 1:
-        settings["breaks"] = 0
-    batch = posse.batch(name, 4, **settings)
-    low, high = batch.layout.bounds()
-    assert np.isfinite(low).all()
-    assert np.isfinite(high).all()
-    assert (low <= high).all()
-    rng = np.random.default_rng(seed)
-    observations = batch.reset(seed=seed)
-    for _ in range(batch.scenario.horizon + 2):
-        assert (observations >= low).all()
-        assert (observations <= high).all()
-        if actions == "straight":
-            chosen = np.tile([1.0, 0.0] + [1.0] * batch.scenario.message_size, (4, 1))
-            chosen = np.broadcast_to(chosen[:, None], batch.action_shape)
-        elif actions == "extreme":
-            chosen = rng.choice([-1.0, 1.0], batch.action_shape)
-        else:
-            chosen = rng.uniform(-1, 1, batch.action_shape)
-        observations = batch.step(chosen)[0]
-
-
 @pytest.mark.parametrize("number", [1, 2, 3, 8, 12, 13, 40, 64])
 @pytest.mark.parametrize("name", ["constant", "radio"])
 def test_one_to_sixty_four_trackers_nearest_first(name: str, number: int) -> None:
@@ -185,12 +108,3 @@ def test_observations_of_another_length_are_refused() -> None:
     layout = posse.batch().layout
     with pytest.raises(ValueError, match="last axis"):
         layout.views(np.zeros((2, layout.size + 1)))
-
-
-def test_an_unknown_target_is_marked_by_sentinels() -> None:
-    batch = posse.batch("search", sensing_range=0.5, start_distance=(6.0, 9.0))
-    views = batch.layout.views(batch.reset(seed=8))
-    for field in batch.layout.fields:
-        if field.name.startswith("target_") and field.unknown is not None:
-            assert (views[field.name] == field.unknown).all(), field.name
-    assert (views["target_known"] == 0).all()

@@ -12,44 +12,47 @@ import pytest
 
 import posse
 
-TEAMS: list[dict[str, Any]] = [
-    {"num_trackers": 1},
-    {"num_trackers": 2},
-    {"num_trackers": 5, "message_size": 2},
-    {"num_trackers": 8, "sonar_beams": 5},
-    {"num_trackers": 9, "num_neighbours": 8, "target_motion": "agent"},
-    {"num_trackers": 16, "num_neighbours": 15},
-    {"num_trackers": 17, "num_neighbours": 16, "message_size": 1},
-    {"num_trackers": 5, "num_neighbours": 2},
-    {"num_trackers": 5, "num_neighbours": 7, "message_size": 1},
-    {"num_trackers": 8, "num_neighbours": 3, "message_size": 2},
-    {"num_trackers": 16, "message_size": 1},
-    {"num_trackers": 16, "num_neighbours": 9},
-    {"num_trackers": 3, "num_neighbours": 0},
-    {"num_trackers": 5, "field_of_view": 2.0, "sensing_range": 9.0},
-    {"num_trackers": 64, "num_neighbours": 63},
-]
-WORLDS = 11  # eight together, and three each alone
+WORLDS: dict[str, dict[str, Any]] = {
+    "smart": {"num_trackers": 5, "num_neighbours": 7, "message_size": 1},
+    "smart, one": {"num_trackers": 1, "num_neighbours": 0},
+    "smart, eight": {"num_trackers": 8, "num_neighbours": 3, "sonar_beams": 5, "message_size": 2},
+    "smart, the target an agent": {"num_trackers": 9, "num_neighbours": 8, "target_motion": "agent"},
+    "smart, sixteen": {"num_trackers": 16, "num_neighbours": 15},
+    "smart, some of sixteen": {"num_trackers": 16, "num_neighbours": 9, "message_size": 1},
+    "smart, seventeen": {"num_trackers": 17, "num_neighbours": 16, "message_size": 1},
+    "smart, sixty-four": {"num_trackers": 64, "num_neighbours": 63},
+    "constant": {"field_of_view": 2.0, "sensing_range": 9.0},
+    "obstacles": {"autoreset": "same_step"},
+    "radio": {"message_size": 2},
+    "leader-loss": {"autoreset": "same_step", "break_window": (0.2, 0.5)},
+    "field": {"num_trackers": 3},
+    "robots": {"command_delay": 2, "odometry_drift": 0.05, "heading_drift": 0.02, "heading_noise": 0.05},
+}
+COUNT = 11  # eight together, and three each alone
 
 
-@pytest.mark.parametrize("team", TEAMS, ids=str)
-def test_worlds_that_are_observed_together_are_as_each_alone(team: dict[str, Any]) -> None:
-    make: dict[str, Any] = {**team, "horizon": 31, "num_threads": 1, "seed": 4}
-    together = posse.batch("smart", WORLDS, **make)
-    alone = [posse.batch("smart", 1, first_world=e, **make) for e in range(WORLDS)]
+@pytest.mark.parametrize("world", WORLDS)
+def test_worlds_that_are_played_together_are_as_each_alone(world: str) -> None:
+    scenario = world.partition(",")[0]
+    make: dict[str, Any] = {"horizon": 31, "num_threads": 1, "seed": 4, "settle_time": 1.0, **WORLDS[world]}
+    together = posse.batch(scenario, COUNT, **make)
+    alone = [posse.batch(scenario, 1, first_world=e, **make) for e in range(COUNT)]
     rng = np.random.default_rng(0)
-    observed = together.reset()
-    expected = np.concatenate([world.reset() for world in alone])
+    outputs, expected = [together.reset()], [np.concatenate([each.reset() for each in alone])]
     for step in range(40):  # past the horizon, where worlds start anew
-        np.testing.assert_array_equal(observed, expected)
+        for mine, theirs in zip(outputs, expected, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
         actions = rng.uniform(-1, 1, together.action_shape).astype(np.float32)
-        observed = together.step(actions)[0]
-        expected = np.concatenate([world.step(actions[e : e + 1])[0] for e, world in enumerate(alone)])
+        *outputs, infos = together.step(actions)
+        outputs.append(infos["score"])
+        each = [world.step(actions[e : e + 1]) for e, world in enumerate(alone)]
+        expected = [np.concatenate(parts) for parts in zip(*(step[:4] for step in each), strict=True)]
+        expected.append(np.concatenate([step[4]["score"] for step in each]))
         if step == 12:  # some start anew, in their midst some that are only looked at
-            mask = rng.random(WORLDS) < 0.5
-            observed = together.reset(options={"reset_mask": mask})
+            mask = rng.random(COUNT) < 0.5
+            outputs[0] = together.reset(options={"reset_mask": mask})
             for e in np.flatnonzero(mask):
-                expected[e] = alone[e].reset()[0]
+                expected[0][e] = alone[e].reset()[0]
 
 
 LARGEST = """

@@ -11,8 +11,8 @@ import pytest
 from posse_baselines import from_function, load
 from posse_training import evaluate, provenance
 from posse_training.cli import main
-from posse_training.errors import ClusterError, MissingExtraError, SettingsError
-from posse_training.parallel import Job, address_of, cut
+from posse_training.errors import ClusterError, MissingExtraError
+from posse_training.parallel import Job, cut
 from posse_training.train.seeds import train_on_worker
 from posse_training.train.settings import TrainSettings
 
@@ -30,12 +30,6 @@ def test_what_needs_ray_names_the_extra(
     with pytest.raises(MissingExtraError, match=r"extra 'cluster' of posse-rl"):
         evaluate("idle", "smart", 2, ray=True)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_which_cluster() -> None:
-    assert (address_of(None), address_of(()), address_of(("10.0.0.1:6379",))) == (False, True, "10.0.0.1:6379")
-    with pytest.raises(SettingsError, match="one address at most, not 'auto smart'"):
-        address_of(("auto", "smart"))
 
 
 @pytest.mark.parametrize(("count", "size"), [(1, 5), (10, 5), (11, 5), (7, 1)])
@@ -62,28 +56,6 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
     provenance.sources.cache_clear()  # as in another process
     mine.write_text("class Team: # other\n    ...\n")
     assert [folder(each) == at for each, at in zip(names, folders, strict=True)] == [True] * 5 + [False]
-
-
-@pytest.mark.parametrize(
-    ("seeds", "folder", "expected"),
-    [
-        ("3 4", [], ["runs/train/smart-ppo-3", "runs/train/smart-ppo-4"]),
-        ("3 4", ["--folder", "f"], ["f/seed-3", "f/seed-4"]),
-    ],
-)
-def test_each_seed_has_a_folder_of_its_own(
-    seeds: str, folder: list[str], expected: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found: list[tuple[str, int]] = []
-
-    def train_seeds(runs: list[TrainSettings], ray: bool | str) -> list[Path]:
-        found.extend((str(run.run_folder), run.seed) for run in runs)
-        assert ray is False
-        return []
-
-    monkeypatch.setattr("posse_training.train.seeds.train_seeds", train_seeds)
-    assert main(["train", "--seeds", *seeds.split(), *folder]) == 0
-    assert found == [(path, seed) for path, seed in zip(expected, (3, 4), strict=True)]
 
 
 def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +21,8 @@ from posse_training.evaluation.statistics import difference
 
 def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     names = ("idle", "pursuit")
-    settings = Settings(names, ("constant",), episodes=20, out=tmp_path, figures=False, planner_episodes=0)
-    rows = compare(settings).rows
+    made: dict[str, Any] = {"figures": False, "planner_episodes": 0, "export": ("marl-eval",)}
+    rows = compare(Settings(names, ("constant",), episodes=20, out=tmp_path, **made)).rows
     scores = {}
     for name in names:
         with (tmp_path / f"constant-{name}.csv").open(newline="") as file:
@@ -34,6 +35,8 @@ def test_differences_are_those_of_the_rows(tmp_path: Path) -> None:
     written = json.loads((tmp_path / "summary.json").read_text())
     assert written["comparison"][1]["safe_score"]["value"] == pytest.approx(scores["pursuit"].mean())
     assert (written["seed"], written["split"]) == (7, "test")
+    exported = json.loads((tmp_path / "marl-eval.json").read_text())["posse"]["constant"]["pursuit"]["seed_0"]
+    assert exported["absolute_metrics"]["safe_score"] == exported["step_0"]["safe_score"] == list(scores["pursuit"])
 
 
 def test_teams_are_ranked_and_stand_beside_the_planner(tmp_path: Path) -> None:
@@ -67,15 +70,6 @@ def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None
     with pytest.raises(posse.ScenarioError, match="unknown scenario 'konstant'"):
         compare(Settings(("idle",), ("constant", "konstant"), out=tmp_path))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
-    assert main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    row = next(k for k, line in enumerate(lines) if line.split()[:1] == ["pursuit"])
-    assert lines[row + 1].count("]") == 2, "safe score and difference with their intervals"
-    assert not list(tmp_path.glob("*.png"))
 
 
 def test_a_file_goes_by_the_name_on_its_card(files: list[str], tmp_path: Path) -> None:
@@ -143,13 +137,6 @@ def test_who_cannot_play_is_left_out_with_a_line(
     assert summary["comparison"][2]["difference"] is not None
 
 
-def test_a_split_that_was_trained_on_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    learned(1, "test").save(tmp_path / "mine.safetensors")
-    options = ["--scenarios", "constant", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]
-    assert main(["compare", str(tmp_path / "mine.safetensors"), *options]) == 2
-    assert "was trained on the split 'test'" in capsys.readouterr().err
-
-
 @pytest.mark.long
 def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--scenarios", "constant", "leader-loss", "--episodes", "3"]
@@ -187,30 +174,3 @@ def test_labels_that_give_one_file_name_have_a_file_each(tmp_path: Path) -> None
     files = [name for row in found.rows for name in row["files"]]
     assert files == ["constant-a_b.csv", "constant-a_b-2.csv", "constant-A_B-3.csv"]
     assert all((tmp_path / name).is_file() for name in files)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("a\nb=idle", "printable characters"),
-        ("x" * 400 + "=idle", r"400 characters\) must have at most 100"),
-        ("x" * 5000, "unknown policy 'x+.*policies are: random"),
-        ("", "unknown policy ''; policies are: random"),
-    ],
-)
-def test_labels_that_no_report_can_show(text: str, message: str) -> None:
-    with pytest.raises(PolicyError, match=message):
-        read_contenders(("pursuit", text))
-
-
-def test_brackets_and_dollars_are_shown_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    labels = ("[bold]a[/bold]", "[/]", "$x^{$", "_hidden")
-    policies = [f"{label}=idle" for label in labels]
-    options = ["--scenarios", "constant", "--episodes", "1"]
-    assert main(["compare", *policies, *options, "--out", str(tmp_path / "out")]) == 0
-    shown = capsys.readouterr().out
-    assert all(label in shown for label in labels)
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert [row["policy"] for row in summary["comparison"]] == [*labels, "planner"]
-    drawn = (tmp_path / "out" / "scenarios.svg").read_text()
-    assert all(f"{label}</text>" in drawn for label in labels)

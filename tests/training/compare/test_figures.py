@@ -62,30 +62,6 @@ def test_a_profile_is_the_share_of_worlds_with_at_least_a_score() -> None:
     assert set(bound) == {1.0}
 
 
-def test_scores_and_bounds_stand_where_they_should() -> None:
-    figure = figures.scores(
-        {
-            (name, policy): plays_of(policy, name, safe_score=[low, low + 0.2], bound=[0.9, 0.8])
-            for name, low in (("smart", 0.3), ("radio", 0.5))
-            for policy in ("planner", "pursuit")
-        },
-        LOOKS,
-    )
-    (axis,) = figure.axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == [
-        f"{name} v{posse.get_scenario(name).version}" for name in ("smart", "radio")
-    ]
-    points = [
-        (round(float(np.ravel(drawn.get_xdata())[0]), 6), round(float(np.ravel(drawn.get_ydata())[0])))
-        for drawn in axis.lines
-        if drawn.get_marker() == LOOKS["planner"].marker
-    ]
-    assert points == [(0.4, 0), (0.6, 1)]
-    upright = [drawn for drawn in axis.lines if len(set(np.atleast_1d(drawn.get_xdata()))) == 1]
-    bounds = [drawn for drawn in upright if drawn.get_color() == LOOKS[BOUND].colour]
-    assert {round(float(np.asarray(drawn.get_xdata())[0]), 6) for drawn in bounds} >= {0.85}
-
-
 def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
     """Teams that never recover count, and no team counts after the end of its episode."""
     taken = [1.0, 2.0, np.nan, np.nan]
@@ -96,25 +72,6 @@ def test_recovery_is_the_share_that_has_settled_anew_by_then() -> None:
     scenario = posse.get_scenario("leader-loss")
     assert max(x) == pytest.approx(0.4 * scenario.duration - scenario.settle_time)
     assert max(y) == 0.5
-
-
-def said(figure: Figure) -> list[str]:
-    """What a figure's note says, line by line."""
-    return str(figure.get_supxlabel()).splitlines()
-
-
-def test_figures_say_what_was_played() -> None:
-    plays = {
-        ("field", "idle"): plays_of("idle", "field", safe_score=[0.1] * 3, bound=[1.0] * 3),
-        ("field", "mine"): plays_of("mine", "field", safe_score=[0.1] * 3, bound=[1.0] * 3),
-        ("field", "planner"): plays_of("planner", "field", safe_score=[0.1], bound=[1.0]),
-    }
-    for draw in (figures.profile, figures.scores):
-        assert said(draw(plays, LOOKS))[0].endswith("3 worlds (planner 1), test split, seed 7")
-    losses = [plays_of("idle", "leader-loss", recovery_time=[1.0, 2.0], score=[0.0, 0.0])]
-    assert said(figures.recovery(losses, LOOKS)) == [
-        f"leader-loss v{posse.get_scenario('leader-loss').version}: 2 worlds, test split, seed 7"
-    ]
 
 
 def learned(curve: object) -> Contender:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from posse_baselines import PolicyError
 from posse_training import evaluate
 from posse_training.cli import main
 from posse_training.compare.compare import Settings, compare
@@ -103,19 +102,6 @@ def test_a_policy_that_hangs_is_ended(tmp_path: Path) -> None:
     assert all("exceeded the time limit of 12 s" in row["why"] for row in found.failed)
 
 
-@pytest.mark.long
-def test_a_policy_that_hangs_while_it_loads_costs_its_own_rows(tmp_path: Path) -> None:
-    found = compare(settings_for(tmp_path, "HangsWhileLoading", limit=10.0))
-    assert [row["policy"] for row in found.rows] == ["idle", "pursuit"]
-    assert [row["policy"] for row in found.failed] == [f"{BAD}HangsWhileLoading"]
-
-
-def test_code_that_is_no_policy_is_refused_before_anything_is_played(tmp_path: Path) -> None:
-    with pytest.raises(PolicyError, match="has no 'Typo'"):
-        compare(settings_for(tmp_path, "Typo"))
-    assert not (tmp_path / "out").exists()
-
-
 HANG = """
 import sys
 from pathlib import Path
@@ -155,36 +141,6 @@ def alive(pid: int) -> bool:
         return False
     stat = Path(f"/proc/{pid}/stat")
     return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
-
-
-@pytest.mark.long
-def test_after_the_time_limit_a_policy_is_not_played_again(tmp_path: Path) -> None:
-    settings = Settings(
-        (f"{BAD}Sleeps", "idle"),
-        ("constant", "smart"),
-        episodes=1,
-        out=tmp_path / "out",
-        figures=False,
-        planner_episodes=0,
-        time_limit=10.0,
-    )
-    first, second = compare(settings).failed
-    assert first["what"] == "constant"
-    assert (second["what"], second["why"].partition(" it ")[0]) == ("smart", "not played: on constant")
-
-
-def test_a_failure_in_one_scenario_leaves_the_others(tmp_path: Path) -> None:
-    settings = Settings(
-        (f"{BAD}FailsOnSmart",),
-        ("smart", "constant"),
-        episodes=1,
-        out=tmp_path / "out",
-        figures=False,
-        planner_episodes=0,
-    )
-    found = compare(settings)
-    assert [(row["what"], "not this one" in row["why"]) for row in found.failed] == [("smart", True)]
-    assert [row["scenario"] for row in found.rows] == ["constant"]
 
 
 def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -42,17 +42,11 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     return compare(Settings(policies, ("constant",), episodes=3, out=out, planner_episodes=0, replays=2))
 
 
-def test_it_holds_every_estimate_and_figure(found: Comparison) -> None:
+def test_it_holds_all_estimates_and_figures_and_a_hostile_label_is_text(found: Comparison) -> None:
     page = Page(found.folder / "report.html")
-    for row in found.rows:
-        score = row["safe_score"]
+    for score in (row["safe_score"] for row in found.rows):
         assert f"{score.value:.3f}[{score.low:.3f}, {score.high:.3f}]" in page.text
-    shown = [attributes["src"] for tag, attributes in page.tags if tag == "img"]
-    assert shown == ["scenarios.svg", "profile.svg"]
-
-
-def test_a_hostile_label_is_text(found: Comparison) -> None:
-    page = Page(found.folder / "report.html")
+    assert [attributes["src"] for tag, attributes in page.tags if tag == "img"] == ["scenarios.svg", "profile.svg"]
     assert HOSTILE in page.text
     assert "script" not in {tag for tag, _ in page.tags}
     assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]

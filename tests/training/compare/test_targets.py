@@ -20,7 +20,6 @@ from posse_training.compare.compare import main as compare_main
 from posse_training.compare.contenders import Contender
 from posse_training.compare.playing import Game
 from posse_training.compare.playing import replay as play_again
-from posse_training.errors import TrainedSplitError
 from posse_training.replay import record
 
 SHORT = posse.get_scenario("smart", num_trackers=3, horizon=30, settle_time=1.0)
@@ -49,19 +48,6 @@ def test_an_evaluation_names_the_target_and_is_the_same_alone(file: Path, tmp_pa
     rows = list(csv.DictReader(text.splitlines()))
     assert {row["target"] for row in rows} == {"evading"}
     assert json.loads((tmp_path / "rows.json").read_text())["target"] == "evading"
-
-
-def test_a_scripted_target_is_given_by_its_name() -> None:
-    given = evaluate("pursuit", SHORT, 4, target="accelerating", progress=False)
-    own = evaluate("pursuit", SHORT.replace(target_motion="accelerating"), 4, progress=False)
-    np.testing.assert_array_equal(given["tracking_error"], own["tracking_error"])
-
-
-def test_what_cannot_be_played_is_refused(file: Path) -> None:
-    with pytest.raises(TrainedSplitError, match="train"):
-        evaluate("pursuit", SHORT, 1, target=str(file), split="train")
-    with pytest.raises(PolicyError, match="unknown target 'evadr'"):
-        evaluate("pursuit", SHORT, 1, target="evadr")
 
 
 def test_a_comparison_plays_every_team_against_the_target(

@@ -15,15 +15,6 @@ def test_the_interval_of_a_mean_agrees_with_the_normal_theory() -> None:
     assert estimate.high == pytest.approx(values.mean() + half, abs=0.02)
 
 
-def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
-    rng = np.random.default_rng(2)
-    covered = 0
-    for _ in range(200):
-        estimate = mean(rng.exponential(1.0, 80))
-        covered += estimate.low <= 1.0 <= estimate.high
-    assert 0.88 <= covered / 200 <= 0.99
-
-
 def test_episodes_in_which_it_never_happened_do_not_count() -> None:
     estimate = mean([1.0, np.nan, 3.0])
     assert (estimate.value, estimate.count) == (2.0, 2)
@@ -33,19 +24,6 @@ def test_episodes_in_which_it_never_happened_do_not_count() -> None:
 def test_the_interquartile_mean_ignores_both_tails() -> None:
     values = np.concatenate([np.full(50, 0.5), np.full(10, 1e6), np.full(10, -1e6)])
     assert over_seeds(values, middle_mean).value == 0.5
-
-
-def test_a_paired_difference_is_sharper_than_two_means() -> None:
-    rng = np.random.default_rng(4)
-    worlds = rng.normal(size=300)
-    first = worlds + 0.1 + 0.01 * rng.normal(size=300)
-    paired = difference(first, worlds)
-    assert paired.low > 0.09
-    assert paired.high < 0.11
-
-
-def test_improvement_counts_ties_half() -> None:
-    assert improvement([1, 2, 3, 4], [1, 1, 3, 5]).value == pytest.approx(0.5)
 
 
 def test_a_share_has_wilsons_interval() -> None:
@@ -83,10 +61,6 @@ class TestTrainingSeeds:
         assert estimate.value == pytest.approx(values.mean())
         assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * deviation, rel=0.1)
 
-    def test_one_seed_is_a_plain_bootstrap_of_worlds(self) -> None:
-        values = np.random.default_rng(6).normal(size=400)
-        assert over_seeds(values) == mean(values)
-
     def test_what_worlds_have_in_common_leaves_a_paired_difference(self) -> None:
         rng = np.random.default_rng(7)
         worlds = 10 * rng.normal(size=200)
@@ -98,13 +72,6 @@ class TestTrainingSeeds:
         turned = difference(worlds, trained)
         assert turned.value == pytest.approx(-paired.value)
         assert turned.low == pytest.approx(-paired.high, abs=0.02)
-
-    def test_seeds_that_disagree_leave_the_sign_open(self) -> None:
-        """Many worlds do not replace training seeds."""
-        rng = np.random.default_rng(8)
-        trained = np.array([[0.3], [0.25], [-0.2]]) + 0.05 * rng.normal(size=(3, 5000))
-        assert difference(trained, np.zeros(5000)).low < 0
-        assert difference(trained.reshape(-1), np.zeros(15_000)).low > 0  # if all were worlds
 
     def test_improvement_compares_every_pair_of_seeds(self) -> None:
         mine, theirs = np.array([[1.0, 4.0], [2.0, 4.0]]), np.array([[0.0, 4.0], [2.0, 5.0]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -175,20 +174,6 @@ def test_the_safe_score_stops_at_the_first_contact(browser: Browser, tmp_path: P
             assert row.locator("td").all_inner_texts()[1:] == wanted
 
 
-def test_what_is_not_known_is_grey(browser: Browser, tmp_path: Path) -> None:
-    path = write_replay(record(["ddcs-distributed"], "search", seconds=1), tmp_path / "a.html")
-    with opened(browser, path, "#r=0") as page:
-        known = page.locator("tr", has=page.locator("th", has_text="target range")).locator("td")
-        assert known.last.inner_text() == "not known"
-        assert "unknown" in str(known.last.get_attribute("class"))
-        for name in ("estimate", "estimate age"):
-            row = page.locator("tr", has=page.get_by_role("rowheader", name=name, exact=True))
-            assert row.locator("td").last.inner_text() == "none"
-        seen = page.locator("tr", has=page.locator("th", has_text="target seen")).locator("td")
-        assert seen.last.inner_text() == "0"
-        assert "unknown" not in str(seen.last.get_attribute("class"))
-
-
 def test_the_address_says_when_and_whom(browser: Browser, written: Path) -> None:
     with opened(browser, written, "#t=12.4&r=3") as page:
         assert (state(page, "position"), state(page, "selected")) == (124, 3)
@@ -227,68 +212,6 @@ def test_on_a_phone(browser: Browser, written: Path) -> None:
         }""")
         page.locator("#views canvas").first.tap(position={"x": place[0], "y": place[1]})
         assert state(page, "selected") == 1
-
-
-def test_views_zoom_and_move_together_unless_unlinked(browser: Browser, written: Path) -> None:
-    def scales() -> list[float]:
-        looks: list[float] = page.evaluate("[0, 1].map((k) => window.replay.look(k).scale)")
-        return looks
-
-    with opened(browser, written) as page:
-        first = page.locator("#views canvas").first
-        before = scales()
-        assert before[0] == pytest.approx(before[1])
-        first.hover()
-        page.mouse.wheel(0, -400)
-        until(page, f"window.replay.look(0).scale > {1.5 * before[0]}")
-        assert scales()[0] == pytest.approx(scales()[1])
-        middle = page.evaluate("window.replay.look(1).x")
-        page.mouse.down()
-        page.mouse.move(100, 300)
-        page.mouse.up()
-        assert page.evaluate("window.replay.look(1).x") != middle
-        page.keyboard.press("c")
-        linked = scales()
-        page.mouse.wheel(0, 400)
-        until(page, f"window.replay.look(0).scale < {0.8 * linked[0]}")
-        assert scales()[1] == pytest.approx(linked[1])
-        page.keyboard.press("r")
-        page.keyboard.press("c")
-        assert scales() == pytest.approx(before)
-
-
-def test_following_keeps_a_robot_in_the_middle(browser: Browser, written: Path) -> None:
-    with opened(browser, written, "#t=8&r=1") as page:
-        page.keyboard.press("f")
-        for k in (0, 1):
-            x, y = page.evaluate(f"""() => {{
-                const {{ columns }} = window.replay.app.players[{k}];
-                const look = window.replay.look({k});
-                return [look.x - columns.get("tracker_x").at(80, 1),
-                        look.y - columns.get("tracker_y").at(80, 1)];
-            }}""")
-            assert (x, y) == pytest.approx((0, 0))
-
-
-def test_layers_are_switched(browser: Browser, written: Path, tmp_path: Path) -> None:
-    with opened(browser, written, "#t=15&r=0") as page:
-        pictures = [drawn(page, tmp_path / "0.png")]
-        for key in ("l", "s", "t"):
-            page.keyboard.press(key)
-            pictures.append(drawn(page, tmp_path / f"{key}.png"))
-        assert state(page, "layers") == {"links": False, "sensing": False, "trails": False}
-        for one, other in itertools.pairwise(pictures):
-            assert (one != other).any(axis=-1).sum() > 50
-
-
-def test_help_opens_and_closes(browser: Browser, written: Path) -> None:
-    with opened(browser, written, "#r=2") as page:
-        page.keyboard.press("?")
-        assert page.locator("#legend").is_visible()
-        assert "its last fix of the target" in page.locator("#legend").inner_text()
-        page.keyboard.press("Escape")
-        assert not page.locator("#legend").is_visible()
-        assert state(page, "selected") == 2
 
 
 def test_a_picture_and_a_film_are_saved(browser: Browser, written: Path, tmp_path: Path) -> None:
@@ -363,18 +286,6 @@ def test_the_sensing_area_holds_the_target_when_it_is_seen(
     assert 0.05 < sees.mean() < 0.98
     # Only where rounding to a millimetre decides.
     assert wrong.mean() < 0.004
-
-
-def test_four_players_of_unequal_length(browser: Browser, tmp_path: Path) -> None:
-    names = ["ddcs-distributed", "pursuit", "idle", "random"]
-    replay = record(names, "obstacles", world=3, seconds=30, terminate_on_contact=True)
-    lengths = [player.frames for player in replay.players]
-    assert len(set(lengths)) > 1
-    with opened(browser, write_replay(replay, tmp_path / "a.html"), "#r=0") as page:
-        assert page.locator("#views canvas").count() == 4
-        page.keyboard.press("End")
-        assert state(page, "position") == max(lengths) - 1
-        assert page.locator("#panel .player").all_inner_texts() == names
 
 
 def test_one_player_and_a_target_that_is_driven(browser: Browser, tmp_path: Path) -> None:

@@ -64,18 +64,10 @@ def test_ticks_agree_with_the_metrics() -> None:
         assert [e.step for e in player.events] == sorted(e.step for e in player.events)
 
 
-def test_every_dart_of_a_smart_target_is_a_tick() -> None:
-    player = record(["planner"], "smart", seed=1).players[0]
-    darts = [event.step for event in player.events if event.kind == "dart"]
-    column = player.columns["target_dart"].values
-    assert darts == (np.flatnonzero(np.diff(column) == 1) + 1).tolist()
-    assert darts
-
-
-def test_a_leader_is_whom_more_than_half_follow() -> None:
+def test_a_leader_is_whom_more_than_half_follow_and_a_dart_begins_once() -> None:
     frames, n = 6, 4
     states = {
-        "world_pressed": np.zeros(frames),
+        "world_pressed": np.array([0, 0, -1, -1, 0, 0]),
         "world_step": np.arange(frames),
         "tracker_onsets": np.zeros((frames, n)),
         "tracker_broken_at": np.full((frames, n), 1000),
@@ -84,5 +76,6 @@ def test_a_leader_is_whom_more_than_half_follow() -> None:
     }
     leader = np.array([[-1, -1, -1, -1], [2, 2, 2, 0], [2, 2, 0, 0], [0, 0, 0, 2], [0, 0, 0, 0], [2, 2, 2, 2]])
     events = find_events({**states, "annotation/leader": leader})
-    assert [(event.step, event.robots) for event in events] == [(3, (2, 0)), (5, (0, 2))]
-    assert find_events(states) == ()
+    found = [(event.step, event.kind, event.robots) for event in events]
+    assert found == [(2, "dart", ()), (3, "leader", (2, 0)), (5, "leader", (0, 2))]
+    assert [event.kind for event in find_events(states)] == ["dart"]

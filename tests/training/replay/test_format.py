@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import hypothesis.extra.numpy as arrays
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.replays import short
 
-from posse_training.errors import SettingsError
 from posse_training.replay import Column, Event, Player, Replay
 from posse_training.replay.format import decode, encode
 
@@ -35,17 +31,6 @@ def test_any_column_comes_back_to_half_its_resolution(values: Any, resolution: f
     assert np.nanmax(off, initial=0) <= resolution * 0.5 * (1 + 1e-9)
 
 
-@settings(deadline=None)
-@given(
-    values=arrays.arrays(
-        np.int64, st.tuples(st.integers(1, 12), st.integers(0, 3)), elements=st.integers(-(2**30), 2**30)
-    )
-)
-def test_whole_numbers_come_back_exactly(values: Any) -> None:
-    replay = Replay({}, (Player("p", {"c": Column(values)}),))
-    np.testing.assert_array_equal(decode(*encode(replay)).players[0].columns["c"].values, values)
-
-
 def test_all_that_is_not_a_column_comes_back() -> None:
     world = {"inf": float("inf"), "list": [1, -float("inf"), None, True, "ü"], "in": {"a": 0.1}}
     events = (Event(3, "contact", "text", (1, 2)), Event(9, "dart", ""))
@@ -57,21 +42,3 @@ def test_all_that_is_not_a_column_comes_back() -> None:
     assert back.players[0].about == {"card": "x"}
     assert back.players[0].metrics["score"] == 0.25
     assert np.isnan(back.players[0].metrics["settling_time"])
-
-
-def test_the_header_says_what_every_column_is() -> None:
-    header = json.loads(encode(short())[0])
-    columns = {column["name"]: column for column in header["players"][0]["columns"]}
-    assert columns["tracker_x"]["unit"] == "m"
-    assert columns["tracker_x"]["shape"] == [4]
-    assert columns["tracker_slot"]["scale"] == 1
-    fields = {field["name"]: field for field in header["world"]["fields"]}
-    for name, field in fields.items():
-        assert {"unit", "low", "high", "meaning", "unknown", "block"} <= set(field), name
-    assert fields["target_range"]["unknown"] == -1
-
-
-def test_numbers_too_great_are_refused() -> None:
-    replay = Replay({}, (Player("p", {"far": Column(np.full((2, 1), 1e7), 0.001)}),))
-    with pytest.raises(SettingsError, match=r"column 'far' holds 1e\+07, too great"):
-        encode(replay)

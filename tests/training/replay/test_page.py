@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import re
 from html.parser import HTMLParser
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,7 @@ from tests.support.replays import ATTACK, hostile, short
 from posse_training.cli import main
 from posse_training.errors import SettingsError
 from posse_training.replay import read_replay, record, write_replay
-from posse_training.replay.page import MODULES, page
-
-WEB = resources.files("posse_training.replay") / "web"
+from posse_training.replay.page import page
 
 
 @pytest.mark.parametrize("scenario", ["smart", "field"])
@@ -81,29 +78,6 @@ def test_nothing_of_a_hostile_name_is_markup() -> None:
     assert title is not None
     assert "<" not in title[1]
     assert html.unescape(title[1]).startswith(ATTACK)
-
-
-def test_the_hostile_name_comes_back_from_the_page(tmp_path: Path) -> None:
-    back = read_replay(write_replay(hostile(), tmp_path / "a.html"))
-    assert back.players[0].name == ATTACK
-    assert back.players[0].about == hostile().players[0].about
-    assert back.world["scenario"] == ATTACK
-
-
-def test_the_code_is_in_small_files_that_make_no_markup_of_text() -> None:
-    files = {file.name: file.read_text(encoding="utf-8") for file in WEB.iterdir()}
-    modules = {name for name in files if name.endswith(".js")}
-    assert modules == set(MODULES)
-    for name, text in files.items():
-        assert len(text.splitlines()) < 400, name
-        assert not re.search(
-            r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function"
-            r"|setAttribute\(\"on|https?://|fetch\(|XMLHttpRequest|import\(",
-            text,
-        ), name
-    for number, name in enumerate(MODULES):
-        wanted = re.findall(r'from "\./(.*?)"', files[name])
-        assert set(wanted) <= set(MODULES[:number]), name
 
 
 def test_a_path_or_file_that_is_no_page_is_named(tmp_path: Path) -> None:

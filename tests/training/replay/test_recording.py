@@ -96,13 +96,6 @@ def test_the_world_is_described() -> None:
     assert [p.name for p in short().players] == ["ddcs-distributed", "pursuit"]
 
 
-def test_without_observations_only_what_is_drawn_is_kept() -> None:
-    for player in short(observations=False).players:
-        kept = [name for name in player.columns if name.startswith("observation/")]
-        assert kept == ["observation/sonar"]
-    assert [field["name"] for field in short(observations=False).world["fields"]] == ["sonar"]
-
-
 def driven(batch: posse.Batch, steps: int) -> Trajectory:
     recorder = Recorder(batch, RECORD)
     recorder.reset()
@@ -120,22 +113,6 @@ def test_a_world_of_a_larger_batch_is_recorded_as_if_alone() -> None:
     for name, column in one.columns.items():
         np.testing.assert_array_equal(column.values, other.columns[name].values)
     assert one.events == other.events
-
-
-def test_a_target_that_is_an_agent_has_a_row_of_its_own() -> None:
-    batch = posse.batch("smart", 1, target_motion="agent")
-    replay = replay_of(driven(batch, 10), "me")
-    n, columns = batch.scenario.num_trackers, replay.players[0].columns
-    assert columns["action"].values.shape == (11, n + 1, 2)
-    assert columns["observation/heading"].values.shape == (11, n + 1, 2)
-    assert columns["tracker_x"].values.shape == (11, n)
-    assert replay.world["agents"] == n + 1
-
-
-def test_an_episode_ends_where_it_ends() -> None:
-    recorded = record(["idle"], "constant", horizon=7, settle_time=0.5)
-    assert recorded.players[0].frames == 8
-    assert record(["idle"], "constant", seconds=0.5).players[0].frames == 6
 
 
 def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
@@ -163,10 +140,3 @@ def test_players_of_the_same_world_are_joined_and_others_refused() -> None:
 def test_what_cannot_be_recorded_is_named(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         record(**({"policies": ["idle"], "scenario": "smart"} | wrong))
-
-
-def test_only_small_entries_of_a_card_are_taken() -> None:
-    about = record(["learned-smart"], "smart", seconds=0.5).players[0].about
-    assert about["trained_splits"] == "train"
-    assert about["steps"] == load("learned-smart").card["steps"]  # type: ignore[attr-defined]
-    assert sum(len(str(value)) for value in about.values()) < 3000

@@ -95,34 +95,6 @@ def test_behind_the_safeguard_actions_are_wanted_velocities() -> None:
         PosseEnv("smart", WORLDS, safeguard=True, discrete_actions=True)
 
 
-def test_rows_of_a_target_that_is_an_agent_come_last() -> None:
-    settings: dict[str, Any] = {"target_motion": "agent", "num_trackers": 3}
-    env = PosseEnv("constant", WORLDS, seed=5, **settings)
-    batch = posse.batch("constant", WORLDS, seed=5, **settings)
-    carried, _ = env.reset(), batch.reset()
-    actions = some_actions(batch.action_shape, 1)[0]
-    observations, rewards, *_ = batch.step(actions)
-    carried.set(("target", "action"), torch.from_numpy(actions[:, 3:]))
-    now = env.step(act(carried, actions[:, :3]))["next"]
-    np.testing.assert_array_equal(now["agents", "observation"].numpy(), observations[:, :3])
-    np.testing.assert_array_equal(now["target", "observation"].numpy(), observations[:, 3:])
-    np.testing.assert_array_equal(now["agents", "reward"].squeeze(-1).numpy(), rewards[:, :3])
-    np.testing.assert_array_equal(now["target", "reward"].squeeze(-1).numpy(), rewards[:, 3:])
-
-
-def test_what_was_returned_is_never_overwritten() -> None:
-    env = PosseEnv("constant", 300)  # large enough that the engine reuses memory
-    carried = env.reset()
-    kept, copies = [], []
-    for actions in some_actions(env.batch.action_shape, 12):
-        following, carried = env.step_and_maybe_reset(act(carried, actions))
-        kept.append(following["next", "agents", "observation"])
-        copies.append(kept[-1].clone())
-        del following
-    for tensor, copy in zip(kept, copies, strict=True):
-        assert torch.equal(tensor, copy)
-
-
 def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     env = PosseEnv("field", WORLDS)
     carried = env.reset()
@@ -137,17 +109,6 @@ def test_a_reset_of_some_worlds_leaves_the_others_alone() -> None:
     for name, array in env.batch.state.items():
         np.testing.assert_array_equal(array[~marks.numpy()], state[name][~marks.numpy()])
     assert env.batch.worlds["episode"].tolist() == [0, 1, 0, 1, 1, 0]
-
-
-def test_the_horizon_truncates_and_a_contact_terminates() -> None:
-    env = PosseEnv("constant", 64, terminate_on_contact=True, start_distance=(1.0, 2.5), **SHORT)
-    rollout = env.rollout(12, break_when_any_done=False)
-    now = rollout["next"]
-    assert now["terminated"].any()
-    assert now["truncated"].any()
-    assert not (now["terminated"] & now["truncated"]).any()
-    assert torch.equal(now["done"], now["terminated"] | now["truncated"])
-    assert now["truncated"][:, -1].logical_or(now["terminated"].any(dim=1)).all()
 
 
 def test_a_rollout_goes_on_with_the_next_episode() -> None:
@@ -165,17 +126,6 @@ def test_a_rollout_goes_on_with_the_next_episode() -> None:
         np.testing.assert_array_equal(observation[:, step].numpy(), batch.reset())
 
 
-def test_a_seed_gives_the_worlds_of_that_seed_from_the_start() -> None:
-    env = PosseEnv("constant", WORLDS, seed=1)
-    env.reset()
-    env.reset()
-    env.set_seed(9)
-    seeded = env.reset()["agents", "observation"].numpy()
-    np.testing.assert_array_equal(seeded, posse.batch("constant", WORLDS, seed=9).reset())
-    following = env.reset()["agents", "observation"].numpy()  # the next episode, not the same again
-    assert (following != seeded).any()
-
-
 def test_a_choice_of_autoreset_is_refused() -> None:
     with pytest.raises(TypeError, match=r"autoreset='same_step'.*leave it out"):
         PosseEnv("constant", WORLDS, autoreset="same_step")
@@ -185,44 +135,3 @@ def test_a_step_of_some_worlds_alone_is_refused() -> None:
     env = PosseEnv("constant", 64, terminate_on_contact=True, start_distance=(1.0, 2.5), **SHORT)
     with pytest.raises(NotImplementedError, match="break_when_any_done=False"):
         env.rollout(12, break_when_all_done=True, break_when_any_done=False)
-
-
-def test_a_bad_action_is_refused_and_changes_nothing() -> None:
-    env = PosseEnv("constant", WORLDS)
-    carried = env.reset()
-    before = env.batch.worlds.copy()
-    actions = some_actions(env.batch.action_shape, 1)[0]
-    actions[2, 1, 0] = 1.5
-    with pytest.raises(ValueError, match=r"actions\[2, 1, 0\] = 1.5"):
-        env.step(act(carried, actions))
-    np.testing.assert_array_equal(env.batch.worlds, before)
-
-
-# TorchRL's collectors define classes by a deprecated interface at import.
-@pytest.mark.filterwarnings("ignore:Creating .*WeightUpdater:DeprecationWarning")
-def test_a_collector_gathers_whole_batches() -> None:
-    from torchrl.collectors import Collector
-
-    env = PosseEnv("constant", WORLDS, seed=8, **SHORT)
-    batch = posse.batch("constant", WORLDS, seed=8, **SHORT)
-
-    def policy(carried: TensorDictBase) -> TensorDictBase:
-        return act(carried, np.ones(env.batch.action_shape, np.float32))
-
-    collector = Collector(
-        env,
-        policy,
-        frames_per_batch=8 * WORLDS,
-        total_frames=16 * WORLDS,
-        trust_policy=True,  # a plain function, with nothing to adapt
-        auto_register_policy_transforms=False,  # there are none, and it asks for an answer
-    )
-    parts: list[Any] = [part.clone() for part in collector]
-    data: Any = torch.cat(parts, dim=1)
-    collector.shutdown()
-    assert data.batch_size == (WORLDS, 16)
-    batch.reset()
-    for step in range(12):
-        observations, *_ = batch.step(np.ones(batch.action_shape, np.float32))
-        np.testing.assert_array_equal(data["next", "agents", "observation"][:, step].numpy(), observations)
-    assert data["next", "truncated"].squeeze(-1)[:, 11].all()

@@ -97,19 +97,6 @@ def test_kill_9_loses_at_most_one_interval(tmp_path: Path) -> None:
     assert_equal(numbers(whole), numbers(killed))
 
 
-def test_killed_before_the_first_checkpoint_it_starts_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def killed(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(checkpoint, "write_checkpoint", killed)
-    with pytest.raises(KeyboardInterrupt):
-        train(small(tmp_path / "cut"), console=quiet())
-    monkeypatch.undo()
-    resume(tmp_path / "cut", console=quiet())
-    train(small(tmp_path / "whole"), console=quiet())
-    assert_equal(numbers(tmp_path / "whole"), numbers(tmp_path / "cut"))
-
-
 def test_a_finished_training_can_be_gone_on_with_for_longer(tmp_path: Path) -> None:
     train(small(tmp_path / "run"), console=quiet())
     resume(tmp_path / "run", console=quiet(), steps=1920)

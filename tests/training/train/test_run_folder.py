@@ -2,42 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-from tests.support.disk import largest_file
-from tests.support.runs import assert_equal, numbers, quiet, small, steps_saved
+from tests.support.runs import quiet, small
 
-from posse_training.errors import CheckpointError, RunFolderError, SettingsError
+from posse_training.errors import CheckpointError, RunFolderError
 from posse_training.files import locked
-from posse_training.train import checkpoint
 from posse_training.train.train import resume, train
-
-
-def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "run"
-    write, count = checkpoint.write_checkpoint, 0
-
-    def full(*arguments: Any) -> None:
-        nonlocal count
-        count += 1
-        with largest_file(1000) if count == 3 else contextlib.nullcontext():
-            write(*arguments)
-
-    monkeypatch.setattr(checkpoint, "write_checkpoint", full)
-    with pytest.raises(OSError, match="File too large"):
-        train(small(folder), console=quiet())
-    monkeypatch.undo()
-    assert not list(folder.glob(".*"))
-    assert steps_saved(folder) >= 0
-    resume(folder, console=quiet())
-    train(small(tmp_path / "whole"), console=quiet())
-    assert_equal(numbers(folder), numbers(tmp_path / "whole"))
 
 
 def test_a_damaged_checkpoint(tmp_path: Path) -> None:
@@ -78,11 +53,6 @@ def test_a_folder_that_holds_a_run(tmp_path: Path) -> None:
     assert (tmp_path / "checkpoint.pt").read_bytes() == before
 
 
-def test_no_run_to_go_on_with(tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match="not a run folder"):
-        resume(tmp_path, console=quiet())
-
-
 def test_a_checkpoint_of_other_settings(tmp_path: Path) -> None:
     train(small(tmp_path), console=quiet())
     settings = json.loads((tmp_path / "settings.json").read_text())
@@ -92,7 +62,12 @@ def test_a_checkpoint_of_other_settings(tmp_path: Path) -> None:
         resume(tmp_path, console=quiet())
 
 
-def test_damaged_settings(tmp_path: Path) -> None:
-    (tmp_path / "settings.json").write_text("{")
-    with pytest.raises(SettingsError, match=r"settings\.json is damaged"):
-        resume(tmp_path, console=quiet())
+def test_a_subfolder_that_leads_elsewhere(tmp_path: Path) -> None:
+    """As in the folder of a league or a job, whose results lie in subfolders."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / "league").mkdir()
+    (tmp_path / "league" / "cells").symlink_to(elsewhere)
+    with pytest.raises(OSError, match="symbolic link"), locked(tmp_path / "league"):
+        pass
+    assert list(elsewhere.iterdir()) == []

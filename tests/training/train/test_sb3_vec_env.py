@@ -9,7 +9,6 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecMonitor
 
 import posse
 from posse_baselines.learned import Encoder, Encoding
@@ -139,26 +138,6 @@ def test_nothing_returned_is_overwritten_or_shared() -> None:
             assert array.base is None or array.base is not kept[0][0]
 
 
-def test_seed_and_options_are_used_once() -> None:
-    env = make()
-    env.seed(9)
-    first = env.reset()
-    assert env._seeds == [None] * env.num_envs
-    second = env.reset()
-    assert not np.array_equal(first, second)
-    env.seed(9)
-    np.testing.assert_array_equal(env.reset(), first)
-    pose = np.array([[6.0 + i, 0.0, 0.0] for i in range(5)])
-    env.set_options({"tracker_pose": pose, "target_pose": np.zeros(3)})
-    views = env.batches[0].layout.views(env.reset())
-    np.testing.assert_allclose(views["position"].reshape(3, 5, 2)[:, :, 0], [pose[:, 0]] * 3)
-    assert env._options == [{}] * env.num_envs
-    assert not np.allclose(env.batches[0].layout.views(env.reset())["position"][:5, 0], pose[:, 0])
-    env.set_options([{"target_pose": np.zeros(3)}] + [{}] * (env.num_envs - 1))
-    with pytest.raises(ValueError, match="equal options"):
-        env.reset()
-
-
 def test_teams_of_several_sizes_and_scenarios() -> None:
     batches = [
         posse.batch("constant", 2, num_trackers=3, autoreset="disabled", horizon=50),
@@ -195,25 +174,6 @@ def test_the_state_is_the_truth_as_it_was_at_the_end() -> None:
 
 
 class TestMethods:
-    def test_env_method_calls_each_batch_once(self) -> None:
-        env = make()
-        env.reset()
-        results = env.env_method("metrics", indices=[0, 7])
-        assert results[0] is results[1]
-
-    def test_attributes(self) -> None:
-        env = make()
-        assert env.get_attr("num_worlds", indices=2) == [3]
-        assert env.get_attr("render_mode") == [None] * 15
-        env.set_attr("seed", 4)
-        assert env.get_attr("seed", [0]) == [4]
-        with pytest.raises(AttributeError):
-            env.set_attr("nonsense", 1)
-        with pytest.raises(AttributeError):
-            env.get_attr("nonsense")
-        assert not env.has_attr("nonsense")
-        assert env.env_is_wrapped(VecMonitor, [0]) == [False]  # type: ignore[arg-type]
-
     @pytest.mark.parametrize(
         ("batches", "message"),
         [
@@ -228,24 +188,6 @@ class TestMethods:
         layout = posse.ObservationLayout(posse.get_scenario("constant"))
         with pytest.raises(ValueError, match=message):
             TeamVecEnv(made, Encoding.of(layout))
-
-
-def test_saved_worlds_go_on_as_they_would_have() -> None:
-    first, second = make(staggered=True), make(staggered=True)
-    generator = np.random.default_rng(0)
-    first.reset()
-    for _ in range(5):
-        first.step(draw(first, generator))
-    saved = first.save()
-    second.restore(saved)
-    for _ in range(2 * HORIZON):
-        actions = draw(first, generator)
-        mine, theirs = move(first, actions), move(second, actions)
-        for a, b in zip(mine[:3], theirs[:3], strict=True):
-            np.testing.assert_array_equal(a, b)
-        assert [i.get("episode") for i in mine[3]] == [i.get("episode") for i in theirs[3]]
-    with pytest.raises(ValueError, match="do not fit"):
-        make(worlds=4).restore(saved)
 
 
 class _Recorder(BaseCallback):

@@ -77,11 +77,6 @@ def test_what_an_algorithm_cannot_do(tmp_path: Path, changes: dict[str, Any], me
     assert not (tmp_path / "run").exists()
 
 
-def test_unknown_settings() -> None:
-    with pytest.raises(SettingsError, match="unknown setting 'stepz'"):
-        TrainSettings.from_dict({"stepz": 3})
-
-
 @pytest.mark.parametrize(
     ("option", "value"),
     [

@@ -14,10 +14,8 @@ from tests.support.runs import HORIZON, assert_equal, numbers, quiet, small
 import posse
 from posse_baselines import PolicyError, load, load_target
 from posse_training import evaluate
-from posse_training.cli import main as cli
 from posse_training.errors import CheckpointError, SettingsError
 from posse_training.train import TrainSettings
-from posse_training.train.presets import default_settings
 from posse_training.train.train import Run, resume, train
 from posse_training.train.validation import play_all
 from posse_training.train.worlds import make_env
@@ -93,20 +91,6 @@ def test_a_killed_run_resumes_bit_for_bit(side: str, tmp_path: Path, monkeypatch
     assert_equal(numbers(tmp_path / "cut"), numbers(tmp_path / "whole"))
 
 
-def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
-    settings = target_run(tmp_path, against="idle,ddcs-distributed,idle", num_worlds=9)
-    env = make_env(settings)
-    assert [batch.num_worlds for batch in env.batches] == [6, 3]
-    assert [batch.first_world for batch in env.batches] == [0, 6]
-    assert env.num_envs == 9, "one slot for each target"
-    assert env.action_length == 2
-    weights = dict(env.batches[0].scenario.target_reward_weights)
-    assert weights == {"team": -1.0, "contact": -0.5}
-    observations = env.reset()
-    assert observations.shape == (9, env.encoding.size)
-    assert not any(f.name == "neighbour_message" for f in env.encoding.fields)
-
-
 def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
     settings = target_run(tmp_path, against="ddcs-distributed", evaluate_worlds=4)
     smart = load_target("smart")
@@ -167,22 +151,15 @@ def test_unknown_opponents_are_refused_before_anything_is_made(
     assert not (tmp_path / "run").exists()
 
 
-def test_a_target_has_defaults_of_its_own() -> None:
-    settings = default_settings("smart", side="target")
-    assert (settings.encoding, settings.beside) == ("plain", "smart")
-    assert set(settings.reward_weights) == {"team", "contact"}
-
-
-def test_the_command_says_how_to_watch_a_target(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = (
-        "train --side target --scenario smart --against ddcs-distributed,idle --steps 160 "
-        "--num-worlds 4 --rollout 20 --minibatch 20 --hidden 8 --evaluate-worlds 2 --beside None "
-        "--no-tensorboard --overrides horizon 40 settle_time 1.0 num_trackers 2 "
-        f"--folder {tmp_path / 'run'}"
-    )
-    assert cli(words.split()) == 0
-    file = tmp_path / "run" / "best.safetensors"
-    shown = capsys.readouterr().out
-    assert f"posse watch ddcs-distributed --scenario smart --target {file}" in shown
-    assert f"posse compare ddcs-distributed idle --scenarios smart --target {file}" in shown
-    assert load_target(file).motion == "agent"
+def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
+    settings = target_run(tmp_path, against="idle,ddcs-distributed,idle", num_worlds=9)
+    env = make_env(settings)
+    assert [batch.num_worlds for batch in env.batches] == [6, 3]
+    assert [batch.first_world for batch in env.batches] == [0, 6]
+    assert env.num_envs == 9, "one slot for each target"
+    assert env.action_length == 2
+    weights = dict(env.batches[0].scenario.target_reward_weights)
+    assert weights == {"team": -1.0, "contact": -0.5}
+    observations = env.reset()
+    assert observations.shape == (9, env.encoding.size)
+    assert not any(f.name == "neighbour_message" for f in env.encoding.fields)

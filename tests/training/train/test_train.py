@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
-from rich.console import Console
 from stable_baselines3 import PPO
 from tests.support.runs import (
     ADVISED,
@@ -24,12 +22,12 @@ from tests.support.runs import (
     steps_saved,
 )
 
-from posse_baselines import PolicyError, load
+from posse_baselines import load
 from posse_baselines.learned import LearnedPolicy
 from posse_training.errors import DivergedError, SettingsError
 from posse_training.evaluation import evaluate
 from posse_training.train import train as module
-from posse_training.train.algorithms import ALGORITHMS, even_minibatch
+from posse_training.train.algorithms import ALGORITHMS
 from posse_training.train.train import resume, steps_made, train
 from posse_training.train.worlds import make_env
 
@@ -63,31 +61,6 @@ def test_a_training_exports_what_it_played(tmp_path: Path, changes: dict[str, An
         small(tmp_path, advise="ddcs-distributed", message_size=1)
 
 
-def test_a_line_is_printed_for_each_evaluation(tmp_path: Path) -> None:
-    console = Console(file=StringIO(), width=20)
-    train(small(tmp_path, beside="pursuit", imitate="pursuit", imitate_rounds=1), console=console)
-    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
-    assert "copying pursuit: 1 of 1 rounds" in lines[1]
-    found = [line.split(" steps ")[0].strip() for line in lines if "safe score" in line]
-    assert found == ["0", "640", "1,280"]
-    assert "pursuit 0." in lines[-1]
-
-
-def test_the_card_says_what_it_is(tmp_path: Path) -> None:
-    best = train(small(tmp_path), console=quiet())
-    policy = LearnedPolicy.from_file(best)
-    card = policy.card
-    assert card["scenarios"][0]["name"] == "constant"
-    assert card["scenarios"][0]["num_trackers"] == 2
-    assert card["trained_splits"] == ["train"]
-    assert card["seed"] == 3
-    curve = LearnedPolicy.from_file(tmp_path / "last.safetensors").card["curve"]
-    assert [point["steps"] for point in curve] == [640, 1280]
-    assert card["validation_safe_score"] == max(p["safe_score"] for p in curve)
-    table = (tmp_path / "curve.csv").read_text().splitlines()
-    assert len(table) == 3
-
-
 def test_the_best_policy_is_kept_not_the_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scores = iter([0.2, 0.9, 0.4])
     monkeypatch.setattr(
@@ -118,22 +91,6 @@ def test_a_last_rollout_beyond_the_steps_asked_for_does_not_learn_backwards(tmp_
     at_once = env.num_envs * settings.rollout
     assert steps_made(settings, env.num_envs) == -(-100 // at_once) * at_once
     assert steps_made(replace(settings, steps=3 * at_once), env.num_envs) == 3 * at_once
-
-
-@pytest.mark.parametrize(("rows", "wanted", "size"), [(81920, 8192, 8192), (100, 40, 50), (7, 3, 7), (6, 100, 6)])
-def test_minibatches_are_even(rows: int, wanted: int, size: int) -> None:
-    assert even_minibatch(rows, wanted) == size
-
-
-def test_a_training_that_diverges_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def diverge(self: PPO) -> None:
-        with torch.no_grad():
-            for parameter in self.policy.parameters():
-                parameter.fill_(float("nan"))
-
-    monkeypatch.setattr(PPO, "train", diverge)
-    with pytest.raises(DivergedError, match=r"diverged at 160 steps.*Lower --learning-rate"):
-        train(small(tmp_path / "run"), console=quiet())
 
 
 def test_what_was_good_before_a_divergence_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,14 +128,6 @@ def test_the_deviation_of_actions_falls_to_its_limit(tmp_path: Path) -> None:
         assert deviation == pytest.approx(-1.0 - 2.0 * k / 8, abs=0.02)
     with pytest.raises(SettingsError, match=r"final_log_deviation=0.0 must not exceed"):
         small(tmp_path, log_deviation=-1.0, final_log_deviation=0.0)
-
-
-@pytest.mark.parametrize("name", ["imitate", "advise", "beside"])
-def test_a_name_that_does_not_exist_leaves_no_folder(tmp_path: Path, name: str) -> None:
-    changes: dict[str, Any] = {name: "nobody"}
-    with pytest.raises(PolicyError, match="unknown policy 'nobody'"):
-        train(small(tmp_path / "run", **changes), console=quiet())
-    assert not (tmp_path / "run").exists()
 
 
 def test_the_log_has_every_validation_at_its_step(tmp_path: Path) -> None:
