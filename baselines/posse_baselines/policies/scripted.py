@@ -8,6 +8,7 @@ from typing import Any, Final
 from posse_baselines.ddcs import DDCS, Settings
 from posse_baselines.ddcs.baseline import FAMILY
 from posse_baselines.fields import Tunable, tunables
+from posse_baselines.policies.belief_planner import BeliefPlanner
 from posse_baselines.policies.planner import Planner
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random
@@ -20,6 +21,7 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "pursuit": Pursuit,
     **{name: (lambda name=name: DDCS(FAMILY[name], name)) for name in FAMILY},  # type: ignore[misc]
     **{name: (lambda name=name: TunedDDCS(name)) for name in TUNED},  # type: ignore[misc]
+    "belief-planner": BeliefPlanner,
     "planner": Planner,
 }
 
