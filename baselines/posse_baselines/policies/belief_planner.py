@@ -55,6 +55,9 @@ class BeliefSettings:
     lost_after: float = number(2.0, "s", 0.0, 100.0)
     """Age of a fix up to which the planned motion is played, then the script's."""
 
+    unseen_delay: float = number(30.0, "s", 0.0, 100.0)
+    """By how much later slots are filled from which the target cannot be seen."""
+
     def __post_init__(self) -> None:
         check(self)
 
@@ -76,8 +79,6 @@ def believed(scenario: Scenario) -> Scenario:
     """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
     return scenario.replace(
         sensor="range-bearing",
-        sensing_range=math.inf,
-        field_of_view=2.0 * math.pi,
         sonar_beams=0,
         num_neighbours=0,
         message_size=0,
@@ -106,8 +107,8 @@ class Beliefs(OwnArrays):
         self.settings, self.layout, self.dt = settings, layout, scenario.control_step
         self.rows = num_worlds * scenario.num_trackers
         self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
-        late = scenario.radio_delay > 0 or scenario.radio_loss > 0
-        window = 2 * scenario.radio_delay + 2 if late else 0
+        self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
+        window = 2 * scenario.radio_delay + 2 if self.late else 0
         assumed = believed(scenario)
         first = Batch(assumed, 1)
         first.reset(seed=0)
@@ -124,6 +125,8 @@ class Beliefs(OwnArrays):
         self._told = tuple(self._nothing(*shape) for _ in range(window + 1))  # of each moment, oldest first
         self._played = tuple(np.zeros(self.now.action_shape, np.float32) for _ in range(window + 1))
         self.search = Search(settings.plan, self.now)
+        arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
+        self.search.teams.late[:] = settings.unseen_delay * (np.array(arms) > scenario.sensing_range)
         self.restart(np.ones(self.rows, np.bool_))
 
     @staticmethod
@@ -305,14 +308,19 @@ class BeliefPlanner(DDCS):
         me, beliefs = minds.me, memory.beliefs
         shape = me.shape
         observations = check_observations(self, observations, shape[0], memory.layout)
+        plans = beliefs.search.teams.plans.reshape(minds.mates.shape)
+        if beliefs.late:  # where trackers know different things, they keep to what they tell each other
+            claimed = minds.mates["slot"] >= 0
+            plans["slot"][claimed] = minds.mates["slot"][claimed]
         actions = beliefs.act(observations, self._working(minds)).reshape(*shape, 2)
         planned = self._planned(memory)
         speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
-        own = speed * np.exp(1j * omega * beliefs.dt)
-        wishes = {"wish": own * me["heading"], "wish_speed": speed, "wish_omega": omega}
+        mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
+        wish = mine["wish_x"] + 1j * mine["wish_y"]
+        wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}
         for name, value in wishes.items():
             me[name] = np.where(planned, value, me[name])
-        own = own / me["max_speed"]
+        own = wish * me["heading"].conj() / me["max_speed"]
         return np.where(planned[..., None], np.stack([own.real, own.imag], axis=-1), proposals), memory
 
     def annotations(self, memory: Memory) -> Annotations:
