@@ -7,6 +7,7 @@ from typing import Final
 
 from posse_baselines.ddcs import DDCS
 from posse_baselines.ddcs.baseline import FAMILY
+from posse_baselines.policies.belief_planner import BeliefPlanner
 from posse_baselines.policies.planner import Planner
 from posse_baselines.policies.pursuit import Pursuit
 from posse_baselines.policies.simple import Idle, Random
@@ -19,5 +20,6 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "pursuit": Pursuit,
     **{name: (lambda name=name: DDCS.of(name)) for name in FAMILY},  # type: ignore[misc]
     **{name: (lambda name=name: TunedDDCS(name)) for name in TUNED},  # type: ignore[misc]
+    "belief-planner": BeliefPlanner,
     "planner": Planner,
 }

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.support.drive import Instant, complex_of, drive
 
-from posse_baselines import Policy
+from posse_baselines import DDCS, Policy
 from posse_baselines.ddcs import FLOCKING
 
 OFFSET = 0.15  # m, of the control point

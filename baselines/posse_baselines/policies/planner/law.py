@@ -56,6 +56,8 @@ PLAN: Final[np.dtype[Any]] = np.dtype(
             ("slot", np.int32),  # -1: none yet
             ("mean_x", np.float32),  # running mean of the target's velocity, m/s; used only in the first record
             ("mean_y", np.float32),
+            ("wish_x", np.float32),  # the safe velocity that it was to have, m/s
+            ("wish_y", np.float32),
         ],
     )
 )
@@ -88,6 +90,8 @@ class Teams(NamedTuple):
     """(E, N) :data:`WAY`."""
     plans: Records
     """(E, N) :data:`PLAN`, brought up to date by :func:`drive`."""
+    late: FloatArray
+    """(N,) s; by how much a slot is taken to be reached later than it is, so that others are filled before it."""
     paths: FloatArray
     """(P, T, 4) x, y of the target, cosine and sine of the slot frame at each step, where it was foreseen. The E / P
     copies of a world share a path."""
@@ -106,6 +110,7 @@ class Scene(NamedTuple):
     obstacles: Records
     ways: Records
     plans: Records
+    late: FloatArray
     path: FloatArray
     since: int
     """Control steps since the path began; -1: there is none."""
@@ -126,7 +131,9 @@ def teams_of(scenario: Scenario, ways: Records, path_length: int) -> Teams:
         np.zeros(MOST_THREADS, PLAYS),
     )
     paths, begun = np.zeros((num_worlds, path_length, 4), np.float32), np.full(num_worlds, -1, np.int64)
-    return Teams(config_record(scenario), slot_records(scenario), ways, plans, paths, begun, work)
+    return Teams(
+        config_record(scenario), slot_records(scenario), ways, plans, np.zeros(n, np.float32), paths, begun, work
+    )
 
 
 def drive(teams: Teams, batch: Batch, going: BoolArray, actions: FloatArray) -> None:
@@ -206,7 +213,7 @@ def assign_slots(scene: Scene, work: Work) -> None:
                 time = time_to_slot(way, course_of(scene), speed)
             # Time for turning towards it.
             away = wrap(angle_of(way) - math.atan2(t.heading_sin, t.heading_cos))
-            time += _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
+            time += scene.late[k] + _TURNING * abs(away) / t.max_turn_rate * min(1.0, time)
             if plans[i].slot == k:
                 time -= _LOYALTY
             work.cost[rows, k] = time
@@ -294,6 +301,7 @@ def drive_team(scene: Scene, work: Work, actions: FloatArray) -> None:
         body.speed, body.omega = t.speed, t.turn_rate
         body.max_speed, body.max_omega = t.max_speed, t.max_turn_rate
         velocity, _ = safe_velocity(body, discs, velocity, work.plays)
+        scene.plans[i].wish_x, scene.plans[i].wish_y = velocity.real, velocity.imag
         v, omega = regulate(body, velocity, 0.0)
         if c.actuator_lag > 0.0:  # command what the lag leaves of it
             more = 1.0 / (1.0 - math.exp(-body.dt / c.actuator_lag)) - 1.0
@@ -321,6 +329,7 @@ def drive_all(
                 worlds.obstacle[e],
                 teams.ways[e],
                 teams.plans[e],
+                teams.late,
                 teams.paths[shared],
                 world.step - begun if 0 <= begun <= world.step else -1,
                 frame_rate_of(config, world),

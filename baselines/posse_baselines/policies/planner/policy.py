@@ -97,7 +97,7 @@ class Search(OwnArrays):
     def restart(self, mask: BoolArray) -> None:
         """Forget what was planned for the worlds of a mask (E,)."""
         self.teams.ways[mask] = _STANDARD[0]
-        self.teams.plans[mask] = np.array((-1, 0, 0), PLAN)
+        self.teams.plans[mask] = np.array((-1, 0, 0, 0, 0), PLAN)
         self.teams.begun[mask] = -1
 
     def actions(self) -> FloatArray:

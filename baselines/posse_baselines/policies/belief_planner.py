@@ -1,0 +1,347 @@
+"""The belief planner: plays ahead as the planner does, in a world of each tracker's own that its observations wrote.
+
+What a tracker is told belongs to the moment at which it was measured or sent: it is written into the world as it was
+then, and the world is stepped from there to the present with the actions that were planned meanwhile. So a late fix
+corrects the present by what the engine makes of it, and is not rolled forward on a line.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from posse import Batch, ObservationLayout, Scenario
+from posse.numeric import BoolArray, FloatArray, OwnArrays, Records
+from posse.rules import NEVER
+from posse_baselines.ddcs import DDCS
+from posse_baselines.ddcs.memory import Minds
+from posse_baselines.ddcs.settings import Settings
+from posse_baselines.fields import check, number
+from posse_baselines.policies.planner.policy import PlannerSettings, Search
+from posse_baselines.policy import Annotations, Memory, check_observations
+from posse_baselines.tuned import TunedDDCS
+
+_ROBOT: Final = ("x", "y", "heading_cos", "heading_sin", "speed", "turn_rate")
+_AWAY: Final = 1e3  # m; where what is not known of stands
+_AGREES: Final = 0.02  # rad; a heading foreseen this well leaves the goal that the target was believed to have
+_TURNS: Final = 0.4  # share of its turn limit from which a target is taken to turn for a goal
+_JUMP: Final = 1.0  # m; a fix farther than this from what was believed replaces it
+_GAP: Final = 1.0  # s; over longer gaps no turn rate is measured
+
+_SEEN: Final[np.dtype[Any]] = np.dtype(
+    [
+        ("step", np.int64),  # own step of the newest fix that was written; NEVER before it: none
+        ("theta", np.float64),  # heading then, rad
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeliefSettings:
+    """What the belief planner trusts, and how it plans. Units and ranges: each field's metadata.
+
+    Raises:
+        ValueError: A number out of its range.
+    """
+
+    plan: PlannerSettings = field(default_factory=PlannerSettings)
+    """How far it plays ahead, and what it tries."""
+    fix_trust: float = number(0.3, "", 0.01, 1.0)
+    """Share of the difference between a noisy fix and the believed position that is corrected."""
+    lost_after: float = number(2.0, "s", 0.0, 100.0)
+    """Age of a fix up to which the planned motion is played, then the script's."""
+
+    unseen_delay: float = number(30.0, "s", 0.0, 100.0)
+    """By how much later slots are filled from which the target cannot be seen."""
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class _Told(NamedTuple):
+    """What the trackers of R belief worlds were told of one moment."""
+
+    heard: BoolArray
+    """(R, N) whose pose is known."""
+    robots: FloatArray
+    """(R, N, 6) by :data:`_ROBOT`, in the common frame."""
+    fixed: BoolArray
+    """(R,) whether there is a fix of the target."""
+    fix: FloatArray
+    """(R, 8) its position, heading, slot frame and velocity, each a pair."""
+
+
+def believed(scenario: Scenario) -> Scenario:
+    """Return the scenario of the belief worlds: robots, target and space of the real one; nothing hides or fails."""
+    return scenario.replace(
+        sensor="range-bearing",
+        sonar_beams=0,
+        num_neighbours=0,
+        message_size=0,
+        radio_range=math.inf,
+        terminate_on_contact=False,
+        num_obstacles=0,
+        extra_fields=(),
+        metrics=(),
+        **dict.fromkeys(("range_noise", "bearing_noise", "heading_noise", "velocity_smoothing"), 0.0),
+        **dict.fromkeys(("odometry_drift", "heading_drift", "radio_loss", "sensor_outages", "radio_outages"), 0.0),
+        **dict.fromkeys(("radio_delay", "breaks"), 0),
+    )
+
+
+class Beliefs(OwnArrays):
+    """The belief worlds of E teams of N trackers, R = E N, and the search for the best way to play in them.
+
+    Args:
+        settings: What is trusted, and how it plans.
+        layout: Of the observations.
+        num_worlds: E.
+    """
+
+    def __init__(self, settings: BeliefSettings, layout: ObservationLayout, num_worlds: int) -> None:
+        scenario = layout.scenario
+        self.settings, self.layout, self.dt = settings, layout, scenario.control_step
+        self.rows = num_worlds * scenario.num_trackers
+        self.noisy = scenario.range_noise > 0 or scenario.bearing_noise > 0
+        self.late = scenario.radio_delay > 0 or scenario.radio_loss > 0 or math.isfinite(scenario.radio_range)
+        window = 2 * scenario.radio_delay + 2 if self.late else 0
+        assumed = believed(scenario)
+        first = Batch(assumed, 1)
+        first.reset(seed=0)
+        self._start = first.arrays.copy()
+        self._start.world["step"] = -window - 1
+        self._start.tracker["x"], self._start.tracker["broken_at"] = _AWAY, 0
+        self.now = Batch(assumed, self.rows)
+        self.now.reset(seed=0)
+        self._past = self.now.arrays.copy()
+        """The worlds as they were at the beginning of the window, before anything was written of that moment."""
+        self._seen = np.zeros(self.rows, _SEEN)  # as of the past
+        self.step, self.newest, self.age = (np.zeros(self.rows, np.int64) for _ in range(3))
+        shape = self.rows, scenario.num_trackers
+        self._told = tuple(self._nothing(*shape) for _ in range(window + 1))  # of each moment, oldest first
+        self._played = tuple(np.zeros(self.now.action_shape, np.float32) for _ in range(window + 1))
+        self.search = Search(settings.plan, self.now)
+        arms = [math.hypot(*slot) for slot in scenario.slot_offsets]
+        self.search.teams.late[:] = settings.unseen_delay * (np.array(arms) > scenario.sensing_range)
+        self.restart(np.ones(self.rows, np.bool_))
+
+    @staticmethod
+    def _nothing(rows: int, n: int) -> _Told:
+        heard, robots = np.zeros((rows, n), np.bool_), np.zeros((rows, n, len(_ROBOT)), np.float32)
+        return _Told(heard, robots, np.zeros(rows, np.bool_), np.zeros((rows, 8), np.float32))
+
+    def restart(self, mask: BoolArray) -> None:
+        """Forget the rows of a mask (R,)."""
+        for mine, start in zip(self._past, self._start, strict=True):
+            mine[mask] = start
+        self._seen[mask] = (-NEVER, 0.0)
+        self.step[mask], self.newest[mask], self.age[mask] = 0, -1, NEVER
+        for told in self._told:
+            told.heard[mask], told.fixed[mask] = False, False
+        self.search.restart(mask)
+
+    def act(self, observations: FloatArray, working: BoolArray) -> FloatArray:
+        """Bring the worlds up to the present; return the action of each tracker in its own, (R, 2).
+
+        ``working`` (R, N): which trackers count as such. Observations are (E, N, F).
+        """
+        now, worlds = self.now, self.now.arrays
+        worlds.write(self._past)
+        worlds.tracker["broken_at"] = np.where(working, NEVER, 0)
+        self._advance(self._seen, self._told[0], self._played[0])
+        self._past.write(worlds)
+        self._told = (*self._told[1:], self._nothing(*working.shape))
+        own = self._listen(observations)
+        seen = self._seen.copy()
+        for told, played in zip(self._told[:-1], self._played[1:], strict=True):
+            self._advance(seen, told, played)
+        self._write(seen, self._told[-1])
+        worlds.tracker["near"], worlds.world["near"], worlds.world["over"] = 1, 1, 0
+        planned = self.search.actions()
+        actions = np.zeros(now.action_shape, np.float32)
+        actions[:, : planned.shape[1]] = planned
+        if actions.shape[1] > planned.shape[1]:  # a target that is an agent goes on as it moves now
+            scenario: Any = now.scenario
+            actions[:, -1, 0] = np.clip(2.0 * worlds.world["speed"] / scenario.target_speed - 1.0, -1.0, 1.0)
+            actions[:, -1, 1] = np.clip(worlds.world["turn_rate"] / scenario.target_turn_rate, -1.0, 1.0)
+        self._played = (*self._played[1:], actions)
+        self.step += 1
+        return actions[np.arange(self.rows), own, :2]
+
+    def _advance(self, seen: Records, told: _Told, played: FloatArray) -> None:
+        """Write what was told of a moment, and step the worlds from there."""
+        self._write(seen, told)
+        self.now.arrays.world["over"] = 0
+        self.now.step(played)
+
+    def _listen(self, observations: FloatArray) -> npt.NDArray[np.int64]:
+        """Sort what observations (E, N, F) say by its moments; return each tracker's number, (R,)."""
+        views = self.layout.views(observations)
+        v = {name: view.reshape(self.rows, *view.shape[2:]) for name, view in views.items()}
+        rows, window = np.arange(self.rows), len(self._told) - 1
+        heading, position = _complex(v["heading"]), _complex(v["position"])
+        own = np.asarray(v["number"], np.int64)
+
+        def note(robots: Records, age: npt.NDArray[Any], number: npt.NDArray[Any], *pose: npt.NDArray[Any]) -> None:
+            for told, back in zip(self._told, range(window, -1, -1), strict=True):
+                place, which = robots[age == back], number[age == back]
+                told.heard[place, which] = True
+                told.robots[place, which] = np.stack([each[age == back] for each in pose], axis=-1)
+
+        now = np.zeros(self.rows, np.int64)
+        note(rows, now, own, position.real, position.imag, heading.real, heading.imag, v["speed"], v["turn_rate"])
+        for k in range(self.layout.neighbours):
+            number = np.asarray(v["neighbour_number"][:, k], np.int64)
+            age = np.where(number >= 0, np.rint(v["neighbour_age"][:, k] / self.dt), -1)
+            place = position + v["neighbour_range"][:, k] * _complex(v["neighbour_bearing"][:, k]) * heading
+            turned = _complex(v["neighbour_heading"][:, k]) * heading
+            motion = v["neighbour_speed"][:, k], v["neighbour_turn_rate"][:, k]
+            note(rows, age, number, place.real, place.imag, turned.real, turned.imag, *motion)
+        age = np.rint(v["target_age"] / self.dt)
+        self.age = np.where(v["target_known"] > 0, age, NEVER)
+        fresh = (v["target_known"] > 0) & (v["target_range"] >= 0) & (self.step - age > self.newest)
+        self.newest[fresh] = (self.step - age)[fresh]
+        place = position + v["target_range"] * _complex(v["target_bearing"]) * heading
+        theta, frame = (_complex(v[name]) * heading for name in ("target_heading", "target_frame"))
+        velocity = _complex(v["target_velocity"]) * heading
+        late = np.maximum(age - window, 0.0) * self.dt
+        place = place + late * self.now.scenario.target_speed * theta
+        fix = np.stack([part for each in (place, theta, frame, velocity) for part in (each.real, each.imag)], axis=-1)
+        for told, back in zip(self._told, range(window, -1, -1), strict=True):
+            here = fresh & (np.minimum(age, window) == back)
+            told.fixed[here], told.fix[here] = True, fix[here]
+        return own
+
+    def _write(self, seen: Records, told: _Told) -> None:
+        """Write what was told of the present moment of the worlds into them."""
+        worlds, s = self.now.arrays, self.now.scenario
+        w = worlds.world
+        for k, name in enumerate(_ROBOT):
+            worlds.tracker[name][told.heard] = told.robots[told.heard, k]
+        here = told.fixed
+        place, theta, frame, velocity = (_complex(told.fix[:, k : k + 2]) for k in (0, 2, 4, 6))
+        gap = (w["step"] - seen["step"]) * self.dt
+        first = gap > self.settings.lost_after
+        angle = np.angle(theta)
+        turn = np.where(gap <= _GAP, _wrap(angle - seen["theta"]) / np.maximum(gap, self.dt), 0.0)
+        turn = np.clip(turn, -s.target_turn_rate, s.target_turn_rate)
+        surprise = _wrap(angle - np.arctan2(w["heading_sin"], w["heading_cos"]))
+        if self.noisy:
+            guess = w["x"] + 1j * w["y"]
+            trust = np.where(first | (np.abs(place - guess) > _JUMP), 1.0, self.settings.fix_trust)
+            place = guess + trust * (place - guess)
+        speed = np.full(self.rows, s.target_speed)
+        if s.target_is_agent:
+            speed = np.clip(np.abs(velocity), s.target_least_speed, s.target_speed)
+        goal = _complex(np.stack([w["goal_cos"], w["goal_sin"]], axis=-1))
+        if s.target_motion == "smart":
+            turning = np.abs(turn) > _TURNS * s.target_turn_rate
+            ahead = theta * np.exp(1j * np.where(turning, np.sign(turn), 0.0))
+            goal = np.where(first | (np.abs(surprise) > _AGREES), ahead, goal)
+        else:
+            goal = np.where(first | (np.abs(surprise) > 10 * _AGREES), theta, goal * np.exp(1j * surprise))
+            if s.target_motion == "accelerating":
+                w["weave_amplitude"][here], w["weave_rate"][here] = np.abs(turn)[here], 0.0
+                w["weave_phase"][here] = np.where(turn >= 0, math.pi / 2, 3 * math.pi / 2)[here]
+        for name, value in (
+            *(("x", place.real), ("y", place.imag), ("speed", speed), ("turn_rate", turn)),
+            *(("heading_cos", theta.real), ("heading_sin", theta.imag), ("frame_cos", frame.real)),
+            *(("frame_sin", frame.imag), ("goal_cos", goal.real), ("goal_sin", goal.imag)),
+        ):
+            w[name][here] = value[here]
+        seen["step"][here], seen["theta"][here] = w["step"][here], angle[here]
+
+
+def _complex(pairs: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
+    return np.asarray(pairs[..., 0] + 1j * pairs[..., 1], np.complex128)
+
+
+def _wrap(angle: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    return np.asarray(np.angle(np.exp(1j * angle)))
+
+
+@dataclass
+class _Memory(OwnArrays):
+    layout: ObservationLayout
+    minds: Minds
+    beliefs: Beliefs
+
+
+class BeliefPlanner(DDCS):
+    """Model-predictive control in a world that each tracker keeps from what it observes and is told.
+
+    Where the target is known, a tracker plays the planner's choice for it in its own world; else it searches as
+    ``ddcs-tuned`` does, whose monitoring, messages and safeguard it has in any case.
+
+    Args:
+        settings: What it trusts, and how it plans.
+    """
+
+    def __init__(self, settings: BeliefSettings | None = None) -> None:
+        super().__init__(name="belief-planner")
+        self._script = TunedDDCS("ddcs-tuned")
+        self.plans = settings or BeliefSettings()
+
+    def settings_for(self, scenario: Scenario) -> Settings:
+        """Return the settings of ``ddcs-tuned`` for a scenario."""
+        return self._script.settings_for(scenario)
+
+    def begin(self, layout: ObservationLayout, num_worlds: int) -> Memory:
+        """Return the memory of ``num_worlds`` teams at the start of an episode."""
+        memory = self._script.begin(layout, num_worlds)
+        return _Memory(layout, memory.minds, Beliefs(self.plans, layout, num_worlds))
+
+    def restart(self, memory: Memory, mask: BoolArray) -> Memory:
+        """Reset the memory of the worlds of a mask (E,)."""
+        if isinstance(memory, _Memory):
+            memory.beliefs.restart(np.repeat(mask, memory.minds.me.shape[1]))
+        return super().restart(memory, mask)
+
+    def propose(self, observations: FloatArray, memory: Memory) -> tuple[FloatArray, Memory]:
+        """Return the wanted velocities (E, N, 2) of every team, before the safeguard."""
+        proposals, memory = super().propose(observations, memory)
+        minds: Minds = memory.minds
+        me, beliefs = minds.me, memory.beliefs
+        shape = me.shape
+        observations = check_observations(self, observations, shape[0], memory.layout)
+        plans = beliefs.search.teams.plans.reshape(minds.mates.shape)
+        if beliefs.late:  # where trackers know different things, they keep to what they tell each other
+            claimed = minds.mates["slot"] >= 0
+            plans["slot"][claimed] = minds.mates["slot"][claimed]
+        actions = beliefs.act(observations, self._working(minds)).reshape(*shape, 2)
+        planned = self._planned(memory)
+        speed, omega = 0.5 * (actions[..., 0] + 1.0) * me["max_speed"], actions[..., 1] * me["max_omega"]
+        mine = np.take_along_axis(plans, me["number"][..., None], axis=-1)[..., 0]
+        wish = mine["wish_x"] + 1j * mine["wish_y"]
+        wishes = {"wish": wish, "wish_speed": speed, "wish_omega": omega, "slot": mine["slot"]}
+        for name, value in wishes.items():
+            me[name] = np.where(planned, value, me[name])
+        own = wish * me["heading"].conj() / me["max_speed"]
+        return np.where(planned[..., None], np.stack([own.real, own.imag], axis=-1), proposals), memory
+
+    def annotations(self, memory: Memory) -> Annotations:
+        """Return those of the DDCS, with the ``estimate`` as believed where the planned motion is played."""
+        notes, beliefs = super().annotations(memory), memory.beliefs
+        world, planned = beliefs.now.worlds, self._planned(memory)
+        theta = np.arctan2(world["heading_sin"], world["heading_cos"])
+        estimate = np.stack([world["x"], world["y"], theta], axis=-1).reshape(*planned.shape, 3)
+        notes["estimate"] = np.where(planned[..., None], estimate, notes["estimate"])
+        return notes
+
+    def _planned(self, memory: Memory) -> BoolArray:
+        """Return whether each tracker plays what it planned, (E, N)."""
+        beliefs = memory.beliefs
+        return np.asarray(beliefs.age.reshape(memory.minds.me.shape) * beliefs.dt <= self.plans.lost_after)
+
+    def _working(self, minds: Minds) -> BoolArray:
+        """Return which trackers each one takes to work and to be in range, (R, N)."""
+        settings, me = minds.team.settings[0], minds.me
+        patience = np.minimum(settings["lost_after"], settings["least_patience"] + 2.0 * me["usual_gap"])
+        silence = (me["step"][..., None] - minds.mates["step"]) * me["dt"][..., None]
+        there = (minds.mates["step"] >= 0) & (silence <= patience[..., None])
+        there |= np.arange(there.shape[-1]) == me["number"][..., None]
+        return np.asarray(there.reshape(-1, there.shape[-1]))
