@@ -70,9 +70,9 @@ def test_usage_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         (["watch", "nobody"], "unknown policy 'nobody'"),
         (["watch", "pursuit", "--world", "-1"], "world=-1"),
         (["watch"], "No policies given"),
-        (["watch", "pursuit", "--film", "film.avi"], "must end in .gif or .mp4"),
-        (["watch", "pursuit", "--film", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
-        (["watch", "pursuit", "--film", "film.gif", "--size", "9", "9"], "at least 200 px"),
+        (["watch", "pursuit", "--out", "film.avi"], "must end in .gif or .mp4"),
+        (["watch", "pursuit", "--out", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
+        (["watch", "pursuit", "--out", "film.gif", "--size", "9", "9"], "at least 200 px"),
         (["watch", "pursuit", "--speed", "2"], "--speed is not for a window: leave it out"),
         (["watch", "pursuit", "--size", "9", "9"], "--size 9 9 must be 200 to 4096 px"),
         (["watch", "numpy:ndarray"], "cannot be created without arguments"),
@@ -91,7 +91,7 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     arguments = (
         "train --scenario constant --steps 1_280 --num-worlds 4 --team-sizes 2 --hidden 8 8 "
         "--rollout 40 --minibatch 80 --evaluate-worlds 2 --beside None --no-tensorboard "
-        f"--overrides horizon 40 settle_time 1.0 --folder {folder}"
+        f"--set horizon=40 settle_time=1.0 --out {folder}"
     )
     assert main(arguments.split()) == 0
     shown = capsys.readouterr().out
@@ -100,7 +100,7 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     watch, compare, replay = (shlex.split(line) for line in after.splitlines())
     assert (watch[1], compare[1], replay[1]) == ("watch", "compare", "replay")
     assert (folder / "best.safetensors") == Path(watch[2]) == Path(compare[3]) == Path(replay[3])
-    assert main([*replay[1:], "--seconds", "1", "--num-trackers", "2"]) == 0
+    assert main([*replay[1:], "--seconds", "1", "--set", "num_trackers=2"]) == 0
     assert (folder / "replay.html").is_file()
     settings = json.loads((folder / "settings.json").read_text())
     assert settings["steps"] == 1280
@@ -119,14 +119,14 @@ def test_who_stops_a_training_is_told_how_to_go_on(
 
     monkeypatch.setattr("posse_training.train.train.train", stopped)
     monkeypatch.setattr("posse_training.train.train.resume", stopped)
-    for arguments in (["--folder", str(tmp_path)], ["--resume", str(tmp_path)]):
+    for arguments in (["--out", str(tmp_path)], ["--resume", str(tmp_path)]):
         assert main(["train", *arguments]) == 130
         assert f"to resume: posse train --resume {tmp_path}" in capsys.readouterr().err
 
 
 def test_watch_writes_a_film(tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
-    options = ["--scenario", "paper-distributed", "--num-trackers", "2", "--film", str(path)]
+    options = ["--scenario", "paper-distributed", "--set", "num_trackers=2", "--out", str(path)]
     assert main(["watch", "pursuit", *options]) == 0
     assert path.read_bytes()[:4] == b"GIF8"
 

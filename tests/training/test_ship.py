@@ -154,7 +154,7 @@ def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pyt
         run,
         side="target",
         encoding="plain",
-        against="idle",
+        team="idle",
         scenario="smart",
         team_sizes=(),
         steps=80,
@@ -178,7 +178,7 @@ def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pyt
 
 
 def test_every_scenario_has_its_own_training() -> None:
-    runs = all_runs(Runs(folder=Path("x")))
+    runs = all_runs(Runs(out=Path("x")))
     assert {(run.scenario, run.algorithm) for run in runs} == set(ALGORITHMS.items())
     assert [run.seed for run in runs if run.scenario == "smart"] == [1, 2, 3, 4, 5]
     assert [run.seed for run in runs if run.scenario == "radio"] == [1, 2, 3]

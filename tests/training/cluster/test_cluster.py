@@ -11,12 +11,12 @@ import pytest
 from posse_baselines import from_function, load
 from posse_training import evaluate, provenance
 from posse_training.cli import main
-from posse_training.errors import ClusterError, MissingExtraError, SettingsError
-from posse_training.parallel import Job, address_of, cut
+from posse_training.errors import ClusterError, MissingExtraError
+from posse_training.parallel import Job, cut
 from posse_training.train.seeds import train_on_worker
 from posse_training.train.settings import TrainSettings
 
-COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seeds 1 2 --ray", "tune pngl-l-phi --ray")
+COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seed 1 2 --ray", "tune pngl-l-phi --ray")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
@@ -30,12 +30,6 @@ def test_what_needs_ray_names_the_extra(
     with pytest.raises(MissingExtraError, match=r"extra 'cluster' of posse-rl"):
         evaluate("idle", "smart", 2, ray=True)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_which_cluster() -> None:
-    assert (address_of(None), address_of(()), address_of(("10.0.0.1:6379",))) == (False, True, "10.0.0.1:6379")
-    with pytest.raises(SettingsError, match="one address at most, not 'auto smart'"):
-        address_of(("auto", "smart"))
 
 
 @pytest.mark.parametrize(("count", "size"), [(1, 5), (10, 5), (11, 5), (7, 1)])
@@ -68,7 +62,7 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
     ("seeds", "folder", "expected"),
     [
         ("3 4", [], ["runs/train/smart-ppo-3", "runs/train/smart-ppo-4"]),
-        ("3 4", ["--folder", "f"], ["f/seed-3", "f/seed-4"]),
+        ("3 4", ["--out", "f"], ["f/seed-3", "f/seed-4"]),
     ],
 )
 def test_each_seed_has_a_folder_of_its_own(
@@ -82,17 +76,17 @@ def test_each_seed_has_a_folder_of_its_own(
         return []
 
     monkeypatch.setattr("posse_training.train.seeds.train_seeds", train_seeds)
-    assert main(["train", "--seeds", *seeds.split(), *folder]) == 0
+    assert main(["train", "--seed", *seeds.split(), *folder]) == 0
     assert found == [(path, seed) for path, seed in zip(expected, (3, 4), strict=True)]
 
 
 def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["train", "--seeds", "1", "1"]) == 2
+    assert main(["train", "--seed", "1", "1"]) == 2
     assert "names one twice" in capsys.readouterr().err
     folder = tmp_path / "seed-1"
     folder.mkdir()
     (folder / "settings.json").write_text('{"steps": 5}')
-    assert main(["train", "--seeds", "1", "--folder", str(tmp_path)]) == 2
+    assert main(["train", "--seed", "1", "2", "--out", str(tmp_path)]) == 2
     assert "holds a run with another" in capsys.readouterr().err
 
 

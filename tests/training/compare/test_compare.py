@@ -70,7 +70,7 @@ def test_an_unknown_name_stops_before_anything_is_played(tmp_path: Path) -> None
 
 
 def test_the_command_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["compare", "idle", "pursuit", "--scenarios", "constant", "--episodes", "3"]
+    arguments = ["compare", "idle", "pursuit", "--scenario", "constant", "--episodes", "3"]
     assert main([*arguments, "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     row = next(k for k, line in enumerate(lines) if line.split()[:1] == ["pursuit"])
@@ -126,7 +126,7 @@ def test_who_cannot_play_is_left_out_with_a_line(
 ) -> None:
     SCENARIOS["few-beams"] = {"sonar_beams": 4}
     try:
-        command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
+        command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
         options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
         assert main([*command, *options]) == 0
     finally:
@@ -145,14 +145,14 @@ def test_who_cannot_play_is_left_out_with_a_line(
 
 def test_a_split_that_was_trained_on_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     learned(1, "test").save(tmp_path / "mine.safetensors")
-    options = ["--scenarios", "constant", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]
+    options = ["--scenario", "constant", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path)]
     assert main(["compare", str(tmp_path / "mine.safetensors"), *options]) == 2
     assert "was trained on the split 'test'" in capsys.readouterr().err
 
 
 @pytest.mark.long
 def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--scenarios", "constant", "leader-loss", "--episodes", "3"]
+    options = ["--scenario", "constant", "leader-loss", "--episodes", "3"]
     assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
     for suffix in ("png", "svg"):
         assert {path.stem for path in tmp_path.glob(f"*.{suffix}")} == {"profile", "scenarios", "recovery"}
@@ -206,7 +206,7 @@ def test_labels_that_no_report_can_show(text: str, message: str) -> None:
 def test_brackets_and_dollars_are_shown_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     labels = ("[bold]a[/bold]", "[/]", "$x^{$", "_hidden")
     policies = [f"{label}=idle" for label in labels]
-    options = ["--scenarios", "constant", "--episodes", "1"]
+    options = ["--scenario", "constant", "--episodes", "1"]
     assert main(["compare", *policies, *options, "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
     assert all(label in shown for label in labels)

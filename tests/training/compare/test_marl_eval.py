@@ -14,7 +14,7 @@ def test_the_export_holds_every_worlds_metrics(tmp_path: Path) -> None:
     compare(
         Settings(
             policies=("idle", "pursuit"),
-            scenarios=("constant",),
+            scenario=("constant",),
             episodes=3,
             out=out,
             figures=False,

@@ -99,7 +99,7 @@ def test_unknown_settings() -> None:
 def test_nothing_is_made_before_settings_are_checked(
     tmp_path: Path, option: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = [f"--{option}", value, "--folder", str(tmp_path / "run")]
+    arguments = [f"--{option}", value, "--out", str(tmp_path / "run")]
     scenario = [] if option == "scenario" else ["--scenario", "constant"]
     try:
         status: Any = main(["train", *scenario, *arguments])
