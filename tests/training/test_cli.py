@@ -15,6 +15,7 @@ from stable_baselines3 import PPO
 
 import posse
 import posse_baselines
+from posse_baselines.policies.scripted import ABLATIONS
 from posse_training.cli import COMMANDS, main
 
 HEAVY = ("numpy", "numba", "torch", "tyro", "rich", "matplotlib", "posse")
@@ -36,6 +37,19 @@ def test_the_module_is_the_command_line() -> None:
         [sys.executable, "-m", "posse", "--version"], capture_output=True, text=True, timeout=120, check=False
     )
     assert done.stdout.startswith("posse 0."), done.stderr
+
+
+def test_the_list_of_policies_names_each_and_leaves_out_ablations(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["policies"]) == 0
+    short = capsys.readouterr().out
+    assert main(["policies", "--all"]) == 0
+    whole = capsys.readouterr().out
+    listed = [line.split()[0] for line in whole.splitlines()[1:] if line[0] != " "]
+    assert listed == list(posse_baselines.policy_names())
+    assert {name for name in listed if f"\n{name} " not in short} == set(ABLATIONS)
+    assert max(map(len, whole.splitlines())) <= 80
+    assert main(["watch", "ddcs-distribted"]) == 2
+    assert "ddcs-no-radio" not in capsys.readouterr().err
 
 
 def test_all_settings_of_a_scenario(capsys: pytest.CaptureFixture[str]) -> None:

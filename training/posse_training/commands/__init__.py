@@ -1,1 +1,1 @@
-"""The commands ``train``, ``watch``, ``play`` and ``scenarios``."""
+"""The commands ``train``, ``watch``, ``scenarios`` and ``policies``."""
