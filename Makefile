@@ -80,7 +80,7 @@ tune: $(FULL) ## Tune the scripted teams that ship again (an hour); interrupted,
 	$(BIN)/python scripts/tune_shipped.py
 
 train-shipped: $(FULL) ## Train the learned teams that ship again (hours); interrupted, it resumes
-	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seeds $(SEEDS)) $(if $(ONLY),--only $(ONLY))
+	$(BIN)/python scripts/train_shipped.py $(if $(SEEDS),--seed $(SEEDS)) $(if $(ONLY),--scenario $(ONLY))
 
 clean: ## Remove everything that these commands created, including .venv
 	rm -rf $(VENV) $(RECIPES) $(AGILERL) site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -2,7 +2,7 @@
 
 Writes a row of benchmarks/algorithms.csv for each run. Runs with a row are skipped and interrupted ones resume.
 
-    python benchmarks/algorithms.py --algorithms ppo sac --scenarios smart --seeds 1
+    python benchmarks/algorithms.py --algorithm ppo sac --scenario smart --seed 1
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ TEST_SEED: Final = 7
 class Settings:
     """Command-line arguments."""
 
-    algorithms: tuple[str, ...] = tuple(CHANGES)
-    scenarios: tuple[str, ...] = ("smart", "radio", "field")
-    seeds: tuple[int, ...] = (1, 2, 3)
+    algorithm: tuple[str, ...] = tuple(CHANGES)
+    scenario: tuple[str, ...] = ("smart", "radio", "field")
+    seed: tuple[int, ...] = (1, 2, 3)
     steps: int = 10_000_000
     """Steps of training; a step is one control step of one tracker."""
     off_policy_steps: int = 1_000_000
     """The same for sac and td3, whose steps take longer."""
     worlds: int = 500
     """Worlds of the split ``test`` that the last policy plays."""
-    folder: Path = Path("runs/algorithms")
+    out: Path = Path("runs/algorithms")
 
 
 def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainSettings:
@@ -62,7 +62,7 @@ def settings_of(s: Settings, algorithm: str, scenario: str, seed: int) -> TrainS
     changes = dict(CHANGES[algorithm])
     base = default_settings(scenario, changes.pop("algorithm", "ppo"), preset="nothing")
     steps = s.off_policy_steps if algorithm in OFF_POLICY else s.steps
-    folder = s.folder / f"{algorithm}-{scenario}-{seed}"
+    folder = s.out / f"{algorithm}-{scenario}-{seed}"
     run: dict[str, Any] = {"seed": seed, "steps": steps, "evaluate_every": steps // 20, "folder": folder}
     return replace(base, **changes, **run, tensorboard=False, beside=None)
 
@@ -91,7 +91,7 @@ def main() -> None:
     with TABLE.open(newline="", encoding="utf-8") as file:
         done = {(row["algorithm"], row["scenario"], int(row["training_seed"])) for row in csv.DictReader(file)}
     console = Console()
-    todo = [(a, c, n) for n in s.seeds for c in s.scenarios for a in s.algorithms if (a, c, n) not in done]
+    todo = [(a, c, n) for n in s.seed for c in s.scenario for a in s.algorithm if (a, c, n) not in done]
     for algorithm, scenario, seed in todo:
         run = settings_of(s, algorithm, scenario, seed)
         if (run.run_folder / SETTINGS).is_file():

@@ -32,7 +32,7 @@ class Settings:
     """Command-line arguments."""
 
     policies: tuple[str, ...] = policy_names()
-    scenarios: tuple[str, ...] = SCENARIOS
+    scenario: tuple[str, ...] = SCENARIOS
     worlds: int = WORLDS
     planner_worlds: int = 100
     """Worlds of policies that read the state: the planner takes 0.3 s and more for each."""
@@ -48,7 +48,7 @@ def main() -> None:
     """Play, and replace the rows of what was played."""
     settings = tyro.cli(Settings, description=__doc__)
     rows = {(row.scenario, row.label): row for row in read_standings(TABLE)}
-    for scenario in settings.scenarios:
+    for scenario in settings.scenario:
         for name in settings.policies:
             if not plays(name, scenario):
                 continue

@@ -15,10 +15,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import machine
@@ -39,8 +39,8 @@ class Settings:
     """Command-line arguments."""
 
     scenario: str = "smart"
-    overrides: dict[str, int] = field(default_factory=dict)
-    """Integer settings that override those of the scenario."""
+    changes: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="KEY=NUMBER ...")] = ()
+    """Settings of the scenario to change, whole numbers."""
     worlds: tuple[int, ...] = (1, 32, 1024, 4096, 16384)
     seconds: float = 1.0
     """Total time of the five runs of each figure, s."""
@@ -76,7 +76,8 @@ def batches(settings: Settings) -> list[dict[str, Any]]:
     rows = []
     for count in settings.worlds:
         for threads in sorted({1, os.cpu_count() or 1}):
-            batch = posse.batch(settings.scenario, count, num_threads=threads, **dict[str, Any](settings.overrides))
+            changes: dict[str, Any] = {key: int(text) for key, text in (word.split("=") for word in settings.changes)}
+            batch = posse.batch(settings.scenario, count, num_threads=threads, **changes)
             batch.reset(seed=0)
             actions = np.random.default_rng(0).uniform(-1, 1, batch.action_shape).astype(np.float32)
             agents = actions.shape[0] * actions.shape[1]
@@ -128,8 +129,7 @@ def compare(settings: Settings, other: Path) -> None:
     """Measure another checkout and this one in new processes, in turns; print a table of figures and ratios."""
     command = [sys.executable, __file__, "--scenario", settings.scenario, "--seconds", str(settings.seconds)]
     command += ["--worlds", *map(str, settings.worlds), "--cold" if settings.cold else "--no-cold"]
-    if settings.overrides:
-        command += ["--overrides", *(str(word) for item in settings.overrides.items() for word in item)]
+    command += ["--set", *settings.changes] if settings.changes else []
     roots = (other.resolve(), Path(__file__).resolve().parents[1])
     found: tuple[list[dict[str, float]], ...] = ([], [])
     with tempfile.TemporaryDirectory() as folder:

@@ -29,6 +29,7 @@ from posse_baselines.registry import LEARNED, SHIPPED, SHIPPED_TARGETS
 from posse_training.errors import SettingsError
 from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.statistics import difference, mean
+from posse_training.options import words_of
 from posse_training.provenance import commit
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, SETTINGS, TrainSettings, read_settings
@@ -229,7 +230,7 @@ def command_of(settings: TrainSettings) -> str:
     of_all = default_settings(*which, side=side, preset="nothing").to_dict()
     stated = {"scenario", "algorithm", "steps", "seed"}
     if side == "target":
-        stated |= {"side", "against"}
+        stated |= {"side", "team"}
     words = ["posse", "train"]
     for name, value in settings.to_dict().items():
         usual = value == default[name] == of_all[name]
@@ -240,8 +241,12 @@ def command_of(settings: TrainSettings) -> str:
             words.append(f"--{option}" if value else f"--no-{option}")
         elif isinstance(value, dict) and default[name]:
             words += [w for k, v in value.items() for w in (f"--{option}.{k}", str(v))]
+        elif name == "overrides":
+            words += ["--set", *words_of(value)]
         elif isinstance(value, dict):
             words += [f"--{option}", *(str(part) for item in value.items() for part in item)]
+        elif name in ("scenario", "target", "team"):
+            words += [f"--{option}", *str(value).split(",")]
         elif isinstance(value, (tuple, list)):
             words += [f"--{option}", *map(str, value)]
         else:

@@ -1,6 +1,6 @@
 """``make train-shipped``: train every team that ships, with the default settings of its scenario.
 
-Finished runs are skipped, an interrupted one resumes. To use more cores, start it several times with different --only.
+Finished runs are skipped, an interrupted one resumes. To use more cores, start it for several scenarios at once.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ SEEDS: Final = {"smart": 5, "field": 5}
 class Settings:
     """Command-line arguments."""
 
-    seeds: tuple[int, ...] = ()
+    seed: tuple[int, ...] = ()
     """Training seeds; default: 1 to 3, for smart and field 1 to 5."""
-    only: tuple[str, ...] = tuple(ALGORITHMS)
+    scenario: tuple[str, ...] = tuple(ALGORITHMS)
     """Scenarios to train on."""
-    folder: Path = Path("runs/shipped")
+    out: Path = Path("runs/shipped")
     """Folder of the run folders SCENARIO-SEED."""
 
 
 def all_runs(settings: Settings) -> list[TrainSettings]:
     """Return the settings of all runs, the first seed of every scenario first."""
-    for name in settings.only:
+    for name in settings.scenario:
         if name not in ALGORITHMS:
             known = ", ".join(ALGORITHMS)
-            raise SettingsError(f"only={name!r:.80} has no learned team of its own; those that have: {known}")
+            raise SettingsError(f"scenario={name!r:.80} has no learned team of its own; those that have: {known}")
     return [
         replace(
             default_settings(name, ALGORITHMS[name], preset="residual"),
             seed=seed,
-            folder=settings.folder / f"{name}-{seed}",
+            folder=settings.out / f"{name}-{seed}",
         )
-        for seed in settings.seeds or range(1, 1 + max(SEEDS.values()))
-        for name in settings.only
-        if settings.seeds or seed <= SEEDS.get(name, 3)
+        for seed in settings.seed or range(1, 1 + max(SEEDS.values()))
+        for name in settings.scenario
+        if settings.seed or seed <= SEEDS.get(name, 3)
     ]
 
 

@@ -16,7 +16,7 @@ from typing import Any, Final, TypeVar, cast
 from posse import TARGET_MOTIONS, Family, Scenario, TargetPolicy
 from posse_baselines.learned import LearnedPolicy
 from posse_baselines.policies.open_loop import OPEN_LOOP
-from posse_baselines.policies.scripted import SCRIPTED
+from posse_baselines.policies.scripted import ABLATIONS, SCRIPTED
 from posse_baselines.policy import Policy, PolicyError
 from posse_baselines.tuned import from_file
 
@@ -116,7 +116,7 @@ def load(policy: str | Path) -> Policy:
         return made
     if is_file(path / "best.safetensors"):
         raise PolicyError(f"{text!r} is a run folder: its policy is {path / 'best.safetensors'}")
-    raise _unknown("policy", "policies", text, policy_names())
+    raise _unknown("policy", "policies", text, [name for name in policy_names() if name not in ABLATIONS])
 
 
 def load_target(target: str | Path | Target) -> Target:

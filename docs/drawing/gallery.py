@@ -1,6 +1,6 @@
 """Draws the pictures of the scenarios, docs/media/scenarios/NAME.png.
 
-python docs/drawing/gallery.py [--scenarios smart field]
+python docs/drawing/gallery.py [--scenario smart field]
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SHOWN: Final = {
 
 @dataclass(frozen=True)
 class _Arguments:
-    scenarios: tuple[str, ...] = tuple(SHOWN)
+    scenario: tuple[str, ...] = tuple(SHOWN)
 
 
 def picture(scenario: str) -> Image.Image:
@@ -54,5 +54,5 @@ def picture(scenario: str) -> Image.Image:
 
 
 if __name__ == "__main__":
-    for each in tyro.cli(_Arguments).scenarios:
+    for each in tyro.cli(_Arguments).scenario:
         picture(each).save(PICTURES / f"{each}.png", optimize=True)

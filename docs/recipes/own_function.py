@@ -11,4 +11,4 @@ def chase(observations):
     return np.stack([np.ones_like(views["speed"]), views["target_bearing"][..., 1]], axis=-1)
 
 
-policy = from_function(chase)  # posse compare own_function:policy ddcs-tuned --scenarios constant
+policy = from_function(chase)  # posse compare own_function:policy ddcs-tuned --scenario constant

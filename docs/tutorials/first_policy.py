@@ -14,7 +14,7 @@ from posse_training.train.train import train
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=8_000_000)
-parser.add_argument("--folder", type=Path, default=Path("runs/tutorials/first"))
+parser.add_argument("--out", type=Path, default=Path("runs/tutorials/first"))
 parser.add_argument("--episodes", type=int, default=200)
 arguments = parser.parse_args()
 
@@ -23,7 +23,7 @@ settings = replace(
     default_settings("smart", "ppo"),
     steps=arguments.steps,
     seed=1,
-    folder=arguments.folder,
+    folder=arguments.out,
     num_worlds=128,
     evaluate_every=max(arguments.steps // 5, 1),
     tensorboard=False,

@@ -103,9 +103,9 @@ def test_a_policy_that_fails_or_kills_its_workers_is_named(nodes: Cluster, folde
 
 COMPARE = "--episodes 3 --planner-episodes 1 --no-figures"
 COMMANDS = {
-    f"compare idle pursuit --scenarios smart constant {COMPARE}": "summary.json",
-    f"compare idle tests.support.bad_policies:Crashes --scenarios constant {COMPARE}": "constant-idle.csv",
-    f"compare idle --target evader --scenarios duel {COMPARE}": "summary.json",
+    f"compare idle pursuit --scenario smart constant {COMPARE}": "summary.json",
+    f"compare idle tests.support.bad_policies:Crashes --scenario constant {COMPARE}": "constant-idle.csv",
+    f"compare idle --target evader --scenario duel {COMPARE}": "summary.json",
     "tune pngl-l-phi --scenario constant --only gain near --population 4 --worlds 2 --generations 2": "tuned.json",
 }
 
@@ -119,7 +119,7 @@ def test_a_command_gives_the_same_file(command: str, nodes: Cluster, folder: Pat
 
 
 def test_an_interrupted_comparison_resumes(nodes: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    command = [*f"compare idle pursuit --scenarios smart constant {COMPARE} --ray".split()]
+    command = [*f"compare idle pursuit --scenario smart constant {COMPARE} --ray".split()]
     with monkeypatch.context() as patch:
         patch.setattr(Results, "write", Mock(side_effect=KeyboardInterrupt))
         assert main(command) == 130
@@ -130,9 +130,9 @@ def test_an_interrupted_comparison_resumes(nodes: Cluster, monkeypatch: pytest.M
 
 
 def test_seeds_are_trained_to_the_same_weights(nodes: Cluster, folder: Path) -> None:
-    command = "train --seeds 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard"
+    command = "train --seed 1 --steps 1 --num-worlds 2 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard"
     for name, *more in (["here"], ["there", "--ray"]):
-        assert main([*command.split(), "--folder", name, *more]) == 0
+        assert main([*command.split(), "--out", name, *more]) == 0
     here, there = (load_file(folder / name / "seed-1" / "last.safetensors") for name in ("here", "there"))
     assert_equal(here, there)
 

@@ -59,7 +59,7 @@ def test_importing_says_what_to_install(tmp_path: Path, package: str) -> None:
     assert "pip install '.[training]'" in done.stderr.splitlines()[-1]
 
 
-COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]
+COMPARE = ["compare", "idle", "--scenario", "constant", "--episodes", "2"]
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ COMPARE = ["compare", "idle", "--scenarios", "constant", "--episodes", "2"]
         ["scenarios"],
         ["train", "--help"],
         pytest.param(COMPARE, marks=pytest.mark.long),
-        ["watch", "idle", "--scenario", "paper-distributed", "--film", "film.gif"],
+        ["watch", "idle", "--scenario", "paper-distributed", "--out", "film.gif"],
         pytest.param(["reproduce", "--starts", "2"], marks=pytest.mark.long),
         ["replay", "idle", "--scenario", "constant", "--out", "replay.html"],
     ],

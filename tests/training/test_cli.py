@@ -46,9 +46,9 @@ def test_every_command_has_help(name: str, capsys: pytest.CaptureFixture[str]) -
         (["watch", "nobody"], "unknown policy 'nobody'"),
         (["watch", "pursuit", "--world", "-1"], "world=-1"),
         (["watch"], "No policies given"),
-        (["watch", "pursuit", "--film", "film.avi"], "must end in .gif or .mp4"),
-        (["watch", "pursuit", "--film", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
-        (["watch", "pursuit", "--film", "film.gif", "--size", "9", "9"], "at least 200 px"),
+        (["watch", "pursuit", "--out", "film.avi"], "must end in .gif or .mp4"),
+        (["watch", "pursuit", "--out", "film.gif", "--from", "90"], "start=90.0 (--from) must be"),
+        (["watch", "pursuit", "--out", "film.gif", "--size", "9", "9"], "at least 200 px"),
         (["watch", "pursuit", "--speed", "2"], "--speed is not for a window: leave it out"),
         (["watch", "pursuit", "--size", "9", "9"], "--size 9 9 must be 200 to 4096 px"),
         (["watch", "numpy:ndarray"], "cannot be created without arguments"),
@@ -67,7 +67,7 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     arguments = (
         "train --scenario constant --steps 1_280 --num-worlds 4 --team-sizes 2 --hidden 8 8 "
         "--rollout 40 --minibatch 80 --evaluate-worlds 2 --beside None --no-tensorboard "
-        f"--overrides horizon 40 settle_time 1.0 --folder {folder}"
+        f"--set horizon=40 settle_time=1.0 --out {folder}"
     )
     assert main(arguments.split()) == 0
     shown = capsys.readouterr().out
@@ -76,7 +76,7 @@ def test_train_and_go_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     watch, compare, replay = (shlex.split(line) for line in after.splitlines())
     assert (watch[1], compare[1], replay[1]) == ("watch", "compare", "replay")
     assert (folder / "best.safetensors") == Path(watch[2]) == Path(compare[3]) == Path(replay[3])
-    assert main([*replay[1:], "--seconds", "1", "--num-trackers", "2"]) == 0
+    assert main([*replay[1:], "--seconds", "1", "--set", "num_trackers=2"]) == 0
     assert (folder / "replay.html").is_file()
     settings = json.loads((folder / "settings.json").read_text())
     assert settings["steps"] == 1280

@@ -21,7 +21,7 @@ HOSTILE = ["![p](https://x.invalid/p){: onerror=alert(1) }", "<script>", "a|b", 
 
 @pytest.fixture(scope="module")
 def claim(tmp_path_factory: pytest.TempPathFactory) -> Standing:
-    return submit("pngl", tmp_path_factory.mktemp("claim") / "sent", SCENARIO, worlds=WORLDS, progress=False)
+    return submit("pngl", tmp_path_factory.mktemp("claim") / "sent", SCENARIO, episodes=WORLDS, progress=False)
 
 
 def sent(folder: Path, claim: Standing, **changes: Any) -> Path:
@@ -41,19 +41,19 @@ def test_a_claim_is_what_an_evaluation_measures(claim: Standing) -> None:
 def test_an_honest_claim_holds_on_fresh_worlds(
     claim: Standing, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["verify", str(sent(tmp_path, claim)), "--worlds", str(WORLDS), "--seed", "3"]
+    arguments = ["verify", str(sent(tmp_path, claim)), "--episodes", str(WORLDS), "--seed", "3"]
     assert cli.main(arguments) == 0
     assert "the claim holds" in capsys.readouterr().out
 
 
 def test_a_raised_claim_does_not_hold_and_the_measured_score_stands(claim: Standing, tmp_path: Path) -> None:
     folder = sent(tmp_path, claim, safe_score=claim.safe_score + 0.003, high=1.0, low=0.0, score=1.0)
-    verdict = verify(folder, worlds=WORLDS, seed=3, progress=False)
+    verdict = verify(folder, episodes=WORLDS, seed=3, progress=False)
     assert not verdict.holds
     assert verdict.repeated.safe_score == pytest.approx(claim.safe_score, rel=0, abs=0.002)
     assert verdict.measured.seed == 3
     assert verdict.measured.low <= verdict.measured.safe_score < claim.safe_score + 0.1
-    assert cli.main(["verify", str(folder), "--worlds", str(WORLDS), "--seed", "3"]) == 1
+    assert cli.main(["verify", str(folder), "--episodes", str(WORLDS), "--seed", "3"]) == 1
 
 
 @pytest.mark.parametrize(
@@ -85,10 +85,10 @@ def test_a_policy_file_travels_with_its_claim(tmp_path: Path) -> None:
     given = tmp_path / "mine.safetensors"
     given.write_bytes(shipped()["learned-smart"].read_bytes())
     out = tmp_path / "sent"
-    assert cli.main(["submit", str(given), "--scenario", SCENARIO, "--worlds", "3", "--out", str(out)]) == 0
+    assert cli.main(["submit", str(given), "--scenario", SCENARIO, "--episodes", "3", "--out", str(out)]) == 0
     given.unlink()
     assert sorted(file.name for file in out.iterdir()) == ["mine.safetensors", CLAIM]
-    assert verify(out, worlds=3, progress=False).measured.policy == "mine.safetensors"
+    assert verify(out, episodes=3, progress=False).measured.policy == "mine.safetensors"
 
 
 def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
@@ -103,8 +103,8 @@ def test_nothing_is_overwritten_and_wrong_arguments_are_refused_before_a_step(
     for wrong in (
         ["--out", str(tmp_path)],
         ["--out", str(kept)],
-        ["--out", str(tmp_path / "new"), "--label", HOSTILE[0]],
-        ["--out", str(tmp_path / "new"), "--worlds", "0"],
+        ["--out", str(tmp_path / "new"), "--name", HOSTILE[0]],
+        ["--out", str(tmp_path / "new"), "--episodes", "0"],
         ["--out", str(tmp_path / "new"), "--seed", "-1"],
         ["--out", str(tmp_path / "new"), "--scenario", "nowhere"],
     ):

@@ -138,7 +138,7 @@ def test_a_target_ships_only_if_it_costs_enough(tmp_path: Path, monkeypatch: pyt
         run,
         side="target",
         encoding="plain",
-        against="idle",
+        team="idle",
         scenario="smart",
         team_sizes=(),
         steps=80,

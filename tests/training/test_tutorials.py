@@ -41,7 +41,7 @@ def run(name: str, monkeypatch: pytest.MonkeyPatch, *arguments: object) -> dict[
 @pytest.mark.long
 def test_first_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "run"
-    left = run("first_policy.py", monkeypatch, "--steps", 1000, "--folder", folder, "--episodes", 2)
+    left = run("first_policy.py", monkeypatch, "--steps", 1000, "--out", folder, "--episodes", 2)
     policy = load(folder / "best.safetensors")
     assert policy.name == "smart-ppo-1"
     assert left["file"] == folder / "best.safetensors"

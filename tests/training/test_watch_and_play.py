@@ -73,12 +73,12 @@ def test_a_page_is_recorded_and_opened(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["watch", "idle", "--page", "--film", "a.gif"], "exclude each other"),
+        (["watch", "idle", "--page", "--out", "a.gif"], "exclude each other"),
         (["watch", "idle"], "no window can be opened (neither DISPLAY nor WAYLAND_DISPLAY is set): posse watch --page"),
         (["play", "--as", "tracker_9"], "--as tracker_9 is no robot; there are: tracker_0"),
-        (["play", "--against", "planner"], "cannot play against a person"),
+        (["play", "planner"], "cannot play against a person"),
         (["play", "--out", "play.txt"], "--out play.txt must end in .html"),
-        (["play", "--against", "idle"], "no window can be opened"),
+        (["play", "idle"], "no window can be opened"),
     ],
 )
 def test_mistakes_are_named(
@@ -96,7 +96,7 @@ def test_the_arrows_drive_a_robot_and_the_last_round_is_recorded(
 ) -> None:
     out = tmp_path / "mine.html"
     states = at({0: "space", 2: "n", 3: "space", 5: "left down", 6: "right", 9: "q"})
-    assert main(["play", "--against", "pursuit", "--as", robot, "--out", str(out), "--size", "300", "300"]) == 0
+    assert main(["play", "pursuit", "--as", robot, "--out", str(out), "--size", "300", "300"]) == 0
     assert states[:5] == ["paused", "running", "running", "paused", "running"]
     assert "replay: " in capsys.readouterr().out
     player = read_replay(out).players[0]

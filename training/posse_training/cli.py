@@ -13,23 +13,32 @@ from typing import Any, Final
 
 from posse_training.errors import UserError
 
-COMMANDS: Final = {
-    "demo": ("a table of scores, films and a replay page", "demo"),
-    "train": ("train a team", "commands.train"),
-    "tune": ("tune the settings of a scripted team", "tune"),
-    "league": ("train teams and targets in turns against each other", "league"),
-    "compare": ("score policies on the same worlds", "compare.compare"),
-    "watch": ("show policies in a window, as a page or a film", "commands.watch"),
-    "play": ("drive the target, or a tracker, in a window", "play"),
-    "replay": ("write a replay of teams as a web page", "replay.command"),
-    "submit": ("play for the leaderboard and write the claim", "leaderboard:submit_command"),
-    "verify": ("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
-    "record": ("record episodes as a data set for offline learning", "datasets"),
-    "export": ("write the network of a learned policy as ONNX", "commands.export"),
-    "reproduce": ("repeat the paper's experiments", "reproduce.reproduce"),
-    "scenarios": ("list the scenarios", "commands.scenarios"),
+GROUPS: Final = {
+    "See what there is": {
+        "demo": ("a table of scores, films and a replay page", "demo"),
+        "scenarios": ("list the scenarios, or the settings of one", "commands.lists:scenarios"),
+        "policies": ("list the policies", "commands.lists:policies"),
+        "watch": ("show policies in a window, as a page or a film", "commands.watch"),
+        "play": ("drive the target, or a tracker, in a window", "play"),
+    },
+    "Make a team and measure it": {
+        "train": ("train a team", "commands.train"),
+        "compare": ("score policies on the same worlds", "compare.compare"),
+        "replay": ("write a replay of teams as a web page", "replay.command"),
+    },
+    "Go further": {
+        "tune": ("tune the settings of a scripted team", "tune"),
+        "league": ("train teams and targets in turns against each other", "league"),
+        "record": ("record episodes as a data set for offline learning", "datasets"),
+        "export": ("write the network of a learned policy as ONNX", "commands.export"),
+        "reproduce": ("repeat the paper's experiments", "reproduce.reproduce"),
+        "submit": ("play for the leaderboard and write the claim", "leaderboard:submit_command"),
+        "verify": ("check a claim on worlds of a fresh seed", "leaderboard:verify_command"),
+    },
 }
-"""Of each command a summary, and the module whose ``main``, or ``:function``, takes its arguments."""
+"""Commands in the order in which they are met: of each a summary, and the module whose ``main``, or ``:function``,
+takes its arguments."""
+COMMANDS: Final = {name: command for group in GROUPS.values() for name, command in group.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,8 +80,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _usage() -> str:
-    lines = [f"  {name:<11} {summary}" for name, (summary, _) in COMMANDS.items()]
-    return "\n".join(["usage: posse COMMAND ...", "", *lines, "", "posse COMMAND --help lists its arguments"])
+    lines = ["usage: posse COMMAND ...", ""]
+    for group, commands in GROUPS.items():
+        lines += [f"{group}:", *(f"  {name:<11} {summary}" for name, (summary, _) in commands.items()), ""]
+    return "\n".join([*lines, "posse COMMAND --help lists its arguments"])
 
 
 if __name__ == "__main__":

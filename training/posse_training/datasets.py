@@ -9,7 +9,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -23,6 +23,7 @@ from posse import Batch, Scenario, get_scenario
 from posse_baselines import Policy, PolicyError, load, rollout
 from posse_training.errors import SettingsError, require
 from posse_training.evaluation.evaluation import progress_bar
+from posse_training.options import Changes
 from posse_training.provenance import commit
 
 if TYPE_CHECKING:
@@ -196,6 +197,8 @@ class _Record:
     """Policies: names, files, or package.module:Class."""
     scenario: str = "smart"
     """Scenario to play."""
+    overrides: Changes = field(default_factory=dict)
+    """Settings of the scenario to change, such as num_trackers=3 or arena=6,4."""
     episodes: int = 1000
     """How many."""
     out: Path = Path("runs/datasets")
@@ -213,7 +216,9 @@ def main(arguments: Sequence[str]) -> None:
     which = tyro.cli(_Record, prog="posse record", args=arguments)
     with progress_bar() as bar:
         task = bar.add_task("episodes", total=which.episodes)
-        dataset = record_dataset(**asdict(which), progress=lambda count: bar.advance(task, count))
+        values = asdict(which)
+        values |= values.pop("overrides")
+        dataset = record_dataset(**values, progress=lambda count: bar.advance(task, count))
     print(
         f"{dataset.total_episodes} episodes, {dataset.total_steps:,} steps: "
         f"MINARI_DATASETS_PATH={which.out} and minari.load_dataset({dataset.spec.dataset_id!r})"

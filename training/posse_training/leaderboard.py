@@ -148,8 +148,8 @@ def submit(
     policy: Annotated[str, tyro.conf.Positional],
     out: Path,
     scenario: str = "smart",
-    label: str | None = None,
-    worlds: int = WORLDS,
+    name: str | None = None,
+    episodes: int = WORLDS,
     seed: int = SEED,
     progress: bool = True,
 ) -> Standing:
@@ -159,8 +159,8 @@ def submit(
         policy: A name, a policy file, which is copied, or ``package.module:Class``.
         out: New or empty folder to write to.
         scenario: Name of the scenario.
-        label: Name on the leaderboard; default: the policy's.
-        worlds: Number of worlds; 1,000 or more are ranked.
+        name: Name on the leaderboard; default: the policy's.
+        episodes: Number of worlds; 1,000 or more are ranked.
         seed: Seed of the worlds.
         progress: Whether to show a bar.
 
@@ -170,12 +170,12 @@ def submit(
     loaded, is_file = load(policy), not is_code(policy) and policy not in policy_names()
     text = Path(policy).name if is_file else policy
     content = Path(policy).read_bytes() if is_file else None
-    label = label or (loaded.name if is_file else policy)
-    check_text("label", label)
+    label = name or (loaded.name if is_file else policy)
+    check_text("name", label)
     check_text("policy", text)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ResultFileError(f"{out} exists and is not an empty folder: choose another --out")
-    results = evaluate(loaded, scenario, worlds, seed, progress=progress)
+    results = evaluate(loaded, scenario, episodes, seed, progress=progress)
     claim = standing_of(label, text, loaded, results)
     out.mkdir(parents=True, exist_ok=True)
     if content is not None:
@@ -187,7 +187,7 @@ def submit(
 def verify(
     folder: Annotated[Path, tyro.conf.Positional],
     run_code: bool = False,
-    worlds: int = WORLDS,
+    episodes: int = WORLDS,
     seed: int | None = None,
     progress: bool = True,
 ) -> Verdict:
@@ -199,7 +199,7 @@ def verify(
     Args:
         folder: Folder that ``posse submit`` wrote.
         run_code: Import a policy that is code. It runs with all your rights: read it first.
-        worlds: Number of fresh worlds.
+        episodes: Number of fresh worlds.
         seed: Seed of the fresh worlds; default: drawn now, so that no submission can know them.
         progress: Whether to show a bar.
 
@@ -224,7 +224,7 @@ def verify(
         results = evaluate(policy, claim.scenario, count, played_seed, split=split, progress=progress)
         return standing_of(claim.label, text, policy, results)
 
-    return Verdict(claim, played(claim.worlds, claim.seed, claim.split), played(worlds, drawn, "test"))
+    return Verdict(claim, played(claim.worlds, claim.seed, claim.split), played(episodes, drawn, "test"))
 
 
 def submit_command(arguments: Sequence[str]) -> None:

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import tyro
 from rich.console import Console
@@ -27,6 +27,7 @@ from posse_training.evaluation.evaluation import evaluate
 from posse_training.evaluation.results import Results
 from posse_training.evaluation.statistics import Estimate
 from posse_training.files import hold_settings, locked, read_json
+from posse_training.options import Changes, Pairs
 from posse_training.train.presets import default_settings
 from posse_training.train.settings import BEST, LAST, SETTINGS, TrainSettings, read_settings
 
@@ -36,6 +37,8 @@ SUMMARY: Final = "summary.json"
 TEAM: Final = "trackers"
 TARGET: Final = "target"
 OTHER: Final = {TEAM: TARGET, TARGET: TEAM}
+OPPONENTS: Final = {TEAM: "target", TARGET: "team"}
+"""The setting of a training that names what a side plays against."""
 TEST_SEED: Final = 7
 CHOICE: Final = (1, 32)
 """Seed and number of the validation worlds by which opponents are weighed (pfsp)."""
@@ -43,6 +46,7 @@ _SHARES: Final = 8  # parts of the worlds that go to the opponents by their diff
 _FREE: Final = ("generations", "responses", "response_steps", "episodes", "folder")
 """Settings that the command that resumes a league may change."""
 _STEPS: Final = (1, 10**12)
+_COLUMNS: Final = 4  # of targets, which fit into 80 characters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,9 +64,9 @@ class LeagueSettings:
     opponents: Literal["pfsp", "fictitious"] = "pfsp"
     """How the worlds are divided among the other side's past. fictitious: evenly; pfsp: an opponent
     that is harder for the present policy gets more."""
-    teams: tuple[str, ...] = ("ddcs-tuned",)
+    teams: Annotated[tuple[str, ...], tyro.conf.arg(name="team")] = ("ddcs-tuned",)
     """Teams at the beginning: names or files."""
-    targets: tuple[str, ...] = ("smart", "constant", *OPEN_LOOP)
+    targets: Annotated[tuple[str, ...], tyro.conf.arg(name="target")] = ("smart", "constant", *OPEN_LOOP)
     """Targets at the beginning: names or files. Default: the scenario's own, and those that read nothing."""
     target_steps: int = number(2_000_000, "", *_STEPS)
     """Steps of each target's training."""
@@ -76,11 +80,11 @@ class LeagueSettings:
     """Test worlds of each pair of a team and a target."""
     seed: int = number(1, "", 0, 2**32 - 1)
     """Seed of the trainings."""
-    overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
-    """Settings of the scenario to change, by name."""
-    training: dict[str, bool | int | float | str] = field(default_factory=dict)
-    """Settings of the trainings to change, by name, such as num_worlds."""
-    folder: Path | None = None
+    overrides: Changes = field(default_factory=dict)
+    """Settings of the scenario to change, such as target_speed=0.5 or arena=6,4."""
+    training: Pairs = field(default_factory=dict)
+    """Settings of the trainings to change, such as num_worlds=64."""
+    folder: Annotated[Path | None, tyro.conf.arg(name="out")] = None
     """Folder; default: runs/league/SCENARIO."""
 
     def __post_init__(self) -> None:
@@ -242,7 +246,7 @@ class League:
             "steps": steps,
             "seed": s.seed,
             "overrides": s.overrides,
-            "against": opponents,
+            OPPONENTS[side]: opponents,
             "start": None if start is None else str(start),
             "folder": str(run),
             "evaluate_every": max(1, steps // 4),
@@ -320,7 +324,7 @@ def shares(difficulties: Mapping[str, float]) -> dict[str, int]:
 
 
 def against(parts: Mapping[str, int]) -> str:
-    """Return opponents and their shares as the setting ``against`` has them."""
+    """Return opponents and their shares as the setting of a training names them."""
     return ",".join(name for name, part in parts.items() for _ in range(part))
 
 
@@ -372,19 +376,23 @@ def draw_matrix(found: League) -> list[Path]:
 
 def tables(found: League) -> list[Table]:
     """Return the matrix and what the best responses gain, as tables."""
-    matrix = Table("team", title="score of the team (row) against the target (column), 95 % intervals")
-    for target in found.targets:
-        matrix.add_column(target.label)
-    for team in found.teams:
-        scores = [found.at(team.label, target.label).score for target in found.targets]
-        matrix.add_row(team.label, *(f"{s.value:.2f}\n[{s.low:.2f}, {s.high:.2f}]" for s in scores))
+    matrices = []
+    for first in range(0, len(found.targets), _COLUMNS):
+        part = found.targets[first : first + _COLUMNS]
+        matrix = Table("team", title="score of the team (row) against the target (column), 95 % intervals")
+        for target in part:
+            matrix.add_column(target.label)
+        for team in found.teams:
+            scores = [found.at(team.label, target.label).score for target in part]
+            matrix.add_row(team.label, *(f"{s.value:.2f}\n[{s.low:.2f}, {s.high:.2f}]" for s in scores))
+        matrices.append(matrix)
     exploited = Table(
         "member", "strongest opponent so far", "score", "with the response", "gain", title="best responses"
     )
     for e in found.exploited:
         opponent = e.before.target if e.side == TEAM else e.before.team
         exploited.add_row(e.label, opponent, str(e.before.score), str(e.after.score), f"{e.gain:+.3f}")
-    return [matrix, exploited] if found.exploited else [matrix]
+    return [*matrices, exploited] if found.exploited else matrices
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -394,9 +402,9 @@ def main(arguments: Sequence[str]) -> None:
     try:
         found = play_league(settings)
     except KeyboardInterrupt:
-        sys.stderr.write("\nto resume: run the same command again with the same --folder\n")
+        sys.stderr.write("\nto resume: run the same command again with the same --out\n")
         raise
-    console = Console(width=None if sys.stdout.isatty() else 240)
+    console = Console()
     for table in tables(found):
         console.print(table)
     for path in draw_matrix(found):

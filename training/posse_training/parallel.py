@@ -20,16 +20,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import cloudpickle
 import numpy as np
 import numpy.typing as npt
-import tyro
 
 from posse_baselines.files import write_atomically
 from posse_baselines.registry import is_code
-from posse_training.errors import ClusterError, PlayError, SettingsError, TimeLimitError, require
+from posse_training.errors import ClusterError, PlayError, TimeLimitError, require
 from posse_training.provenance import installed, sources
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -95,23 +94,6 @@ def _answer() -> None:
 
 
 # --- a Ray cluster --------------------------------------------------------------------------------
-
-RayOption = Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="[ADDRESS]")]
-"""Type of the option ``--ray``: without an address, with one, or left out (``None``)."""
-
-
-def address_of(option: tuple[str, ...] | None) -> bool | str:
-    """Return the argument ``ray`` of an option ``--ray``.
-
-    Raises:
-        SettingsError: More than one address.
-    """
-    if not option:
-        return option is not None
-    if len(option) > 1:
-        given = " ".join(option)
-        raise SettingsError(f"--ray takes one address at most, not {given!r:.100}: put it after the unnamed arguments")
-    return option[0]
 
 
 @contextlib.contextmanager

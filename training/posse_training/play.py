@@ -16,6 +16,7 @@ from posse.rendering.renderer import Renderer
 from posse.rendering.style import TRACKER
 from posse_baselines import Policy, PolicyError, Recorder, begin, load
 from posse_training.errors import SettingsError
+from posse_training.options import OneWorld
 from posse_training.replay import RECORD, Replay, join, replay_of, write_replay
 
 _SIZES: Final = (200, 4096)  # px, least and most
@@ -24,28 +25,18 @@ _CHANGE: Final = 2.0  # of the speed's action per second: from rest to full spee
 _YOU: Final = (0, 114, 178)  # colour of the player's tracker
 
 
-@dataclass(frozen=True)
-class _Play:
+@dataclass(frozen=True, kw_only=True)
+class _Play(OneWorld):
     """Drive the target against a team, or one tracker in it. Writes a replay page at the end.
 
     Keys of the window: Left and Right turn, Up and Down change the speed, Space starts and pauses, S steps, - and +
     change the pace, N goes to the next world, Q or Esc ends.
     """
 
-    scenario: str = "smart"
-    """Scenario to play."""
-    against: str = "ddcs-tuned"
+    policy: Annotated[str, tyro.conf.Positional] = "ddcs-tuned"
     """Policy of the trackers: a name, a file, or package.module:Class."""
     robot: Annotated[str, tyro.conf.arg(name="as")] = "target"
     """What you drive: target, or one of the trackers, such as tracker_2."""
-    seed: int = 7
-    """Seed of the world."""
-    world: int = 0
-    """Index of the first world."""
-    split: str = "test"
-    """Split of the world: train, validation or test."""
-    num_trackers: int | None = None
-    """Trackers in the team; default: the scenario's."""
     size: tuple[int, int] = (960, 720)
     """Width and height of the window, px."""
     out: Path = Path("play.html")
@@ -57,13 +48,9 @@ def main(arguments: Sequence[str]) -> None:
     which = tyro.cli(_Play, prog="posse play", args=arguments)
     if which.out.suffix.lower() not in (".html", ".htm"):
         raise SettingsError(f"--out {which.out} must end in .html or .htm")
-    scenario = get_scenario(which.scenario)
-    if which.num_trackers is not None:
-        scenario = scenario.replace(num_trackers=which.num_trackers)
+    scenario = get_scenario(which.scenario, **which.overrides)
     robot = robot_of(which.robot, scenario.num_trackers)
-    rounds, page = play(
-        load(which.against), scenario, robot, which.size, seed=which.seed, world=which.world, split=which.split
-    )
+    rounds, page = play(load(which.policy), scenario, robot, which.size, **which.place)
     if rounds:
         print(f"{len(rounds)} rounds, best {max(rounds):.0f} points")
     if page is None:
@@ -85,7 +72,7 @@ def open_window(scenario: Scenario, size: tuple[int, int], keys: Mapping[str, st
         renderer = Renderer(scenario, "human", size, keys=keys)
     except RuntimeError as error:
         raise SettingsError(
-            f"no window can be opened ({error.__cause__}): posse watch --page records a replay page, --film film.gif "
+            f"no window can be opened ({error.__cause__}): posse watch --page records a replay page, --out film.gif "
             "writes a film"
         ) from error
     assert renderer.window is not None

@@ -31,7 +31,8 @@ from posse_training.errors import CheckpointError, RunFolderError, SettingsError
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import mean
 from posse_training.files import LOCK, hold_settings, locked, read_json
-from posse_training.parallel import RayOption, address_of, connected, joined, on_ray
+from posse_training.options import Ray
+from posse_training.parallel import connected, joined, on_ray
 from posse_training.provenance import commit
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class TuneSettings:
     """Settings to search over; default: all that have an effect on this scenario."""
     threads: int | None = optional(1, 1_024, whole=True)
     """Threads that step the worlds; default: as many as cores. Never changes the result."""
-    ray: RayOption = None
+    ray: Ray = False
     """Play on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of this machine, or
     else all its cores. Extra: cluster."""
     ship: bool = False
@@ -162,7 +163,7 @@ def tune(settings: TuneSettings, *, console: Console | None = None) -> Path:
         others = [path.name for path in folder.iterdir() if path.name != LOCK] if folder.is_dir() else ["is a file"]
         if others:
             raise RunFolderError(f"{folder} is not the folder of a tuning run: {others[0]}. Choose another --out")
-    with connected(address_of(settings.ray)), locked(folder):
+    with connected(settings.ray), locked(folder):
         hold_settings(folder / SETTINGS, run.identity)
         content = (json.dumps(run.play(), indent=2, sort_keys=True) + "\n").encode()
         write_atomically(folder / RESULT, content)
@@ -286,9 +287,9 @@ class _Run:
     def _play(self, candidates: Sequence[dict[str, float]], worlds: _Worlds) -> list[dict[str, Point]]:
         """Return the metrics of each candidate, (worlds,) each."""
         s = self.settings
-        threads = s.threads if s.ray is None else 1
+        threads = s.threads if s.ray is False else 1
         calls = [(self.policy.with_settings(**values), self.scenario, worlds, threads) for values in candidates]
-        if s.ray is None:
+        if s.ray is False:
             return [_played(*call) for call in calls]
         found = dict(on_ray(_played, calls))
         for result in found.values():

@@ -23,3 +23,29 @@ SCRIPTED: Final[dict[str, Callable[[], Policy]]] = {
     "belief-planner": BeliefPlanner,
     "planner": Planner,
 }
+MEANINGS: Final = {
+    "random": "every action uniform in its box",
+    "idle": "all trackers stand still",
+    "pursuit": "straight to the target, around what the sonar detects; no formation",
+    "pngl-l-phi": "the baseline: a leader under PNGL, followers under l-φ",
+    "pngl-l-phi-literal": "the same as printed: c = 0, and φ from the leader's heading",
+    "pngl": "everyone under proportional navigation (PNGL)",
+    "deviated-pursuit": "everyone under deviated pursuit",
+    "velocity-pursuit": "everyone under velocity pursuit; no formation",
+    "ddcs-centralized-pursuit": "a leader under velocity pursuit, followers under l-φ",
+    "ddcs-distributed": "every tracker holds its own slot by the slot law",
+    "ddcs-centralized": "a leader that holds its slot, followers under l-φ",
+    "ddcs-centralized-l-l": "the same, followers by l-l from the third robot on",
+    "ddcs-centralized-no-exchange": "the first leader stays leader, even when broken",
+    "ddcs-no-radio": "ddcs-distributed that ignores messages",
+    "ddcs-tuned": "ddcs-distributed with settings tuned for the scenario",
+    "pngl-l-phi-tuned": "pngl-l-phi with settings tuned for the scenario",
+    "belief-planner": "plays ahead in a world of each tracker's own, written from what it observes",
+    "planner": "a reference that reads the state and plays ahead in copies of the world",
+}
+"""Of each a sentence, as ``posse policies`` shows it."""
+ABLATIONS: Final = (
+    *("pngl-l-phi-literal", "ddcs-centralized-pursuit", "ddcs-centralized-l-l"),
+    *("ddcs-centralized-no-exchange", "ddcs-no-radio"),
+)
+"""Policies that show what one part of another is good for; lists of names leave them out."""

@@ -16,7 +16,7 @@ from posse_training.parallel import Job, cut
 from posse_training.train.seeds import train_on_worker
 from posse_training.train.settings import TrainSettings
 
-COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seeds 1 2 --ray", "tune pngl-l-phi --ray")
+COMMANDS = ("compare idle --episodes 2 --ray", "train --steps 1000 --seed 1 2 --ray", "tune pngl-l-phi --ray")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
@@ -59,12 +59,12 @@ def test_finished_shards_belong_to_what_is_played(tmp_path: Path, monkeypatch: p
 
 
 def test_a_seed_twice_and_another_run_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["train", "--seeds", "1", "1"]) == 2
+    assert main(["train", "--seed", "1", "1"]) == 2
     assert "names one twice" in capsys.readouterr().err
     folder = tmp_path / "seed-1"
     folder.mkdir()
     (folder / "settings.json").write_text('{"steps": 5}')
-    assert main(["train", "--seeds", "1", "--folder", str(tmp_path)]) == 2
+    assert main(["train", "--seed", "1", "2", "--out", str(tmp_path)]) == 2
     assert "holds a run with another" in capsys.readouterr().err
 
 

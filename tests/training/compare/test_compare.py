@@ -120,7 +120,7 @@ def test_who_cannot_play_is_left_out_with_a_line(
 ) -> None:
     SCENARIOS["few-beams"] = {"sonar_beams": 4}
     try:
-        command = ["compare", files[0], "pursuit", "--scenarios", "few-beams", "constant"]
+        command = ["compare", files[0], "pursuit", "--scenario", "few-beams", "constant"]
         options = ["--episodes", "2", "--no-figures", "--planner-episodes", "0", "--out", str(tmp_path / "out")]
         assert main([*command, *options]) == 0
     finally:
@@ -139,7 +139,7 @@ def test_who_cannot_play_is_left_out_with_a_line(
 
 @pytest.mark.long
 def test_figures_are_drawn_with_the_planner_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--scenarios", "constant", "leader-loss", "--episodes", "3"]
+    options = ["--scenario", "constant", "leader-loss", "--episodes", "3"]
     assert main(["compare", "pursuit", *options, "--out", str(tmp_path)]) == 0
     for suffix in ("png", "svg"):
         assert {path.stem for path in tmp_path.glob(f"*.{suffix}")} == {"profile", "scenarios", "recovery"}

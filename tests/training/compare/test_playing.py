@@ -71,7 +71,7 @@ def test_code_plays_as_it_would_in_this_process(tmp_path: Path) -> None:
 UNGUARDED = """
 from posse_training.cli import main
 policies = ["posse_baselines.policies.pursuit:Pursuit", "--planner-episodes", "0", "--no-figures"]
-raise SystemExit(main(["compare", *policies, "--scenarios", "constant", "--episodes", "2", "--out", "out"]))
+raise SystemExit(main(["compare", *policies, "--scenario", "constant", "--episodes", "2", "--out", "out"]))
 """
 
 
@@ -144,7 +144,7 @@ def alive(pid: int) -> bool:
 
 
 def test_the_command_says_who_failed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--scenarios", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
+    options = ["--scenario", "constant", "--episodes", "1", "--no-figures", "--planner-episodes", "0"]
     assert main(["compare", f"{BAD}Raises", "idle", *options, "--out", str(tmp_path / "a")]) == 1
     shown = " ".join(capsys.readouterr().out.split())
     assert f"failed: {BAD}Raises on constant: ZeroDivisionError: [bold]by zero[/bold]" in shown

@@ -81,6 +81,6 @@ def test_a_replay_and_a_film_show_the_target(file: Path, tmp_path: Path) -> None
     shown = play_again(Contender("p", (load("pursuit"),)), 0, SHORT, 0, Game(7, "test", str(file), 60.0))
     assert shown.players[0].columns["action"].values.shape[1] == SHORT.num_trackers + 1
     film = tmp_path / "film.gif"
-    asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--num-trackers", "3"]
-    watch.main([*asked, "--film", str(film), "--seconds", "0.3"])
+    asked = ["pursuit", "--scenario", "smart", "--target", str(file), "--set", "num_trackers=3"]
+    watch.main([*asked, "--out", str(film), "--seconds", "0.3"])
     assert film.is_file()

@@ -96,9 +96,9 @@ def test_the_command_writes_a_page_and_takes_players_from_pages(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     world = ["--scenario", "smart", "--world", "3", "--seconds", "1", "--no-observations"]
-    assert main(["replay", "idle", "pursuit", *world, "--num-trackers", "3"]) == 0
+    assert main(["replay", "idle", "pursuit", *world, "--set", "num_trackers=3"]) == 0
     assert "replay.html" in capsys.readouterr().out
-    assert main(["replay", "replay.html", "random", *world, "--num-trackers", "3", "--out", "all.html"]) == 0
+    assert main(["replay", "replay.html", "random", *world, "--set", "num_trackers=3", "--out", "all.html"]) == 0
     replay = read_replay(tmp_path / "all.html")
     assert [player.name for player in replay.players] == ["idle", "pursuit", "random"]
     assert replay.world["world"] == 3

@@ -94,7 +94,7 @@ def test_what_an_algorithm_cannot_do(tmp_path: Path, changes: dict[str, Any], me
 def test_nothing_is_made_before_settings_are_checked(
     tmp_path: Path, option: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = [f"--{option}", value, "--folder", str(tmp_path / "run")]
+    arguments = [f"--{option}", value, "--out", str(tmp_path / "run")]
     scenario = [] if option == "scenario" else ["--scenario", "constant"]
     try:
         status: Any = main(["train", *scenario, *arguments])

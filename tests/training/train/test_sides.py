@@ -29,7 +29,7 @@ def target_run(folder: Path, **changes: Any) -> TrainSettings:
         **{
             "side": "target",
             "encoding": "plain",
-            "against": "ddcs-distributed,idle",
+            "team": "ddcs-distributed,idle",
             "scenario": "smart",
             "team_sizes": (),
             "steps": 640,
@@ -67,7 +67,8 @@ def test_a_killed_run_resumes_bit_for_bit(side: str, tmp_path: Path, monkeypatch
         changes = {
             "side": "trackers",
             "encoding": "slots",
-            "against": f"smart,{file}",
+            "team": None,
+            "target": f"smart,{file}",
             "reward_weights": {},
             "steps": 1920,
             "checkpoint_every": 480,
@@ -92,7 +93,7 @@ def test_a_killed_run_resumes_bit_for_bit(side: str, tmp_path: Path, monkeypatch
 
 
 def test_a_target_is_scored_by_what_it_denies(tmp_path: Path) -> None:
-    settings = target_run(tmp_path, against="ddcs-distributed", evaluate_worlds=4)
+    settings = target_run(tmp_path, team="ddcs-distributed", evaluate_worlds=4)
     smart = load_target("smart")
     (denied,) = play_all(settings, smart, 0, SPLIT)
     scenario = settings.scenarios[0]
@@ -120,11 +121,11 @@ def test_a_run_begins_with_the_networks_of_another(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"against": None}, "set against"),
+        ({"team": None}, "set team"),
         ({"encoding": "slots"}, "encoding='slots'"),
         ({"message_size": 2}, "message_size=2"),
         ({"side": "neither"}, "side='neither'"),
-        ({"overrides": {"target_motion": "agent"}}, "the setting against"),
+        ({"overrides": {"target_motion": "agent"}}, "the setting target"),
         ({"reward_weights": {"slot": 1.0}, "num_worlds": 8}, "unknown term of a target 'slot'"),
     ],
 )
@@ -137,10 +138,10 @@ def test_settings_that_fit_no_target_are_refused(changes: dict[str, Any], messag
     ("changes", "message"),
     [
         ({"algorithm": "mappo"}, "mappo"),
-        ({"against": "nobody"}, "unknown policy 'nobody'"),
-        ({"against": "planner"}, "cannot be trained against"),
+        ({"team": "nobody"}, "unknown policy 'nobody'"),
+        ({"team": "planner"}, "cannot be trained against"),
         ({"beside": "evadr"}, "unknown target 'evadr'"),
-        ({"side": "trackers", "against": "idle", "reward_weights": {}}, "unknown target 'idle'"),
+        ({"side": "trackers", "team": None, "target": "idle", "reward_weights": {}}, "unknown target 'idle'"),
     ],
 )
 def test_unknown_opponents_are_refused_before_anything_is_made(
@@ -152,7 +153,7 @@ def test_unknown_opponents_are_refused_before_anything_is_made(
 
 
 def test_the_worlds_are_shared_out_among_the_opponents(tmp_path: Path) -> None:
-    settings = target_run(tmp_path, against="idle,ddcs-distributed,idle", num_worlds=9)
+    settings = target_run(tmp_path, team="idle,ddcs-distributed,idle", num_worlds=9)
     env = make_env(settings)
     assert [batch.num_worlds for batch in env.batches] == [6, 3]
     assert [batch.first_world for batch in env.batches] == [0, 6]

@@ -1,1 +1,1 @@
-"""The commands ``train``, ``watch``, ``export`` and ``scenarios``."""
+"""The commands ``train``, ``watch``, ``export``, ``scenarios`` and ``policies``."""

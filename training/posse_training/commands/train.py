@@ -8,14 +8,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
 from posse_training.errors import require
-from posse_training.files import read_json
-from posse_training.parallel import RayOption, address_of
+from posse_training.options import Names, Ray
 from posse_training.train.presets import Preset, default_settings
-from posse_training.train.settings import TrainSettings, opponents_of
+from posse_training.train.settings import SETTINGS, TrainSettings, read_settings
 
 _NEEDED = ("training", "torch", "stable_baselines3")
 
@@ -24,7 +24,7 @@ _NEEDED = ("training", "torch", "stable_baselines3")
 class _Which:
     """What the defaults of all other settings depend on."""
 
-    scenario: str = "smart"
+    scenario: Names = "smart"
     algorithm: str = "ppo"
     side: str = "trackers"
     preset: Preset = "nothing"
@@ -37,15 +37,18 @@ class _Arguments(TrainSettings):
     preset: Preset = "nothing"
     """Default settings: learn from nothing, that is from random weights; or learn a correction of a scripted team,
     where the scenario has such defaults and the algorithm is on policy."""
-    seeds: tuple[int, ...] = ()
-    """Seeds of several runs, in turn, or with --ray at once; the same command again resumes them."""
-    ray: RayOption = None
+    seed: Annotated[int, tyro.conf.Suppress] = 1
+    seeds: Annotated[tuple[int, ...], tyro.conf.arg(name="seed")] = (1,)
+    """Seed of the worlds, the networks and the exploration; or several for as many runs, in turn, or with --ray at
+    once, which the same command resumes."""
+    ray: Ray = False
     """Make them on a Ray cluster."""
 
     @property
     def settings(self) -> TrainSettings:
         """The settings alone."""
-        return TrainSettings(**{field.name: getattr(self, field.name) for field in fields(TrainSettings)})
+        values = {field.name: getattr(self, field.name) for field in fields(TrainSettings)}
+        return TrainSettings(**{**values, "seed": self.seeds[0]})
 
 
 @dataclass(frozen=True)
@@ -80,32 +83,32 @@ def main(arguments: Sequence[str]) -> None:
         args=arguments,
     )
     require(*_NEEDED)
-    if given.seeds or given.ray is not None:
+    if len(given.seeds) != 1 or given.ray is not False:
         _train_all(given)
         return
     from posse_training.train.train import train
 
-    with _how_to_resume(given.run_folder):
+    with _how_to_resume(given.settings.run_folder):
         path = train(given.settings)
     print(_what_next(path))
 
 
 def _what_next(path: Path) -> str:
     """Return the file of the policy, and the commands that show what it does."""
-    run = read_json(path.parent / "settings.json")
-    scenario, _, _ = run["scenario"].partition(",")
-    beside, policy = shlex.quote(run["beside"] or "ddcs-tuned"), shlex.quote(str(path))
+    run = read_settings(path.with_name(SETTINGS))
+    scenario, _, _ = run.scenario.partition(",")
+    beside, policy = shlex.quote(run.beside or "ddcs-tuned"), shlex.quote(str(path))
     page = shlex.quote(str(path.with_name("replay.html")))
-    opponents = [shlex.quote(name) for name in opponents_of(run["against"])]
+    opponents = [shlex.quote(name) for name in run.opponents]
     watched, teams, target = policy, f"{beside} {policy}", ""
-    if run["side"] == "target":
+    if run.side == "target":
         watched, teams, target = opponents[0], " ".join(opponents), f" --target {policy}"
     elif opponents:
         target = f" --target {opponents[-1]}"
     return (
         f"{path}\nnext:\n"
         f"  posse watch {watched} --scenario {scenario}{target}\n"
-        f"  posse compare {teams} --scenarios {scenario}{target}\n"
+        f"  posse compare {teams} --scenario {scenario}{target}\n"
         f"  posse replay {teams} --scenario {scenario}{target} --out {page}"
     )
 
@@ -114,10 +117,8 @@ def _train_all(given: _Arguments) -> None:
     """Train with every seed, and print the files of the best policies."""
     from posse_training.train.seeds import train_seeds, with_seeds
 
-    ray = address_of(given.ray)
-    runs = with_seeds(given.settings, given.seeds or (given.seed,))
     try:
-        for path in train_seeds(runs, ray):
+        for path in train_seeds(with_seeds(given.settings, given.seeds), given.ray):
             print(path)
     except KeyboardInterrupt:
         print("\nto resume: run the same command again", file=sys.stderr)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import tyro
 
 from posse_training.errors import SettingsError
+from posse_training.options import Shown
 
 if TYPE_CHECKING:
     from posse import Scenario
@@ -21,40 +22,22 @@ if TYPE_CHECKING:
 _PAGE: Final = Path("runs/watch/replay.html")
 
 
-@dataclass(frozen=True)
-class _Watch:
+@dataclass(frozen=True, kw_only=True)
+class _Watch(Shown):
     """Show policies in one world: live in a window, as a replay page, or as a film.
 
-    Keys of the window: Space pauses and goes on, S steps, - and + change the speed, N goes to the next world, P to
-    the next policy, Q or Esc closes it.
+    The window shows one policy at a time; a page or a film all side by side. Keys of the window: Space pauses and goes
+    on, S steps, - and + change the speed, N goes to the next world, P to the next policy, Q or Esc closes it.
     """
 
-    policies: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Policies: names, files, or package.module:Class. The window shows one at a time; a page or a film all side by
-    side."""
-    scenario: str = "smart"
-    """Scenario to play."""
-    target: str | None = None
-    """Target: a motion, a learned target, a file or package.module:Class; default: the
-    scenario's own."""
-    seed: int = 7
-    """Seed of the world."""
-    world: int = 0
-    """Index of the world."""
-    split: str = "test"
-    """Split of the world: train, validation or test."""
-    num_trackers: int | None = None
-    """Trackers in the team; default: the scenario's."""
     page: bool = False
     """Record the world and open its replay page (runs/watch/replay.html) in the browser, instead of a window."""
-    film: Path | None = None
+    out: Path | None = None
     """Write a film to this file (.gif or .mp4) instead of opening a window."""
     size: tuple[int, int] | None = None
     """Width and height of window or film, px; default: 960 720 for a window."""
     start: Annotated[float | None, tyro.conf.arg(name="from")] = None
     """Simulated time at which a film begins, s; default: 0."""
-    seconds: float | None = None
-    """Simulated time that a film or page shows, s; default: to the end of the episode."""
     speed: float | None = None
     """Simulated seconds per second of a film; default: 1.5."""
 
@@ -64,9 +47,9 @@ def main(arguments: Sequence[str]) -> None:
     which = tyro.cli(_Watch, prog="posse watch", args=arguments)
     if not which.policies:
         raise SettingsError("No policies given. Pass at least one, such as ddcs-distributed.")
-    if which.page and which.film is not None:
-        raise SettingsError(f"--page and --film {which.film} exclude each other: leave one out")
-    is_film = which.film is not None
+    if which.page and which.out is not None:
+        raise SettingsError(f"--page and --out {which.out} exclude each other: leave one out")
+    is_film = which.out is not None
     for option, value, is_used in (
         ("--from", which.start, is_film),
         ("--speed", which.speed, is_film),
@@ -80,22 +63,20 @@ def main(arguments: Sequence[str]) -> None:
     from posse import get_scenario
     from posse_baselines import load, load_target
 
-    scenario = get_scenario(which.scenario)
-    if which.num_trackers is not None:
-        scenario = scenario.replace(num_trackers=which.num_trackers)
+    scenario = get_scenario(which.scenario, **which.overrides)
     target = None if which.target is None else load_target(which.target)
     if target is not None:
         scenario = target.fit(scenario)
     policies = [load(name) for name in which.policies]
-    world: dict[str, Any] = {"seed": which.seed, "world": which.world, "split": which.split, "target": target}
-    if which.film is not None:
+    world = {**which.place, "target": target}
+    if which.out is not None:
         from posse_training.film import film
 
         print(
             film(
                 [(p.name, p) for p in policies],
                 scenario,
-                path=which.film,
+                path=which.out,
                 start=0.0 if which.start is None else which.start,
                 seconds=scenario.duration if which.seconds is None else which.seconds,
                 speed=1.5 if which.speed is None else which.speed,

@@ -6,7 +6,6 @@ import contextlib
 import itertools
 import json
 import re
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,7 +28,7 @@ from posse_training.errors import PlayError, RunFolderError, SettingsError, Time
 from posse_training.evaluation.episodes import refuse_trained_split
 from posse_training.evaluation.evaluation import progress_bar
 from posse_training.evaluation.statistics import Estimate
-from posse_training.parallel import RayOption, address_of
+from posse_training.options import Changes, Ray, words_of
 from posse_training.provenance import commit
 from posse_training.replay import join, write_replay
 
@@ -37,8 +36,6 @@ PLANNER: Final = "planner"
 """The reference that is shown with every team."""
 SUMMARY: Final = "summary.json"
 REPORT: Final = "report.html"
-_PIPED: Final = 240
-"""Width of the table where lines have no end (a pipe, a file)."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +45,8 @@ class Settings:
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Names, files, package.module:Class, or LABEL=FILE,FILE,... for several training seeds of one
     policy; the first is the baseline of differences."""
-    scenarios: tuple[str, ...] = ("all",)
-    """Names of scenarios, or "all"."""
+    scenario: tuple[str, ...] = ("all",)
+    """Names of one or several scenarios or families, or "all"."""
     episodes: int = number(1000, "", 1, 10**8)
     """Worlds for each policy and scenario."""
     seed: int = 7
@@ -73,12 +70,14 @@ class Settings:
     time_limit: float = number(1800.0, "s", 0.001, 10.0**9)
     """Time limit of a policy on one scenario, for each training seed, s (with --ray: of a shard of
     500 worlds); a policy that exceeds it is stopped and skipped on the remaining scenarios."""
-    ray: RayOption = None
+    ray: Ray = False
     """Play all at once on a Ray cluster, with the same result: --ray ADDRESS, or --ray alone for the cluster of
     this machine, or else all its cores. The same command resumes an interrupted comparison. Extra: cluster."""
     target: str | None = None
     """Target that all teams play against: a motion, a learned target, a file or
     package.module:Class; default: the scenario's own."""
+    overrides: Changes = field(default_factory=dict)
+    """Settings to change in each scenario, such as num_trackers=3 or arena=6,4."""
 
 
 @dataclass
@@ -126,16 +125,15 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
     if settings.target is not None:
         refuse_trained_split(load_target(settings.target), settings.split)
     folder = _free(settings.out)
-    ray = address_of(settings.ray)
-    if ray is not False:
+    if settings.ray is not False:
         require("cluster", "ray")
     run = _Run(settings, scenarios, contenders, Comparison(contenders[0].label, folder))
     with progress_bar(console=console or Console(stderr=True)) as bar, contextlib.ExitStack() as stack:
         task = bar.add_task("comparison", total=len(scenarios) * len(contenders))
-        if ray is not False:
+        if settings.ray is not False:
             played = [(c, scenario, run.episodes(c)) for scenario in scenarios for c in contenders]
             report = lambda done, total: bar.update(task, completed=done, total=total)  # noqa: E731
-            run.played = stack.enter_context(played_on_ray(played, run.game, ray, report))
+            run.played = stack.enter_context(played_on_ray(played, run.game, settings.ray, report))
             bar.reset(task, total=len(scenarios) * len(contenders))
         folder.mkdir(parents=True, exist_ok=True)
         for scenario in scenarios:
@@ -146,8 +144,8 @@ def compare(settings: Settings, *, console: Console | None = None) -> Comparison
 
 def _checked(settings: Settings) -> list[Scenario | Family]:
     check_settings(settings)
-    names = scenario_names() if settings.scenarios == ("all",) else settings.scenarios
-    found = [scenario_or_family(name) for name in dict.fromkeys(names)]
+    names = scenario_names() if settings.scenario == ("all",) else settings.scenario
+    found = [scenario_or_family(name, **settings.overrides) for name in dict.fromkeys(names)]
     for scenario in found:
         first, _ = next(blocks(scenario, range(1), 0, "train"))
         Batch(first, 1, seed=settings.seed, split=settings.split)
@@ -221,6 +219,7 @@ class _Run:
             write_marl_eval(found.plays, found.folder / "marl-eval.json")
         rows = [{k: v.to_dict() if isinstance(v, Estimate) else v for k, v in row.items()} for row in found.rows]
         about: dict[str, Any] = {"seed": s.seed, "split": s.split, "episodes": s.episodes, "target": s.target}
+        about["changed"] = s.overrides
         about |= {"comparison": rows, "left_out": found.left_out, "failed": found.failed}
         (found.folder / SUMMARY).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
@@ -272,7 +271,7 @@ class _Run:
     def _record(self, one: Any) -> tuple[str, str]:
         """Write the replay of a world, the policy beside the baseline; return its address, or why there is none."""
         by_label = {each.label: each for each in self.contenders}
-        given, game = scenario_or_family(one.scenario), self.game
+        given, game = next(each for each in self.scenarios if each.name == one.scenario), self.game
         scenario, _ = next(blocks(given, range(one.world, one.world + 1), game.seed, game.split))
         try:
             replays = [
@@ -288,6 +287,7 @@ class _Run:
 
 def _facts(settings: Settings) -> str:
     target = "" if settings.target is None else f"target {settings.target}, "
+    target += "".join(f"{word}, " for word in words_of(settings.overrides))
     return f"{settings.episodes:,} worlds each, {target}split {settings.split}, seed {settings.seed}"
 
 
@@ -295,7 +295,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Compare policies, print the table, and return 1 if a policy failed, else 0."""
     settings = tyro.cli(Settings, prog="posse compare", args=arguments)
     found = compare(settings)
-    console = Console(width=None if sys.stdout.isatty() else _PIPED)
+    console = Console()
     title = f"{_facts(settings)}; 95 % intervals; differences of the safe score to {found.reference}, paired by world"
     console.print(table(found.rows, title))
     for word, problems in (("left out", found.left_out), ("failed", found.failed)):

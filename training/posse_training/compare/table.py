@@ -28,8 +28,14 @@ COLUMNS: Final = {
     "bound": "bound",
 }
 """Estimates and their headers, as the report shows them."""
-_SHORT: Final = ("safe_score", "of_planner", "contact_free", "difference", "improvement")
-"""Columns that fit into 80 characters."""
+_SHORT: Final = {
+    "safe_score": "safe score",
+    "of_planner": "of the\nplanner's",
+    "contact_free": "contact-\nfree",
+    "difference": "difference",
+    "improvement": "better\nin",
+}
+"""Columns that fit into 80 characters beside the name of a policy, and their headers."""
 
 
 def row_of(plays: Plays, reference: Plays | None) -> Row:
@@ -65,10 +71,10 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
 
 def table(rows: Sequence[Row], title: str) -> Table:
     """Return the most important estimates, each interval below its value."""
-    shown = Table(title=Text(title), box=box.HORIZONTALS, pad_edge=False, collapse_padding=True)
+    shown = Table(title=Text(title), box=box.HORIZONTALS, padding=0, show_edge=False)
     shown.add_column("policy", overflow="fold")
-    for name in _SHORT:
-        shown.add_column(COLUMNS[name].replace("the planner", "the\nplanner"), no_wrap=True)
+    for header in _SHORT.values():
+        shown.add_column(header, no_wrap=True)
     before = None
     for row in ranked(rows):
         if row["scenario"] != before:

@@ -61,7 +61,7 @@ def open_run(folder: Path, settings: TrainSettings, resume: bool) -> State | Non
     elif (folder / SETTINGS).exists():
         raise RunFolderError(
             f"{folder} already holds a run: resume it (posse train --resume {folder}), remove it, "
-            "or choose another --folder"
+            "or choose another --out"
         )
     text = json.dumps({**settings.to_dict(), "folder": None}, indent=2) + "\n"
     write_atomically(folder / SETTINGS, text.encode())

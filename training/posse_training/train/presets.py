@@ -36,7 +36,7 @@ def default_settings(
     folder = resources.files("posse_training") / "defaults"
     own = folder / ("mixture.toml" if "," in scenario else f"{scenario}.toml")
     if side == "target":  # its opponents are for the user to name
-        values |= {"side": side, "against": "ddcs-distributed"}
+        values |= {"side": side, "team": "ddcs-distributed"}
         files = [folder / "target.toml"]
     elif preset == "residual" and on_policy and own.is_file():
         files = [folder / "residual.toml", own]

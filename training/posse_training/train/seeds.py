@@ -25,17 +25,16 @@ from posse_training.train.train import check_before, train
 
 
 def with_seeds(settings: TrainSettings, seeds: Sequence[int]) -> list[TrainSettings]:
-    """Return the settings with each seed; a folder that is given holds a subfolder for each.
+    """Return the settings with each seed; a folder that is given holds a subfolder for each of several.
 
     Raises:
         SettingsError: A seed out of its range, or one twice.
     """
     if len(set(seeds)) < len(seeds):
-        raise SettingsError(f"seeds={' '.join(map(str, seeds))} names one twice: leave it out")
-    return [
-        replace(settings, seed=seed, folder=None if settings.folder is None else settings.folder / f"seed-{seed}")
-        for seed in seeds
-    ]
+        raise SettingsError(f"seed={' '.join(map(str, seeds))} names one twice: leave it out")
+    folder = settings.folder if len(seeds) > 1 else None
+    runs = [replace(settings, seed=seed) for seed in seeds]
+    return runs if folder is None else [replace(run, folder=folder / f"seed-{run.seed}") for run in runs]
 
 
 def train_seeds(runs: Sequence[TrainSettings], ray: bool | str) -> Iterator[Path]:
@@ -70,7 +69,7 @@ def _check_folder(settings: TrainSettings) -> None:
     wanted = json.loads(json.dumps({**settings.to_dict(), "folder": None}))
     if found != wanted:
         other = next((name for name in wanted if found.get(name) != wanted[name]), "?")
-        raise RunFolderError(f"{path.parent} holds a run with another {other}: remove it, or choose another --folder")
+        raise RunFolderError(f"{path.parent} holds a run with another {other}: remove it, or choose another --out")
 
 
 def _train(settings: TrainSettings, console: Console | None = None, num_threads: int | None = None) -> Path:

@@ -7,7 +7,9 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal, NoReturn, Self, get_args, get_origin, get_type_hints
+
+import tyro
 
 from posse import Family, Scenario, ScenarioError
 from posse.scenarios.family import scenario_or_family
@@ -15,6 +17,7 @@ from posse_baselines import PolicyError, load
 from posse_baselines.fields import check, number, optional
 from posse_training.errors import SettingsError
 from posse_training.files import read_json
+from posse_training.options import Changes, MaybeNames, Names
 
 Point = dict[str, float]
 """Results of an evaluation, by the columns of ``curve.csv``."""
@@ -36,24 +39,26 @@ class TrainSettings:
         SettingsError: A value out of its range; the message names it, the range and the fix.
     """
 
-    scenario: str = "smart"
-    """Scenario to train on, or several separated by commas."""
+    scenario: Names = "smart"
+    """Scenario to train on, or several; in Python separated by commas."""
     algorithm: str = "ppo"
     """ppo, mappo (ppo with a value function that reads the state of the world), sac or td3."""
     steps: int = number(20_000_000, "", 1, 10**12)
     """Steps to train for, at least; rollouts are completed."""
     seed: int = number(1, "", 0, 2**32 - 1)
     """Seed of the worlds, the networks and the exploration."""
-    folder: Path | None = None
+    folder: Annotated[Path | None, tyro.conf.arg(name="out")] = None
     """Run folder; default: runs/train/SCENARIO-ALGORITHM-SEED."""
 
     # The sides
     side: Literal["trackers", "target"] = "trackers"
     """What learns: the trackers, or the target."""
-    against: str | None = None
-    """What it plays: targets where trackers learn, teams where the target learns; names, files or
-    package.module:Class, separated by commas. The worlds are divided evenly among them; a name
-    twice gets two shares. Default for trackers: the scenario's own target."""
+    target: MaybeNames = None
+    """Targets that the trackers play against where these learn: names, files or package.module:Class; in Python
+    separated by commas. The worlds are divided evenly among them; a name twice gets two shares. Default: the
+    scenario's own target."""
+    team: MaybeNames = None
+    """Teams that a target plays against where it learns, likewise."""
     start: str | None = None
     """Run folder whose networks and input statistics the run begins with."""
 
@@ -68,8 +73,8 @@ class TrainSettings:
     """Team-mates that the policy reads, nearest first; default: as many as are observed."""
     message_size: int = number(0, "", 0, 64)
     """Numbers that a tracker adds to its broadcast in each step."""
-    overrides: dict[str, bool | int | float | str] = field(default_factory=dict)
-    """Settings of the scenario to change, by name."""
+    overrides: Changes = field(default_factory=dict)
+    """Settings of the scenario to change, such as target_speed=0.5 or arena=6,4."""
     reward_weights: dict[str, float] = field(default_factory=dict)
     """Weight of each reward term; default: the scenario's own."""
 
@@ -184,6 +189,12 @@ class TrainSettings:
         return tuple(found)
 
     @property
+    def opponents(self) -> dict[str, int]:
+        """What the side that learns plays against, and how often each is named; empty: the scenario's own target."""
+        named = self.team if self.side == "target" else self.target
+        return dict(Counter(name.strip() for name in named.split(",")) if named else {})
+
+    @property
     def run_folder(self) -> Path:
         """The folder that the run is written to."""
         return self.folder or Path("runs/train") / self.name
@@ -220,11 +231,6 @@ class TrainSettings:
         if isinstance(fitted.get("folder"), str):
             fitted["folder"] = Path(fitted["folder"])
         return cls(**fitted)
-
-
-def opponents_of(against: str | None) -> dict[str, int]:
-    """Return the opponents that the setting ``against`` names, and how often each."""
-    return dict(Counter(name.strip() for name in against.split(",")) if against else {})
 
 
 def _check_each(s: TrainSettings) -> None:
@@ -268,6 +274,9 @@ def _check_together(s: TrainSettings) -> None:
             "safeguard=True goes with neither advise nor imitate, whose actions are not wanted velocities: "
             "use --no-safeguard; a correction of the adviser's velocity is safeguarded by the adviser"
         )
+    other = "target" if s.side == "target" else "team"
+    if getattr(s, other) is not None:
+        raise SettingsError(f"{other}={getattr(s, other)!r:.80} is what learns with side={s.side!r}: leave it out")
     if s.side == "target":
         _check_target(s)
     for name, instead in _ELSEWHERE.items():
@@ -284,8 +293,8 @@ def _check_together(s: TrainSettings) -> None:
 
 def _check_target(s: TrainSettings) -> None:
     """Raise if settings do not fit a target that learns."""
-    if s.against is None:
-        raise SettingsError("side='target' needs the teams that chase it: set against, for example to ddcs-tuned")
+    if s.team is None:
+        raise SettingsError("side='target' needs the teams that chase it: set team, for example to ddcs-tuned")
     wanted = {"imitate": None, "advise": None, "message_size": 0, "encoding": "plain", "safeguard": False}
     for name, needed in wanted.items():
         value = getattr(s, name)
@@ -301,7 +310,7 @@ _ELSEWHERE = {
     "message_size": "the setting message_size",
     "reward_weights": "the setting reward_weights",
     "target_reward_weights": "the setting reward_weights with side target",
-    "target_motion": "the setting against",
+    "target_motion": "the setting target",
     "num_trackers": "the setting team_sizes",
 }
 

@@ -59,7 +59,7 @@ def train(
         try:
             stack.enter_context(locked(folder))
         except InUseError as error:
-            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --folder") from error
+            raise RunFolderError(f"run folder {error}: wait for it, stop it, or choose another --out") from error
         stack.callback(torch.set_num_threads, torch.get_num_threads())
         torch.set_num_threads(settings.threads)
         display = stack.enter_context(Display(settings, console or Console()))
@@ -164,7 +164,7 @@ class Run(BaseCallback):
         except Exception as error:  # whatever a state of other settings raises
             raise CheckpointError(
                 f"the checkpoint in {self.folder} does not fit its settings: {error!s:.300}. "
-                "Restore settings.json, or start the training again in another --folder"
+                "Restore settings.json, or start the training again in another --out"
             ) from error
 
     def _on_rollout_start(self) -> None:
@@ -273,5 +273,5 @@ class Run(BaseCallback):
         raise DivergedError(
             f"the training diverged at {self.model.num_timesteps:,} steps: its networks give "
             f"numbers that are not finite; {kept}. Lower --learning-rate, or --log-deviation, and "
-            "train again in another --folder"
+            "train again in another --out"
         ) from cause

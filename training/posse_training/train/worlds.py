@@ -12,7 +12,7 @@ from posse_baselines.learned import Encoding
 from posse_baselines.learned.advice import Advising
 from posse_training.errors import SettingsError
 from posse_training.train.algorithms import ALGORITHMS
-from posse_training.train.settings import TrainSettings, opponents_of
+from posse_training.train.settings import TrainSettings
 from posse_training.train.vec_env import TeamVecEnv
 
 TARGET = "target"
@@ -53,9 +53,9 @@ def pairings(settings: TrainSettings) -> tuple[Pairing, ...]:
     """
     found: list[Pairing] = []
     for scenario in settings.given:
-        if settings.against is None:
+        if not settings.opponents:
             found.append(Pairing(scenario, None))
-        for name, share in opponents_of(settings.against).items():
+        for name, share in settings.opponents.items():
             if settings.side == TARGET:
                 policy = load(name)
                 size = max(scenario.message_size, policy.message_size)

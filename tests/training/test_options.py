@@ -1,0 +1,64 @@
+"""The options that commands share: what is written behind them, and what it becomes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import tyro
+
+import posse
+from posse_training.cli import main
+from posse_training.compare.compare import Settings
+from posse_training.errors import SettingsError
+from posse_training.options import settings_of, words_of
+from posse_training.train.settings import TrainSettings, read_settings
+
+
+def test_settings_are_read_and_written_alike() -> None:
+    words = ["arena=6,4", "target_speed=0.5", "horizon=40", "terminate_on_contact=True", "target_motion=smart"]
+    values = {"arena": (6, 4), "target_speed": 0.5, "horizon": 40, "terminate_on_contact": True}
+    assert settings_of(words) == {**values, "target_motion": "smart"}
+    assert words_of(settings_of(words)) == words
+    assert posse.get_scenario("smart", **settings_of(["arena=6,4"])).arena == (6, 4)
+    assert settings_of(["num_neighbours=none", "sensing_range=inf"]) == {
+        "num_neighbours": None,
+        "sensing_range": float("inf"),
+    }
+
+
+@pytest.mark.parametrize("words", ["--set arena", "--set arena=6 arena=4", "--set =6", "--ray auto smart"])
+def test_what_sets_nothing_is_refused(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        tyro.cli(Settings, args=["idle", *words.split()])
+    shown = "".join(capsys.readouterr())
+    assert "KEY=VALUE" in shown if "--set" in words else "one address at most" in shown
+
+
+@pytest.mark.parametrize(("words", "ray"), [("", False), ("--ray", True), ("--ray 10.0.0.1:6379", "10.0.0.1:6379")])
+def test_which_cluster(words: str, ray: bool | str) -> None:
+    assert tyro.cli(Settings, args=["idle", *words.split()]).ray == ray
+
+
+def test_a_world_of_another_size_is_compared_and_replayed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changes = ["--scenario", "obstacles", "--set", "arena=14,10", "num_obstacles=1", "horizon=20", "settle_time=1.0"]
+    played = ["--episodes", "2", "--planner-episodes", "0", "--no-figures", "--out", str(tmp_path / "out")]
+    assert main(["compare", "idle", *changes, *played]) == 0
+    shown = capsys.readouterr().out
+    assert "arena=14,10" in shown.replace("\n", " ")
+    assert max(map(len, shown.partition("rows and summary")[0].splitlines())) <= 80
+    assert main(["replay", "idle", *changes, "--out", str(tmp_path / "r.html")]) == 0
+    assert main(["replay", "idle", "--set", "arna=6,4"]) == 2
+    assert "did you mean 'arena'" in capsys.readouterr().err
+
+
+def test_several_scenarios_and_targets_of_a_training(tmp_path: Path) -> None:
+    small = "--steps 1 --num-worlds 4 --rollout 8 --evaluate-worlds 1 --beside None --no-tensorboard --hidden 8"
+    named = "--scenario constant accelerating --target smart constant --set arena=30,20 --seed 3"
+    assert main(["train", *named.split(), *small.split(), "--out", str(tmp_path / "run")]) == 0
+    found = read_settings(tmp_path / "run" / "settings.json")
+    assert (found.scenario, found.opponents) == ("constant,accelerating", {"smart": 1, "constant": 1})
+    assert found.seed == 3
+    assert [scenario.arena for scenario in found.scenarios] == [(30, 20), (30, 20)]
+    with pytest.raises(SettingsError, match="team='idle' is what learns with side='trackers'"):
+        TrainSettings(team="idle")

@@ -1,0 +1,72 @@
+"""``posse scenarios`` and ``posse policies``: what there is, by name, in tables that fit 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from posse import get_scenario, scenario_names
+from posse_training.options import words_of
+
+
+@dataclass(frozen=True)
+class _Scenarios:
+    """List the scenarios, or all settings of one."""
+
+    name: Annotated[str | None, tyro.conf.Positional] = None
+    """Scenario whose settings to list."""
+
+
+@dataclass(frozen=True)
+class _Policies:
+    """List the policies."""
+
+    all: bool = False
+    """List ablations, too: policies that show what one part of another is good for."""
+
+
+def scenarios(arguments: Sequence[str]) -> None:
+    """List the scenarios with their differences from ``constant``, or all settings of one."""
+    which = tyro.cli(_Scenarios, prog="posse scenarios", args=arguments)
+    if which.name is not None:
+        scenario, rows = get_scenario(which.name), []
+        for name, declared in scenario.settings().items():
+            value = " ".join((str(getattr(scenario, name)), declared.unit.replace("1", "")))
+            rows.append((name, value.strip(), "; ".join(filter(None, (declared.meaning, declared.range)))))
+        _show(("setting", "value", "meaning; range"), rows)
+        return
+    plain, rows = get_scenario("constant").to_dict(), []
+    for name in scenario_names():
+        scenario = get_scenario(name)
+        own = {k: v for k, v in scenario.to_dict().items() if v != plain[k] and k not in ("name", "meaning")}
+        rows.append((name, scenario.meaning, " ".join(words_of(own)) or "-"))
+    _show(("scenario", "meaning", "what is set otherwise than in constant"), rows)
+
+
+def policies(arguments: Sequence[str]) -> None:
+    """List the policies, each with a sentence."""
+    which = tyro.cli(_Policies, prog="posse policies", args=arguments)
+    from posse_baselines.policies.scripted import ABLATIONS, MEANINGS
+    from posse_baselines.registry import LEARNED, shipped
+
+    rows = [(name, text) for name, text in MEANINGS.items() if which.all or name not in ABLATIONS]
+    rows += [(name, f"learned on {name.removeprefix(LEARNED)}") for name in shipped()]
+    rows = [(name, text.replace("learned on generalist", "learned on eight scenarios at once")) for name, text in rows]
+    _show(("policy", "what it does"), rows)
+    if not which.all:
+        print("\nposse policies --all lists ablations, too")
+
+
+def _show(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    table = Table(box=None, pad_edge=False)
+    for k, header in enumerate(headers):
+        table.add_column(header, style=None if k else "bold", no_wrap=not k, overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console().print(table)

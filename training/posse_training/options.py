@@ -1,0 +1,148 @@
+"""What the commands share: one word for one thing, in every command.
+
+``--scenario`` names a scenario or several, ``--target`` a target, ``--set`` changes settings of the scenario, ``--out``
+is the file or folder that is written to, ``--steps`` and ``--minutes`` say how long something goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final
+
+import tyro
+from tyro.constructors import PrimitiveConstructorSpec
+
+_WORDS: Final = {"true": True, "false": False, "none": None}
+
+
+def value_of(text: str) -> Any:
+    """Return the value that a text stands for: a number, true, false, none, a text, or several with commas between."""
+    if "," in text:
+        return tuple(value_of(part) for part in text.split(",") if part)
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return _WORDS.get(text.lower(), text)
+
+
+def settings_of(words: Sequence[str]) -> dict[str, Any]:
+    """Return the settings that words like ``arena=6,4`` stand for.
+
+    Raises:
+        ValueError: A word without ``=``, or two of one setting.
+    """
+    found: dict[str, Any] = {}
+    for word in words:
+        name, sign, text = word.partition("=")
+        if not (name and sign) or name in found:
+            raise ValueError(
+                f"{word!r:.80} sets nothing, or what is set already: write KEY=VALUE once for each, such as "
+                "target_speed=0.5 or arena=6,4, and names of policies before the options"
+            )
+        found[name] = value_of(text)
+    return found
+
+
+def words_of(settings: Mapping[str, Any]) -> list[str]:
+    """Return the words that stand for settings, as :func:`settings_of` reads them."""
+    return [
+        f"{name}={','.join(map(str, value)) if isinstance(value, (tuple, list)) else value}"
+        for name, value in settings.items()
+    ]
+
+
+Pairs = Annotated[
+    dict[str, Any],
+    PrimitiveConstructorSpec(
+        nargs="*",
+        metavar="KEY=VALUE ...",
+        instance_from_str=settings_of,
+        is_instance=lambda value: isinstance(value, dict),
+        str_from_instance=words_of,
+    ),
+]
+"""Type of an option that takes ``KEY=VALUE ...``."""
+Changes = Annotated[Pairs, tyro.conf.arg(name="set")]
+"""Type of the option ``--set``."""
+Names = Annotated[
+    str,
+    PrimitiveConstructorSpec(
+        nargs="+",
+        metavar="NAME ...",
+        instance_from_str=",".join,
+        is_instance=lambda value: isinstance(value, str),
+        str_from_instance=lambda value: value.split(","),
+    ),
+]
+"""Type of an option that takes one name or several; in Python a text with commas between."""
+MaybeNames = Annotated[
+    str | None,
+    PrimitiveConstructorSpec(
+        nargs="+",
+        metavar="NAME ...",
+        instance_from_str=lambda words: None if words == ["None"] else ",".join(words),
+        is_instance=lambda value: value is None or isinstance(value, str),
+        str_from_instance=lambda value: ["None"] if value is None else value.split(","),
+    ),
+]
+"""Type of an option that takes one name or several, or none."""
+
+
+def _address(words: Sequence[str]) -> bool | str:
+    """Return the argument ``ray`` of functions: an address, or ``True`` for the cluster of this machine.
+
+    Raises:
+        ValueError: More than one address.
+    """
+    if len(words) > 1:
+        raise ValueError(f"one address at most, not {' '.join(words)!r:.100}: put it after the unnamed arguments")
+    return words[0] if words else True
+
+
+Ray = Annotated[
+    bool | str,
+    PrimitiveConstructorSpec(
+        nargs="*",
+        metavar="[ADDRESS]",
+        instance_from_str=_address,
+        is_instance=lambda value: isinstance(value, (bool, str)),
+        str_from_instance=lambda value: [str(value)],
+    ),
+]
+"""Type of the option ``--ray``: with an address or without; ``False``: left out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneWorld:
+    """One world of a scenario, as all commands name it that show one."""
+
+    scenario: str = "smart"
+    """Scenario to play."""
+    overrides: Changes = field(default_factory=dict)
+    """Settings of the scenario to change, such as num_trackers=3 or arena=6,4."""
+    seed: int = 7
+    """Seed of the world."""
+    world: int = 0
+    """Index of the world within the seed."""
+    split: str = "test"
+    """Split of the world: train, validation or test."""
+
+    @property
+    def place(self) -> dict[str, Any]:
+        """Seed, index and split."""
+        return {"seed": self.seed, "world": self.world, "split": self.split}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown(OneWorld):
+    """Policies in one world."""
+
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Policies: names, files, or package.module:Class."""
+    target: str | None = None
+    """Target: a motion, a learned target, a file or package.module:Class; default: the scenario's own."""
+    seconds: float | None = None
+    """Simulated time to show, s; default: to the end of the episode."""
